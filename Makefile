@@ -1,0 +1,37 @@
+# LumenPilot. `make run` and `make test` set up all they need; `make help` lists the rest.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.ONESHELL:
+.DEFAULT_GOAL := help
+.PHONY: help run test lint setup clean
+
+# Tools are started as modules, so that a checkout that was moved still works (the scripts in .venv/bin name their old place).
+PY := .venv/bin/python
+
+help:  ## this list
+	@echo "usage: make TARGET [ARGS='...'] [PYTHON=/path/to/python3.11]"
+	sed -nE 's/^([a-z]+):.*## (.*)/  \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 12
+
+run: setup  ## start the operator window (ARGS='...' is handed to main.py)
+	@exec $(PY) main.py $(ARGS)
+
+test: setup  ## ruff, mypy and pytest, no screen needed (ARGS='...' is handed to pytest)
+	@failed=
+	$(PY) -m ruff check || failed=1
+	$(PY) -m mypy || failed=1
+	$(PY) -m pytest $(ARGS) || failed=1
+	[[ -z $$failed ]]
+
+lint: setup  ## ruff and mypy only
+	@failed=
+	$(PY) -m ruff check || failed=1
+	$(PY) -m mypy || failed=1
+	[[ -z $$failed ]]
+
+setup:  ## make or renew .venv; returns at once when it is up to date
+	@PYTHON='$(PYTHON)' bash scripts/set_up.sh
+
+clean:  ## remove .venv and all caches
+	@rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,140 @@
+"""The command line (a contract: scripts and studies rely on it). Errors are one clear line and exit code 2."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from core.config import ConfigError
+from core.devices import DeviceError
+from core.learning.dataset import DatasetError
+from core.learning.model_file import ModelError
+
+app = typer.Typer(
+    name="lumenpilot",
+    help="Teleoperation assist for a tendon-driven interventional robot: perception, pose state, advice, and a bench twin.",
+    add_completion=False,
+    no_args_is_help=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file; keys that differ from the defaults are enough")]
+PresetOption = Annotated[str | None, typer.Option("--preset", help="'paper' takes the paper literally")]
+RigOption = Annotated[str, typer.Option("--rig", help="rig to open; 'twin' needs no hardware")]
+SourceOption = Annotated[Path | None, typer.Option("--source", help="video, picture or folder to look at instead of a camera")]
+JsonOption = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
+
+
+class UsageError(Exception):
+    """The command cannot be carried out as given; the message is one line and says what to do."""
+
+
+def main() -> None:
+    """Run the command line. Known errors end as one line on standard error and exit code 2; Ctrl-C as exit code 130."""
+    from hardware.twin.synth import SynthError
+
+    try:
+        app()
+    except (ConfigError, DeviceError, ModelError, DatasetError, SynthError, UsageError) as error:
+        sys.stderr.write(f"error: {error}\n")
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        sys.exit(130)
+
+
+@app.callback(invoke_without_command=True)
+def _window(context: typer.Context, rig: RigOption = "twin", config: ConfigOption = None, source: SourceOption = None) -> None:
+    """Without a command: the operator window."""
+    if context.invoked_subcommand is None:
+        _open_window(rig, config, source)
+
+
+@app.command()
+def gui(rig: RigOption = "twin", config: ConfigOption = None, source: SourceOption = None) -> None:
+    """The operator window (the same as no command)."""
+    _open_window(rig, config, source)
+
+
+def _open_window(rig: str, config_path: Path | None, source: Path | None) -> None:
+    from app.window_command import run_window
+
+    sys.exit(run_window(rig, config_path, source))
+
+
+@app.command()
+def perceive(
+    images: Annotated[list[Path], typer.Argument(help="pictures, folders of pictures, or videos")],
+    jsonl: Annotated[Path | None, typer.Option(help="one JSON object per image; default: standard output")] = None,
+    masks: Annotated[Path | None, typer.Option(help="folder for <stem>_vessel.png and <stem>_robot.png")] = None,
+    targets: Annotated[Path | None, typer.Option(help='JSON {"stem": [x, y]}: where the operator wants to go')] = None,
+    overlay: Annotated[Path | None, typer.Option(help="folder for pictures with everything drawn in")] = None,
+    model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Vessel, robot, angle, distances and pose state of pictures or a video."""
+    from app.perceive_command import Outputs, run_perceive
+
+    run_perceive(images, Outputs(jsonl, masks, overlay), targets_path=targets, model=model, preset=preset, config_path=config)
+
+
+@app.command()
+def synth(
+    out: Annotated[Path, typer.Option(help="folder of the set; an interrupted one is continued")],
+    count: Annotated[int, typer.Option(min=1, help="frames")],
+    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; ten frames use one seed")] = 0,
+    width: Annotated[int, typer.Option(min=160, max=4096)] = 640,
+    height: Annotated[int, typer.Option(min=120, max=4096)] = 480,
+    family: Annotated[list[str] | None, typer.Option(help="only these families of looks")] = None,
+    phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,
+    workers: Annotated[int, typer.Option(min=1, max=64)] = 1,
+) -> None:
+    """Randomised labelled frames from the bench twin: images, masks, truth."""
+    from app.learning_commands import run_synth
+
+    run_synth(out, count, seed, (width, height), tuple(family) if family else None, phantom, workers)
+
+
+@app.command()
+def train(
+    out: Annotated[Path, typer.Option(help="folder of the new model")],
+    data: Annotated[list[Path] | None, typer.Option(help="labelled folder as synth writes it; may be repeated")] = None,
+    synthetic: Annotated[int, typer.Option(min=0, help="also make this many frames with the twin")] = 0,
+    init: Annotated[str | None, typer.Option(help="start from this model instead of from nothing")] = None,
+    steps: Annotated[int, typer.Option(min=1)] = 6000,
+    batch: Annotated[int, typer.Option(min=1, max=512)] = 6,
+    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 2e-3,
+    crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 384,
+    base: Annotated[int | None, typer.Option(min=4, max=128, help="plain U-Net of this base width instead of the folded one")] = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    threads: Annotated[int, typer.Option(min=0, max=256, help="CPU threads; 0 = all")] = 0,
+) -> None:
+    """Train or fine-tune the network; Ctrl-C keeps what was learnt."""
+    from app.learning_commands import run_train
+    from core.learning.training import TrainingPlan
+
+    plan = TrainingPlan(steps=steps, batch=batch, learning_rate=rate, crop=(crop, crop), seed=seed, threads=threads)
+    run_train(out, data or [], synthetic, init, base, plan)
+
+
+@app.command()
+def benchmark(
+    json: JsonOption = False,
+    accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
+    frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
+    model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Latency per stage, throughput, memory and start-up, against the paper-literal baseline in the same run; or accuracy."""
+    from app.benchmark_command import run_accuracy, run_speed
+
+    if accuracy is not None:
+        run_accuracy(accuracy, model=model, preset=preset, config_path=config, as_json=json)
+    else:
+        run_speed(frames, model=model, preset=preset, config_path=config, as_json=json)

@@ -1,0 +1,158 @@
+"""The thread around the engine: opens the rig, turns the loop, hands the newest tick to the window."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from PySide6.QtCore import QObject, QThread, Signal
+
+from core.devices import DeviceError, EndOfStream
+from core.latest import Latest
+from core.types import Command, Point, Tick
+
+STEP_TIMEOUT_S = 0.1
+
+_log = logging.getLogger(__name__)
+
+
+class EngineLike(Protocol):
+    """What the thread needs of ``core.control.engine.Engine``."""
+
+    def step(self, timeout_s: float) -> Tick | None: ...
+    def jog(self, command: Command) -> None: ...
+    def set_target(self, target_px: Point | None) -> None: ...
+    def close(self) -> None: ...
+
+
+OpenEngine = Callable[[], EngineLike]
+
+
+class Phase(Enum):
+    """Where the thread is. Nothing leaves FAULT or ENDED but a new order."""
+
+    IDLE = "idle"
+    STARTING = "starting"
+    RUNNING = "running"
+    ENDED = "ended"
+    FAULT = "fault"
+
+
+@dataclass(frozen=True, slots=True)
+class EngineStatus:
+    """A phase and, for FAULT and ENDED, the one line that says why."""
+
+    phase: Phase
+    message: str = ""
+
+
+class EngineThread(QThread):
+    """Runs one engine at a time.
+
+    ``tick_ready`` carries no payload and comes only when the slot was empty, so a slow window falls behind by one tick at most.
+    ``start_engine`` closes the running engine and opens another one in the thread. ``stop`` ends the thread; it returns at once.
+    """
+
+    tick_ready = Signal()
+    status_changed = Signal(object)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("engine")
+        self.ticks: Latest[Tick] = Latest()
+        self._lock = threading.Lock()
+        self._changed = threading.Event()
+        self._stopping = False
+        self._order: OpenEngine | None = None
+        self._engine: EngineLike | None = None
+
+    def start_engine(self, open_engine: OpenEngine) -> None:
+        """Close what runs and open this engine instead; of several orders in a row the last one wins."""
+        with self._lock:
+            self._order = open_engine
+            self._changed.set()
+        if not self.isRunning():
+            self.start()
+
+    def stop(self) -> None:
+        """Ask the thread to end. An engine that is being opened is still opened, and closed at once."""
+        with self._lock:
+            self._stopping = True
+            self._changed.set()
+
+    def jog(self, command: Command) -> bool:
+        """Hand an operator's command over; False when there is no engine or the robot refuses."""
+        engine = self._engine
+        if engine is None:
+            return False
+        try:
+            engine.jog(command)
+        except DeviceError as error:
+            _log.warning("command not taken: %s", error)
+            return False
+        return True
+
+    def set_target(self, target_px: Point | None) -> bool:
+        """Set or clear the destination, in source pixels; False when there is no engine."""
+        engine = self._engine
+        if engine is None:
+            return False
+        engine.set_target(target_px)
+        return True
+
+    def run(self) -> None:
+        while True:
+            self._changed.wait()
+            with self._lock:
+                self._changed.clear()
+                if self._stopping:
+                    return
+                order, self._order = self._order, None
+            if order is not None:
+                self._report(self._outcome(order))
+
+    def _outcome(self, order: OpenEngine) -> EngineStatus:
+        try:
+            self._serve(order)
+        except EndOfStream as error:
+            return EngineStatus(Phase.ENDED, _one_line(error))
+        except Exception as error:  # the one top of this thread: everything becomes a visible fault
+            return EngineStatus(Phase.FAULT, _one_line(error))
+        return EngineStatus(Phase.IDLE)
+
+    def _serve(self, open_engine: OpenEngine) -> None:
+        """Open an engine and turn its loop until there is another order."""
+        self.ticks.take()
+        self._report(EngineStatus(Phase.STARTING))
+        engine = open_engine()
+        try:
+            if not self._changed.is_set():
+                self._engine = engine
+                self._report(EngineStatus(Phase.RUNNING))
+                self._turn(engine)
+        finally:
+            self._engine = None
+            engine.close()
+
+    def _turn(self, engine: EngineLike) -> None:
+        while not self._changed.is_set():
+            tick = engine.step(STEP_TIMEOUT_S)
+            if tick is not None and self.ticks.put(tick):
+                self.tick_ready.emit()
+
+    def _report(self, status: EngineStatus) -> None:
+        if not self._stopping:
+            self.status_changed.emit(status)
+
+
+def _one_line(error: Exception) -> str:
+    """The message of an expected error; for any other one its type too, with the traceback in the log."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    if type(error).__module__.partition(".")[0] in {"core", "hardware"}:
+        return text
+    _log.error("the engine stopped", exc_info=error)
+    return f"unexpected {type(error).__name__}: {text}"

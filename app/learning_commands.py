@@ -1,0 +1,132 @@
+"""``synth`` and ``train``: long work with progress that can be interrupted and gone on with."""
+
+from __future__ import annotations
+
+import signal
+import time
+from dataclasses import replace
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+_console = Console(stderr=True)
+
+
+def progress_bar() -> Progress:
+    """The bar that all long commands show, on standard error."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TaskProgressColumn())
+    return Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=_console)
+
+
+def run_synth(
+    out: Path, count: int, seed: int, size: tuple[int, int], families: tuple[str, ...] | None, phantom: str | None, workers: int
+) -> None:
+    """Write a labelled set; raises SynthError."""
+    from hardware.twin.appearance import LOOK_FAMILIES
+    from hardware.twin.phantoms import make_phantom
+    from hardware.twin.synth import SynthError, SynthPlan, write_set
+
+    unknown = [name for name in families or () if name not in LOOK_FAMILIES]
+    if unknown:
+        raise SynthError(f"unknown look family {unknown[0]!r}; known: {', '.join(LOOK_FAMILIES)}")
+    if phantom is not None:
+        try:
+            make_phantom(phantom)
+        except ValueError as error:
+            raise SynthError(str(error)) from None
+    plan = SynthPlan(out, count, seed, size, families, phantom)
+    with progress_bar() as bar:
+        task = bar.add_task(f"frames -> {out}", total=count)
+        write_set(plan, workers=workers, on_progress=lambda frames: bar.advance(task, frames))
+    _console.print(f"{count} labelled frames of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}")
+
+
+class _Interrupt:
+    """Ctrl-C and a termination request ask the work to stop at the next good moment instead of tearing it down."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._old: dict[int, Any] = {}
+
+    def __enter__(self) -> _Interrupt:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._old[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._old.items():
+            signal.signal(number, handler)
+
+    def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
+        self.asked = True
+
+
+def run_train(out: Path, data: list[Path], synthetic: int, init: str | None, base: int | None, plan: Any) -> None:
+    """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log."""
+    import torch
+
+    from core.learning.dataset import DatasetError, find_samples
+    from core.learning.model_file import load_network, model_folder, save_model
+    from core.learning.training import Progress as Report
+    from core.learning.training import train
+    from core.perception.unet import DualUNet, UNetShape
+
+    if not data and not synthetic:
+        raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        log = out.with_name(out.name + ".log").open("a", encoding="utf-8", buffering=1)
+    except OSError as error:
+        raise DatasetError(f"{out.parent}: cannot be written ({error.strerror}); choose another --out") from None
+    folders = list(data)
+    if synthetic:
+        folder = out.with_name(out.name + "_frames")
+        run_synth(folder, synthetic, 1_000_000 + plan.seed * 100_000, (640, 480), None, None, 1)
+        folders.append(folder)
+    samples = find_samples(folders)
+    torch.manual_seed(plan.seed)
+    if init is not None:
+        network = load_network(model_folder(init))[0]
+    else:
+        network = DualUNet(UNetShape.of_base(base) if base else default_shape())
+    plan = replace(plan, crop=tuple(-(-side // network.shape.stride) * network.shape.stride for side in plan.crop))
+    notes = {"plan": plan.to_json(), "init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
+    log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {notes}\n")
+    with log, _Interrupt() as interrupt, progress_bar() as bar:
+        task = bar.add_task("steps", total=plan.steps)
+
+        def report(now: Report) -> None:
+            dice = f"dice vessel {now.vessel_dice:.3f} robot {now.robot_dice:.3f}"
+            bar.update(task, completed=now.step, description=f"loss {now.loss:.3f} {dice}")
+            log.write(f"{time.strftime('%H:%M:%S')} step {now.step} loss {now.loss:.4f} {dice} {now.images_per_s:.1f} images/s\n")
+
+        def checkpoint(average: DualUNet, step: int) -> None:
+            save_model(average, out, training=notes | {"steps_done": step}, figures={})
+
+        network, done = train(
+            network, samples, plan, on_progress=report, on_checkpoint=checkpoint, should_stop=lambda: interrupt.asked
+        )
+    save_model(network, out, training=notes | {"steps_done": done}, figures={})
+    ending = "" if done == plan.steps else f" (interrupted after {done} of {plan.steps} steps; go on with --init {out})"
+    _console.print(f"model written to {out}{ending}")
+
+
+def default_shape() -> Any:
+    """The shipped network: chosen in docs/method.md for 27 ms a frame at 640x480 on two cores without bf16."""
+    from core.perception.unet import UNetShape
+
+    return UNetShape((16, 32, 64, 96, 128), (16, 24, 32, 48), 2, 2)
+
+
+def _described(folder: Path) -> dict[str, Any]:
+    """What is known of a set: synth leaves its plan beside the frames."""
+    import json
+
+    plan = folder / "plan.json"
+    try:
+        return {"name": folder.name} | (json.loads(plan.read_text(encoding="utf-8")) if plan.is_file() else {})
+    except (OSError, ValueError):
+        return {"name": folder.name}

@@ -1,0 +1,142 @@
+"""``perceive``: pictures and videos through perception, to JSON lines, masks and overlay pictures."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import cv2
+import numpy as np
+
+from app.cli import UsageError
+from app.overlay_picture import draw_overlay
+from app.scene_json import scene_to_json, unread_to_json
+from app.sources import SourcePicture, expand, pictures
+from core.config import load_config
+from core.control.policy import table_policy
+from core.learning.dataset import write_mask, write_png
+from core.types import Frame, Mask, Point, Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Where results go; None: not wanted (``jsonl``: standard output)."""
+
+    jsonl: Path | None
+    masks: Path | None
+    overlay: Path | None
+
+
+def run_perceive(
+    paths: list[Path], outputs: Outputs, *, targets_path: Path | None, model: str | None, preset: str | None, config_path: Path | None
+) -> None:
+    """Perceive everything in `paths`; raises UsageError when nothing could be done, ConfigError, ModelError."""
+    from app.learning_commands import progress_bar
+    from core.perception.pipeline import open_pipeline
+
+    overrides: dict[str, Any] = {"perception": {"segmentation": {"model": model}}} if model else {}
+    config = load_config(config_path, preset, overrides)
+    targets = _read_targets(targets_path)
+    files = expand(paths)
+    if not files:
+        raise UsageError(f"{', '.join(map(str, paths))}: no pictures or videos there")
+    for folder in (outputs.masks, outputs.overlay):
+        if folder is not None:
+            _make_folder(folder)
+    pipeline = open_pipeline(config.perception)
+    done = failed = 0
+    with _open_lines(outputs.jsonl) as lines, progress_bar() as bar:
+        task = bar.add_task("pictures", total=None if any(_is_long(f) for f in files) else len(files))
+        for picture in pictures(files):
+            if picture.image is None:
+                record = unread_to_json(picture.name, picture.problem or "")
+                failed += 1
+            else:
+                scene = _perceive_one(pipeline, picture, picture.image, done, targets)
+                record = scene_to_json(picture.name, scene)
+                try:
+                    _write_pictures(outputs, picture.stem, picture.image, scene, config.advice)
+                except OSError as error:
+                    raise UsageError(f"{error.filename or outputs.masks}: cannot be written ({error.strerror or error})") from None
+                done += 1
+            lines.write(json.dumps(record, allow_nan=False) + "\n")
+            bar.advance(task)
+    if not done:
+        raise UsageError(f"none of {failed} pictures could be read; the first: {next(iter(files))}")
+
+
+def _perceive_one(pipeline: Any, picture: SourcePicture, image: Any, index: int, targets: dict[str, Point]) -> Scene:
+    if picture.time_s is None:
+        return pipeline.perceive_single(Frame(index, 0.0, image), targets.get(picture.stem))  # type: ignore[no-any-return]
+    if picture.first_of_stream:
+        pipeline.reset()
+    return pipeline(Frame(index, picture.time_s, image), targets.get(picture.stem))  # type: ignore[no-any-return]
+
+
+def _is_long(path: Path) -> bool:
+    from app.sources import VIDEO_ENDINGS
+
+    return path.suffix.lower() in VIDEO_ENDINGS
+
+
+def _write_pictures(outputs: Outputs, stem: str, image: np.ndarray, scene: Scene, advice_config: Any) -> None:
+    if outputs.masks is not None:
+        size = scene.source_size
+        blank = np.zeros((size[1], size[0]), bool)
+        for name in ("vessel", "robot"):
+            mask = getattr(scene.masks, name) if scene.masks is not None else blank
+            write_mask(outputs.masks / f"{stem}_{name}.png", _source_sized(mask, size))
+    if outputs.overlay is not None:
+        write_png(outputs.overlay / f"{stem}_overlay.png", draw_overlay(image, scene, table_policy(scene, advice_config)))
+
+
+def _source_sized(mask: Mask, size: tuple[int, int]) -> Mask:
+    if mask.shape == (size[1], size[0]):
+        return mask
+    return np.asarray(cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_LINEAR) > 127)
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".write-probe"
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+
+
+def _open_lines(path: Path | None) -> IO[str]:
+    if path is None:
+        return open(sys.stdout.fileno(), "w", encoding="utf-8", buffering=1, closefd=False)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path.open("w", encoding="utf-8", buffering=1)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written ({error.strerror}); choose another file") from None
+
+
+def _read_targets(path: Path | None) -> dict[str, Point]:
+    """``{stem: [x, y]}`` in source pixels."""
+    if path is None:
+        return {}
+    wanted = 'an object {"stem": [x, y], ...} with finite numbers'
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read ({error.strerror})") from None
+    except (ValueError, RecursionError):
+        raise UsageError(f"{path}: not valid JSON; needs {wanted}") from None
+    if not isinstance(data, dict):
+        raise UsageError(f"{path}: needs {wanted}")
+    targets: dict[str, Point] = {}
+    for stem, point in data.items():
+        numbers = isinstance(point, list) and len(point) == 2 and all(type(v) in (int, float) and math.isfinite(v) for v in point)
+        if not numbers:
+            raise UsageError(f"{path}: {stem}: needs {wanted}")
+        targets[stem] = (float(point[0]), float(point[1]))
+    return targets

@@ -1,0 +1,73 @@
+"""What ``perceive`` is given: pictures, folders of pictures, videos. One item per picture, in order; unreadable ones are items too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from core.devices import DeviceError, EndOfStream
+from core.images import ImageError, read_image
+from core.learning.dataset import IMAGE_ENDINGS
+from core.types import Image
+
+VIDEO_ENDINGS = (".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SourcePicture:
+    """One picture of the input. ``image`` is None when it cannot be read; then ``problem`` says why. ``time_s`` is set in videos."""
+
+    name: str
+    stem: str
+    image: Image | None
+    problem: str | None = None
+    time_s: float | None = None
+    first_of_stream: bool = True
+
+
+def expand(paths: Sequence[Path]) -> list[Path]:
+    """Folders become their pictures and videos in name order (other files in them are left out); files stay as they are."""
+    files: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            files += sorted(p for p in path.iterdir() if p.suffix.lower() in IMAGE_ENDINGS + VIDEO_ENDINGS and p.is_file())
+        else:
+            files.append(path)
+    return files
+
+
+def pictures(files: Sequence[Path]) -> Iterator[SourcePicture]:
+    """The pictures of all files, one after another; stems are made unique by a number where two files share one."""
+    seen: dict[str, int] = {}
+    for path in files:
+        count = seen[path.stem] = seen.get(path.stem, 0) + 1
+        stem = path.stem if count == 1 else f"{path.stem}_{count}"
+        if path.suffix.lower() in VIDEO_ENDINGS:
+            yield from _video(path, stem)
+        else:
+            try:
+                yield SourcePicture(str(path), stem, read_image(path))
+            except ImageError as error:
+                yield SourcePicture(str(path), stem, None, str(error))
+
+
+def _video(path: Path, stem: str) -> Iterator[SourcePicture]:
+    from hardware.cameras.video_file import VideoFile
+
+    video = VideoFile(path, paced=False)
+    index = 0
+    try:
+        video.open()
+        while True:
+            frame = video.read(0.0)
+            if frame is not None:
+                yield SourcePicture(f"{path}#{index}", f"{stem}_{index:06d}", frame.image, None, frame.captured_s, index == 0)
+                index += 1
+    except EndOfStream as end:
+        if index == 0 or "damaged" in str(end):
+            yield SourcePicture(f"{path}#{index}", f"{stem}_{index:06d}", None, str(end))
+    except DeviceError as error:
+        yield SourcePicture(str(path), stem, None, str(error))
+    finally:
+        video.close()

@@ -1,0 +1,193 @@
+"""Colours, sizes and fonts of every window. Nothing else in ``app`` names a colour.
+
+State and overlay colours come from the palette of Okabe and Ito (2008), which stays distinct under every common colour blindness;
+states are told by letter and shape as well. Text colours keep a contrast of at least 4.5 : 1 on the panels (tested).
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QFont, QFontDatabase, QFontMetrics, QPalette
+from PySide6.QtWidgets import QApplication
+
+from core.config import RESOURCES
+from core.types import PoseState
+
+# Okabe and Ito
+ORANGE = "#E69F00"
+SKY = "#56B4E9"
+GREEN = "#009E73"
+YELLOW = "#F0E442"
+VERMILLION = "#D55E00"
+PURPLE = "#CC79A7"
+
+# surfaces and text, dark
+WINDOW = "#0E1116"
+PANEL = "#171B22"
+RAISED = "#222831"
+LINE = "#323A46"
+TEXT = "#EEF1F5"
+TEXT_DIM = "#A9B3C1"
+TEXT_FAINT = "#8490A0"
+INK = "#0B0D10"
+FAULT = "#FF7B72"
+
+STATE_COLOUR: dict[PoseState | None, str] = {
+    PoseState.A: GREEN,
+    PoseState.B: SKY,
+    PoseState.C: VERMILLION,
+    PoseState.D: YELLOW,
+    None: TEXT_FAINT,
+}
+
+# what is drawn over the picture; gauge, bars and trends use the same colour for the same quantity
+VESSEL = SKY
+ROBOT = ORANGE
+ROBOT_VECTOR = YELLOW
+VESSEL_VECTOR = "#BFE3F9"
+HEAD = "#FFFFFF"
+NEAREST = "#FFFFFF"
+THETA = YELLOW
+D_HEAD = PURPLE
+D_TAIL = "#E9C3D8"
+ROUTE = "#35D0A5"
+TARGET = "#35D0A5"
+ALLOWED = "#1FB58A"
+SIM = "#E69F00"
+LIVE = "#D55E00"
+PLAYBACK = "#56B4E9"
+
+MIN_WINDOW = (1100, 700)
+START_WINDOW = (1600, 900)
+GAP = 10
+RADIUS = 8
+
+
+class Size(StrEnum):
+    """Names of the text sizes; pixels in ``_PIXELS``."""
+
+    LABEL = "label"
+    BODY = "body"
+    WHY = "why"
+    TITLE = "title"
+    NUMBER = "number"
+    HUGE = "huge"
+
+
+_PIXELS = {Size.LABEL: 12, Size.BODY: 14, Size.WHY: 17, Size.TITLE: 27, Size.NUMBER: 32, Size.HUGE: 76}
+_FAMILIES = ["Inter", "Segoe UI", "Noto Sans", "DejaVu Sans", "sans-serif"]
+
+
+def colour(name: str, alpha: float = 1.0) -> QColor:
+    """The colour `name` with opacity 0..1."""
+    result = QColor(name)
+    result.setAlphaF(alpha)
+    return result
+
+
+def font(size: Size | int = Size.BODY, weight: QFont.Weight = QFont.Weight.Normal) -> QFont:
+    """The interface font with digits of equal width, so that nothing moves when a number changes."""
+    result = QFont()
+    result.setFamilies(_FAMILIES)
+    result.setPixelSize(size if isinstance(size, int) else _PIXELS[size])
+    result.setWeight(weight)
+    result.setFeature(QFont.Tag("tnum"), 1)
+    return result
+
+
+def bold(size: Size | int = Size.BODY) -> QFont:
+    return font(size, QFont.Weight.Bold)
+
+
+def semi_bold(size: Size | int = Size.BODY) -> QFont:
+    return font(size, QFont.Weight.DemiBold)
+
+
+def fitted(text_font: QFont, text: str, width_px: int, smallest_px: int = 11) -> QFont:
+    """`text_font`, made smaller until `text` fits into `width_px` (not below `smallest_px`)."""
+    result = QFont(text_font)
+    while result.pixelSize() > smallest_px and QFontMetrics(result).horizontalAdvance(text) > width_px:
+        result.setPixelSize(result.pixelSize() - 1)
+    return result
+
+
+def contrast(first: str, second: str) -> float:
+    """Contrast ratio of two colours after WCAG 2.1 (1..21)."""
+
+    def luminance(name: str) -> float:
+        channels = (QColor(name).redF(), QColor(name).greenF(), QColor(name).blueF())
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    high, low = sorted((luminance(first), luminance(second)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+def apply_theme(application: QApplication) -> None:
+    """Style, palette, fonts and style sheet for the whole program. Without the font files the system's sans serif is used."""
+    for path in sorted((RESOURCES / "fonts").glob("*.otf")):
+        QFontDatabase.addApplicationFont(str(path))
+    application.setStyle("Fusion")
+    application.setPalette(_palette())
+    application.setFont(font(Size.BODY))
+    application.setStyleSheet(_STYLE_SHEET)
+
+
+def _palette() -> QPalette:
+    palette = QPalette()
+    roles = QPalette.ColorRole
+    for role, name in (
+        (roles.Window, WINDOW),
+        (roles.WindowText, TEXT),
+        (roles.Base, PANEL),
+        (roles.AlternateBase, RAISED),
+        (roles.Text, TEXT),
+        (roles.PlaceholderText, TEXT_FAINT),
+        (roles.Button, RAISED),
+        (roles.ButtonText, TEXT),
+        (roles.BrightText, TEXT),
+        (roles.ToolTipBase, RAISED),
+        (roles.ToolTipText, TEXT),
+        (roles.Highlight, SKY),
+        (roles.HighlightedText, INK),
+        (roles.Link, SKY),
+    ):
+        palette.setColor(role, QColor(name))
+    for role in (roles.WindowText, roles.Text, roles.ButtonText):
+        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(TEXT_FAINT))
+    return palette
+
+
+def elide(text_font: QFont, text: str, width_px: int) -> str:
+    """`text`, cut with an ellipsis where it does not fit into `width_px`."""
+    return QFontMetrics(text_font).elidedText(text, Qt.TextElideMode.ElideRight, width_px)
+
+
+_STYLE_SHEET = f"""
+QMainWindow, QDialog {{ background: {WINDOW}; }}
+QFrame#card {{ background: {PANEL}; border: 1px solid {LINE}; border-radius: {RADIUS}px; }}
+QLabel#card_title {{ color: {TEXT_DIM}; font-size: 12px; font-weight: 600; }}
+QLabel#card_note {{ color: {TEXT_FAINT}; font-size: 12px; }}
+QMenuBar {{ background: {WINDOW}; color: {TEXT_DIM}; padding: 2px 6px; }}
+QMenuBar::item {{ padding: 4px 10px; border-radius: 4px; background: transparent; }}
+QMenuBar::item:selected {{ background: {RAISED}; color: {TEXT}; }}
+QMenu {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; padding: 4px; }}
+QMenu::item {{ padding: 6px 28px 6px 22px; border-radius: 4px; }}
+QMenu::item:selected {{ background: {SKY}; color: {INK}; }}
+QMenu::item:disabled {{ color: {TEXT_FAINT}; }}
+QMenu::separator {{ height: 1px; background: {LINE}; margin: 4px 8px; }}
+QStatusBar {{ background: {WINDOW}; color: {TEXT_DIM}; font-size: 13px; }}
+QStatusBar::item {{ border: none; }}
+QToolTip {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; padding: 6px; }}
+QComboBox, QSpinBox {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; border-radius: 5px; padding: 3px 8px;
+    min-height: 22px; selection-background-color: {SKY}; selection-color: {INK}; }}
+QComboBox:focus, QSpinBox:focus, QPushButton:focus {{ border: 1px solid {SKY}; }}
+QComboBox QAbstractItemView {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE};
+    selection-background-color: {SKY}; selection-color: {INK}; outline: none; }}
+QPushButton {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; border-radius: 5px; padding: 4px 12px; min-height: 22px; }}
+QPushButton:hover {{ border-color: {TEXT_FAINT}; }}
+QPushButton:pressed {{ background: {LINE}; }}
+QPushButton:disabled {{ color: {TEXT_FAINT}; }}
+"""

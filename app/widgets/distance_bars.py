@@ -1,0 +1,115 @@
+"""Distances of head and tail from the centerline, to their side."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app import theme
+from app.pace import Pace
+from app.wording import QUANTITY_MEANING, side
+from core.types import Pose
+
+_RANGE_IN_LIMITS = 5.0
+_TEXT_EVERY_S = 0.15
+
+
+class DistanceBars(QWidget):
+    """Two bars that grow from the centerline to the side on which head and tail lie; the green band is what is allowed.
+
+    Bars on opposite sides mean that the robot has crossed. A bar that leaves the range ends in an arrow.
+    """
+
+    def __init__(self, d_allow_px: float) -> None:
+        super().__init__()
+        self._allow_px = d_allow_px
+        self._offsets: tuple[float, float] | None = None
+        self._numbers: tuple[float, float] | None = None
+        self._pace = Pace(_TEXT_EVERY_S)
+        self.setMinimumSize(200, 150)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAccessibleName("Distances from the centerline")
+        self.setToolTip(f"{QUANTITY_MEANING['d_head']}\n{QUANTITY_MEANING['d_tail']}")
+
+    @property
+    def texts(self) -> tuple[str, str]:
+        """The numbers of d_head and d_tail."""
+        if self._numbers is None:
+            return "\N{EN DASH}", "\N{EN DASH}"
+        return f"{abs(self._numbers[0]):.1f} px", f"{abs(self._numbers[1]):.1f} px"
+
+    def sizeHint(self) -> QSize:
+        return QSize(240, 160)
+
+    def show_pose(self, pose: Pose | None) -> None:
+        """The bars follow at once, the numbers a few times a second."""
+        if pose is None and self._offsets is None:
+            return
+        changed = (pose is None) is not (self._offsets is None)
+        self._offsets = (pose.c_head_px, pose.c_tail_px) if pose is not None else None
+        if self._pace.due() or changed:
+            self._numbers = self._offsets
+            self.setAccessibleDescription("d_head {}, d_tail {}".format(*self.texts))
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        row = (self.height() - 20) / 2
+        for k, (name, colour_name) in enumerate((("d_head", theme.D_HEAD), ("d_tail", theme.D_TAIL))):
+            box = QRectF(0, k * row, self.width(), row)
+            self._paint_row(painter, box, k, name, colour_name)
+        self._paint_axis(painter, QRectF(0, 2 * row, self.width(), 20))
+        painter.end()
+
+    def _paint_row(self, painter: QPainter, box: QRectF, index: int, name: str, colour_name: str) -> None:
+        text_box = QRectF(box.left(), box.top(), box.width(), box.height() - 26)
+        painter.setPen(QColor(colour_name))
+        painter.setFont(theme.semi_bold(theme.Size.BODY))
+        painter.drawText(text_box, Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignLeft, name)
+        painter.setPen(QColor(theme.TEXT if self._numbers is not None else theme.TEXT_FAINT))
+        painter.setFont(theme.bold(24))
+        right = Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignRight
+        painter.drawText(text_box.adjusted(0, 0, 0, 4), right, self.texts[index])
+        track = QRectF(box.left(), box.bottom() - 20, box.width(), 14)
+        self._paint_track(painter, track)
+        if self._offsets is not None:
+            self._paint_bar(painter, track, self._offsets[index], colour_name)
+
+    def _paint_track(self, painter: QPainter, track: QRectF) -> None:
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.RAISED))
+        painter.drawRoundedRect(track, 3, 3)
+        half = track.width() / 2 / _RANGE_IN_LIMITS
+        middle = track.center().x()
+        painter.setBrush(theme.colour(theme.ALLOWED, 0.30))
+        painter.drawRect(QRectF(middle - half, track.top(), 2 * half, track.height()))
+        painter.setPen(QPen(QColor(theme.ALLOWED), 2))
+        for x in (middle - half, middle + half):
+            painter.drawLine(QPointF(x, track.top() - 3), QPointF(x, track.bottom() + 3))
+
+    def _paint_bar(self, painter: QPainter, track: QRectF, offset_px: float, colour_name: str) -> None:
+        span = _RANGE_IN_LIMITS * self._allow_px
+        middle, half = track.center().x(), track.width() / 2
+        end = middle + half * max(-1.0, min(1.0, offset_px / span))
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(colour_name))
+        painter.drawRect(QRectF(min(middle, end), track.top() + 3, max(2.0, abs(end - middle)), track.height() - 6))
+        if abs(offset_px) > span:
+            inward = -8 if offset_px > 0 else 8
+            tip = QPointF(end, track.center().y())
+            painter.setBrush(QColor(theme.TEXT))
+            painter.drawPolygon(QPolygonF([tip, tip + QPointF(inward, -7), tip + QPointF(inward, 7)]))
+        painter.setPen(QPen(QColor(theme.TEXT), 2))
+        painter.drawLine(QPointF(middle, track.top() - 3), QPointF(middle, track.bottom() + 3))
+
+    def _paint_axis(self, painter: QPainter, box: QRectF) -> None:
+        painter.setPen(QColor(theme.TEXT_FAINT))
+        painter.setFont(theme.font(theme.Size.LABEL))
+        painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, side(-1.0))
+        painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, side(1.0))
+        half = box.width() / 2 / _RANGE_IN_LIMITS
+        for x, text in ((-half, f"{self._allow_px:g}"), (0.0, "0"), (half, f"{self._allow_px:g}")):
+            label = QRectF(box.center().x() + x - 20, box.top(), 40, box.height())
+            painter.drawText(label, Qt.AlignmentFlag.AlignCenter, text)

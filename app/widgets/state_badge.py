@@ -1,0 +1,152 @@
+"""The pose state as a large letter in a shape of its own, with its name and the reason in plain words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app import theme
+from app.pace import Pace
+from app.wording import REASON_TEXT, STATE_MEANING, STATE_TITLE, refusal_line, why_line
+from core.config import PoseConfig
+from core.types import PoseState, Scene
+
+_TEXT_EVERY_S = 0.25
+
+
+class StateBadge(QWidget):
+    """Shape, letter and colour tell the state: A circle, B square, C triangle, D diamond; a dashed ring with "-" means no pose."""
+
+    def __init__(self, limits: PoseConfig) -> None:
+        super().__init__()
+        self._limits = limits
+        self._state: PoseState | None = None
+        self._title = "Waiting"
+        self._why = ""
+        self._pace = Pace(_TEXT_EVERY_S)
+        self.setFixedHeight(112)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Pose state")
+        self.setToolTip("\n".join(STATE_MEANING.values()))
+
+    @property
+    def letter(self) -> str:
+        return self._state.value if self._state is not None else "-"
+
+    @property
+    def title(self) -> str:
+        return self._title
+
+    @property
+    def why(self) -> str:
+        return self._why
+
+    def sizeHint(self) -> QSize:
+        return QSize(440, 112)
+
+    def show_scene(self, scene: Scene) -> None:
+        """The state of `scene`, or the reason why it has none. The sentence is renewed four times a second, the letter at once."""
+        pose = scene.pose
+        if pose is not None:
+            self._set(pose.state, STATE_TITLE[pose.state], lambda: why_line(pose, self._limits))
+        elif scene.refusal is not None:
+            refusal = scene.refusal
+            self._set(None, REASON_TEXT[refusal.reason].title, lambda: refusal_line(refusal))
+        else:
+            self.show_nothing("No pose", "")
+
+    def show_nothing(self, title: str, why: str) -> None:
+        """No state, for a cause outside perception: starting, no new picture, fault."""
+        self._pace.reset()
+        self._set(None, title, lambda: why)
+
+    def _set(self, state: PoseState | None, title: str, why: Callable[[], str]) -> None:
+        changed = state is not self._state or title != self._title
+        if changed:
+            self._pace.reset()
+        if not self._pace.due():
+            return
+        text = why()
+        if not changed and text == self._why:
+            return
+        self._state, self._title, self._why = state, title, text
+        self.setAccessibleDescription(f"{self.letter}: {title}. {text}")
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        side = self.height() - 4.0
+        box = QRectF(2.0, 2.0, side, side)
+        paint_state(painter, box, self._state)
+        left = box.right() + 18
+        width = self.width() - left - 2
+        painter.setPen(QColor(theme.TEXT))
+        painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), self._title, int(width)))
+        painter.drawText(QRectF(left, 4, width, 36), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self._title)
+        painter.setPen(QColor(theme.TEXT_DIM))
+        painter.setFont(theme.font(theme.Size.WHY))
+        flags = Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap
+        painter.drawText(QRectF(left, 42, width, self.height() - 44), int(flags), self._why)
+        painter.end()
+
+
+def paint_state(painter: QPainter, box: QRectF, state: PoseState | None) -> None:
+    """The state's shape and letter inside `box`."""
+    name = theme.STATE_COLOUR[state]
+    shape = state_shape(box, state)
+    if state is None:
+        painter.setPen(QPen(QColor(name), max(2.0, box.width() / 28), Qt.PenStyle.DashLine))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+    else:
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(name))
+    painter.drawPath(shape)
+    painter.setPen(QColor(theme.INK if state is not None else theme.TEXT_DIM))
+    painter.setFont(theme.bold(max(9, int(box.height() * (0.5 if state is PoseState.C else 0.62)))))
+    # the visual middle of a triangle lies below that of its box
+    letter_box = box.translated(0, box.height() * 0.13) if state is PoseState.C else box
+    painter.drawText(letter_box, Qt.AlignmentFlag.AlignCenter, state.value if state is not None else "\N{EN DASH}")
+
+
+def state_shape(box: QRectF, state: PoseState | None) -> QPainterPath:
+    """Circle, rounded square, triangle, diamond; a circle where there is no state."""
+    path = QPainterPath()
+    middle, radius = box.center(), box.width() / 2
+    if state is PoseState.B:
+        inset = box.width() * 0.07
+        path.addRoundedRect(box.adjusted(inset, inset, -inset, -inset), radius * 0.16, radius * 0.16)
+    elif state is PoseState.C:
+        path = _rounded_polygon(middle + QPointF(0, radius * 0.18), radius * 1.14, 3, -90.0, radius * 0.2)
+    elif state is PoseState.D:
+        path = _rounded_polygon(middle, radius, 4, -90.0, radius * 0.14)
+    else:
+        inset = box.width() * 0.03
+        path.addEllipse(box.adjusted(inset, inset, -inset, -inset))
+    return path
+
+
+def _rounded_polygon(middle: QPointF, radius: float, corners: int, start_deg: float, rounding: float) -> QPainterPath:
+    points = [
+        middle + radius * QPointF(math.cos(math.radians(start_deg + 360 * k / corners)), math.sin(math.radians(start_deg + 360 * k / corners)))
+        for k in range(corners)
+    ]
+    path = QPainterPath()
+    for k, corner in enumerate(points):
+        before, after = points[k - 1], points[(k + 1) % corners]
+        enter, leave = corner + _unit(before - corner) * rounding, corner + _unit(after - corner) * rounding
+        if k == 0:
+            path.moveTo(enter)
+        else:
+            path.lineTo(enter)
+        path.quadTo(corner, leave)
+    path.closeSubpath()
+    return path
+
+
+def _unit(vector: QPointF) -> QPointF:
+    return vector / math.hypot(vector.x(), vector.y())

@@ -1,0 +1,134 @@
+"""The signed angle between robot and vessel on a dial."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app import theme
+from app.pace import Pace
+from app.wording import QUANTITY_MEANING, side
+from core.types import Pose
+
+_OVERFLOW_DEG = 22.0
+_TEXT_EVERY_S = 0.15
+
+
+class ThetaGauge(QWidget):
+    """A half circle from -90 (left) over 0 (along the vessel) to +90 degrees (right); 90..180 is squeezed into the ends below it.
+
+    The green arc is what counts as "along the vessel". Without a pose the needle is gone and the number is a dash.
+    """
+
+    def __init__(self, theta_allow_deg: float) -> None:
+        super().__init__()
+        self._allow_deg = theta_allow_deg
+        self._theta_deg: float | None = None
+        self._number: float | None = None
+        self._pace = Pace(_TEXT_EVERY_S)
+        self.setMinimumSize(200, 150)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAccessibleName("theta")
+        self.setToolTip(QUANTITY_MEANING["theta"])
+
+    @property
+    def text(self) -> str:
+        """The number on the dial."""
+        return "\N{EN DASH}" if self._number is None else f"{self._number:+.1f}°"
+
+    @property
+    def direction(self) -> str:
+        return "" if self._number is None or abs(self._number) < 0.05 else side(self._number)
+
+    def sizeHint(self) -> QSize:
+        return QSize(240, 160)
+
+    def show_pose(self, pose: Pose | None) -> None:
+        """The needle follows at once, the number a few times a second."""
+        if pose is None and self._theta_deg is None:
+            return
+        changed = (pose is None) is not (self._theta_deg is None)
+        self._theta_deg = pose.theta_signed_deg if pose is not None else None
+        if self._pace.due() or changed:
+            self._number = self._theta_deg
+            self.setAccessibleDescription(f"theta {self.text} {self.direction}")
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        # room: tick labels outside the arc, the number under the hub
+        radius = min(self.width() / 2 - 26.0, self.height() - 74.0)
+        hub = QPointF(self.width() / 2, 22.0 + radius)
+        self._paint_scale(painter, hub, radius)
+        if self._theta_deg is not None:
+            self._paint_needle(painter, hub, radius, self._theta_deg)
+        self._paint_number(painter, hub)
+        painter.end()
+
+    def _paint_scale(self, painter: QPainter, hub: QPointF, radius: float) -> None:
+        rim = QRectF(hub.x() - radius, hub.y() - radius, 2 * radius, 2 * radius)
+        self._paint_arc(painter, rim, -90, 90, QPen(QColor(theme.LINE), 8))
+        for low in (-180, 90):
+            self._paint_arc(painter, rim, low, low + 90, QPen(theme.colour(theme.LINE, 0.55), 8))
+        self._paint_arc(painter, rim, -self._allow_deg, self._allow_deg, QPen(QColor(theme.ALLOWED), 8))
+        painter.setFont(theme.font(theme.Size.LABEL))
+        for degrees in range(-90, 91, 15):
+            major = degrees % 45 == 0
+            inner = _on_dial(hub, radius - (12 if major else 8), degrees)
+            painter.setPen(QPen(QColor(theme.TEXT_DIM if major else theme.TEXT_FAINT), 1.6 if major else 1.0))
+            painter.drawLine(inner, _on_dial(hub, radius - 4, degrees))
+            if major:
+                self._paint_label(painter, _on_dial(hub, radius + 15, degrees), f"{abs(degrees)}")
+        for degrees in (-180, 180):
+            self._paint_label(painter, _on_dial(hub, radius + 17, degrees), "180")
+
+    @staticmethod
+    def _paint_arc(painter: QPainter, rim: QRectF, low: float, high: float, pen: QPen) -> None:
+        pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+        painter.setPen(pen)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        first, last = _dial_angle(high), _dial_angle(low)
+        painter.drawArc(rim, round((90 - first) * 16), round((first - last) * 16))
+
+    @staticmethod
+    def _paint_label(painter: QPainter, middle: QPointF, text: str) -> None:
+        painter.setPen(QColor(theme.TEXT_DIM))
+        painter.drawText(QRectF(middle.x() - 20, middle.y() - 10, 40, 20), Qt.AlignmentFlag.AlignCenter, text)
+
+    @staticmethod
+    def _paint_needle(painter: QPainter, hub: QPointF, radius: float, theta_deg: float) -> None:
+        tip = _on_dial(hub, radius - 2, theta_deg)
+        direction = (tip - hub) / max(radius - 2, 1.0)
+        across = QPointF(-direction.y(), direction.x())
+        painter.setPen(QPen(QColor(theme.PANEL), 1.5))
+        painter.setBrush(QColor(theme.THETA))
+        painter.drawPolygon(QPolygonF([tip, hub + across * 6, hub - direction * 12, hub - across * 6]))
+        painter.setBrush(QColor(theme.TEXT))
+        painter.drawEllipse(hub, 4.0, 4.0)
+
+    def _paint_number(self, painter: QPainter, hub: QPointF) -> None:
+        shown = self._number is not None
+        painter.setPen(QColor(theme.TEXT if shown else theme.TEXT_FAINT))
+        painter.setFont(theme.bold(theme.Size.NUMBER))
+        painter.drawText(QRectF(hub.x() - 90, hub.y() + 10, 180, 34), Qt.AlignmentFlag.AlignCenter, self.text)
+        if self.direction:
+            sign = -1 if self.direction == "left" else 1
+            painter.setPen(QColor(theme.TEXT_DIM))
+            painter.setFont(theme.semi_bold(theme.Size.LABEL))
+            box = QRectF(hub.x() + sign * 92 - 30, hub.y() + 17, 60, 22)
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, self.direction)
+
+
+def _dial_angle(theta_deg: float) -> float:
+    """Where an angle of -180..180 lies on the dial: true up to 90 degrees, squeezed beyond."""
+    beyond = max(0.0, abs(theta_deg) - 90.0)
+    return math.copysign(min(abs(theta_deg), 90.0) + beyond / 90.0 * _OVERFLOW_DEG, theta_deg)
+
+
+def _on_dial(hub: QPointF, radius: float, theta_deg: float) -> QPointF:
+    turn = math.radians(_dial_angle(theta_deg))
+    return QPointF(hub.x() + radius * math.sin(turn), hub.y() - radius * math.cos(turn))

@@ -1,0 +1,127 @@
+"""Texts that people read: states, reasons, quantities. One table each, so that wording stays consistent and can be translated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from core.config import PoseConfig
+from core.types import Advice, Pose, PoseState, Reason, Refusal, Speed
+
+STATE_TITLE = {
+    PoseState.A: "On the centerline",
+    PoseState.B: "Coming back",
+    PoseState.C: "Moving away",
+    PoseState.D: "Crossed",
+}
+
+STATE_MEANING = {
+    PoseState.A: "A: on the centerline and along it. Ideal: speed up, no steering.",
+    PoseState.B: "B: the head is nearer to the centerline than the tail. Coming back: slow down, no steering.",
+    PoseState.C: "C: the head is farther from the centerline than the tail. Moving away: slowest, steer hardest.",
+    PoseState.D: "D: head and tail lie on opposite sides of the centerline. Crossed: moderate speed, steer by theta.",
+}
+
+QUANTITY_MEANING = {
+    "theta": "theta: angle between the robot's last 40 px and the vessel's direction beside the head, in degrees.\n"
+    "Positive: the robot points to the right of the vessel's direction, as seen on screen.",
+    "d_head": "d_head: distance of the robot's head from the line through the vessel's centerline, in working pixels\n"
+    "(the picture scaled to 640 px along its longer side).",
+    "d_tail": "d_tail: distance of the point 40 px behind the head from the same line, in working pixels.\n"
+    "On the other side than the head: the robot has crossed the centerline.",
+    "latency": "Time that each stage took for one frame, over the last seconds: half of the frames were quicker than p50,\n"
+    "95 % were quicker than p95.",
+    "dropped": "Frames that the camera gave but nobody looked at, because a newer one was there already.",
+    "gui_block": "Longest time in the last 10 s in which this window could not react to you.",
+    "shown": "Frames drawn on this screen per second.",
+    "engine": "Frames perceived per second.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ReasonText:
+    """A refusal in plain words, and what the operator can do about it."""
+
+    title: str
+    what_to_do: str
+
+
+REASON_TEXT = {
+    Reason.UNREADABLE: ReasonText("Image unreadable", "check the camera or the file"),
+    Reason.NO_MODEL: ReasonText("No model", "put back resources/models/default, or choose another model in the configuration"),
+    Reason.BLACK: ReasonText("Image is black", "take off the lens cap, switch the lamp on or raise the exposure"),
+    Reason.WHITE: ReasonText("Image is overexposed", "dim the lamp or lower the exposure"),
+    Reason.BLURRED: ReasonText("Image is blurred", "focus the camera or hold it still"),
+    Reason.NO_VESSEL: ReasonText("No vessel in view", "point the camera at the phantom"),
+    Reason.NO_ROBOT: ReasonText("No robot in view", "advance the robot into the picture"),
+    Reason.SEVERAL_ROBOTS: ReasonText("Several robots in view", "leave one robot in the picture"),
+    Reason.TOO_SHORT: ReasonText("Too little of the robot in view", "advance it a little"),
+    Reason.OUTSIDE_VESSEL: ReasonText("Robot is outside the vessel", "check the phantom, or clear what looks like a robot"),
+    Reason.GAP_TOO_LONG: ReasonText("Too much of the robot is hidden", "remove what covers it"),
+    Reason.AMBIGUOUS_PATH: ReasonText("The robot's path is not clear", "retract a little so that it does not cross itself"),
+    Reason.AMBIGUOUS_BRANCH: ReasonText("Two branches fit", "click the destination in the picture"),
+    Reason.LOW_CONFIDENCE: ReasonText("Not sure enough to answer", "better light or focus helps"),
+    Reason.HEAD_JUMP: ReasonText("The head jumped", "wait for the next frames"),
+}
+
+SPEED_WORD = {
+    Speed.STOP: "Stop",
+    Speed.SLOWEST: "Slowest",
+    Speed.SLOW: "Slow",
+    Speed.MODERATE: "Moderate",
+    Speed.FAST: "Fast",
+}
+
+
+def side(signed: float) -> str:
+    """The word for a sign: positive is to the right of the vessel's direction."""
+    return "right" if signed > 0 else "left"
+
+
+def literal_state(pose: Pose, limits: PoseConfig) -> PoseState:
+    """The state by METHOD section 6 without hysteresis."""
+    if pose.d_head_px < limits.d_allow_px and pose.d_tail_px < limits.d_allow_px and pose.theta_deg < limits.theta_allow_deg:
+        return PoseState.A
+    if pose.crossed:
+        return PoseState.D
+    return PoseState.B if pose.d_head_px < pose.d_tail_px else PoseState.C
+
+
+def why_line(pose: Pose, limits: PoseConfig) -> str:
+    """Why the pose has its state, in one plain sentence with the values that decided it."""
+    angle = f"theta {pose.theta_deg:.0f}° {side(pose.theta_signed_deg)}"
+    head, tail = pose.d_head_px, pose.d_tail_px
+    digits = 1 if round(head) == round(tail) else 0
+    if pose.state is PoseState.A:
+        line = (
+            f"d_head {head:.0f} px and d_tail {tail:.0f} px (allowed {limits.d_allow_px:g}), {angle} (allowed {limits.theta_allow_deg:g}°)"
+        )
+    elif pose.state is PoseState.D:
+        line = f"head {head:.0f} px {side(pose.c_head_px)}, tail {tail:.0f} px {side(pose.c_tail_px)} of the centerline, {angle}"
+    elif pose.state is PoseState.B:
+        line = f"back to the centerline: d_head {head:.{digits}f} px < d_tail {tail:.{digits}f} px, {angle}"
+    else:
+        line = f"from the centerline: d_head {head:.{digits}f} px > d_tail {tail:.{digits}f} px, {angle}"
+    # in a stream a state is kept for a moment beyond its limit; then the values alone would contradict the letter
+    return line if literal_state(pose, limits) is pose.state else f"{line}; about to change"
+
+
+def refusal_line(refusal: Refusal) -> str:
+    """What was measured, and what to do about it."""
+    text = REASON_TEXT[refusal.reason]
+    return f"{refusal.detail}: {text.what_to_do}" if refusal.detail else text.what_to_do[0].upper() + text.what_to_do[1:]
+
+
+def advice_headline(advice: Advice) -> str:
+    """For example "Slowest, 18° left"."""
+    if abs(advice.steer_deg) < 0.5:
+        return f"{SPEED_WORD[advice.speed]}, straight"
+    return f"{SPEED_WORD[advice.speed]}, {abs(advice.steer_deg):.0f}° {side(advice.steer_deg)}"
+
+
+def caption(pose: Pose | None, refusal: Refusal | None) -> str:
+    """State and values, or the reason, as one line under a picture."""
+    if pose is None:
+        return f"no pose: {refusal}" if refusal is not None else "no pose"
+    return (
+        f"{STATE_TITLE[pose.state]}   θ {pose.theta_signed_deg:+.1f}°   d_head {pose.d_head_px:.1f} px   d_tail {pose.d_tail_px:.1f} px"
+    )

@@ -1,0 +1,254 @@
+"""The whole configuration, validated. Unknown keys, wrong types and values out of range are one clear line each.
+
+Layers, later ones win: ``resources/config/default.toml``, then a preset (``resources/config/preset_<name>.toml``), then the user's
+file. Every setting has a unit in its name and an allowed range here, which the settings dialog and the error messages show.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+RESOURCES = Path(__file__).resolve().parent.parent / "resources"
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class ConfigError(Exception):
+    """The configuration cannot be used; the message names file, key and allowed range in one line."""
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=False, allow_inf_nan=False)
+
+
+class SegmentationConfig(_Section):
+    """The network and its thresholds (METHOD section 1)."""
+
+    model: str = Field("default", min_length=1, description="model folder in resources/models, or a path")
+    device: Literal["auto", "openvino", "torch"] = Field("auto", description="inference engine")
+    threads: int = Field(0, ge=0, le=64, description="CPU threads; 0 = all cores")
+    vessel_threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+    robot_threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+
+
+class CleaningConfig(_Section):
+    """Mask cleaning and thinning (METHOD section 2)."""
+
+    min_vessel_area_px: int = Field(400, ge=0, le=100_000)
+    min_robot_area_px: int = Field(40, ge=0, le=100_000)
+    max_hole_area_px: int = Field(150, ge=0, le=100_000)
+    prune_spurs: bool = Field(True, description="drop vessel spurs shorter than the local lumen radius")
+    extend_ends: bool = Field(True, description="extend the robot's end along its tangent to the mask's edge")
+    half_size_thinning: bool = Field(True, description="thin the vessel on every second pixel: faster, same topology")
+
+
+class GapConfig(_Section):
+    """Gap repair of the robot's skeleton (METHOD section 3)."""
+
+    rule: Literal["components", "every_pair"] = Field("components", description="every_pair = the paper's Algorithm 1, literally")
+    gap_threshold_px: float = Field(40.0, ge=0.0, le=300.0)
+    max_turn_deg: float = Field(50.0, ge=0.0, le=180.0, description="not used by every_pair")
+
+
+class PathConfig(_Section):
+    """Choice of the robot's path among candidates (METHOD section 4)."""
+
+    weight_length: float = Field(-0.2, ge=-10.0, le=10.0)
+    weight_smoothness: float = Field(1.0, ge=-10.0, le=10.0)
+    weight_consistency: float = Field(0.5, ge=-10.0, le=10.0)
+    step_px: float = Field(8.0, ge=1.0, le=50.0, description="distance over which directions are taken")
+    cosine: Literal["signed", "absolute"] = Field("signed", description="absolute = the paper's |cos|, blind to hairpins")
+    min_length_px: float = Field(12.0, ge=2.0, le=500.0)
+    border_px: float = Field(6.0, ge=0.0, le=100.0, description="an end this near to the image border counts as the entry")
+    max_candidates: int = Field(200, ge=1, le=10_000)
+
+
+class VectorConfig(_Section):
+    """Line fits (METHOD section 5)."""
+
+    robot_length_px: float = Field(40.0, ge=4.0, le=400.0)
+    vessel_half_length_px: float = Field(20.0, ge=2.0, le=200.0)
+    vessel_rule: Literal["graph", "window"] = Field("graph", description="window = all skeleton pixels near the head, the paper's way")
+
+
+class PoseConfig(_Section):
+    """Pose state thresholds (METHOD section 6); hysteresis acts in a stream only."""
+
+    d_allow_px: float = Field(6.0, gt=0.0, le=200.0)
+    theta_allow_deg: float = Field(10.0, gt=0.0, le=180.0)
+    hysteresis_px: float = Field(1.0, ge=0.0, le=50.0)
+    hysteresis_deg: float = Field(1.5, ge=0.0, le=45.0)
+    dwell_frames: int = Field(3, ge=1, le=100)
+
+
+class QualityConfig(_Section):
+    """When perception refuses to answer, and with which reason."""
+
+    black_level: float = Field(12.0, ge=0.0, le=255.0, description="99th percentile of brightness below this: black")
+    white_level: float = Field(250.0, ge=0.0, le=255.0, description="1st percentile of brightness above this: overexposed")
+    min_sharpness: float = Field(0.0, ge=0.0, le=1e6, description="0 = not checked")
+    min_robot_length_px: float = Field(20.0, ge=2.0, le=640.0)
+    min_inside_vessel: Share = Field(0.6, description="share of the robot's last 40 px that must lie in the lumen")
+    max_bridged_share: Share = Field(0.4, description="repaired length over path length")
+    max_ambiguity: Share = 0.95
+    min_confidence: Share = 0.3
+    several_robots_share: Share = Field(0.5, description="a second robot this large against the first one")
+
+
+class TrackingConfig(_Section):
+    """Use of the last frames in a stream."""
+
+    enabled: bool = True
+    max_head_speed_px_s: float = Field(600.0, gt=0.0, le=100_000.0)
+    memory_s: float = Field(0.5, ge=0.0, le=10.0)
+
+
+class PerceptionConfig(_Section):
+    working_size_px: int = Field(640, ge=128, le=4096, description="longer side that all _px settings refer to")
+    segmentation: SegmentationConfig = SegmentationConfig()
+    cleaning: CleaningConfig = CleaningConfig()
+    gaps: GapConfig = GapConfig()
+    path: PathConfig = PathConfig()
+    vectors: VectorConfig = VectorConfig()
+    pose: PoseConfig = PoseConfig()
+    quality: QualityConfig = QualityConfig()
+    tracking: TrackingConfig = TrackingConfig()
+
+
+class AdviceConfig(_Section):
+    """Speeds behind the paper's words, and how theta becomes a degree of steering."""
+
+    slowest_mm_s: float = Field(1.0, ge=0.0, le=50.0)
+    slow_mm_s: float = Field(3.0, ge=0.0, le=50.0)
+    moderate_mm_s: float = Field(5.0, ge=0.0, le=50.0)
+    fast_mm_s: float = Field(8.0, ge=0.0, le=50.0)
+    steer_gain: float = Field(1.0, ge=0.0, le=10.0, description="degrees of steering per degree of theta in state D")
+    steer_gain_away: float = Field(1.5, ge=0.0, le=10.0, description="the same in state C, where the paper steers hardest")
+    max_steer_deg: float = Field(45.0, gt=0.0, le=180.0)
+
+
+class TwinConfig(_Section):
+    """The bench twin (hardware/twin)."""
+
+    phantom: str = Field("s_curve", min_length=1, description="a named phantom, or random:<seed>")
+    appearance_seed: int = Field(0, ge=0, le=2**31 - 1)
+    image_width_px: int = Field(640, ge=160, le=4096)
+    image_height_px: int = Field(480, ge=120, le=4096)
+    frames_per_second: float = Field(30.0, gt=0.0, le=240.0)
+    jog_advance_mm_s: float = Field(10.0, gt=0.0, le=50.0)
+
+
+class RigConfig(_Section):
+    """Which camera and robot are used."""
+
+    name: str = Field("twin", min_length=1)
+    camera: Literal["twin", "video_file", "image_folder"] = "twin"
+    robot: Literal["twin", "none"] = "twin"
+    source: str | None = Field(None, description="path of the video or folder")
+
+
+class Config(_Section):
+    rig: RigConfig = RigConfig()
+    twin: TwinConfig = TwinConfig()
+    perception: PerceptionConfig = PerceptionConfig()
+    advice: AdviceConfig = AdviceConfig()
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such configuration file") from None
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise ConfigError(f"{path}: not a text file in UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+
+
+def _merge(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in top.items():
+        old = merged.get(key)
+        merged[key] = _merge(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return merged
+
+
+def _allowed(error: dict[str, Any]) -> str:
+    context = error.get("ctx", {})
+    limits = [f"{name} {context[key]}" for key, name in (("ge", ">="), ("gt", ">"), ("le", "<="), ("lt", "<")) if key in context]
+    if error["type"] == "extra_forbidden":
+        return "unknown key"
+    return f"must be {' and '.join(limits)}" if limits else str(error["msg"])
+
+
+def _field_range(location: tuple[Any, ...]) -> str:
+    """The allowed range of a setting as text, read from the model, so that one error line shows both ends."""
+    model: Any = Config
+    for part in location[:-1]:
+        model = model.model_fields[part].annotation if part in model.model_fields else None
+        if model is None:
+            return ""
+    info = model.model_fields.get(location[-1]) if hasattr(model, "model_fields") else None
+    if info is None:
+        return ""
+    bounds = []
+    for item in info.metadata:
+        for name, sign in (("ge", ">="), ("gt", ">"), ("le", "<="), ("lt", "<")):
+            value = getattr(item, name, None)
+            if value is not None:
+                bounds.append(f"{sign} {value:g}" if isinstance(value, float) else f"{sign} {value}")
+    return " and ".join(bounds)
+
+
+def _one_line(path: str, error: ValidationError) -> str:
+    first: Any = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    bounds = _field_range(first["loc"])
+    what = f"must be {bounds}" if bounds and first["type"] != "extra_forbidden" else _allowed(first)
+    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    got = "" if first["type"] == "extra_forbidden" else f", got {first['input']!r}"
+    return f"{path}: {key}: {what}{got}{more}"
+
+
+def load_config(path: Path | None = None, preset: str | None = None, overrides: dict[str, Any] | None = None) -> Config:
+    """The configuration from its layers.
+
+    Parameters
+    ----------
+    path : the user's TOML file, or None.
+    preset : name of ``resources/config/preset_<name>.toml``, or None.
+    overrides : nested dictionary that wins over all files.
+
+    Raises
+    ------
+    ConfigError
+        With file, key and allowed range in one line.
+    """
+    data: dict[str, Any] = {}
+    layers = [RESOURCES / "config" / "default.toml"]
+    if preset is not None:
+        preset_path = RESOURCES / "config" / f"preset_{preset}.toml"
+        if not preset_path.is_file():
+            known = ", ".join(sorted(p.stem.removeprefix("preset_") for p in preset_path.parent.glob("preset_*.toml")))
+            raise ConfigError(f"unknown preset {preset!r}; known: {known}")
+        layers.append(preset_path)
+    if path is not None:
+        layers.append(path)
+    config = Config()
+    for layer in layers:
+        data = _merge(data, _read_toml(layer))
+        config = _validate(data, str(layer))
+    return _validate(_merge(data, overrides), "command line") if overrides else config
+
+
+def _validate(data: dict[str, Any], source: str) -> Config:
+    try:
+        return Config.model_validate(data)
+    except ValidationError as error:
+        raise ConfigError(_one_line(source, error)) from None

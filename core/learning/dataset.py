@@ -1,0 +1,91 @@
+"""Labelled frames on disk: ``images/<stem>.png``, ``masks/<stem>_vessel.png``, ``masks/<stem>_robot.png``, ``truth.jsonl``.
+
+``synth`` writes this layout and ``train --data`` reads it; truth is optional for training.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from core.images import ImageError, read_image
+from core.types import Image, Mask
+
+IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+
+
+class DatasetError(Exception):
+    """A data folder cannot be used; the message is one line and says what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Paths of one labelled frame."""
+
+    stem: str
+    image: Path
+    vessel: Path
+    robot: Path
+
+    def load(self) -> tuple[Image, Mask, Mask]:
+        """Image (H, W, 3) and both masks (H, W); raises DatasetError."""
+        try:
+            image = read_image(self.image)
+            masks = [read_image(path)[:, :, 0] > 127 for path in (self.vessel, self.robot)]
+        except ImageError as error:
+            raise DatasetError(str(error)) from None
+        for path, mask in zip((self.vessel, self.robot), masks, strict=True):
+            if mask.shape != image.shape[:2]:
+                raise DatasetError(f"{path}: {mask.shape[1]}x{mask.shape[0]}, but its image is {image.shape[1]}x{image.shape[0]}")
+        return image, masks[0], masks[1]
+
+
+def find_samples(folders: Sequence[Path]) -> list[Sample]:
+    """All images with both masks below the folders' ``images/``, sorted; raises DatasetError when a folder has none."""
+    samples: list[Sample] = []
+    for folder in folders:
+        images = sorted(p for p in (folder / "images").glob("*") if p.suffix.lower() in IMAGE_ENDINGS)
+        masks = folder / "masks"
+        found = [Sample(p.stem, p, masks / f"{p.stem}_vessel.png", masks / f"{p.stem}_robot.png") for p in images]
+        complete = [s for s in found if s.vessel.is_file() and s.robot.is_file()]
+        if not complete:
+            raise DatasetError(f"{folder}: no labelled frames; needs images/NAME.png with masks/NAME_vessel.png and masks/NAME_robot.png")
+        samples += complete
+    return samples
+
+
+def read_truth(folder: Path) -> dict[str, dict[str, Any]]:
+    """``truth.jsonl`` by stem; raises DatasetError. A cut last line (a killed writer) is left out."""
+    path = folder / "truth.jsonl"
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be read ({error.strerror}); write the set again with synth") from None
+    truth: dict[str, dict[str, Any]] = {}
+    for number, line in enumerate(lines, 1):
+        try:
+            row = json.loads(line)
+            truth[row["stem"]] = row
+        except (ValueError, KeyError, TypeError):
+            if number < len(lines):
+                raise DatasetError(f"{path}: line {number} is damaged; write the set again with synth") from None
+    return truth
+
+
+def write_mask(path: Path, mask: Mask) -> None:
+    """A mask as 0/255 PNG; raises OSError when it cannot be written (OpenCV alone would only return False)."""
+    write_png(path, mask.astype(np.uint8) * 255)
+
+
+def write_png(path: Path, image: np.ndarray) -> None:
+    """RGB or grey uint8 as PNG; raises OSError."""
+    ok, data = cv2.imencode(".png", image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    if not ok:
+        raise OSError(f"{path}: cannot be encoded")
+    path.write_bytes(data.tobytes())

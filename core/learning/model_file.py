@@ -1,0 +1,164 @@
+"""A model on disk: ``weights.safetensors``, ``network.onnx`` and ``model.json`` with the SHA-256 of both.
+
+Nothing is loaded before its hash agrees, and nothing is ever unpickled: a cut, bit-flipped or foreign file is one clear error.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from core.config import RESOURCES
+
+if TYPE_CHECKING:
+    from core.perception.unet import DualUNet
+
+WEIGHTS, ONNX, INFO = "weights.safetensors", "network.onnx", "model.json"
+MODELS = RESOURCES / "models"
+
+
+class ModelError(Exception):
+    """A model cannot be used; the message is one line and says what to do."""
+
+
+class ModelInfo(BaseModel):
+    """What ``model.json`` says. ``stride``: image height and width must be multiples of it; ``figures`` are measured, with commands."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: int = Field(1, ge=1, le=1)
+    name: str
+    shape: dict[str, Any]
+    stride: int = Field(ge=1, le=256)
+    image: str = "RGB uint8 (1, H, W, 3), longer side 640, values 0..255"
+    output: str = "probabilities float32 (1, 2, H, W): vessel, robot"
+    weights_sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    onnx_sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    training: dict[str, Any] = {}
+    figures: dict[str, Any] = {}
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file as lower-case hex."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def model_folder(name: str) -> Path:
+    """The folder of a model: a name in resources/models, or a path. Raises ModelError with the known names."""
+    for folder in (MODELS / name, Path(name)):
+        if (folder / INFO).is_file():
+            return folder
+    known = ", ".join(sorted(p.parent.name for p in MODELS.glob(f"*/{INFO}"))) or "none"
+    raise ModelError(f"no model {name!r} (looked for {INFO} in {MODELS / name} and {Path(name)}); installed models: {known}")
+
+
+def read_model_info(folder: Path, *, verify: tuple[str, ...] = (WEIGHTS, ONNX)) -> ModelInfo:
+    """Read ``model.json`` and check the hashes of the files named in `verify`; raises ModelError."""
+    path = folder / INFO
+    try:
+        info = ModelInfo.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read ({error.strerror}); restore the model folder") from None
+    except ValidationError as error:
+        first: Any = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise ModelError(f"{path}: damaged ({key + ': ' if key else ''}{first['msg']}); restore the model folder") from None
+    wanted = {WEIGHTS: info.weights_sha256, ONNX: info.onnx_sha256}
+    for name in verify:
+        file = folder / name
+        try:
+            found = sha256_of(file)
+        except OSError as error:
+            raise ModelError(f"{file}: cannot be read ({error.strerror}); restore the model folder") from None
+        if found != wanted[name]:
+            raise ModelError(f"{file}: SHA-256 differs from {INFO}: the file is cut or damaged; restore the model folder")
+    return info
+
+
+def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
+    """The torch network in evaluation mode with its weights; raises ModelError."""
+    from safetensors import SafetensorError
+    from safetensors.torch import load_file
+
+    from core.perception.unet import DualUNet, UNetShape
+
+    info = read_model_info(folder, verify=(WEIGHTS,))
+    try:
+        network = DualUNet(UNetShape.from_json(info.shape))
+        network.load_state_dict(load_file(folder / WEIGHTS))
+    except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
+        reason = str(error).splitlines()[0]
+        raise ModelError(f"{folder / WEIGHTS}: does not fit the shape in {INFO} ({reason}); restore the model folder") from None
+    return network.eval(), info
+
+
+def save_model(network: DualUNet, folder: Path, *, training: dict[str, Any], figures: dict[str, Any]) -> ModelInfo:
+    """Write weights, ONNX and manifest. The folder appears whole or not at all; an older one of that name is replaced last."""
+    from safetensors.torch import save_file
+
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
+        save_file(state, scratch / WEIGHTS)
+        export_onnx(network, scratch / ONNX)
+        info = ModelInfo(
+            format=1,
+            name=folder.name,
+            shape=network.shape.to_json(),
+            stride=network.shape.stride,
+            weights_sha256=sha256_of(scratch / WEIGHTS),
+            onnx_sha256=sha256_of(scratch / ONNX),
+            training=training,
+            figures=figures,
+        )
+        (scratch / INFO).write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        scratch.chmod(0o755)
+        if folder.exists():
+            shutil.rmtree(folder)
+        os.replace(scratch, folder)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return info
+
+
+def write_figures(folder: Path, figures: dict[str, Any]) -> None:
+    """Store measured figures in the manifest of a model, atomically."""
+    info = read_model_info(folder).model_copy(update={"figures": figures})
+    scratch = folder / f".{INFO}.new"
+    scratch.write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    os.replace(scratch, folder / INFO)
+
+
+def export_onnx(network: DualUNet, path: Path) -> None:
+    """Export with free height and width (multiples of the stride); pre- and post-processing are inside the graph."""
+    import warnings
+
+    import torch
+
+    from core.perception.unet import Probabilities
+
+    stride = network.shape.stride
+    example = torch.zeros(1, stride * 2, stride * 2, 3, dtype=torch.uint8)
+    was_training = network.training
+    with warnings.catch_warnings():
+        # The tracing exporter is the one that needs no further packages; its deprecation is noise to the user.
+        warnings.simplefilter("ignore")
+        torch.onnx.export(
+            Probabilities(network.eval()),
+            (example,),
+            str(path),
+            input_names=["image"],
+            output_names=["probabilities"],
+            dynamic_axes={"image": {1: "height", 2: "width"}, "probabilities": {2: "height", 3: "width"}},
+            opset_version=17,
+            dynamo=False,
+        )
+    network.train(was_training)

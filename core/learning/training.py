@@ -1,0 +1,161 @@
+"""Training of the dual-decoder U-Net: cross entropy + Dice for both tasks, AdamW, one cosine cycle, averaged weights."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.utils.data import DataLoader, Dataset
+
+from core.learning.augment import random_clutter, random_crop, random_look
+from core.learning.dataset import Sample
+from core.perception.unet import DualUNet
+
+
+@dataclass(frozen=True, slots=True)
+class TrainingPlan:
+    """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show neither vessel nor robot."""
+
+    steps: int = 6000
+    batch: int = 6
+    learning_rate: float = 2e-3
+    weight_decay: float = 1e-4
+    warmup_steps: int = 200
+    crop: tuple[int, int] = (384, 384)
+    clutter_share: float = 0.03
+    average_decay: float = 0.998
+    robot_weight: float = 1.5
+    seed: int = 0
+    workers: int = 1
+    threads: int = 0
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """State of a running training: ``loss`` smoothed, ``images_per_s`` since the last report."""
+
+    step: int
+    steps: int
+    loss: float
+    vessel_dice: float
+    robot_dice: float
+    images_per_s: float
+
+
+class _Crops(Dataset[tuple[Tensor, Tensor]]):
+    """Sample `i` of the stream depends on the seed and `i` alone, so that a run can be repeated with any number of workers."""
+
+    def __init__(self, samples: list[Sample], plan: TrainingPlan) -> None:
+        self._samples = samples
+        self._plan = plan
+
+    def __len__(self) -> int:
+        return self._plan.steps * self._plan.batch
+
+    def __getitem__(self, index: int) -> tuple[Tensor, Tensor]:
+        rng = np.random.default_rng((self._plan.seed, index))
+        size = self._plan.crop
+        if rng.random() < self._plan.clutter_share:
+            image, vessel, robot = random_clutter(size, rng), np.zeros(size, bool), np.zeros(size, bool)
+        else:
+            # Epochs without repetition: position in a permutation that is drawn anew for every pass.
+            epoch, place = divmod(index, len(self._samples))
+            order = np.random.default_rng((self._plan.seed, 7919, epoch)).permutation(len(self._samples))
+            image, vessel, robot = random_crop(*self._samples[order[place]].load(), size, rng)
+        image = random_look(image, rng)
+        target = np.stack([vessel, robot]).astype(np.uint8)
+        return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(target)
+
+
+def loss_of(logits: Tensor, target: Tensor, robot_weight: float) -> tuple[Tensor, Tensor]:
+    """Cross entropy + Dice of both tasks, and the soft Dice (2,) of vessel and robot over the batch."""
+    weights = logits.new_tensor([1.0, robot_weight])
+    entropy = torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction="none").mean(dim=(0, 2, 3))
+    probability = torch.sigmoid(logits)
+    overlap = (probability * target).sum(dim=(0, 2, 3))
+    dice = (2 * overlap + 1) / (probability.sum(dim=(0, 2, 3)) + target.sum(dim=(0, 2, 3)) + 1)
+    # The robot is some 2 % of the pixels: unweighted, its entropy would drown in the background's.
+    entropy = entropy * logits.new_tensor([1.0, 5.0])
+    return ((entropy + 1 - dice) * weights).sum(), dice.detach()
+
+
+def _learning_rate(plan: TrainingPlan, step: int) -> float:
+    if step < plan.warmup_steps:
+        return plan.learning_rate * (step + 1) / plan.warmup_steps
+    share = (step - plan.warmup_steps) / max(1, plan.steps - plan.warmup_steps)
+    return plan.learning_rate * (0.01 + 0.99 * 0.5 * (1 + float(np.cos(np.pi * share))))
+
+
+def _batches(samples: list[Sample], plan: TrainingPlan) -> Iterator[tuple[Tensor, Tensor]]:
+    loader = DataLoader(_Crops(samples, plan), plan.batch, num_workers=plan.workers, prefetch_factor=4 if plan.workers else None)
+    yield from loader
+
+
+def train(
+    network: DualUNet,
+    samples: list[Sample],
+    plan: TrainingPlan,
+    *,
+    on_progress: Callable[[Progress], None] = lambda _: None,
+    on_checkpoint: Callable[[DualUNet, int], None] = lambda _network, _step: None,
+    should_stop: Callable[[], bool] = lambda: False,
+    report_every: int = 50,
+    checkpoint_every: int = 1000,
+) -> tuple[DualUNet, int]:
+    """Train `network` in place; returns the network with averaged weights and the number of steps done.
+
+    `should_stop` is asked after every step; what was learnt until then is returned. On a CUDA device bf16 autocast is used.
+    """
+    torch.manual_seed(plan.seed)
+    if plan.threads:
+        torch.set_num_threads(plan.threads)
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    network = network.to(device, memory_format=torch.channels_last).train()
+    average = copy.deepcopy(network).eval()
+    optimizer = torch.optim.AdamW(network.parameters(), lr=plan.learning_rate, weight_decay=plan.weight_decay)
+    smooth_loss, smooth_dice = 0.0, np.zeros(2)
+    done, mark, marked = 0, time.monotonic(), 0
+    for image, target in _batches(samples, plan):
+        for group in optimizer.param_groups:
+            group["lr"] = _learning_rate(plan, done)
+        batch = (image.to(device).float() / 255).contiguous(memory_format=torch.channels_last)
+        with torch.autocast(device.type, torch.bfloat16, enabled=device.type == "cuda"):
+            logits = network(batch)
+        loss, dice = loss_of(logits.float(), target.to(device).float(), plan.robot_weight)
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
+        optimizer.step()
+        _average(average, network, min(plan.average_decay, (1 + done) / (10 + done)))
+        blend = max(0.02, 1 / (done + 1))
+        smooth_loss += blend * (float(loss.detach()) - smooth_loss)
+        smooth_dice += blend * (dice.cpu().numpy() - smooth_dice)
+        done += 1
+        if done % report_every == 0 or done == plan.steps:
+            now = time.monotonic()
+            rate = (done - marked) * plan.batch / max(now - mark, 1e-9)
+            on_progress(Progress(done, plan.steps, smooth_loss, float(smooth_dice[0]), float(smooth_dice[1]), rate))
+            mark, marked = now, done
+        if done % checkpoint_every == 0 and done < plan.steps:
+            on_checkpoint(average, done)
+        if should_stop():
+            break
+    return average.to("cpu"), done
+
+
+@torch.no_grad()
+def _average(average: DualUNet, network: DualUNet, decay: float) -> None:
+    for kept, new in zip(average.state_dict().values(), network.state_dict().values(), strict=True):
+        if kept.dtype.is_floating_point:
+            kept.lerp_(new, 1 - decay)
+        else:
+            kept.copy_(new)

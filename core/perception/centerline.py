@@ -1,0 +1,267 @@
+"""The piece of the vessel's centerline beside the robot's head, and the route along the vessel graph (METHOD section 5).
+
+Lengths are in the graph's own unit: pixels in perception, and the same functions serve analytic graphs in any unit.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.perception import polyline
+from core.perception.vessel_graph import build_graph
+from core.types import Centerline, Point, Points, Route, VesselGraph
+
+__all__ = ["build_graph", "centerline_at", "plan_route", "window_at"]
+
+MIN_PIECE_SHARE = 0.2
+"""A piece shorter than this share of the wanted length (8 of 40 px) gives no direction."""
+PLACE_WEIGHT = 0.5
+SHORTNESS_WEIGHT = 0.5
+ROUTE_WEIGHT = 1.0
+TIE_COST = 0.2
+"""A path whose cost is this much above the best one's no longer counts as nearly as good."""
+TIE_ANGLE_DEG = 20.0
+"""Two nearly as good paths that differ by this much make the answer fully ambiguous; by less, proportionally less so."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Candidate:
+    """One path of the graph past the head, cut to the wanted length and oriented; lower cost fits better."""
+
+    piece: Points
+    nearest: Point
+    radius: float
+    cost: float
+
+    @property
+    def direction(self) -> Points:
+        chord = self.piece[-1] - self.piece[0]
+        return np.asarray(chord / max(float(np.hypot(chord[0], chord[1])), 1e-9))
+
+
+def centerline_at(
+    graph: VesselGraph, head: Point, robot_direction: Point, half_length_px: float, route: Route | None = None
+) -> Centerline | None:
+    """The piece of centerline beside the head, along one path of the vessel graph, in the robot's direction of travel.
+
+    Near a junction the nearest edge may be a side branch that the robot merely passes. So every path that leads past the head within
+    reach is a candidate, and the one is taken that the robot's straight line fits best, in direction and in place (and that keeps to
+    the route, if there is one). The cost changes smoothly with head and direction, so that a small disturbance changes the choice
+    only where two branches fit equally well; `ambiguity` says how near that is.
+
+    Parameters
+    ----------
+    graph : vessel centerlines.
+    head : the robot's head.
+    robot_direction : unit vector of the robot's last 40 px, pointing to the head.
+    half_length_px : arc length of the piece to each side of the nearest point; cut short where the vessel ends.
+    route : the operator's route; it decides between branches where it passes the head.
+
+    Returns
+    -------
+    The piece, or None when the graph is empty or ends too soon (less than ``MIN_PIECE_SHARE`` of the wanted length).
+    """
+    feet = _feet(graph, head, half_length_px)
+    incidence = _incidence(graph)
+    ahead = _route_ahead(route, head, half_length_px, max((radius for _, _, radius in feet), default=0.0))
+    direction = np.asarray(robot_direction, np.float64)
+    candidates = []
+    for edge, position, radius in feet:
+        backward = _walks(graph, incidence, edge, position, False, 2.0 * half_length_px)
+        forward = _walks(graph, incidence, edge, position, True, 2.0 * half_length_px)
+        for back, used_behind in backward:
+            for onward, used_ahead in forward:
+                if used_behind & used_ahead:
+                    continue
+                line = np.concatenate([back[:0:-1], onward])
+                candidate = _candidate(line, radius, head, direction, half_length_px, ahead)
+                if candidate is not None:
+                    candidates.append(candidate)
+    if not candidates:
+        return None
+    best = min(candidates, key=lambda candidate: candidate.cost)
+    ambiguity = max(_rivalry(best, other) for other in candidates)
+    return Centerline(best.piece, best.nearest, best.radius, ambiguity)
+
+
+def _feet(graph: VesselGraph, head: Point, half_length: float) -> list[tuple[int, float, float]]:
+    """Edges that the head may belong to, as (edge, arc-length position of its foot, radius there)."""
+    found = []
+    for index, edge in enumerate(graph.edges):
+        if len(edge.points) < 2:
+            continue
+        distance, position, _ = polyline.nearest(edge.points, head)
+        radius = float(np.interp(position, polyline.arc_length(edge.points), edge.radius))
+        found.append((distance, index, position, max(radius, 0.25 * half_length)))
+    if not found:
+        return []
+    least, _, _, radius_there = min(found)
+    return [
+        (index, position, radius)
+        for distance, index, position, radius in found
+        if distance <= max(least + 0.25 * radius_there, 1.1 * radius)
+    ]
+
+
+def _incidence(graph: VesselGraph) -> list[list[tuple[int, bool]]]:
+    """For each node the edges that touch it, as (edge, whether the edge starts here)."""
+    touching: list[list[tuple[int, bool]]] = [[] for _ in range(len(graph.nodes))]
+    for index, edge in enumerate(graph.edges):
+        touching[edge.start].append((index, True))
+        touching[edge.end].append((index, False))
+    return touching
+
+
+def _walks(
+    graph: VesselGraph, incidence: list[list[tuple[int, bool]]], edge: int, position: float, onward: bool, reach: float
+) -> list[tuple[Points, frozenset[int]]]:
+    """All ways to walk `reach` along the graph from a place on an edge: polylines from that place, and the other edges they use."""
+    first = graph.edges[edge]
+    total = float(polyline.arc_length(first.points)[-1])
+    if onward:
+        line, node = polyline.cut(first.points, position, min(position + reach, total)), first.end
+    else:
+        line, node = polyline.cut(first.points, max(position - reach, 0.0), position)[::-1], first.start
+    walks = []
+    left = reach - (total - position if onward else position)
+    pending: list[tuple[Points, int, float, frozenset[int]]] = [(line, node, left, frozenset())]
+    while pending:
+        line, node, left, used = pending.pop()
+        options = [(i, starts) for i, starts in incidence[node] if i != edge and i not in used] if left > 0 else []
+        if not options:
+            walks.append((line, used))
+        for index, starts in options:
+            following = graph.edges[index]
+            points = following.points if starts else following.points[::-1]
+            length = float(polyline.arc_length(points)[-1])
+            joined = np.concatenate([line, polyline.cut(points, 0.0, left)])
+            pending.append((joined, following.end if starts else following.start, left - length, used | {index}))
+    return walks
+
+
+def _route_ahead(route: Route | None, head: Point, half_length: float, radius: float) -> Points | None:
+    """The part of the route that lies ahead of the head, or None where the route does not pass by."""
+    if route is None or len(route.points) < 2:
+        return None
+    distance, position, _ = polyline.nearest(route.points, head)
+    ahead = polyline.cut(route.points, position, position + 2.0 * half_length)
+    near = distance <= max(1.5 * radius, 0.5 * half_length)
+    return ahead if near and float(polyline.arc_length(ahead)[-1]) > MIN_PIECE_SHARE * half_length else None
+
+
+def _candidate(
+    line: Points, radius: float, head: Point, direction: NDArray[np.float64], half_length: float, ahead: Points | None
+) -> _Candidate | None:
+    _, position, nearest = polyline.nearest(line, head)
+    piece = polyline.cut(line, position - half_length, position + half_length)
+    before, after = min(position, half_length), float(polyline.arc_length(piece)[-1]) - min(position, half_length)
+    length = before + after
+    if length < MIN_PIECE_SHARE * 2.0 * half_length:
+        return None
+    travel = float((piece[-1] - piece[0]) @ direction)
+    if ahead is not None:
+        # On the route its direction is the direction of travel, even if the head is bent to a bit beyond a right angle.
+        way = ahead[-1] - ahead[0]
+        if float(way @ direction) > -0.5 * float(np.hypot(way[0], way[1])):
+            travel = float((piece[-1] - piece[0]) @ way)
+    if travel < 0.0:
+        piece, before, after = piece[::-1], after, before
+    chord = piece[-1] - piece[0]
+    turn_cost = 1.0 - float(chord @ direction) / length
+    places = np.array([piece[0], nearest, piece[-1]])
+    robot_line = np.asarray(head) + np.outer([-before, 0.0, after], direction)
+    place_cost = float(np.mean(np.sum((places - robot_line) ** 2, axis=1))) / radius**2
+    cost = turn_cost + PLACE_WEIGHT * place_cost + SHORTNESS_WEIGHT * (1.0 - length / (2.0 * half_length))
+    if ahead is not None:
+        cost += ROUTE_WEIGHT * _off_route(polyline.cut(piece, before, length), ahead, radius)
+    return _Candidate(piece, nearest, radius, cost)
+
+
+def _off_route(forward: Points, ahead: Points, radius: float) -> float:
+    """How far the forward half of a piece leaves the route, 0 (on it) to 1 (more than half a lumen radius off)."""
+    if len(forward) < 2:
+        return 0.0
+    probes = polyline.resample(forward, float(polyline.arc_length(forward)[-1]) / 4.0)
+    gaps = [polyline.nearest(ahead, (float(x), float(y)))[0] for x, y in probes]
+    return float(np.mean(np.minimum(1.0, (np.array(gaps) / (0.5 * radius)) ** 2)))
+
+
+def _rivalry(best: _Candidate, other: _Candidate) -> float:
+    """How much another candidate puts the best one in doubt: it must fit nearly as well and point elsewhere."""
+    closeness = max(0.0, 1.0 - (other.cost - best.cost) / TIE_COST)
+    angle_deg = float(np.degrees(np.arccos(np.clip(best.direction @ other.direction, -1.0, 1.0))))
+    return closeness * min(1.0, angle_deg / TIE_ANGLE_DEG)
+
+
+def plan_route(graph: VesselGraph, start: Point, target: Point) -> Route | None:
+    """The shortest way along the graph from the place beside `start` to the place nearest to `target`.
+
+    Returns
+    -------
+    The route, or None when the graph is empty or has no way between the two places.
+    """
+    here, there = _place(graph, start), _place(graph, target)
+    if here is None or there is None:
+        return None
+    (edge, position), (last_edge, last_position) = here, there
+    lengths = [float(polyline.arc_length(e.points)[-1]) for e in graph.edges]
+    reached, came_by = _distances(graph, lengths, edge, position)
+    last = graph.edges[last_edge]
+    ways: list[tuple[float, int | None]] = [
+        (reached[last.start] + last_position, last.start),
+        (reached[last.end] + lengths[last_edge] - last_position, last.end),
+    ]
+    if edge == last_edge:
+        ways.append((abs(last_position - position), None))
+    length, node = min(ways, key=lambda way: way[0])
+    if not np.isfinite(length):
+        return None
+    if node is None:
+        low, high = sorted((position, last_position))
+        points = polyline.cut(last.points, low, high)
+        return Route(points if position <= last_position else points[::-1], length, target)
+    final = polyline.cut(last.points, 0.0, last_position) if node == last.start else polyline.cut(last.points, last_position, np.inf)[::-1]
+    pieces = [final]
+    while (via := came_by[node]) is not None:
+        points = graph.edges[via].points
+        pieces.append(points if graph.edges[via].end == node else points[::-1])
+        node = graph.edges[via].start if graph.edges[via].end == node else graph.edges[via].end
+    first = graph.edges[edge]
+    leaves_by_end = node == first.end and (node != first.start or 2.0 * position > lengths[edge])
+    pieces.append(polyline.cut(first.points, position, np.inf) if leaves_by_end else polyline.cut(first.points, 0.0, position)[::-1])
+    points = np.concatenate(pieces[::-1])
+    distinct = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])
+    return Route(points[distinct], length, target)
+
+
+def _place(graph: VesselGraph, point: Point) -> tuple[int, float] | None:
+    """The edge nearest to a point and the arc-length position on it."""
+    best = min(
+        ((*polyline.nearest(edge.points, point)[:2], index) for index, edge in enumerate(graph.edges) if len(edge.points) > 1),
+        default=None,
+    )
+    return None if best is None else (best[2], best[1])
+
+
+def _distances(graph: VesselGraph, lengths: list[float], edge: int, position: float) -> tuple[list[float], list[int | None]]:
+    """Dijkstra from a place on an edge: the distance to every node and the edge it is reached by (None: straight from the place)."""
+    reached = [np.inf] * len(graph.nodes)
+    came_by: list[int | None] = [None] * len(graph.nodes)
+    incidence = _incidence(graph)
+    first = graph.edges[edge]
+    queue: list[tuple[float, int, int]] = [(position, first.start, -1), (lengths[edge] - position, first.end, -1)]
+    heapq.heapify(queue)
+    while queue:
+        distance, node, via = heapq.heappop(queue)
+        if distance >= reached[node]:
+            continue
+        reached[node], came_by[node] = distance, via if via >= 0 else None
+        for index, starts in incidence[node]:
+            following = graph.edges[index].end if starts else graph.edges[index].start
+            if distance + lengths[index] < reached[following]:
+                heapq.heappush(queue, (distance + lengths[index], following, index))
+    return reached, came_by

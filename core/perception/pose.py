@@ -1,0 +1,100 @@
+"""From two vectors to the pose: angle, signed distances, crossing, and the state A to D (METHOD sections 5 and 6)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from core.config import PoseConfig
+from core.types import Point, Pose, PoseState, Vector
+
+
+def measure(robot: Vector, vessel: Vector, config: PoseConfig, confidence: float = 1.0) -> Pose:
+    """The robot's pose against the vessel's line, with the state that this one image shows.
+
+    Parameters
+    ----------
+    robot : line through the last 40 px, pointing to the head.
+    vessel : line through the centerline beside the head, in the robot's direction of travel.
+    config : thresholds of the states.
+    confidence : 0..1, handed through.
+    """
+    v, r = vessel.direction, robot.direction
+    cross, dot = v[0] * r[1] - v[1] * r[0], v[0] * r[0] + v[1] * r[1]
+    theta_signed_deg = math.degrees(math.atan2(cross, dot))
+    if theta_signed_deg <= -180.0:  # atan2 gives -180 for a cross product of -0.0; the interval is (-180, 180]
+        theta_signed_deg = 180.0
+    c_head, c_tail = signed_distance(robot.end, vessel), signed_distance(robot.start, vessel)
+    theta_deg = abs(theta_signed_deg)
+    return Pose(
+        theta_deg=theta_deg,
+        theta_signed_deg=theta_signed_deg,
+        c_head_px=c_head,
+        c_tail_px=c_tail,
+        crossed=c_head * c_tail < 0.0,
+        state=classify(c_head, c_tail, theta_deg, config),
+        confidence=confidence,
+    )
+
+
+def signed_distance(point: Point, line: Vector) -> float:
+    """Distance of a point to a directed line, in px; positive to the right of its direction as seen on screen."""
+    v, p = line.direction, line.center
+    return v[0] * (point[1] - p[1]) - v[1] * (point[0] - p[0])
+
+
+def classify(c_head_px: float, c_tail_px: float, theta_deg: float, config: PoseConfig, current: PoseState | None = None) -> PoseState:
+    """The one state of a pose.
+
+    The paper's four descriptions overlap and leave holes; asked in the order A, D, B, C every pose has exactly one state.
+
+    Parameters
+    ----------
+    c_head_px, c_tail_px : signed distances of head and tail to the vessel's line.
+    theta_deg : unsigned angle.
+    config : thresholds; the hysteresis acts only with `current`.
+    current : the state in force. It is left only when it is contradicted by more than the hysteresis.
+    """
+    d_head, d_tail = abs(c_head_px), abs(c_tail_px)
+    band_px = 0.0 if current is None else config.hysteresis_px
+    slack_px, slack_deg = (config.hysteresis_px, config.hysteresis_deg) if current is PoseState.A else (0.0, 0.0)
+    if max(d_head, d_tail) < config.d_allow_px + slack_px and theta_deg < config.theta_allow_deg + slack_deg:
+        return PoseState.A
+    crossed = c_head_px * c_tail_px < 0.0
+    if current is PoseState.D:
+        crossed = crossed or min(d_head, d_tail) < band_px
+    elif current is not None:
+        crossed = crossed and min(d_head, d_tail) >= band_px
+    if crossed:
+        return PoseState.D
+    favour_px = {PoseState.B: band_px, PoseState.C: -band_px}.get(current, 0.0) if current is not None else 0.0
+    return PoseState.B if d_head < d_tail + favour_px else PoseState.C
+
+
+class StateFilter:
+    """Steadies the state of a stream: a hysteresis on every threshold and a dwell time, so that the badge does not chatter.
+
+    A new state must show for ``dwell_frames`` frames in a row. A frame without a pose forgets everything: the next pose starts anew,
+    and no stale state is ever shown.
+    """
+
+    def __init__(self, config: PoseConfig) -> None:
+        self._config = config
+        self._current: PoseState | None = None
+        self._waiting: PoseState | None = None
+        self._seen = 0
+
+    def update(self, pose: Pose | None) -> Pose | None:
+        """The same pose with the steadied state; None for None."""
+        if pose is None:
+            self._current, self._waiting, self._seen = None, None, 0
+            return None
+        shown = classify(pose.c_head_px, pose.c_tail_px, pose.theta_deg, self._config, self._current)
+        if self._current is None or shown is self._current:
+            self._current, self._waiting, self._seen = shown, None, 0
+        else:
+            self._seen = self._seen + 1 if shown is self._waiting else 1
+            self._waiting = shown
+            if self._seen >= self._config.dwell_frames:
+                self._current, self._waiting, self._seen = shown, None, 0
+        return replace(pose, state=self._current)

@@ -1,0 +1,138 @@
+"""Stage 1: frame -> vessel and robot probabilities at working resolution (METHOD section 1)."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.config import SegmentationConfig
+from core.learning.model_file import ONNX, ModelError, ModelInfo, model_folder, read_model_info
+from core.types import Image
+
+Probability = NDArray[np.float32]
+
+
+class Segmenter(Protocol):
+    """Gives vessel and robot probabilities, float32 (h, w) each, of an RGB uint8 image (h, w, 3) of any size."""
+
+    @property
+    def info(self) -> ModelInfo: ...
+    @property
+    def engine(self) -> str: ...
+    def __call__(self, image: Image) -> tuple[Probability, Probability]: ...
+
+
+def to_working(image: Image, working_size_px: int) -> tuple[Image, float]:
+    """Scale an image so that its longer side is `working_size_px`; returns it and working pixels per source pixel."""
+    height, width = image.shape[:2]
+    scale = working_size_px / max(height, width)
+    if scale == 1.0:
+        return image, 1.0
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    # Area averaging keeps thin structures when shrinking; it would show blocks when enlarging.
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR), scale
+
+
+def _padded(image: Image, stride: int) -> Image:
+    """Right and bottom filled up to multiples of `stride`; mirrored, because an edge of constant colour would look like a wall."""
+    height, width = image.shape[:2]
+    down, right = -height % stride, -width % stride
+    if not down and not right:
+        return image
+    border = cv2.BORDER_REFLECT_101 if min(height, width) > stride else cv2.BORDER_REPLICATE
+    return cv2.copyMakeBorder(image, 0, down, 0, right, border)
+
+
+class OpenVinoSegmenter:
+    """The ONNX network on the CPU through OpenVINO; compiled once per image size."""
+
+    _MAX_SIZES = 4
+
+    def __init__(self, folder: Path, threads: int = 0) -> None:
+        import openvino
+
+        self.info = read_model_info(folder, verify=(ONNX,))
+        self._core = openvino.Core()
+        self._threads = threads or os.cpu_count() or 1
+        try:
+            self._model = self._core.read_model(folder / ONNX)
+        except RuntimeError as error:
+            reason = str(error).strip().splitlines()[-1]
+            raise ModelError(f"{folder / ONNX}: cannot be read ({reason}); restore the model folder") from None
+        self._requests: dict[tuple[int, int], openvino.InferRequest] = {}
+
+    @property
+    def engine(self) -> str:
+        return "OpenVINO CPU"
+
+    def __call__(self, image: Image) -> tuple[Probability, Probability]:
+        height, width = image.shape[:2]
+        padded = _padded(image, self.info.stride)
+        request = self._request(padded.shape[0], padded.shape[1])
+        # The output tensor is reused by the next call, hence the copies.
+        output = request.infer({0: np.ascontiguousarray(padded)[None]}, share_inputs=True, share_outputs=True)[0]
+        return output[0, 0, :height, :width].copy(), output[0, 1, :height, :width].copy()
+
+    def _request(self, height: int, width: int):  # type: ignore[no-untyped-def]
+        key = (height, width)
+        if key not in self._requests:
+            if len(self._requests) >= self._MAX_SIZES:
+                self._requests.pop(next(iter(self._requests)))
+            model = self._model.clone()
+            model.reshape([1, height, width, 3])
+            options = {"PERFORMANCE_HINT": "LATENCY", "INFERENCE_NUM_THREADS": self._threads}
+            self._requests[key] = self._core.compile_model(model, "CPU", options).create_infer_request()
+        return self._requests[key]
+
+
+class TorchSegmenter:
+    """The same network in torch: half precision on a CUDA device where there is one, else fp32 on the CPU."""
+
+    def __init__(self, folder: Path, threads: int = 0) -> None:
+        import torch
+
+        from core.learning.model_file import load_network
+        from core.perception.unet import Probabilities
+
+        network, self.info = load_network(folder)
+        self._torch = torch
+        self._device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        if self._device.type == "cpu":
+            torch.set_num_threads(threads or os.cpu_count() or 1)
+        self._network = Probabilities(network).to(self._device, memory_format=torch.channels_last)
+
+    @property
+    def engine(self) -> str:
+        return f"torch {self._device.type.upper()}"
+
+    def __call__(self, image: Image) -> tuple[Probability, Probability]:
+        height, width = image.shape[:2]
+        torch = self._torch
+        batch = torch.from_numpy(np.ascontiguousarray(_padded(image, self.info.stride)))[None].to(self._device)
+        with torch.inference_mode(), torch.autocast("cuda", torch.float16, enabled=self._device.type == "cuda"):
+            output = self._network(batch)[0].float().cpu().numpy()
+        return np.ascontiguousarray(output[0, :height, :width]), np.ascontiguousarray(output[1, :height, :width])
+
+
+def cuda_present() -> bool:
+    """Whether an NVIDIA driver is loaded. Asked of the kernel, because importing torch to ask costs seconds."""
+    return Path("/proc/driver/nvidia/version").exists() or Path("/dev/nvidia0").exists()
+
+
+def open_segmenter(config: SegmentationConfig) -> Segmenter:
+    """Load the configured model into the configured engine ("auto": torch where a CUDA device is present, else OpenVINO).
+
+    Raises
+    ------
+    ModelError
+        Missing, cut or damaged model; the message says what to do.
+    """
+    folder = model_folder(config.model)
+    if config.device == "torch" or (config.device == "auto" and cuda_present()):
+        return TorchSegmenter(folder, config.threads)
+    return OpenVinoSegmenter(folder, config.threads)

@@ -1,0 +1,126 @@
+"""The dual-decoder multi-task U-Net (METHOD section 1; the paper, "Vascular Structure Segmentation and Interventional Robot Detection").
+
+One encoder with four down-samplings, and for each task a decoder of its own with four up-samplings and skip connections. Two things
+are ours, chosen by measurement (docs/method.md): ``fold`` rearranges blocks of fold x fold pixels into channels before the first
+convolution and back after the last one, so that the network works on a quarter of the positions and yet tells every pixel apart; and
+the decoders may be narrower than the encoder. ``UNetShape(base=64, fold=1)`` with equal decoders is the paper's network.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+
+@dataclass(frozen=True, slots=True)
+class UNetShape:
+    """Size of the network.
+
+    ``widths`` are the channels of the five encoder levels, ``decoder_widths`` those of the four decoder levels from fine to coarse,
+    ``fold`` the block of pixels folded into channels (1 = none), ``decoder_convolutions`` the 3x3 convolutions per decoder level.
+    """
+
+    widths: tuple[int, int, int, int, int] = (16, 32, 64, 128, 256)
+    decoder_widths: tuple[int, int, int, int] = (16, 32, 64, 128)
+    decoder_convolutions: int = 2
+    fold: int = 1
+
+    @classmethod
+    def of_base(cls, base: int) -> UNetShape:
+        """The paper's plain shape at a base width (64 in the paper)."""
+        return cls((base, base * 2, base * 4, base * 8, base * 16), (base, base * 2, base * 4, base * 8), 2, 1)
+
+    @property
+    def stride(self) -> int:
+        """Input height and width must be multiples of this."""
+        return 16 * self.fold
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> UNetShape:
+        """Inverse of ``to_json``; raises TypeError, KeyError or ValueError for anything else."""
+        widths = tuple(int(w) for w in data["widths"])
+        decoder = tuple(int(w) for w in data["decoder_widths"])
+        if len(widths) != 5 or len(decoder) != 4 or min(widths + decoder) < 1 or max(widths + decoder) > 4096:
+            raise ValueError("a U-Net has five encoder widths and four decoder widths between 1 and 4096")
+        fold, convolutions = int(data["fold"]), int(data["decoder_convolutions"])
+        if fold not in (1, 2, 4) or convolutions not in (1, 2):
+            raise ValueError("fold is 1, 2 or 4 and decoder_convolutions 1 or 2")
+        return cls(widths, decoder, convolutions, fold)  # type: ignore[arg-type]
+
+
+def _convolutions(inputs: int, outputs: int, count: int) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for _ in range(count):
+        layers += [nn.Conv2d(inputs, outputs, 3, padding=1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU(inplace=True)]
+        inputs = outputs
+    return nn.Sequential(*layers)
+
+
+class _Decoder(nn.Module):
+    """Four up-samplings with skip connections and a 1x1 output."""
+
+    def __init__(self, shape: UNetShape) -> None:
+        super().__init__()
+        below = shape.widths[4]
+        up, blocks = [], []
+        for level in (3, 2, 1, 0):
+            width = shape.decoder_widths[level]
+            up.append(nn.ConvTranspose2d(below, width, 2, stride=2))
+            blocks.append(_convolutions(width + shape.widths[level], width, shape.decoder_convolutions))
+            below = width
+        self.up = nn.ModuleList(up)
+        self.blocks = nn.ModuleList(blocks)
+        self.output = nn.Conv2d(below, shape.fold**2, 1)
+
+    def forward(self, bottom: Tensor, skips: list[Tensor]) -> Tensor:
+        x = bottom
+        for up, block, skip in zip(self.up, self.blocks, reversed(skips), strict=True):
+            x = block(torch.cat([up(x), skip], dim=1))
+        return self.output(x)  # type: ignore[no-any-return]
+
+
+class DualUNet(nn.Module):
+    """RGB images (N, 3, H, W), 0..1 -> logits (N, 2, H, W): channel 0 vessel, channel 1 robot. H, W multiples of ``shape.stride``."""
+
+    def __init__(self, shape: UNetShape) -> None:
+        super().__init__()
+        self.shape = shape
+        channels = 3 * shape.fold**2
+        encoder = []
+        for width in shape.widths:
+            encoder.append(_convolutions(channels, width, 2))
+            channels = width
+        self.encoder = nn.ModuleList(encoder)
+        self.vessel = _Decoder(shape)
+        self.robot = _Decoder(shape)
+
+    def forward(self, image: Tensor) -> Tensor:
+        x = (image - 0.5) * 4.0
+        if self.shape.fold > 1:
+            x = nn.functional.pixel_unshuffle(x, self.shape.fold)
+        skips: list[Tensor] = []
+        for level, block in enumerate(self.encoder):
+            x = block(nn.functional.max_pool2d(x, 2) if level else x)
+            skips.append(x)
+        bottom = skips.pop()
+        outputs = [decoder(bottom, skips) for decoder in (self.vessel, self.robot)]
+        if self.shape.fold > 1:
+            outputs = [nn.functional.pixel_shuffle(output, self.shape.fold) for output in outputs]
+        return torch.cat(outputs, dim=1)
+
+
+class Probabilities(nn.Module):
+    """The network as it is exported: uint8 image (1, H, W, 3) -> probabilities (1, 2, H, W) in 0..1."""
+
+    def __init__(self, network: DualUNet) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, image: Tensor) -> Tensor:
+        return torch.sigmoid(self.network(image.permute(0, 3, 1, 2).to(torch.float32) / 255.0))

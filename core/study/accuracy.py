@@ -1,0 +1,117 @@
+"""How well perception agrees with the twin's truth, frame by frame and in sum. Errors in working pixels and degrees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from core.types import Mask, Point, Reason, Scene
+
+
+@dataclass(frozen=True, slots=True)
+class FrameScore:
+    """One frame against its truth. Errors are None where perception or truth has no pose; Dice of an absent robot is None."""
+
+    stem: str
+    vessel_dice: float
+    robot_dice: float | None
+    expected: bool
+    answered: bool
+    reason: Reason | None
+    head_error_px: float | None
+    theta_error_deg: float | None
+    theta_deg: float | None
+    true_theta_deg: float | None
+    state: str | None
+    true_state: str | None
+    confidence: float
+
+
+def dice(found: Mask, true: Mask) -> float:
+    """Dice coefficient; 1 when both are empty."""
+    total = int(found.sum()) + int(true.sum())
+    return 1.0 if total == 0 else 2.0 * int((found & true).sum()) / total
+
+
+def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[str, Any]) -> FrameScore:
+    """Compare a scene with the true masks (at working size) and a truth row as ``synth`` writes it (source pixels)."""
+    blank = np.zeros_like(vessel)
+    found_vessel = scene.masks.vessel if scene.masks is not None else blank
+    found_robot = scene.masks.robot if scene.masks is not None else blank
+    pose = scene.pose
+    state, theta = truth.get("state"), truth.get("theta_deg")
+    head_error = theta_error = None
+    if pose is not None and scene.path is not None and state is not None and theta is not None:
+        true_head: Point = (float(truth["head_xy"][0]), float(truth["head_xy"][1]))
+        true_head = scene.to_working(true_head)
+        head_error = float(np.hypot(scene.path.head[0] - true_head[0], scene.path.head[1] - true_head[1]))
+        theta_error = float(pose.theta_deg - theta)
+    return FrameScore(
+        stem=stem,
+        vessel_dice=dice(found_vessel, vessel),
+        robot_dice=dice(found_robot, robot) if robot.any() else None,
+        expected=state is not None,
+        answered=pose is not None,
+        reason=scene.refusal.reason if scene.refusal is not None else None,
+        head_error_px=head_error,
+        theta_error_deg=theta_error,
+        theta_deg=pose.theta_deg if pose is not None else None,
+        true_theta_deg=theta,
+        state=pose.state.value if pose is not None else None,
+        true_state=state,
+        confidence=pose.confidence if pose is not None else 0.0,
+    )
+
+
+def _statistics(values: Sequence[float]) -> dict[str, float] | None:
+    if not values:
+        return None
+    array = np.abs(np.array(values))
+    return {"median": float(np.median(array)), "mean": float(array.mean()), "p95": float(np.percentile(array, 95))}
+
+
+def kappa(true: Sequence[str], found: Sequence[str]) -> float | None:
+    """Cohen's kappa of two labellings; None when it is not defined."""
+    labels = sorted(set(true) | set(found))
+    table = np.zeros((len(labels), len(labels)))
+    for a, b in zip(true, found, strict=True):
+        table[labels.index(a), labels.index(b)] += 1
+    total = table.sum()
+    if total == 0:
+        return None
+    observed = np.trace(table) / total
+    chance = float((table.sum(0) * table.sum(1)).sum() / total**2)
+    return None if chance >= 1.0 else float((observed - chance) / (1 - chance))
+
+
+def summarise(scores: Sequence[FrameScore]) -> dict[str, Any]:
+    """Sums over frames. "Expected" frames are those whose truth has a pose; "empty" ones show no robot at all."""
+    expected = [s for s in scores if s.expected]
+    pairs = [(s.true_state, s.state) for s in expected if s.true_state is not None and s.state is not None]
+    thetas = [(s.true_theta_deg, s.theta_deg) for s in expected if s.theta_deg is not None and s.true_theta_deg is not None]
+    robots = [s.robot_dice for s in scores if s.robot_dice is not None]
+    empty = [s for s in scores if s.robot_dice is None]
+    refused: dict[str, int] = {}
+    for s in expected:
+        if s.reason is not None:
+            refused[s.reason.value] = refused.get(s.reason.value, 0) + 1
+    wrong = [s for s in expected if s.theta_error_deg is not None and (abs(s.theta_error_deg) > 10 or (s.head_error_px or 0) > 15)]
+    return {
+        "frames": len(scores),
+        "expected": len(expected),
+        "answered_share": len(pairs) / len(expected) if expected else None,
+        "refused": dict(sorted(refused.items())),
+        "vessel_dice": float(np.mean([s.vessel_dice for s in scores])) if scores else None,
+        "robot_dice": float(np.mean(robots)) if robots else None,
+        "head_error_px": _statistics([s.head_error_px for s in expected if s.head_error_px is not None]),
+        "theta_error_deg": _statistics([s.theta_error_deg for s in expected if s.theta_error_deg is not None]),
+        "theta_pearson": float(np.corrcoef(np.array(thetas).T)[0, 1]) if len(thetas) > 2 else None,
+        "state_agreement": sum(a == b for a, b in pairs) / len(pairs) if pairs else None,
+        "state_kappa": kappa([str(a) for a, _ in pairs], [str(b) for _, b in pairs]),
+        "confident_and_wrong_share": len(wrong) / len(pairs) if pairs else None,
+        "empty_frames": len(empty),
+        "answers_on_empty_frames": sum(s.answered for s in empty),
+    }

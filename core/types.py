@@ -1,0 +1,302 @@
+"""What flows through LumenPilot, from the camera's frame to the command that was sent.
+
+Everything here is frozen; nobody writes to an array that he was given. Points are ``(x, y)`` in pixels, x to the right, y down,
+pixel centres at integers. Inside the pipeline they are *working* pixels (longer side of the image = 640); ``Scene.to_source`` maps
+them back. "Missing" is ``None`` together with a named reason, never NaN.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+"""RGB image, shape (H, W, 3)."""
+Mask = NDArray[np.bool_]
+"""Binary mask or skeleton, shape (H, W)."""
+Points = NDArray[np.float64]
+"""Polyline or point set, shape (N, 2), columns x, y."""
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One camera image. ``captured_s`` is ``time.monotonic()`` at capture (or simulated time in lock-step)."""
+
+    index: int
+    captured_s: float
+    image: Image
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Masks:
+    """Cleaned masks and raw probabilities at working resolution, each of shape (h, w); probabilities float32 in 0..1."""
+
+    vessel: Mask
+    robot: Mask
+    vessel_probability: NDArray[np.float32]
+    robot_probability: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Skeletons:
+    """One-pixel skeletons of both masks, shape (h, w). ``bridges`` are the gaps that were joined, as pairs of (x, y) end points."""
+
+    vessel: Mask
+    robot: Mask
+    bridges: tuple[tuple[Point, Point], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotPath:
+    """The robot's centerline ``points`` (N, 2), ordered tail -> head, extended to the mask's edge at the head.
+
+    ``score`` is the weighted score of METHOD section 4; ``runner_up`` that of the best different candidate (None: there was none);
+    ``entry_on_border`` tells whether the tail lies at the image border or the insertion port; ``bridged_px`` the length of repaired
+    gaps on the path; ``radius_px`` the robot's median radius.
+    """
+
+    points: Points
+    score: float
+    runner_up: float | None
+    entry_on_border: bool
+    bridged_px: float
+    radius_px: float
+
+    @property
+    def head(self) -> Point:
+        return float(self.points[-1, 0]), float(self.points[-1, 1])
+
+    @property
+    def tail(self) -> Point:
+        return float(self.points[0, 0]), float(self.points[0, 1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraphEdge:
+    """One piece of vessel between two nodes: ``points`` (N, 2) from node ``start`` to node ``end``, lumen ``radius`` (N,) along it."""
+
+    start: int
+    end: int
+    points: Points
+    radius: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VesselGraph:
+    """Centerlines of a vessel tree (loops allowed): ``nodes`` (K, 2) are junctions and ends, ``edges`` join them.
+
+    Lengths are pixels in perception and millimetres in the twin's phantoms; the functions that walk it do not care.
+    """
+
+    nodes: Points
+    edges: tuple[GraphEdge, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Route:
+    """The way along the vessel graph to the operator's destination: ``points`` (N, 2) from the robot's place to the target."""
+
+    points: Points
+    length_px: float
+    target: Point
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Centerline:
+    """The piece of the vessel's centerline beside the head.
+
+    ``piece`` (N, 2) runs along one path of the vessel graph in the robot's direction of travel; ``nearest`` is the centerline point
+    nearest to the head; ``radius_px`` the lumen radius there; ``ambiguity`` 0..1 tells how nearly another branch fitted as well.
+    """
+
+    piece: Points
+    nearest: Point
+    radius_px: float
+    ambiguity: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """A fitted, directed line: ``end`` is where it points to, ``center`` the middle of ``start`` and ``end``."""
+
+    start: Point
+    center: Point
+    end: Point
+
+    @property
+    def direction(self) -> Point:
+        """Unit vector from ``start`` to ``end``; (0, 0) never occurs for a fitted line."""
+        dx, dy = self.end[0] - self.start[0], self.end[1] - self.start[1]
+        length = float(np.hypot(dx, dy))
+        return dx / length, dy / length
+
+
+class PoseState(StrEnum):
+    """The paper's four pose states (METHOD section 6)."""
+
+    A = "A"
+    B = "B"
+    C = "C"
+    D = "D"
+
+
+class Reason(StrEnum):
+    """Why there is no pose. The value is the name kept in files; the text shown to people is in ``REASON_TEXT``."""
+
+    UNREADABLE = "unreadable image"
+    NO_MODEL = "no model"
+    BLACK = "image black"
+    WHITE = "image overexposed"
+    BLURRED = "image blurred"
+    NO_VESSEL = "no vessel"
+    NO_ROBOT = "no robot"
+    SEVERAL_ROBOTS = "several robots"
+    TOO_SHORT = "robot too short"
+    OUTSIDE_VESSEL = "robot outside vessel"
+    GAP_TOO_LONG = "repaired gap too long"
+    AMBIGUOUS_PATH = "robot path ambiguous"
+    AMBIGUOUS_BRANCH = "ambiguous branch"
+    LOW_CONFIDENCE = "low confidence"
+    HEAD_JUMP = "head jumped"
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """No pose, and why. ``detail`` adds the measured value against its threshold, in plain words."""
+
+    reason: Reason
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.reason.value}: {self.detail}" if self.detail else self.reason.value
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """The robot's pose against the vessel's centerline (METHOD sections 5 and 6). Distances in working pixels.
+
+    ``c_head`` and ``c_tail`` are the signed distances (positive: right of the vessel's direction as seen on screen);
+    ``theta_signed_deg`` in (-180, 180] is positive when the robot points to the right of the vessel's direction.
+    """
+
+    theta_deg: float
+    theta_signed_deg: float
+    c_head_px: float
+    c_tail_px: float
+    crossed: bool
+    state: PoseState
+    confidence: float
+
+    @property
+    def d_head_px(self) -> float:
+        return abs(self.c_head_px)
+
+    @property
+    def d_tail_px(self) -> float:
+        return abs(self.c_tail_px)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """All that perception understood of one frame. Exactly one of ``pose`` and ``refusal`` is set.
+
+    ``scale`` is working pixels per source pixel; ``source_size`` is (width, height) of the frame. Stages that were not reached are
+    None. ``latency_ms`` maps stage name to milliseconds, with "total".
+    """
+
+    frame_index: int
+    captured_s: float
+    source_size: tuple[int, int]
+    scale: float
+    masks: Masks | None = None
+    skeletons: Skeletons | None = None
+    path: RobotPath | None = None
+    vessel_graph: VesselGraph | None = None
+    route: Route | None = None
+    centerline: Centerline | None = None
+    robot_vector: Vector | None = None
+    vessel_vector: Vector | None = None
+    pose: Pose | None = None
+    refusal: Refusal | None = None
+    latency_ms: dict[str, float] = field(default_factory=dict)
+
+    def to_source(self, point: Point) -> Point:
+        """Working pixels -> source pixels (pixel centres at integers in both)."""
+        return (point[0] + 0.5) / self.scale - 0.5, (point[1] + 0.5) / self.scale - 0.5
+
+    def to_working(self, point: Point) -> Point:
+        """Source pixels -> working pixels."""
+        return (point[0] + 0.5) * self.scale - 0.5, (point[1] + 0.5) * self.scale - 0.5
+
+
+class Speed(StrEnum):
+    """The paper's speed words, slowest to fastest."""
+
+    STOP = "stop"
+    SLOWEST = "slowest"
+    SLOW = "slow"
+    MODERATE = "moderate"
+    FAST = "fast"
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What the operator should do next.
+
+    ``steer_deg`` is how far to turn the head, positive = to the robot's right as seen on screen; 0 means no steering. ``speed`` is
+    the paper's word and ``advance_mm_s`` its number. ``why`` is one plain sentence. No pose -> no advice (None), never a stale one.
+    """
+
+    speed: Speed
+    advance_mm_s: float
+    steer_deg: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What is asked of the robot.
+
+    ``bend`` and ``pitch`` are the head's bend in the image plane and out of it, each -1..1 of the tendons' full pull; positive bend
+    = to the robot's right as seen on screen. ``advance_mm_s`` feeds the robot (negative retracts), ``delivery_mm_s`` the catheter
+    sheath.
+    """
+
+    bend: float = 0.0
+    pitch: float = 0.0
+    advance_mm_s: float = 0.0
+    delivery_mm_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RobotStatus:
+    """What the robot reports. ``time_s`` on the clock of the frames; tendon order: right, left, up, down (pull in mm, force in mN).
+
+    ``wall_contact_n`` is the low-passed sum of wall contact forces, known in the twin only (None on a real rig).
+    """
+
+    time_s: float
+    insertion_mm: float
+    delivery_mm: float
+    tendon_pull_mm: tuple[float, float, float, float]
+    tendon_force_mn: tuple[float, float, float, float]
+    wall_contact_n: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tick:
+    """One turn of the engine: what the window shows. ``dropped_frames`` counts since start; ``robot_truth`` exists in the twin."""
+
+    frame: Frame
+    scene: Scene
+    advice: Advice | None
+    sent: Command | None
+    status: RobotStatus | None
+    dropped_frames: int
+    frames_per_second: float
+    extras: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,93 @@
+"""The board and the table under the phantom: colour, texture, uneven light."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from hardware.twin.appearance import Appearance
+from hardware.twin.phantom import BOARD_MM
+
+F32 = NDArray[np.float32]
+
+_TABLE_MARGIN_MM = 6.0
+
+
+def smooth_noise(rng: Generator, shape: tuple[int, int], cell_px: float) -> F32:
+    """Soft random field of `shape` (H, W) in about -1..1, with features of `cell_px`."""
+    height, width = shape
+    coarse = rng.standard_normal((max(3, int(height / cell_px) + 2), max(3, int(width / cell_px) + 2)), np.float32)
+    return np.asarray(np.clip(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC) * np.float32(0.6), -1, 1))
+
+
+def paint_board(appearance: Appearance, grid_mm: F32, pixels_per_mm: float, rng: Generator) -> F32:
+    """Board with texture on a table, shape (H, W, 3), float32 in 0..1, before any light falls on it unevenly."""
+    shape = grid_mm.shape[:2]
+    board = np.empty((*shape, 3), np.float32)
+    board[:] = np.asarray(appearance.board_rgb, np.float32)
+    board += (_texture(appearance, grid_mm, pixels_per_mm, rng) * np.float32(0.25 * appearance.texture_strength))[..., None]
+    if appearance.material == "xray":
+        return np.clip(board, 0, 1)
+    # Beyond the board lies the table; a thin dark line and a soft shadow part the two.
+    outside = np.maximum(
+        np.abs(grid_mm[..., 0] - np.float32(BOARD_MM[0] / 2)) - np.float32(BOARD_MM[0] / 2 + _TABLE_MARGIN_MM),
+        np.abs(grid_mm[..., 1] - np.float32(BOARD_MM[1] / 2)) - np.float32(BOARD_MM[1] / 2 + _TABLE_MARGIN_MM),
+    )
+    if float(outside.max()) > 0:
+        share = np.clip(outside * np.float32(pixels_per_mm) + np.float32(0.5), 0, 1)[..., None]
+        table = np.asarray(appearance.table_rgb, np.float32) * (1 + 0.12 * smooth_noise(rng, shape, 5 * pixels_per_mm))[..., None]
+        table *= (1 - 0.5 * np.exp(-np.maximum(outside, 0) / np.float32(2.5)))[..., None]
+        board = board * (1 - share) + table * share
+    return np.clip(board, 0, 1)
+
+
+def light_field(appearance: Appearance, grid_mm: F32, rng: Generator) -> F32:
+    """Uneven lamp light, (H, W), about 1: brighter towards the lamp, with one soft random stain of light."""
+    angle = np.deg2rad(appearance.light_deg)
+    along = (grid_mm[..., 0] - np.float32(BOARD_MM[0] / 2)) * np.float32(np.cos(angle) / 100)
+    along += (grid_mm[..., 1] - np.float32(BOARD_MM[1] / 2)) * np.float32(np.sin(angle) / 100)
+    soft = smooth_noise(rng, grid_mm.shape[:2], grid_mm.shape[1] / 2.5)
+    return np.asarray(np.clip(1 + np.float32(appearance.light_gradient) * (0.6 * along + 0.4 * soft), 0.3, 1.7), np.float32)
+
+
+def _texture(appearance: Appearance, grid_mm: F32, pixels_per_mm: float, rng: Generator) -> F32:
+    """Texture in about -1..1, (H, W)."""
+    shape, kind = grid_mm.shape[:2], appearance.board_texture
+    if appearance.material == "xray":
+        return _tissue(grid_mm, shape, pixels_per_mm, rng)
+    if kind == "speckle":
+        return 0.5 * smooth_noise(rng, shape, 1.2 * pixels_per_mm) + 0.5 * smooth_noise(rng, shape, 12 * pixels_per_mm)
+    if kind == "wood":
+        bend = 3.0 * smooth_noise(rng, shape, 30 * pixels_per_mm)
+        rings = np.sin(np.float32(1.1) * (grid_mm[..., 1] + bend) + 2 * smooth_noise(rng, shape, 14 * pixels_per_mm))
+        return np.asarray(0.6 * rings + 0.4 * _streaks(rng, shape, pixels_per_mm), np.float32)
+    if kind == "grid":
+        step = np.float32(rng.choice([5.0, 10.0, 12.7]))
+        cell = np.minimum(np.abs((grid_mm / step + np.float32(0.5)) % 1 - np.float32(0.5)).min(axis=2) * step, 1)
+        sign = -1.0 if np.mean(appearance.board_rgb) > 0.4 else 1.0
+        return np.asarray(sign * 1.4 * np.clip(1.3 - cell * np.float32(min(pixels_per_mm, 4.0)) * 1.2, 0, 1), np.float32)
+    if kind == "brushed":
+        return _streaks(rng, shape, pixels_per_mm)
+    if kind == "cloth":
+        weave = np.sin(grid_mm[..., 0] * np.float32(4.0)) * np.sin(grid_mm[..., 1] * np.float32(4.0))
+        return np.asarray(0.4 * weave + 0.5 * smooth_noise(rng, shape, 25 * pixels_per_mm), np.float32)
+    return 0.15 * smooth_noise(rng, shape, 30 * pixels_per_mm)
+
+
+def _streaks(rng: Generator, shape: tuple[int, int], pixels_per_mm: float) -> F32:
+    """Fine lines along the board's length: brushed metal, printed layers, grain."""
+    height, width = shape
+    coarse = rng.standard_normal((max(3, int(height / (0.5 * pixels_per_mm))), max(3, width // 60)), np.float32)
+    return np.asarray(np.clip(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR) * 0.6, -1, 1), np.float32)
+
+
+def _tissue(grid_mm: F32, shape: tuple[int, int], pixels_per_mm: float, rng: Generator) -> F32:
+    """Soft tissue and a few bone-like bands under X-rays."""
+    field = 0.6 * smooth_noise(rng, shape, 40 * pixels_per_mm) + 0.3 * smooth_noise(rng, shape, 9 * pixels_per_mm)
+    for _ in range(int(rng.integers(0, 4))):
+        angle, place, wide = rng.uniform(0, np.pi), rng.uniform(-60, 60), rng.uniform(4, 16)
+        across = (grid_mm[..., 0] - 100) * np.float32(np.cos(angle)) + (grid_mm[..., 1] - 75) * np.float32(np.sin(angle))
+        field -= np.float32(rng.uniform(0.15, 0.5)) / (1 + np.exp((np.abs(across - np.float32(place)) - np.float32(wide)) * np.float32(1.5)))
+    return np.asarray(field, np.float32)

@@ -1,0 +1,121 @@
+"""The MuJoCo model of robot and walls. Units mm, kg, s, so forces are millinewtons; board plane z = 0, x right, y down, z away
+from the camera. Numbers come from measurements of stability and bending; they are not calibrated to a real rig.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from hardware.twin.walls import Port, Wall
+
+ROBOT_RADIUS_MM = 1.25
+LINK_MM = 2.0
+STEERABLE_LINKS = 10
+TENDONS = ("right", "left", "up", "down")
+TIMESTEP_S = 0.002
+LUMEN_HALF_HEIGHT_MM = 6.0
+TENDON_OFFSET_MM = 1.0
+FEED_KP_MN_MM, FEED_KV = 2000.0, 200.0
+_TENDON_KP_MN_MM, _TENDON_KV, _TENDON_MAX_MN = 2000.0, 40.0, 4000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Specimen:
+    """One robot's mechanical properties; no two are alike.
+
+    ``shaft_ei`` and ``tip_ei`` are bending stiffnesses (mN mm2), ``damping_s`` is damping over stiffness, ``tip_set_deg`` the bend that
+    the steerable part keeps with slack tendons (positive: right), ``friction`` that against the wall.
+    """
+
+    shaft_ei: float = 2.5e4
+    tip_ei: float = 8e3
+    damping_s: float = 0.02
+    friction: float = 0.1
+    tip_set_deg: float = 0.0
+    feed_force_mn: float = 1500.0
+
+    @staticmethod
+    def drawn(seed: int) -> Specimen:
+        """The nominal robot for seed 0, else one drawn at random."""
+        if seed == 0:
+            return Specimen()
+        rng = np.random.default_rng([seed, 40427])
+        return Specimen(
+            shaft_ei=2.5e4 * rng.uniform(0.8, 1.5),
+            tip_ei=8e3 * rng.uniform(0.9, 1.15),
+            friction=rng.uniform(0.06, 0.15),
+            tip_set_deg=float(np.clip(rng.normal(0.0, 2.0), -5.0, 5.0)),
+        )
+
+
+def build_model(walls: list[Wall], port: Port, links: int, specimen: Specimen) -> mujoco.MjModel:
+    """Compile the model: a chain of `links` capsules on a slide along the port's axis, with its tip at the port for slide position 0.
+
+    Joint order: slide, then one planar hinge per link, followed by the pitch hinge where the link is steerable. Actuator order: right,
+    left, up, down, feed.
+    """
+    x, y = port.point
+    wall_geoms = "".join(
+        f'<geom class="wall" type="box" size="{wall.half_length + 0.01:.5f} {wall.half_thickness:.5f} {LUMEN_HALF_HEIGHT_MM + 1}" '
+        f'pos="{wall.x:.5f} {wall.y:.5f} 0" euler="0 0 {wall.angle_rad:.6f}"/>'
+        for wall in walls
+    )
+    sites = range(links - STEERABLE_LINKS - 1, links)
+    tendons = "".join(
+        f'<spatial name="{name}">' + "".join(f'<site site="{name}{link}"/>' for link in sites) + "</spatial>" for name in TENDONS
+    )
+    pulls = "".join(
+        f'<position name="{name}" tendon="{name}" kp="{_TENDON_KP_MN_MM}" kv="{_TENDON_KV}" forcerange="-{_TENDON_MAX_MN} 0"/>'
+        for name in TENDONS
+    )
+    return mujoco.MjModel.from_xml_string(f"""
+<mujoco>
+  <compiler angle="radian" autolimits="true"/>
+  <option timestep="{TIMESTEP_S}" gravity="0 0 0" integrator="discrete" solver="Newton" iterations="20" tolerance="1e-8"/>
+  <default>
+    <joint armature="0.05"/>
+    <geom condim="3" friction="{specimen.friction} 0.001 0.0001" solref=".004 1" solimp=".9 .95 .05"/>
+    <default class="wall"><geom contype="2" conaffinity="1"/></default>
+    <default class="link">
+      <geom type="capsule" size="{ROBOT_RADIUS_MM}" fromto="0 0 0 {LINK_MM} 0 0" mass="6e-5" contype="1" conaffinity="2"/>
+    </default>
+  </default>
+  <worldbody>
+    {wall_geoms}
+    <geom class="wall" type="plane" size="1 1 1" pos="0 0 -{LUMEN_HALF_HEIGHT_MM}"/>
+    <geom class="wall" type="plane" size="1 1 1" pos="0 0 {LUMEN_HALF_HEIGHT_MM}" euler="{np.pi} 0 0"/>
+    <body name="base" pos="{x:.6f} {y:.6f} 0" euler="0 0 {port.angle_rad:.9f}">
+      <joint name="feed" type="slide" axis="1 0 0" range="0 {links * LINK_MM}" armature="0.01"/>
+      <inertial pos="0 0 0" mass="0.001" diaginertia="0.01 0.01 0.01"/>
+      {_chain(links, specimen)}
+    </body>
+  </worldbody>
+  <tendon>{tendons}</tendon>
+  <actuator>
+    {pulls}
+    <position name="feed" joint="feed" kp="{FEED_KP_MN_MM}" kv="{FEED_KV}" forcerange="-{specimen.feed_force_mn} {specimen.feed_force_mn}"/>
+  </actuator>
+</mujoco>""")
+
+
+def _chain(links: int, specimen: Specimen) -> str:
+    """The nested bodies of the chain, written from the base outward."""
+    opening, reach = [], -links * LINK_MM
+    for link in range(links):
+        steerable = link >= links - STEERABLE_LINKS
+        stiffness = (specimen.tip_ei if steerable else specimen.shaft_ei) / LINK_MM
+        hinge = f'stiffness="{stiffness:.6g}" damping="{stiffness * specimen.damping_s:.6g}" range="-0.45 0.45"'
+        set_rad = np.radians(specimen.tip_set_deg) / STEERABLE_LINKS if steerable else 0.0
+        opening.append(f'<body pos="{reach if link == 0 else LINK_MM} 0 0"><joint axis="0 0 1" {hinge} springref="{set_rad:.6g}"/>')
+        if steerable:
+            # Positive pitch lifts the tip towards the camera (-z).
+            opening.append(f'<joint axis="0 1 0" {hinge}/>')
+        opening.append('<geom class="link"/>')
+        if link >= links - STEERABLE_LINKS - 1:
+            offset = TENDON_OFFSET_MM
+            places = {"right": (offset, 0.0), "left": (-offset, 0.0), "up": (0.0, -offset), "down": (0.0, offset)}
+            opening.extend(f'<site name="{name}{link}" pos="{LINK_MM / 2} {side} {depth}"/>' for name, (side, depth) in places.items())
+    return "".join(opening) + "</body>" * links

@@ -1,0 +1,28 @@
+"""Vascular phantoms as centerline graphs with a lumen radius along the way, in millimetres on a 200 x 150 mm board."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from core.types import VesselGraph
+
+BOARD_MM = (200.0, 150.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Phantom:
+    """A phantom. ``graph`` is in mm with points every 0.5 mm or denser; the robot enters at node ``port`` (a leaf)."""
+
+    name: str
+    title: str
+    graph: VesselGraph
+    port: int
+
+    @property
+    def targets(self) -> tuple[int, ...]:
+        """Leaf nodes that the robot can be sent to (all leaves but the port)."""
+        degree = [0] * len(self.graph.nodes)
+        for edge in self.graph.edges:
+            degree[edge.start] += 1
+            degree[edge.end] += 1
+        return tuple(node for node, count in enumerate(degree) if count == 1 and node != self.port)

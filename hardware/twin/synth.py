@@ -1,0 +1,192 @@
+"""Labelled data sets from the twin: random phantoms, physical robot shapes, random looks, exact masks and truth.
+
+Frame ``i`` of a set belongs to episode ``i // FRAMES_PER_EPISODE``; an episode is one random phantom (seed = first seed + episode)
+through which the robot is driven once, with a look that changes every few frames. A frame depends on its episode's seed alone, so a
+set can be continued after an interruption, and two sets are disjoint when their seed ranges are.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from core.config import PerceptionConfig
+from core.learning.dataset import write_mask, write_png
+from core.types import Points
+from hardware.twin.appearance import Appearance, make_view, random_appearance
+from hardware.twin.autopilot import RouteFollower
+from hardware.twin.phantom import Phantom
+from hardware.twin.phantoms import make_phantom
+from hardware.twin.physics import TwinPhysics
+from hardware.twin.renderer import Picture, Renderer
+from hardware.twin.truth import truth_of
+
+FRAMES_PER_EPISODE = 10
+FRAMES_PER_LOOK = 2
+_EMPTY_SHARE = 0.03
+_STEP_S = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class SynthPlan:
+    """What to write. ``families`` limits the looks (None: all), ``phantom`` fixes the phantom (None: random ones)."""
+
+    out: Path
+    count: int
+    seed: int
+    size: tuple[int, int] = (640, 480)
+    families: tuple[str, ...] | None = None
+    phantom: str | None = None
+
+    @property
+    def episodes(self) -> int:
+        return -(-self.count // FRAMES_PER_EPISODE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelledFrame:
+    """One frame of an episode: picture, masks, and truth as plain types."""
+
+    stem: str
+    picture: Picture
+    truth: dict[str, Any]
+
+
+def robot_shapes(phantom: Phantom, seed: int, count: int) -> list[tuple[Points, float, float]]:
+    """Drive the robot once through a phantom; `count` moments as (points mm tail->head, sheath mm, clearance mm)."""
+    rng = np.random.default_rng((seed, 11))
+    physics = TwinPhysics(phantom, seed)
+    target = int(rng.choice(phantom.targets))
+    follower = RouteFollower(phantom, target, lookahead_mm=float(rng.uniform(6, 14)), wander=float(rng.choice((0.0, 0.4, 0.9))), seed=seed)
+    moments = np.sort(rng.uniform(0.12, 0.98, count)) * follower.length_mm
+    shapes: list[tuple[Points, float, float]] = []
+    sheath_speed = float(rng.choice((0.0, 0.0, 6.0, 14.0)))
+    for _ in range(int(3.0 * follower.length_mm / 25.0 / _STEP_S)):
+        command = follower.command(physics.robot_points_mm(), 25.0, _STEP_S)
+        physics.step(type(command)(command.bend, 0.0, command.advance_mm_s, sheath_speed), _STEP_S)
+        while len(shapes) < count and physics.insertion_mm >= moments[len(shapes)]:
+            shapes.append((physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm()))
+            # A free wiggle between the moments: not every picture shows a robot that follows its route.
+            physics.step(type(command)(float(rng.uniform(-1, 1)), 0.0, 0.0, 0.0), float(rng.uniform(0.0, 0.15)))
+        if len(shapes) == count:
+            break
+    while len(shapes) < count:  # it got stuck: its last shape, seen by other looks
+        shapes.append((physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm()))
+    return shapes
+
+
+def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
+    """The frames of one episode, in order."""
+    seed = plan.seed + episode
+    phantom = make_phantom(plan.phantom or f"random:{seed}")
+    rng = np.random.default_rng((seed, 13))
+    config = PerceptionConfig()
+    shapes = robot_shapes(phantom, seed, FRAMES_PER_EPISODE)
+    # The order is shuffled so that a look sees short and long robots.
+    order = rng.permutation(FRAMES_PER_EPISODE)
+    first = episode * FRAMES_PER_EPISODE
+    for place in range(min(FRAMES_PER_EPISODE, plan.count - first)):
+        if place % FRAMES_PER_LOOK == 0:
+            appearance = _look(plan, seed * 16 + place // FRAMES_PER_LOOK, rng)
+            view = make_view(appearance, plan.size, phantom)
+            renderer = Renderer(phantom, appearance, plan.size, seed)
+        points, sheath_mm, clearance_mm = shapes[order[place]]
+        empty = bool(rng.random() < _EMPTY_SHARE)
+        picture = renderer.render(None if empty else points, 0.0 if empty else sheath_mm, noise_seed=place)
+        truth = {} if empty else truth_of(phantom, view, points, appearance.robot_radius_mm, config).to_json()
+        stem = f"{first + place:06d}"
+        row = {"stem": stem, "seed": seed, "phantom": phantom.name, "family": appearance.family, "clearance_mm": clearance_mm}
+        yield LabelledFrame(stem, picture, row | {"robot_visible": bool(picture.robot.any())} | truth)
+
+
+def _look(plan: SynthPlan, look_seed: int, rng: np.random.Generator) -> Appearance:
+    family = str(rng.choice(plan.families)) if plan.families else None
+    return random_appearance(look_seed, family)
+
+
+def _write_episode(plan: SynthPlan, episode: int) -> int:
+    """Write one episode; its truth file comes last, by rename, and marks it as complete."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    rows = []
+    for frame in episode_frames(plan, episode):
+        write_png(plan.out / "images" / f"{frame.stem}.png", frame.picture.image)
+        write_mask(plan.out / "masks" / f"{frame.stem}_vessel.png", frame.picture.vessel)
+        write_mask(plan.out / "masks" / f"{frame.stem}_robot.png", frame.picture.robot)
+        rows.append(json.dumps(frame.truth, allow_nan=False))
+    path = _episode_file(plan, episode)
+    scratch = path.with_suffix(".new")
+    scratch.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    scratch.replace(path)
+    return len(rows)
+
+
+def _episode_file(plan: SynthPlan, episode: int) -> Path:
+    return plan.out / "episodes" / f"{episode:05d}.jsonl"
+
+
+def _is_complete(plan: SynthPlan, episode: int) -> bool:
+    path = _episode_file(plan, episode)
+    expected = min(FRAMES_PER_EPISODE, plan.count - episode * FRAMES_PER_EPISODE)
+    return path.is_file() and len(path.read_text(encoding="utf-8").splitlines()) >= expected
+
+
+class SynthError(Exception):
+    """The set cannot be written; the message is one line and says what to do."""
+
+
+def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int], None] = lambda _: None) -> int:
+    """Write the set; frames that are there already are kept. Returns the number of frames in it.
+
+    `on_progress` is given the number of frames that were completed since its last call. An interruption (Ctrl-C) loses the episodes
+    in hand only; the same call goes on from there.
+
+    Raises
+    ------
+    SynthError
+        The folder holds a set of another plan, or cannot be written.
+    """
+    _prepare(plan)
+    missing = [episode for episode in range(plan.episodes) if not _is_complete(plan, episode)]
+    on_progress(plan.count - sum(min(FRAMES_PER_EPISODE, plan.count - e * FRAMES_PER_EPISODE) for e in missing))
+    if workers <= 1:
+        for episode in missing:
+            on_progress(_write_episode(plan, episode))
+    elif missing:
+        # Spawned, not forked: physics and OpenCV own threads that a fork would cut off.
+        with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+            jobs = [pool.submit(_write_episode, plan, episode) for episode in missing]
+            try:
+                for job in as_completed(jobs):
+                    on_progress(job.result())
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+    rows = [_episode_file(plan, episode).read_text(encoding="utf-8") for episode in range(plan.episodes)]
+    (plan.out / "truth.jsonl").write_text("".join(rows), encoding="utf-8")
+    return plan.count
+
+
+def _prepare(plan: SynthPlan) -> None:
+    described = {"seed": plan.seed, "size": list(plan.size), "families": plan.families and list(plan.families), "phantom": plan.phantom}
+    path = plan.out / "plan.json"
+    try:
+        for name in ("images", "masks", "episodes"):
+            (plan.out / name).mkdir(parents=True, exist_ok=True)
+        if path.is_file():
+            if json.loads(path.read_text(encoding="utf-8")) != described:
+                raise SynthError(f"{plan.out}: holds a set with other settings ({path.name}); choose another folder")
+        else:
+            path.write_text(json.dumps(described) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise SynthError(f"{plan.out}: cannot be written ({error.strerror}); choose another folder") from None
+    except ValueError:
+        raise SynthError(f"{path}: damaged; delete the folder and write the set again") from None

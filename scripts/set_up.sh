@@ -1,0 +1,123 @@
+#!/usr/bin/env bash
+# Makes .venv ready to run LumenPilot: Python 3.11, system libraries, pinned packages. Does nothing when that is done already.
+# PYTHON=/path/to/python3.11 chooses the interpreter.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+venv=.venv
+stamp=$venv/.ready # holds what .venv was made from; written last, so an interrupted set-up leaves none
+
+# Shared library that is missing on a bare Debian 12 -> the package that has it. (Found by trying, not by reading: docs/bench.md.)
+libraries="
+libGL.so.1 libgl1
+libEGL.so.1 libegl1
+libxkbcommon.so.0 libxkbcommon0
+libfontconfig.so.1 libfontconfig1
+libglib-2.0.so.0 libglib2.0-0
+libdbus-1.so.3 libdbus-1-3
+libusb-1.0.so.0 libusb-1.0-0
+libxcb-cursor.so.0 libxcb-cursor0
+libxcb-icccm.so.4 libxcb-icccm4
+libxcb-keysyms.so.1 libxcb-keysyms1
+libxcb-shape.so.0 libxcb-shape0
+libxkbcommon-x11.so.0 libxkbcommon-x11-0
+"
+
+say() { printf '%s\n' "$*" >&2; }
+
+stop() {
+    say "set-up: $*"
+    exit 1
+}
+
+is_python_311() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; }
+
+find_python() {
+    local candidate
+    for candidate in ${PYTHON:-python3.11 python3}; do
+        if is_python_311 "$candidate"; then
+            command -v "$candidate"
+            return
+        fi
+    done
+    stop "Python 3.11 is needed (the last RealSense library that knows the L515 camera has no build for 3.12), but
+  ${PYTHON:-python3.11 or python3} is not one. Debian 12: sudo apt-get install python3.11 python3.11-venv
+  Elsewhere install it beside your own, then: make PYTHON=/path/to/python3.11 run"
+}
+
+# Debian packages that this machine lacks, one line.
+missing_packages() {
+    local missing=()
+    "$1" -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3.11-venv)
+    # shellcheck disable=SC2086 # the table is meant to be split into words
+    mapfile -t -O "${#missing[@]}" missing < <("$1" - $libraries <<'PYTHON_CODE'
+import ctypes
+import sys
+
+for library, package in zip(sys.argv[1::2], sys.argv[2::2]):
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        print(package)
+PYTHON_CODE
+    )
+    echo "${missing[*]}"
+}
+
+install_system_packages() {
+    local python=$1 missing
+    missing=$(missing_packages "$python")
+    [[ -n $missing ]] || return 0
+    local install="apt-get install --yes --no-install-recommends $missing"
+    if ! command -v apt-get >/dev/null; then
+        stop "these libraries are missing (Debian's names): $missing. Install your system's packages of them, then run make again."
+    fi
+    if ((EUID != 0)); then
+        stop "system libraries are missing. Install them with
+  sudo apt-get update && sudo $install
+and run make again."
+    fi
+    say "set-up: installing system packages: $missing"
+    export DEBIAN_FRONTEND=noninteractive
+    # An unreachable extra source makes `update` fail; what counts is whether the packages can be had.
+    apt-get update -qq </dev/null || say "set-up: 'apt-get update' failed, trying with the package lists at hand"
+    # shellcheck disable=SC2086
+    $install -qq -o DPkg::Lock::Timeout=120 </dev/null || stop "system packages could not be installed: $install"
+    missing=$(missing_packages "$python")
+    [[ -z $missing ]] || stop "still missing after installation: $missing"
+}
+
+install_python_packages() {
+    local python=$1
+    if [[ ! -f $stamp ]]; then
+        say "set-up: making $venv with $python (the first time takes some minutes)"
+        "$python" -m venv --clear "$venv"
+    fi
+    rm -f "$stamp"
+    # Wheels only: nothing is compiled here, and a machine that has no wheel is told so at once.
+    "$venv/bin/python" -m pip install --no-input --disable-pip-version-check --only-binary :all: --requirement requirements.lock
+    # openvino brings this package and reports every import with it; without it, openvino falls back to its own silent stub.
+    "$venv/bin/python" -m pip uninstall --quiet --yes --disable-pip-version-check openvino-telemetry
+}
+
+main() {
+    local wanted
+    wanted=$(cat requirements.lock scripts/set_up.sh | sha256sum)
+    if [[ -f $stamp && $(<"$stamp") == "$wanted" ]] && is_python_311 "$venv/bin/python"; then
+        return
+    fi
+    exec 9<requirements.lock
+    flock 9 # a second `make` waits here and then finds the work done
+    if [[ -f $stamp && $(<"$stamp") == "$wanted" ]] && is_python_311 "$venv/bin/python"; then
+        return
+    fi
+    local python
+    python=$(find_python)
+    install_system_packages "$python"
+    is_python_311 "$venv/bin/python" || rm -f "$stamp" # its Python is gone: make it anew
+    install_python_packages "$python"
+    echo "$wanted" >"$stamp"
+    say "set-up: done"
+}
+
+main

@@ -1,0 +1,68 @@
+from pathlib import Path
+
+import pytest
+
+from core.config import Config, ConfigError, load_config
+
+
+def _write(folder: Path, text: str) -> Path:
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_defaults_and_presets_load() -> None:
+    assert load_config().twin.phantom == "tree"
+    paper = load_config(preset="paper").perception
+    assert paper.gaps.rule == "every_pair"
+    assert paper.path.cosine == "absolute"
+    assert not paper.cleaning.extend_ends
+
+
+def test_a_users_file_wins_over_the_preset_and_keeps_the_rest(tmp_path: Path) -> None:
+    path = _write(tmp_path, "[perception.gaps]\ngap_threshold_px = 12\n")
+    config = load_config(path, preset="paper")
+    assert config.perception.gaps.gap_threshold_px == 12
+    assert config.perception.gaps.rule == "every_pair"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[perception.pose]\nd_allow_px = -3\n", ["perception.pose.d_allow_px", "> 0 and <= 200", "-3"]),
+        ("[perception.pose]\nd_allow = 3\n", ["perception.pose.d_allow", "unknown key"]),
+        ("[perception.pose]\nd_allow_px = 'wide'\n", ["perception.pose.d_allow_px", "'wide'"]),
+        ("[perception.pose]\nd_allow_px = nan\n", ["perception.pose.d_allow_px"]),
+        ("[perception.gaps]\nrule = 'nearest'\n", ["perception.gaps.rule", "components", "every_pair"]),
+        ("[perception\n", ["not valid TOML"]),
+        ("perception = 3\n", ["perception"]),
+    ],
+)
+def test_a_bad_file_is_one_line_with_file_key_and_range(tmp_path: Path, text: str, words: list[str]) -> None:
+    path = _write(tmp_path, text)
+    with pytest.raises(ConfigError) as caught:
+        load_config(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert str(path) in message
+    for word in words:
+        assert word in message
+
+
+def test_missing_file_and_unknown_preset_are_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no such configuration file"):
+        load_config(tmp_path / "none.toml")
+    with pytest.raises(ConfigError, match=r"unknown preset 'papre'; known: paper"):
+        load_config(preset="papre")
+
+
+def test_a_binary_file_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "x.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match="UTF-8"):
+        load_config(path)
+
+
+def test_the_configuration_cannot_be_changed_in_place() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        Config().twin = None  # type: ignore[misc, assignment]

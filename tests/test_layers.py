@@ -1,0 +1,145 @@
+"""The house's arrows: app -> hardware -> core, Qt in app only, every vendor's SDK in its own driver only."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+LAYERS = {"core": {"core"}, "hardware": {"hardware", "core"}, "app": {"app", "hardware", "core"}}
+QT = {"PySide6", "shiboken6", "pyqtgraph"}
+
+# Who may import what talks to a device, a simulator or the network. A folder stands for all files in it.
+ONLY_IN = {
+    "mujoco": "hardware/twin",
+    "pyrealsense2": "hardware/cameras/realsense.py",
+    "dynamixel_sdk": "hardware/servos",
+    "serial": "hardware/servos",
+    "PySide6": "app",
+    "shiboken6": "app",
+    "pyqtgraph": "app",
+    "typer": "app",
+    "rich": "app",
+}
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """Our modules by dotted name; a package is called as its folder."""
+    found = {}
+    for layer in LAYERS:
+        for path in sorted((ROOT / layer).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imported_names(source: str, package: str) -> set[str]:
+    """Dotted names that a source imports, wherever: at the top, in functions, under TYPE_CHECKING, by import_module("...")."""
+    names = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package.rsplit(".", node.level - 1)[0] if node.level else ""
+            origin = ".".join(part for part in (base, node.module) if part)
+            names.add(origin)
+            names.update(f"{origin}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("import_module", "__import__", "importorskip")):
+            names.update(arg.value for arg in node.args[:1] if isinstance(arg, ast.Constant) and isinstance(arg.value, str))
+    return names
+
+
+@cache
+def imports_of(module: str) -> frozenset[str]:
+    path = modules()[module]
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    return frozenset(imported_names(path.read_text(encoding="utf-8"), package))
+
+
+@cache
+def reached_from(module: str) -> dict[str, tuple[str, ...]]:
+    """Top-level packages that importing `module` can lead to, each with the chain of our modules that leads there."""
+    reached: dict[str, tuple[str, ...]] = {}
+    seen, waiting = {module}, [(module, (module,))]
+    while waiting:
+        current, chain = waiting.pop()
+        for name in imports_of(current):
+            top = name.partition(".")[0]
+            reached.setdefault(top, chain)
+            if name in modules() and name not in seen:
+                seen.add(name)
+                waiting.append((name, (*chain, name)))
+    return reached
+
+
+def test_the_import_reader_sees_every_way_to_import() -> None:
+    source = """
+import a.b
+from c import d
+from . import e
+from ..f import g
+def late():
+    import h
+if TYPE_CHECKING:
+    from i.j import k
+importlib.import_module("l.m")
+"""
+    assert imported_names(source, "x.y") == {
+        "a.b", "c", "c.d", "x.y", "x.y.e", "x.f", "x.f.g", "h", "i.j", "i.j.k", "l.m",
+    }  # fmt: skip
+
+
+def test_there_is_a_house() -> None:
+    assert {name.partition(".")[0] for name in modules()} == set(LAYERS)
+
+
+@pytest.mark.parametrize("module", modules())
+def test_arrows_run_one_way(module: str) -> None:
+    allowed = LAYERS[module.partition(".")[0]]
+    for layer in set(LAYERS) - allowed:
+        assert layer not in reached_from(module), f"{' -> '.join(reached_from(module)[layer])} -> {layer}"
+
+
+@pytest.mark.parametrize("module", [name for name in modules() if not name.startswith("app")])
+def test_no_qt_below_the_app(module: str) -> None:
+    for package in QT:
+        assert package not in reached_from(module), f"{' -> '.join(reached_from(module)[package])} -> {package}"
+
+
+@pytest.mark.parametrize("module", [name for name in modules() if name.startswith("core")])
+def test_core_needs_no_device(module: str) -> None:
+    for package in ("mujoco", "pyrealsense2", "dynamixel_sdk", "serial", "av"):
+        assert package not in reached_from(module), f"{' -> '.join(reached_from(module)[package])} -> {package}"
+
+
+@pytest.mark.parametrize("package", ONLY_IN)
+def test_devices_stay_in_their_drivers(package: str) -> None:
+    home = ROOT / ONLY_IN[package]
+    strays = [
+        module
+        for module, path in modules().items()
+        if package in {name.partition(".")[0] for name in imports_of(module)} and not path.is_relative_to(home)
+    ]
+    assert not strays, f"{package} belongs in {ONLY_IN[package]}"
+
+
+def test_packages_hold_nothing_themselves() -> None:
+    full = [str(path.relative_to(ROOT)) for path in modules().values() if path.name == "__init__.py" and path.read_text().strip()]
+    assert not full, "__init__.py is empty in this house"
+
+
+def test_every_folder_with_code_is_a_package() -> None:
+    bare = {str(path.parent.relative_to(ROOT)) for path in modules().values() if not (path.parent / "__init__.py").is_file()}
+    assert not bare
+
+
+def test_main_only_hands_over() -> None:
+    tree = ast.parse((ROOT / "main.py").read_text(encoding="utf-8"))
+    ours = {name for name in imported_names(ast.unparse(tree), "") if name.partition(".")[0] not in sys.stdlib_module_names}
+    assert ours == {"app.cli", "app.cli.main"}
+    assert not [node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
