@@ -87,7 +87,7 @@ def perceive(
 def synth(
     out: Annotated[Path, typer.Option(help="folder of the set; an interrupted one is continued")],
     count: Annotated[int, typer.Option(min=1, help="frames")],
-    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; ten frames use one seed")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; sixteen frames use one seed")] = 0,
     width: Annotated[int, typer.Option(min=160, max=4096)] = 640,
     height: Annotated[int, typer.Option(min=120, max=4096)] = 480,
     family: Annotated[list[str] | None, typer.Option(help="only these families of looks")] = None,

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import theme
+from app import palette, theme
 from app.pace import Pace
 from app.wording import advice_headline
 from core.types import Advice, PoseState, Speed
@@ -62,8 +62,8 @@ class AdviceLine(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.setPen(QPen(QColor(theme.LINE), 1))
-        painter.setBrush(QColor(theme.PANEL))
+        painter.setPen(QPen(QColor(palette.LINE), 1))
+        painter.setBrush(QColor(palette.PANEL))
         painter.drawRoundedRect(frame, theme.RADIUS, theme.RADIUS)
         if self._advice is None:
             self._paint_nothing(painter, frame)
@@ -72,12 +72,12 @@ class AdviceLine(QWidget):
         painter.end()
 
     def _paint_nothing(self, painter: QPainter, frame: QRectF) -> None:
-        painter.setPen(QColor(theme.TEXT_FAINT))
+        painter.setPen(QColor(palette.TEXT_FAINT))
         painter.setFont(theme.semi_bold(20))
         painter.drawText(frame.adjusted(20, 0, -20, 0), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self.text)
 
     def _paint_advice(self, painter: QPainter, frame: QRectF, advice: Advice) -> None:
-        accent = theme.STATE_COLOUR[self._state]
+        accent = palette.STATE_COLOUR[self._state]
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(accent))
         painter.drawRoundedRect(QRectF(frame.left(), frame.top(), 6, frame.height()), 3, 3)
@@ -86,10 +86,10 @@ class AdviceLine(QWidget):
         left = frame.left() + 168
         width = frame.right() - left - 16
         headline = advice_headline(advice)
-        painter.setPen(QColor(theme.TEXT))
+        painter.setPen(QColor(palette.TEXT))
         painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), headline, int(width)))
         painter.drawText(QRectF(left, frame.top() + 6, width, 34), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, headline)
-        painter.setPen(QColor(theme.TEXT_DIM))
+        painter.setPen(QColor(palette.TEXT_DIM))
         why_font = theme.font(15)
         painter.setFont(why_font)
         why = theme.elide(why_font, advice.why, int(width))
@@ -113,11 +113,11 @@ def _paint_arrow(painter: QPainter, middle: QPointF, size: float, turn_deg: floa
 def _paint_chevrons(painter: QPainter, left_middle: QPointF, count: int) -> None:
     """Four chevrons, `count` of them lit; a square where the advice is to stop."""
     if count == 0:
-        painter.setBrush(QColor(theme.TEXT))
+        painter.setBrush(QColor(palette.TEXT))
         painter.drawRect(QRectF(left_middle.x() + 20, left_middle.y() - 11, 22, 22))
         return
     for k in range(max(_CHEVRONS.values())):
-        pen = QPen(QColor(theme.TEXT if k < count else theme.LINE), 4.0)
+        pen = QPen(QColor(palette.TEXT if k < count else palette.LINE), 4.0)
         pen.setCapStyle(Qt.PenCapStyle.RoundCap)
         pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
         painter.setPen(pen)

@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import theme
+from app import palette, theme
 from app.pace import Pace
 from app.wording import QUANTITY_MEANING, side
 from core.types import Pose
@@ -57,7 +57,7 @@ class DistanceBars(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         row = (self.height() - 20) / 2
-        for k, (name, colour_name) in enumerate((("d_head", theme.D_HEAD), ("d_tail", theme.D_TAIL))):
+        for k, (name, colour_name) in enumerate((("d_head", palette.D_HEAD), ("d_tail", palette.D_TAIL))):
             box = QRectF(0, k * row, self.width(), row)
             self._paint_row(painter, box, k, name, colour_name)
         self._paint_axis(painter, QRectF(0, 2 * row, self.width(), 20))
@@ -68,7 +68,7 @@ class DistanceBars(QWidget):
         painter.setPen(QColor(colour_name))
         painter.setFont(theme.semi_bold(theme.Size.BODY))
         painter.drawText(text_box, Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignLeft, name)
-        painter.setPen(QColor(theme.TEXT if self._numbers is not None else theme.TEXT_FAINT))
+        painter.setPen(QColor(palette.TEXT if self._numbers is not None else palette.TEXT_FAINT))
         painter.setFont(theme.bold(24))
         right = Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignRight
         painter.drawText(text_box.adjusted(0, 0, 0, 4), right, self.texts[index])
@@ -79,13 +79,13 @@ class DistanceBars(QWidget):
 
     def _paint_track(self, painter: QPainter, track: QRectF) -> None:
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.RAISED))
+        painter.setBrush(QColor(palette.RAISED))
         painter.drawRoundedRect(track, 3, 3)
         half = track.width() / 2 / _RANGE_IN_LIMITS
         middle = track.center().x()
-        painter.setBrush(theme.colour(theme.ALLOWED, 0.30))
+        painter.setBrush(theme.colour(palette.ALLOWED, 0.30))
         painter.drawRect(QRectF(middle - half, track.top(), 2 * half, track.height()))
-        painter.setPen(QPen(QColor(theme.ALLOWED), 2))
+        painter.setPen(QPen(QColor(palette.ALLOWED), 2))
         for x in (middle - half, middle + half):
             painter.drawLine(QPointF(x, track.top() - 3), QPointF(x, track.bottom() + 3))
 
@@ -99,13 +99,13 @@ class DistanceBars(QWidget):
         if abs(offset_px) > span:
             inward = -8 if offset_px > 0 else 8
             tip = QPointF(end, track.center().y())
-            painter.setBrush(QColor(theme.TEXT))
+            painter.setBrush(QColor(palette.TEXT))
             painter.drawPolygon(QPolygonF([tip, tip + QPointF(inward, -7), tip + QPointF(inward, 7)]))
-        painter.setPen(QPen(QColor(theme.TEXT), 2))
+        painter.setPen(QPen(QColor(palette.TEXT), 2))
         painter.drawLine(QPointF(middle, track.top() - 3), QPointF(middle, track.bottom() + 3))
 
     def _paint_axis(self, painter: QPainter, box: QRectF) -> None:
-        painter.setPen(QColor(theme.TEXT_FAINT))
+        painter.setPen(QColor(palette.TEXT_FAINT))
         painter.setFont(theme.font(theme.Size.LABEL))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, side(-1.0))
         painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, side(1.0))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import theme
+from app import palette, theme
 from app.pace import Pace
+from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
 from app.wording import REASON_TEXT, STATE_MEANING, STATE_TITLE, refusal_line, why_line
 from core.config import PoseConfig
 from core.types import PoseState, Scene
@@ -85,10 +85,10 @@ class StateBadge(QWidget):
         paint_state(painter, box, self._state)
         left = box.right() + 18
         width = self.width() - left - 2
-        painter.setPen(QColor(theme.TEXT))
+        painter.setPen(QColor(palette.TEXT))
         painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), self._title, int(width)))
         painter.drawText(QRectF(left, 4, width, 36), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self._title)
-        painter.setPen(QColor(theme.TEXT_DIM))
+        painter.setPen(QColor(palette.TEXT_DIM))
         painter.setFont(theme.font(theme.Size.WHY))
         flags = Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap
         painter.drawText(QRectF(left, 42, width, self.height() - 44), int(flags), self._why)
@@ -97,56 +97,17 @@ class StateBadge(QWidget):
 
 def paint_state(painter: QPainter, box: QRectF, state: PoseState | None) -> None:
     """The state's shape and letter inside `box`."""
-    name = theme.STATE_COLOUR[state]
-    shape = state_shape(box, state)
+    name = palette.STATE_COLOUR[state]
+    side, middle = box.height(), box.center()
+    outline = QPolygonF([middle + QPointF(x, y) * (side / 2) for x, y in state_outline(state).tolist()])
     if state is None:
-        painter.setPen(QPen(QColor(name), max(2.0, box.width() / 28), Qt.PenStyle.DashLine))
+        painter.setPen(QPen(QColor(name), max(2.0, side / 28), Qt.PenStyle.DashLine))
         painter.setBrush(Qt.BrushStyle.NoBrush)
     else:
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(name))
-    painter.drawPath(shape)
-    painter.setPen(QColor(theme.INK if state is not None else theme.TEXT_DIM))
-    painter.setFont(theme.bold(max(9, int(box.height() * (0.5 if state is PoseState.C else 0.62)))))
-    # the visual middle of a triangle lies below that of its box
-    letter_box = box.translated(0, box.height() * 0.13) if state is PoseState.C else box
-    painter.drawText(letter_box, Qt.AlignmentFlag.AlignCenter, state.value if state is not None else "\N{EN DASH}")
-
-
-def state_shape(box: QRectF, state: PoseState | None) -> QPainterPath:
-    """Circle, rounded square, triangle, diamond; a circle where there is no state."""
-    path = QPainterPath()
-    middle, radius = box.center(), box.width() / 2
-    if state is PoseState.B:
-        inset = box.width() * 0.07
-        path.addRoundedRect(box.adjusted(inset, inset, -inset, -inset), radius * 0.16, radius * 0.16)
-    elif state is PoseState.C:
-        path = _rounded_polygon(middle + QPointF(0, radius * 0.18), radius * 1.14, 3, -90.0, radius * 0.2)
-    elif state is PoseState.D:
-        path = _rounded_polygon(middle, radius, 4, -90.0, radius * 0.14)
-    else:
-        inset = box.width() * 0.03
-        path.addEllipse(box.adjusted(inset, inset, -inset, -inset))
-    return path
-
-
-def _rounded_polygon(middle: QPointF, radius: float, corners: int, start_deg: float, rounding: float) -> QPainterPath:
-    points = [
-        middle + radius * QPointF(math.cos(math.radians(start_deg + 360 * k / corners)), math.sin(math.radians(start_deg + 360 * k / corners)))
-        for k in range(corners)
-    ]
-    path = QPainterPath()
-    for k, corner in enumerate(points):
-        before, after = points[k - 1], points[(k + 1) % corners]
-        enter, leave = corner + _unit(before - corner) * rounding, corner + _unit(after - corner) * rounding
-        if k == 0:
-            path.moveTo(enter)
-        else:
-            path.lineTo(enter)
-        path.quadTo(corner, leave)
-    path.closeSubpath()
-    return path
-
-
-def _unit(vector: QPointF) -> QPointF:
-    return vector / math.hypot(vector.x(), vector.y())
+    painter.drawPolygon(outline)
+    painter.setPen(QColor(palette.INK if state is not None else palette.TEXT_DIM))
+    painter.setFont(theme.bold(max(9, round(side * LETTER_HEIGHT[state]))))
+    letter = state.value if state is not None else "\N{EN DASH}"
+    painter.drawText(box.translated(0, side * LETTER_DROP.get(state, 0.0)), Qt.AlignmentFlag.AlignCenter, letter)

@@ -1,4 +1,4 @@
-"""The last 30 seconds of theta and both distances, with the state as a band of colour."""
+"""The last 30 seconds of theta and both distances, with the state as a band of colour below."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
-from app import theme
+from app import palette, theme
 from app.pace import Pace
 from core.config import PoseConfig
 from core.types import PoseState, Scene
@@ -16,12 +16,17 @@ from core.types import PoseState, Scene
 SPAN_S = 30.0
 _CAPACITY = 1024
 _DRAW_EVERY_S = 0.1
-_BAND_CELLS = 300
-_STATES: tuple[PoseState | None, ...] = (None, PoseState.A, PoseState.B, PoseState.C, PoseState.D)
+_CELL_S = 0.1
+_STATES: tuple[PoseState | None, ...] = (None, *PoseState)
+_ANGLE_RANGES = (20.0, 45.0, 90.0, 180.0)
+_DISTANCE_RANGES = (15.0, 30.0, 60.0, 120.0, 640.0)
 
 
 class TrendPlot(QWidget):
-    """Curves over fixed buffers; frames without a pose are gaps. Drawn ten times a second, however fast ticks come."""
+    """Curves over fixed buffers; frames without a pose are gaps. Drawn ten times a second, however fast ticks come.
+
+    The scales change in a few steps only, so that a curve can be compared with what it was a second ago.
+    """
 
     def __init__(self, limits: PoseConfig) -> None:
         super().__init__()
@@ -29,29 +34,32 @@ class TrendPlot(QWidget):
         self._values = np.full((3, _CAPACITY), np.nan)
         self._states = np.zeros(_CAPACITY, np.uint8)
         self._pace = Pace(_DRAW_EVERY_S)
-        self.setMinimumHeight(130)
+        self.setMinimumHeight(120)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("Trends of the last 30 seconds")
+        self.setAccessibleName("Trends of theta, d_head and d_tail over the last 30 seconds")
+        self.setToolTip("theta (above), d_head and d_tail (below, dotted) and the state over the last 30 s; gaps: no pose")
         view = pg.GraphicsLayoutWidget()
-        view.setBackground(theme.PANEL)
-        view.ci.layout.setContentsMargins(0, 0, 0, 0)
-        view.ci.layout.setSpacing(2)
+        view.setBackground(palette.PANEL)
         view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        view.viewport().setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        view.ci.layout.setContentsMargins(0, 2, 4, 0)
+        view.ci.layout.setVerticalSpacing(6)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(view)
-        self._angle = _plot(view, 0, (-45.0, 45.0), "θ", "[-45, 0, 45]")
-        self._distance = _plot(view, 1, (0.0, 30.0), "d", "")
-        self._angle.addItem(_band(-limits.theta_allow_deg, limits.theta_allow_deg))
-        self._distance.addItem(_band(0.0, limits.d_allow_px))
+        self._angle = _Chart(view, 0, _ANGLE_RANGES, is_signed=True, allowed=limits.theta_allow_deg)
+        self._distance = _Chart(view, 1, _DISTANCE_RANGES, is_signed=False, allowed=limits.d_allow_px)
         self._curves = (
-            self._angle.plot(pen=_pen(theme.THETA, 1.6), connect="finite"),
-            self._distance.plot(pen=_pen(theme.D_HEAD, 1.6), connect="finite"),
-            self._distance.plot(pen=_pen(theme.D_TAIL, 1.6, Qt.PenStyle.DotLine), connect="finite"),
+            self._angle.add_curve(palette.THETA),
+            self._distance.add_curve(palette.D_HEAD),
+            self._distance.add_curve(palette.D_TAIL, Qt.PenStyle.DotLine),
         )
-        self._state_band = _StateBand()
-        self._distance.addItem(self._state_band)
+        self._band = _StateBand(view, 2)
 
+    @property
+    def curves(self) -> tuple[pg.PlotCurveItem, ...]:
+        """theta, d_head, d_tail."""
+        return self._curves
 
     def add(self, scene: Scene) -> None:
         """Append one frame's values; a clock that jumps back (a recording that starts again) clears the plot."""
@@ -71,3 +79,102 @@ class TrendPlot(QWidget):
         self._values[:] = np.nan
         self._states[:] = 0
         self._draw()
+
+    def _draw(self) -> None:
+        first = int(np.searchsorted(self._times_s, self._times_s[-1] - SPAN_S)) if np.isfinite(self._times_s[-1]) else _CAPACITY
+        ago_s = self._times_s[first:] - self._times_s[-1]
+        values = self._values[:, first:]
+        for curve, series in zip(self._curves, values, strict=True):
+            curve.setData(ago_s, series, connect="finite")
+        self._angle.fit(values[:1])
+        self._distance.fit(values[1:])
+        self._band.show(ago_s, self._states[first:])
+
+
+class _Chart:
+    """One plot with a fixed time axis and a value axis that steps through a few ranges."""
+
+    def __init__(self, view: pg.GraphicsLayoutWidget, row: int, ranges: tuple[float, ...], *, is_signed: bool, allowed: float) -> None:
+        self._ranges = ranges
+        self._is_signed = is_signed
+        self._range = 0.0
+        self._plot = view.addPlot(row=row, col=0)
+        self._plot.setMenuEnabled(False)
+        self._plot.hideButtons()
+        self._plot.setMouseEnabled(False, False)
+        self._plot.hideAxis("bottom")
+        self._plot.setXRange(-SPAN_S, 0.0, padding=0)
+        _style_axis(self._plot.getAxis("left"))
+        band = pg.LinearRegionItem(
+            (-allowed if is_signed else 0.0, allowed),
+            orientation="horizontal",
+            movable=False,
+            brush=theme.colour(palette.ALLOWED, 0.16),
+            pen=QPen(theme.colour(palette.ALLOWED, 0.0)),
+        )
+        band.setZValue(-10)
+        self._plot.addItem(band, ignoreBounds=True)
+        self.fit(np.full((1, 1), np.nan))
+
+    def add_curve(self, colour_name: str, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> pg.PlotCurveItem:
+        pen = QPen(QColor(colour_name), 1.5, style)
+        pen.setCosmetic(True)
+        curve = pg.PlotCurveItem(pen=pen, connect="finite")
+        self._plot.addItem(curve, ignoreBounds=True)
+        return curve
+
+    def fit(self, values: np.ndarray) -> None:
+        """The smallest range that holds all values; it shrinks again only when there is room to spare."""
+        finite = values[np.isfinite(values)]
+        largest = float(np.abs(finite).max()) if finite.size else 0.0
+        wanted = next((r for r in self._ranges if largest <= r), self._ranges[-1])
+        if wanted < self._range and largest > 0.8 * wanted:
+            return
+        if wanted != self._range:
+            self._range = wanted
+            low = -wanted if self._is_signed else 0.0
+            self._plot.setYRange(low, wanted, padding=0.04)
+            ticks = (low, 0.0, wanted) if self._is_signed else (0.0, wanted / 2, wanted)
+            self._plot.getAxis("left").setTicks([[(tick, f"{tick:g}") for tick in ticks]])
+
+
+class _StateBand:
+    """A narrow strip whose colour is the state, with the time axis below it."""
+
+    def __init__(self, view: pg.GraphicsLayoutWidget, row: int) -> None:
+        self._plot = view.addPlot(row=row, col=0)
+        self._plot.setMenuEnabled(False)
+        self._plot.hideButtons()
+        self._plot.setMouseEnabled(False, False)
+        self._plot.setXRange(-SPAN_S, 0.0, padding=0)
+        self._plot.setYRange(0.0, 1.0, padding=0)
+        _style_axis(self._plot.getAxis("left"))
+        self._plot.getAxis("left").setTicks([[]])
+        bottom = self._plot.getAxis("bottom")
+        _style_axis(bottom)
+        bottom.setHeight(18)
+        bottom.setTicks([[(-30.0, "-30 s"), (-20.0, "-20"), (-10.0, "-10"), (0.0, "now")]])
+        self._plot.setFixedHeight(27)
+        colours = [theme.colour(palette.LINE, 0.6)] + [QColor(palette.STATE_COLOUR[state]) for state in PoseState]
+        self._table = np.array([[c.red(), c.green(), c.blue(), c.alpha()] for c in colours], np.uint8)
+        self._cells_s = np.arange(-SPAN_S + _CELL_S / 2, 0.0, _CELL_S)
+        self._image = pg.ImageItem(axisOrder="row-major")
+        self._plot.addItem(self._image, ignoreBounds=True)
+        self.show(np.zeros(0), np.zeros(0, np.uint8))
+
+    def show(self, ago_s: np.ndarray, states: np.ndarray) -> None:
+        cells = np.zeros(len(self._cells_s), np.uint8)
+        if len(ago_s):
+            newest = np.searchsorted(ago_s, self._cells_s + _CELL_S, side="right") - 1
+            fresh = (newest >= 0) & (self._cells_s - ago_s[np.maximum(newest, 0)] < 3 * _CELL_S)
+            cells[fresh] = states[newest[fresh]]
+        self._image.setImage(self._table[cells][None], autoLevels=False)
+        self._image.setRect(QRectF(-SPAN_S, 0.0, SPAN_S, 1.0))
+
+
+def _style_axis(axis: pg.AxisItem) -> None:
+    axis.setPen(QPen(QColor(palette.LINE)))
+    axis.setTextPen(QPen(QColor(palette.TEXT_DIM)))
+    axis.setStyle(tickFont=theme.font(theme.Size.LABEL), tickLength=-3, autoExpandTextSpace=False, autoReduceTextSpace=False)
+    if axis.orientation == "left":
+        axis.setWidth(40)

@@ -24,13 +24,11 @@ def random_crop(image: Image, vessel: Mask, robot: Mask, size: tuple[int, int], 
     target = np.array([width, height]) * (0.5 + rng.uniform(-0.25, 0.25, 2))
     moved = matrix @ np.array([center[0], center[1], 1.0])
     matrix[:, 2] += target - moved
-    border = cv2.BORDER_REFLECT_101
-    cut = cv2.warpAffine(image, matrix, (width, height), flags=cv2.INTER_LINEAR, borderMode=border)
-    masks = [
-        cv2.warpAffine(mask.astype(np.uint8) * 255, matrix, (width, height), flags=cv2.INTER_LINEAR, borderMode=border) > 127
-        for mask in (vessel, robot)
-    ]
-    return cut, masks[0], masks[1]
+    # What lies beyond the picture is one colour without labels; mirrored, robots would meet their own reflection.
+    fill = tuple(float(v) for v in image[int(rng.integers(image.shape[0])), int(rng.integers(image.shape[1]))])
+    cut = cv2.warpAffine(image, matrix, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=fill)
+    masks = [cv2.warpAffine(m.astype(np.uint8) * 255, matrix, (width, height), flags=cv2.INTER_LINEAR) > 127 for m in (vessel, robot)]
+    return np.asarray(cut, np.uint8), np.asarray(masks[0]), np.asarray(masks[1])
 
 
 def _center(robot: Mask, rng: Generator) -> tuple[float, float]:
@@ -45,7 +43,7 @@ def _center(robot: Mask, rng: Generator) -> tuple[float, float]:
 
 def random_look(image: Image, rng: Generator) -> Image:
     """Exposure, contrast, gamma, white balance, uneven light, blur, noise and compression, each now and then."""
-    pixels = image.astype(np.float32) / 255.0
+    pixels: np.ndarray = image.astype(np.float32) / 255.0
     if rng.random() < 0.7:
         mean = float(pixels.mean())
         pixels = (pixels - mean) * rng.uniform(0.65, 1.4) + mean + rng.uniform(-0.15, 0.15)

@@ -70,7 +70,8 @@ class _Crops(Dataset[tuple[Tensor, Tensor]]):
             # Epochs without repetition: position in a permutation that is drawn anew for every pass.
             epoch, place = divmod(index, len(self._samples))
             order = np.random.default_rng((self._plan.seed, 7919, epoch)).permutation(len(self._samples))
-            image, vessel, robot = random_crop(*self._samples[order[place]].load(), size, rng)
+            image, vessel, robot = self._samples[order[place]].load()
+            image, vessel, robot = random_crop(image, vessel, robot, size, rng)
         image = random_look(image, rng)
         target = np.stack([vessel, robot]).astype(np.uint8)
         return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(target)

@@ -53,7 +53,7 @@ class Appearance:
 
     # light
     light_deg: float = 235.0
-    highlight: float = 0.55
+    highlight: float = 0.75
     highlight_width: float = 0.16
     lamps: int = 2
     lamp_strength: float = 0.5
@@ -86,6 +86,7 @@ class Appearance:
     end_fittings: bool = True
     bubbles: int = 0
     cables: int = 1
+    objects: int = 0  # boxes of equipment and gloved or bare hands, beside the vessel
     ruler: bool = False
     labels: int = 1
     stains: int = 1
@@ -136,8 +137,8 @@ def random_appearance(seed: int, family: str | None = None) -> Appearance:
     """
     if family is not None and family not in LOOK_FAMILIES:
         raise ValueError(f"unknown look family {family!r}; known: {', '.join(LOOK_FAMILIES)}")
-    rng = np.random.default_rng([seed, 7919])
-    chosen = family or LOOK_FAMILIES[int(rng.integers(len(LOOK_FAMILIES)))]
+    chosen = family or LOOK_FAMILIES[int(np.random.default_rng([seed, 7919]).integers(len(LOOK_FAMILIES)))]
+    rng = np.random.default_rng([seed, LOOK_FAMILIES.index(chosen), 104729])
     return Appearance(**draw_family(chosen, rng))
 
 

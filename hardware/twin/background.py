@@ -18,8 +18,12 @@ _TABLE_MARGIN_MM = 6.0
 def smooth_noise(rng: Generator, shape: tuple[int, int], cell_px: float) -> F32:
     """Soft random field of `shape` (H, W) in about -1..1, with features of `cell_px`."""
     height, width = shape
-    coarse = rng.standard_normal((max(3, int(height / cell_px) + 2), max(3, int(width / cell_px) + 2)), np.float32)
-    return np.asarray(np.clip(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC) * np.float32(0.6), -1, 1))
+    # Drawn at about two samples a feature and blurred there: plain interpolation of one sample a feature shows its lattice.
+    step = max(1.0, 0.4 * cell_px)
+    coarse = rng.standard_normal((int(height / step) + 8, int(width / step) + 8), np.float32)
+    coarse = cv2.GaussianBlur(coarse, (0, 0), 0.4 * cell_px / step, borderType=cv2.BORDER_REFLECT)[3:-3, 3:-3]
+    coarse *= np.float32(0.45 / max(float(coarse.std()), 1e-6))
+    return np.asarray(np.clip(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC), -1, 1), np.float32)
 
 
 def paint_board(appearance: Appearance, grid_mm: F32, pixels_per_mm: float, rng: Generator) -> F32:
@@ -89,5 +93,6 @@ def _tissue(grid_mm: F32, shape: tuple[int, int], pixels_per_mm: float, rng: Gen
     for _ in range(int(rng.integers(0, 4))):
         angle, place, wide = rng.uniform(0, np.pi), rng.uniform(-60, 60), rng.uniform(4, 16)
         across = (grid_mm[..., 0] - 100) * np.float32(np.cos(angle)) + (grid_mm[..., 1] - 75) * np.float32(np.sin(angle))
-        field -= np.float32(rng.uniform(0.15, 0.5)) / (1 + np.exp((np.abs(across - np.float32(place)) - np.float32(wide)) * np.float32(1.5)))
+        beyond = np.clip((np.abs(across - np.float32(place)) - np.float32(wide)) * np.float32(1.5), -30, 30)
+        field -= np.float32(rng.uniform(0.15, 0.5)) / (1 + np.exp(beyond))
     return np.asarray(field, np.float32)

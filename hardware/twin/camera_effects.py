@@ -36,10 +36,10 @@ class CameraEffects:
         """The noise-free image of `scene` (h, w, 3), which lies at `window` of the whole picture."""
         seen = scene
         if self._sigma > 0.15:
-            seen = cv2.GaussianBlur(seen, (0, 0), self._sigma, borderType=cv2.BORDER_REPLICATE)
+            seen = np.asarray(cv2.GaussianBlur(seen, (0, 0), self._sigma, borderType=cv2.BORDER_REPLICATE), np.float32)
         if self._motion.shape[0] > 1:
-            seen = cv2.filter2D(seen, -1, self._motion, borderType=cv2.BORDER_REPLICATE)
-        coloured = cv2.transform(seen, self._colour)
+            seen = np.asarray(cv2.filter2D(seen, -1, self._motion, borderType=cv2.BORDER_REPLICATE), np.float32)
+        coloured = np.asarray(cv2.transform(seen, self._colour), np.float32)
         if self._vignette is not None:
             coloured *= self._vignette[window][..., None]
         levels = cv2.convertScaleAbs(np.maximum(coloured, 0), alpha=255.0)
@@ -47,16 +47,21 @@ class CameraEffects:
 
     def add_noise(self, image: Image, noise_seed: int) -> Image:
         """`image` with sensor noise (and compression) drawn by `noise_seed`."""
-        noisy = image
+        noisy = image.copy()
         if self._noise is not None:
             height, width = image.shape[:2]
             draw = np.random.default_rng([noise_seed, 104729])
             y, x = (int(v) for v in draw.integers(0, _NOISE_SLACK, 2))
-            noisy = cv2.add(image, self._noise[y : y + height, x : x + width], dtype=cv2.CV_8U)
+            cv2.add(image, self._noise[y : y + height, x : x + width], dst=noisy, dtype=cv2.CV_8U)
         if self._appearance.jpeg_quality:
-            quality = [int(cv2.IMWRITE_JPEG_QUALITY), self._appearance.jpeg_quality]
-            noisy = cv2.imdecode(cv2.imencode(".jpg", noisy, quality)[1], cv2.IMREAD_COLOR)
-        return np.asarray(noisy, np.uint8)
+            noisy = _recompressed(noisy, self._appearance.jpeg_quality)
+        return noisy
+
+
+def _recompressed(image: Image, quality: int) -> Image:
+    """The image after JPEG; that red and blue are swapped on the way changes the artefacts' tint only."""
+    _, data = cv2.imencode(".jpg", image, [int(cv2.IMWRITE_JPEG_QUALITY), quality])
+    return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.uint8)
 
 
 def _motion_kernel(length_px: float, direction_deg: float) -> F32:
@@ -114,6 +119,6 @@ def _noise_pool(appearance: Appearance, size: tuple[int, int], rng: Generator) -
         noise = rng.standard_normal((*shape, 3), np.float32)
     grain = appearance.noise_grain_px * max(size) / _SIDE_PX
     if grain > 0.2:
-        noise = cv2.GaussianBlur(noise, (0, 0), grain)
+        noise = np.asarray(cv2.GaussianBlur(noise, (0, 0), grain), np.float32)
         noise /= max(float(noise[::4, ::4].std()), 1e-6)
     return np.asarray(np.rint(appearance.noise * noise), np.int16)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from core.types import GraphEdge, Points
 from hardware.twin.appearance import Appearance
+from hardware.twin.bulky import cast_shadow, place_object
 from hardware.twin.lumen_field import LumenField
 from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.vessel_look import Layers
@@ -26,23 +27,20 @@ _SHIFT = 4  # cv2 draws with 1/16 px
 
 def add_board_clutter(appearance: Appearance, board: F32, view: View, phantom: Phantom, field: LumenField, rng: Generator) -> F32:
     """`board` (H, W, 3) with everything that lies on it beside the vessel."""
-    canvas = cv2.convertScaleAbs(board, alpha=255.0)
-    shade = np.zeros(canvas.shape[:2], np.uint8)
+    canvas = np.asarray(cv2.convertScaleAbs(board, alpha=255.0), np.uint8)
     scale = view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
     _stains(appearance, canvas, scale, rng)
     for _ in range(appearance.labels):
         _sticker(appearance, canvas, view, rng)
+    for _ in range(appearance.objects):
+        place_object(canvas, view, field, rng)
     if appearance.ruler:
         _ruler(appearance, canvas, view, field, rng)
     for _ in range(appearance.cables):
         path = _cable_path(view, phantom, field, appearance, rng)
         if path is not None:
-            _cable(appearance, canvas, shade, path, scale, rng)
-    lit = canvas.astype(np.float32) / 255
-    if appearance.cables and appearance.material != "xray":
-        soft = cv2.GaussianBlur(shade, (0, 0), max(0.8, 0.8 * scale)).astype(np.float32) / 255
-        lit *= (1 - np.float32(0.4 + 0.4 * appearance.tube_shadow) * soft * (shade < 128))[..., None]
-    return np.asarray(lit, np.float32)
+            _cable(appearance, canvas, path, scale, rng)
+    return np.asarray(canvas.astype(np.float32) / 255, np.float32)
 
 
 def add_fittings(appearance: Appearance, layers: Layers, phantom: Phantom, view: View, rng: Generator) -> None:
@@ -63,7 +61,8 @@ def add_fittings(appearance: Appearance, layers: Layers, phantom: Phantom, view:
     for _ in range(appearance.dust):
         _dust(colour, alpha, scale, rng)
     if alpha.any():
-        layers.cover(alpha.astype(np.float32) / 255, colour.astype(np.float32) / 255)
+        opacity = np.asarray(alpha, np.float32) / np.float32(255)
+        layers.cover(opacity, np.asarray(colour, np.float32) / np.float32(255))
 
 
 def _fixed(points: Points) -> NDArray[np.int32]:
@@ -190,7 +189,9 @@ def _beside(view: View, phantom: Phantom, rng: Generator) -> Points:
     steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(pixels, axis=0), axis=1))])
     dense = np.arange(0.0, steps[-1], 1.0)
     line_px = np.column_stack([np.interp(dense, steps, pixels[:, axis]) for axis in (0, 1)])
-    return cv2.blur(np.ascontiguousarray(line_px), (1, 25), borderType=cv2.BORDER_REPLICATE) if len(line_px) > 30 else line_px
+    if len(line_px) > 30:
+        line_px = cv2.blur(line_px, (1, 25), borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(line_px, np.float64)
 
 
 def _free_pieces(points: Points, view: View, field: LumenField, keep_off_mm: float) -> Iterator[Points]:
@@ -206,7 +207,7 @@ def _free_pieces(points: Points, view: View, field: LumenField, keep_off_mm: flo
             yield piece
 
 
-def _cable(appearance: Appearance, canvas: U8, shade: U8, path: Points, scale: float, rng: Generator) -> None:
+def _cable(appearance: Appearance, canvas: U8, path: Points, scale: float, rng: Generator) -> None:
     colour, wide = _random_colour(appearance, rng), float(rng.uniform(0.8, 3.2) * scale)
     points = path[:: max(1, int(len(path) / 300))]
     angle = np.deg2rad(appearance.light_deg)
@@ -216,8 +217,9 @@ def _cable(appearance: Appearance, canvas: U8, shade: U8, path: Points, scale: f
         _stroke(dark, points, (0, 0, 0), max(1.0, 0.6 * wide))
         cv2.addWeighted(dark, 0.6, canvas, 0.4, 0, dst=canvas)
         return
-    _stroke(shade, points - lamp * 0.6 * wide, 110, wide)
-    _stroke(shade, points, 255, wide)
+    shadow = np.zeros(canvas.shape[:2], np.uint8)
+    _stroke(shadow, points - lamp * 0.6 * wide, 255, wide)
+    cast_shadow(canvas, shadow, 0.25 + 0.5 * appearance.tube_shadow, 0.8 * scale)
     _stroke(canvas, points, _level(colour, 0.7), wide)
     _stroke(canvas, points + lamp * 0.1 * wide, _level(colour), max(1.0, 0.65 * wide))
     if rng.random() < 0.7:

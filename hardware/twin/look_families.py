@@ -16,6 +16,8 @@ Rgb = tuple[float, float, float]
 
 ROBOT_LOOKS = ("ringed", "plain_dark", "white", "blue_gold", "metallic", "black_wire", "translucent", "banded", "coloured")
 
+_LEAST_CONTRAST = 0.28
+
 
 def _uniform(rng: Generator, low: float, high: float) -> float:
     return float(rng.uniform(low, high))
@@ -66,6 +68,7 @@ def _common(rng: Generator) -> Knobs:
         "end_fittings": bool(rng.random() < 0.6),
         "bubbles": int(rng.integers(1, 12)) if rng.random() < 0.3 else 0,
         "cables": int(rng.choice([0, 1, 2, 3, 4], p=[0.3, 0.25, 0.2, 0.15, 0.1])),
+        "objects": int(rng.choice([0, 1, 2, 3], p=[0.55, 0.25, 0.12, 0.08])),
         "ruler": bool(rng.random() < 0.25),
         "labels": int(rng.integers(0, 4)),
         "stains": int(rng.integers(0, 5)),
@@ -182,6 +185,7 @@ def _xray(rng: Generator) -> Knobs:
         "wall_haze": _uniform(rng, 0.0, 0.12),
         "lamps": 0,
         "highlight": 0.0,
+        "objects": 0,
         "fittings": int(rng.choice([0, 1, 2], p=[0.6, 0.25, 0.15])),
         "fitting_opacity": _uniform(rng, 0.1, 0.5),
         "fitting_rgb": _grey(rng, 0.0, 0.3, 0.0),
@@ -281,7 +285,24 @@ def draw_family(family: str, rng: Generator) -> Knobs:
     knobs = {"family": family, **common, **robot, **own}
     if knobs.get("material") == "xray":
         _absorbing(knobs, rng)
+    else:
+        _stand_out(knobs)
+    # A device is 3 to 10 px wide in a picture of 640 px.
+    zoom = float(knobs["pixels_per_mm"])
+    knobs["robot_radius_mm"] = min(max(float(knobs["robot_radius_mm"]), 1.5 / zoom), 5.0 / zoom)
     return knobs
+
+
+def _stand_out(knobs: Knobs) -> None:
+    """Make the robot lighter or darker where it would vanish against the liquid: a label that nobody could see teaches nothing."""
+    opacity, board = float(knobs["liquid_opacity"]), knobs["board_rgb"]
+    behind = [b + (c - b) * opacity for b, c in zip(board, knobs["liquid_rgb"], strict=True)]
+    robot = knobs["robot_rgb"]
+    contrast = max(abs(r - b) for r, b in zip(robot, behind, strict=True))
+    if contrast >= _LEAST_CONTRAST:
+        return
+    shift = _LEAST_CONTRAST if sum(behind) < 1.5 else -_LEAST_CONTRAST
+    knobs["robot_rgb"] = tuple(min(max(b + shift, 0.0), 1.0) for b in behind)
 
 
 def _absorbing(knobs: Knobs, rng: Generator) -> None:

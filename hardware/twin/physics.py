@@ -7,7 +7,7 @@ import threading
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from core.types import Command, Point, Points, RobotStatus
 from hardware.twin.lumen_field import lumen_discs
@@ -16,15 +16,17 @@ from hardware.twin.mjcf import (
     FEED_KV,
     LINK_MM,
     ROBOT_RADIUS_MM,
+    SHAFT_LINK_MM,
     STEERABLE_LINKS,
     TIMESTEP_S,
     Specimen,
     build_model,
+    link_lengths_mm,
 )
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantom_check import node_distances_mm
 from hardware.twin.tendon_drive import DriveProperties, TendonDrive
-from hardware.twin.walls import wall_boxes
+from hardware.twin.walls import lumen_outline, wall_boxes
 
 STEERABLE_MM = STEERABLE_LINKS * LINK_MM
 OUTSIDE_MM = 30.0
@@ -57,10 +59,14 @@ class TwinPhysics:
         self.specimen = Specimen.drawn(seed)
         walls, self._port = wall_boxes(phantom)
         ways = node_distances_mm(phantom)[phantom.port, list(phantom.targets)]
-        self._links = math.ceil((float(ways.max()) + _SPARE_MM) / LINK_MM)
-        self._model = build_model(walls, self._port, self._links, self.specimen)
+        shaft_links = math.ceil((float(ways.max()) + _SPARE_MM - STEERABLE_MM) / SHAFT_LINK_MM)
+        self._lengths = link_lengths_mm(shaft_links)
+        self.chain_mm = float(self._lengths.sum())
+        self._model = build_model(walls, self._port, shaft_links, self.specimen)
         self._data = mujoco.MjData(self._model)
         self._discs = lumen_discs(phantom.graph)
+        self._centers = cKDTree(self._discs[0])
+        self._outline = cKDTree(np.concatenate(lumen_outline(phantom.graph)))
         self._lock = threading.RLock()
         self._bend, self._pitch = TendonDrive(drive or DriveProperties()), TendonDrive(drive or DriveProperties())
         self._index_model()
@@ -68,12 +74,14 @@ class TwinPhysics:
 
     def _index_model(self) -> None:
         """Which entries of MuJoCo's arrays belong to which link."""
-        model, links = self._model, self._links
+        model, links = self._model, len(self._lengths)
         self._bodies = np.flatnonzero(np.arange(model.nbody) >= model.nbody - links)
         self._geoms = np.array([model.body_geomadr[body] for body in self._bodies])
         joints = np.arange(1, model.njnt)
         self._joints, self._dofs = joints, model.jnt_dofadr[joints].copy()
         self._joint_link = np.searchsorted(self._bodies, model.jnt_bodyid[joints])
+        self._starts_mm = np.concatenate([[0.0], np.cumsum(self._lengths)[:-1]]) - self.chain_mm
+        self._joint_length = self._lengths[self._joint_link]
         self._own_stiffness = model.jnt_stiffness[joints].copy().reshape(len(joints), -1)[:, 0]
 
     def reset(self) -> None:
@@ -96,11 +104,6 @@ class TwinPhysics:
     def time_s(self) -> float:
         """Simulated time."""
         return float(self._data.time)
-
-    @property
-    def chain_mm(self) -> float:
-        """Length of the robot, and so the greatest insertion."""
-        return self._links * LINK_MM
 
     @property
     def insertion_mm(self) -> float:
@@ -130,18 +133,26 @@ class TwinPhysics:
         # The antagonist pays out as much as the other takes in: held still it would halve the bend.
         control[0], control[1] = self._slack_mm[0] - bend, self._slack_mm[1] + bend
         control[2], control[3] = self._slack_mm[2] - pitch, self._slack_mm[3] + pitch
+        control[4] = self._feed(command.advance_mm_s)
         insertion_mm = float(self._data.qpos[0])
-        # A stalled drive slips: its goal stays within reach of its greatest force.
-        slip_mm = self.specimen.feed_force_mn / FEED_KP_MN_MM
-        wanted = self._feed_mm + command.advance_mm_s * TIMESTEP_S
-        wanted = max(insertion_mm - slip_mm, min(insertion_mm + slip_mm, wanted))
-        self._feed_mm = max(0.0, min(self.chain_mm, wanted))
-        # Velocity feed-forward cancels the drive's lag of FEED_KV / FEED_KP * velocity; none at the ends of the travel.
-        speed_mm_s = command.advance_mm_s if self._feed_mm == wanted else 0.0
-        control[4] = self._feed_mm + FEED_KV / FEED_KP_MN_MM * speed_mm_s
         reach_mm = max(0.0, insertion_mm - STEERABLE_MM)
         self._delivery_mm = max(0.0, min(reach_mm, self._delivery_mm + command.delivery_mm_s * TIMESTEP_S))
         self._shape_chain()
+
+    def _feed(self, advance_mm_s: float) -> float:
+        """The feed's next goal. A stalled drive slips: its goal stays within reach of its greatest force.
+
+        The limit acts on the goal, because a saturated force inside the solver is explicit and swings from step to step.
+        """
+        insertion_mm, speed_mm_s = float(self._data.qpos[0]), float(self._data.qvel[0])
+        slip_mm, lag_s = self.specimen.feed_force_mn / FEED_KP_MN_MM, FEED_KV / FEED_KP_MN_MM
+        moved = self._feed_mm + advance_mm_s * TIMESTEP_S
+        moved = max(insertion_mm - slip_mm, min(insertion_mm + slip_mm, moved))
+        self._feed_mm = max(0.0, min(self.chain_mm, moved))
+        # Velocity feed-forward cancels the drive's lag; none at the ends of the travel.
+        goal = self._feed_mm + (lag_s * advance_mm_s if self._feed_mm == moved else 0.0)
+        coasting = insertion_mm + lag_s * speed_mm_s
+        return max(coasting - slip_mm, min(coasting + slip_mm, goal))
 
     def _shape_chain(self) -> None:
         """Stiffen what the guide behind the port and the sheath cover; links touch walls only once they are inside.
@@ -149,20 +160,21 @@ class TwinPhysics:
         Joints outside are held straight by stiffness, so the robot cannot buckle there and comes back clean.
         """
         insertion_mm = float(self._data.qpos[0])
-        key = round(insertion_mm, 2), round(self._delivery_mm, 2)
+        key = round(insertion_mm, 1), round(self._delivery_mm, 1)
         if key == self._shaped_for:
             return
         self._shaped_for = key
-        starts = insertion_mm - self.chain_mm + LINK_MM * np.arange(self._links)
+        starts = insertion_mm + self._starts_mm
         inside = (starts >= 0.0).astype(np.int32)
         self._model.geom_contype[self._geoms] = inside
         self._model.geom_conaffinity[self._geoms] = 2 * inside
         at = starts[self._joint_link]
         guided = np.clip((_GUIDE_MM - at) / _GUIDE_MM, 0.0, 1.0) ** 3
-        covered = np.clip((self._delivery_mm - at) / LINK_MM, 0.0, 1.0)
-        own = self._own_stiffness + covered * _SHEATH_EI / LINK_MM
-        stiffness = own + guided * _GUIDE_EI / LINK_MM
-        damping = own * self.specimen.damping_s + guided * _GUIDE_EI / LINK_MM * _GUIDE_DAMPING_S
+        covered = np.clip((self._delivery_mm - at) / self._joint_length, 0.0, 1.0)
+        own = self._own_stiffness + covered * _SHEATH_EI / self._joint_length
+        held = guided * _GUIDE_EI / self._joint_length
+        stiffness = own + held
+        damping = own * self.specimen.damping_s + held * _GUIDE_DAMPING_S
         self._model.jnt_stiffness[self._joints] = stiffness
         self._model.dof_damping[self._dofs] = damping
 
@@ -176,7 +188,7 @@ class TwinPhysics:
             joints = self._data.xpos[self._bodies][:, :2]
             last = self._data.xmat[self._bodies[-1]].reshape(3, 3)[:2, 0]
             insertion_mm = self.insertion_mm
-        first = max(0, int((self.chain_mm - insertion_mm - OUTSIDE_MM) / LINK_MM))
+        first = max(0, int(np.searchsorted(self._starts_mm + insertion_mm, -OUTSIDE_MM)) - 1)
         nose = joints[-1] + last * LINK_MM, joints[-1] + last * (LINK_MM + ROBOT_RADIUS_MM)
         return _smooth(np.vstack([joints[first:], *nose]))
 
@@ -217,14 +229,10 @@ class TwinPhysics:
         inside = points[(points - self._port.point) @ self._port.inward > 0.0]
         if len(inside) == 0:
             return self._port.radius - ROBOT_RADIUS_MM
-        return float(lumen_depth_mm(inside[::2], self._discs).min()) - ROBOT_RADIUS_MM
-
-
-def lumen_depth_mm(points: Points, discs: tuple[Points, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Distance (N,) of points inside the union of `discs` (centres, radii) to its wall; negative outside."""
-    centers, radii = discs
-    offsets = points[:, None, :] - centers[None, :, :]
-    return np.asarray((radii - np.sqrt(np.einsum("ijk,ijk->ij", offsets, offsets))).max(axis=1))
+        away, _ = self._outline.query(inside)
+        gap, disc = self._centers.query(inside, k=4)
+        within = (gap < self._discs[1][disc]).any(axis=1)
+        return float(np.where(within, away, -away).min()) - ROBOT_RADIUS_MM
 
 
 def _smooth(corners: Points) -> Points:

@@ -17,7 +17,7 @@ from hardware.twin.appearance import Appearance, make_view
 from hardware.twin.background import light_field, paint_board
 from hardware.twin.camera_effects import CameraEffects
 from hardware.twin.clutter import add_board_clutter, add_fittings
-from hardware.twin.lumen_field import LumenField, measure_lumen
+from hardware.twin.lumen_field import measure_lumen
 from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.robot_look import Band, measure_band, paint_robot, paint_sheath
 from hardware.twin.vessel_look import paint_vessel, surface_of

@@ -28,10 +28,11 @@ from hardware.twin.physics import TwinPhysics
 from hardware.twin.renderer import Picture, Renderer
 from hardware.twin.truth import truth_of
 
-FRAMES_PER_EPISODE = 10
+FRAMES_PER_EPISODE = 16
 FRAMES_PER_LOOK = 2
 _EMPTY_SHARE = 0.03
 _STEP_S = 0.02
+_FEED_MM_S = 40.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +69,8 @@ def robot_shapes(phantom: Phantom, seed: int, count: int) -> list[tuple[Points, 
     moments = np.sort(rng.uniform(0.12, 0.98, count)) * follower.length_mm
     shapes: list[tuple[Points, float, float]] = []
     sheath_speed = float(rng.choice((0.0, 0.0, 6.0, 14.0)))
-    for _ in range(int(3.0 * follower.length_mm / 25.0 / _STEP_S)):
-        command = follower.command(physics.robot_points_mm(), 25.0, _STEP_S)
+    for _ in range(int(3.0 * follower.length_mm / _FEED_MM_S / _STEP_S)):
+        command = follower.command(physics.robot_points_mm(), _FEED_MM_S, _STEP_S)
         physics.step(type(command)(command.bend, 0.0, command.advance_mm_s, sheath_speed), _STEP_S)
         while len(shapes) < count and physics.insertion_mm >= moments[len(shapes)]:
             shapes.append((physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm()))
@@ -99,8 +100,9 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
             renderer = Renderer(phantom, appearance, plan.size, seed)
         points, sheath_mm, clearance_mm = shapes[order[place]]
         empty = bool(rng.random() < _EMPTY_SHARE)
-        picture = renderer.render(None if empty else points, 0.0 if empty else sheath_mm, noise_seed=place)
-        truth = {} if empty else truth_of(phantom, view, points, appearance.robot_radius_mm, config).to_json()
+        robot = None if empty else points
+        picture = renderer.render(robot, 0.0 if empty else sheath_mm, noise_seed=place)
+        truth = truth_of(phantom, view, robot, appearance.robot_radius_mm, config).to_json()
         stem = f"{first + place:06d}"
         row = {"stem": stem, "seed": seed, "phantom": phantom.name, "family": appearance.family, "clearance_mm": clearance_mm}
         yield LabelledFrame(stem, picture, row | {"robot_visible": bool(picture.robot.any())} | truth)

@@ -51,7 +51,8 @@ class Surface:
 
     def inside(self, margin_mm: float = 0.0) -> F32:
         """Share of each pixel that lies within `margin_mm` of the lumen: an anti-aliased step."""
-        return np.asarray(np.clip((margin_mm - self.field.distance_mm) * np.float32(self.scale) + np.float32(0.5), 0, 1), np.float32)
+        depth = np.float32(margin_mm) - self.field.distance_mm
+        return np.asarray(np.clip(depth * np.float32(self.scale) + np.float32(0.5), 0, 1), np.float32)
 
     def line(self, place_mm: float, width_mm: float) -> F32:
         """A soft line along the wall at `place_mm` from it (negative: in the lumen)."""
@@ -59,10 +60,13 @@ class Surface:
 
 
 def surface_of(field: LumenField, scale: float, lamp: tuple[float, float]) -> Surface:
+    """The surface of a measured lumen at `scale` px per mm, lit from `lamp` (unit vector on screen)."""
     soft = cv2.GaussianBlur(field.distance_mm, (0, 0), max(1.0, 0.4 * scale))
-    dx, dy = cv2.Sobel(soft, cv2.CV_32F, 1, 0), cv2.Sobel(soft, cv2.CV_32F, 0, 1)
-    length = np.maximum(cv2.magnitude(dx, dy), np.float32(1e-3))
-    dx, dy = dx / length, dy / length
+    dx = np.asarray(cv2.Sobel(soft, cv2.CV_32F, 1, 0), np.float32)
+    dy = np.asarray(cv2.Sobel(soft, cv2.CV_32F, 0, 1), np.float32)
+    length = np.maximum(np.sqrt(dx * dx + dy * dy), np.float32(1e-3))
+    dx /= length
+    dy /= length
     return Surface(field, dx, dy, dx * np.float32(lamp[0]) + dy * np.float32(lamp[1]), scale, lamp)
 
 
@@ -80,7 +84,8 @@ def shifted(layer: F32, surface: Surface, distance_mm: float) -> F32:
     """`layer` moved away from the lamp by `distance_mm`, as a shadow falls."""
     step = distance_mm * surface.scale
     move = np.array([[1, 0, -surface.lamp[0] * step], [0, 1, -surface.lamp[1] * step]], np.float32)
-    return cv2.warpAffine(layer, move, layer.shape[1::-1], borderMode=cv2.BORDER_REPLICATE)
+    height, width = layer.shape
+    return np.asarray(cv2.warpAffine(layer, move, (width, height), borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
 def _tube(appearance: Appearance, layers: Layers, surface: Surface, rng: Generator) -> None:
@@ -149,7 +154,7 @@ def _depth(surface: Surface) -> F32:
 def _cast_shadow(appearance: Appearance, layers: Layers, surface: Surface, body: F32) -> None:
     if appearance.tube_shadow:
         shadow = shifted(body, surface, appearance.shadow_mm)
-        shadow = cv2.GaussianBlur(shadow, (0, 0), max(0.8, 0.4 * appearance.shadow_mm * surface.scale))
+        shadow = np.asarray(cv2.GaussianBlur(shadow, (0, 0), max(0.8, 0.4 * appearance.shadow_mm * surface.scale)), np.float32)
         layers.under *= (1 - np.float32(appearance.tube_shadow) * shadow)[..., None]
 
 
@@ -161,7 +166,7 @@ def _refracted(board: F32, surface: Surface, ratio: F32, strength_mm: float) -> 
     bend = np.float32(strength_mm * surface.scale) * np.clip(ratio, 0, 1) ** 3
     map_x = np.arange(width, dtype=np.float32)[None, :] + bend * surface.normal_x
     map_y = np.arange(height, dtype=np.float32)[:, None] + bend * surface.normal_y
-    return cv2.remap(board, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.remap(board, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
 def _fill_liquid(appearance: Appearance, layers: Layers, surface: Surface) -> None:
@@ -176,7 +181,7 @@ def _fill_liquid(appearance: Appearance, layers: Layers, surface: Surface) -> No
 
 
 def _edges(appearance: Appearance, layers: Layers, surface: Surface, places_mm: tuple[float, ...]) -> None:
-    """Refraction lines along the walls: dark on one side of the wall, bright on the other, stronger or weaker with the lamp's direction."""
+    """Refraction lines along the walls, a dark and a bright one side by side; the lamp's direction makes them stronger or weaker."""
     width = appearance.edge_mm
     for place in places_mm:
         dark = surface.line(place - 0.4 * width, width) * (0.55 - 0.45 * surface.facing)
@@ -194,8 +199,9 @@ def _highlight(
     place = np.clip(ratio, 0, 1) * surface.facing
     across = np.float32(0.35) + np.float32(0.65) * surface.facing**2
     width = np.float32(appearance.highlight_width)
-    shine = np.exp(-(((place - np.float32(0.55)) / width) ** 2)) + np.float32(0.35) * np.exp(-(((place + np.float32(0.7)) / width) ** 2))
-    broken = np.clip(0.6 + 0.9 * smooth_noise(rng, ratio.shape, 14 * surface.scale), 0, 1)
+    shine = np.exp(-(((place - np.float32(0.55)) / width) ** 2))
+    shine += np.float32(0.35) * np.exp(-(((place + np.float32(0.7)) / width) ** 2))
+    broken = np.clip(0.8 + 0.8 * smooth_noise(rng, ratio.shape, 14 * surface.scale), 0, 1)
     alpha = np.float32(0.8 * strength * appearance.highlight) * shine * across * broken * body
     layers.cover(np.clip(alpha, 0, 0.92).astype(np.float32), np.ones(3, np.float32))
 
@@ -210,6 +216,6 @@ def _lamps(appearance: Appearance, layers: Layers, surface: Surface, where: F32,
         axes = max(1, int(size[0])), max(1, int(size[1] * 0.5))
         cv2.ellipse(glare, (int(centre[0]), int(centre[1])), axes, rng.uniform(0, 180), 0, 360, float(rng.uniform(0.5, 1)), -1)
     if appearance.lamps:
-        glare = cv2.GaussianBlur(glare, (0, 0), max(1.0, 0.15 * appearance.lamp_mm * surface.scale))
+        glare = np.asarray(cv2.GaussianBlur(glare, (0, 0), max(1.0, 0.15 * appearance.lamp_mm * surface.scale)), np.float32)
         tube = np.clip(1.1 - np.abs(surface.facing - np.float32(0.2)) * np.clip(surface.field.ratio, 0, 1), 0.1, 1)
         layers.cover(np.clip(np.float32(appearance.lamp_strength) * glare * where * tube, 0, 0.97), np.ones(3, np.float32))

@@ -13,8 +13,8 @@ from core.types import Points
 class View:
     """A pinhole view of the plane with one radial distortion term.
 
-    ``homography`` (3, 3) maps board mm (x right, y down) to undistorted pixels; ``distortion`` k1 acts on radii relative to half the
-    image diagonal (negative: barrel; sensible range -0.2..0.3). ``size`` is (width, height) in pixels.
+    ``homography`` (3, 3) maps board mm (x right, y down) to undistorted pixels; ``distortion`` k1 acts on radii relative to half
+    the image diagonal (negative: barrel; sensible range -0.2..0.3). ``size`` is (width, height) in pixels.
     """
 
     homography: np.ndarray
@@ -62,7 +62,7 @@ class View:
         """Board millimetres under every pixel centre, shape (H, W, 2)."""
         width, height = self.size
         x, y = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
-        return self.unproject(np.column_stack([x.ravel(), y.ravel()])).reshape(height, width, 2)
+        return np.asarray(self.unproject(np.column_stack([x.ravel(), y.ravel()])).reshape(height, width, 2))
 
     @property
     def mirrored(self) -> bool:

@@ -1,0 +1,162 @@
+"""``benchmark``: speed against the paper-literal baseline in the same run, accuracy on a labelled set, and the window's own pace."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from app.learning_commands import progress_bar
+from core.config import Config, TwinConfig, load_config
+from core.types import Frame, Image, Scene
+
+_BASELINE_EVERY = 8
+_WARM_UP = 3
+
+
+def _config(model: str | None, preset: str | None, config_path: Path | None) -> Config:
+    return load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model else None)
+
+
+def quantiles(values: Sequence[float]) -> dict[str, float]:
+    """Median and 95th percentile, rounded to microseconds when the values are milliseconds."""
+    return {"p50": round(float(np.median(values)), 3), "p95": round(float(np.percentile(values, 95)), 3)}
+
+
+def run_speed(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
+    """Time perception frame by frame on twin pictures, with a baseline frame in between every eighth."""
+    from core.perception.pipeline import open_pipeline
+    from core.study.paper_baseline import PaperBaseline
+
+    config = _config(model, preset, config_path)
+    first_frame_s = _first_frame_s()
+    pipeline = open_pipeline(config.perception)
+    baseline = PaperBaseline()
+    scenes: list[Scene] = []
+    baseline_ms: list[float] = []
+    started, spent = time.perf_counter(), 0.0
+    with progress_bar() as bar:
+        task = bar.add_task("frames", total=frames)
+        for index, image in enumerate(_pictures(frames + _WARM_UP)):
+            before = time.perf_counter()
+            scene = pipeline.perceive_single(Frame(index, index / 30, image))
+            if index < _WARM_UP:
+                continue
+            spent += time.perf_counter() - before
+            scenes.append(scene)
+            if index % _BASELINE_EVERY == 0 and scene.masks is not None:
+                baseline_ms.append(baseline.time(image, scene.masks.vessel, scene.masks.robot).total_ms)
+            bar.advance(task)
+    stages = sorted({stage for scene in scenes for stage in scene.latency_ms} - {"total"})
+    totals = [scene.latency_ms["total"] for scene in scenes]
+    after = [scene.latency_ms["total"] - scene.latency_ms.get("prepare", 0) - scene.latency_ms["network"] for scene in scenes]
+    result = {
+        "total_ms": quantiles(totals),
+        "after_network_ms": quantiles(after),
+        "stages_ms": {stage: quantiles([scene.latency_ms.get(stage, 0.0) for scene in scenes]) for stage in stages},
+        "baseline_total_ms": quantiles(baseline_ms),
+        "speedup": round(float(np.median(baseline_ms) / np.median(totals)), 2),
+        "fps": round(len(scenes) / spent, 2),
+        "peak_memory_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+        "first_frame_s": first_frame_s,
+        "engine": pipeline.engine,
+        "cores": os.cpu_count(),
+        "frames": len(scenes),
+        "answered": sum(scene.pose is not None for scene in scenes),
+        "seconds": round(time.perf_counter() - started, 1),
+    }
+    _print(result, as_json, "speed")
+
+
+def _pictures(count: int) -> Iterator[Image]:
+    """Pictures of the named phantoms in the default look, with the robot at various depths; rendered before they are timed."""
+    from hardware.twin.phantoms import PHANTOM_NAMES
+    from hardware.twin.world import TwinWorld
+
+    ready: list[Image] = []
+    for place, name in enumerate(PHANTOM_NAMES):
+        world = TwinWorld(TwinConfig(phantom=name, appearance_seed=place), seed=place)
+        for depth in (50.0, 80.0):
+            world.insert(depth)
+            ready.append(world.frame().image)
+    for index in range(count):
+        yield ready[index % len(ready)]
+
+
+def _first_frame_s() -> float | None:
+    """Seconds from starting ``main.py`` to its first overlaid frame, in a process of its own (offscreen when there is no display)."""
+    main = Path(sys.modules["__main__"].__file__ or "main.py").resolve()
+    environment = dict(os.environ)
+    if sys.platform.startswith("linux") and not environment.get("DISPLAY") and not environment.get("WAYLAND_DISPLAY"):
+        environment.setdefault("QT_QPA_PLATFORM", "offscreen")
+    started = time.monotonic()
+    command = [sys.executable, str(main), "gui", "--until-first-frame"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    try:
+        return round(float(json.loads(done.stdout)["first_frame_monotonic_s"]) - started, 2)
+    except (ValueError, KeyError):
+        sys.stderr.write(f"the window did not start (exit code {done.returncode}): {done.stderr.strip()[-300:]}\n")
+        return None
+
+
+def run_accuracy(folder: Path, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
+    """Perceive every frame of a synth set as a single image and compare with its truth."""
+    from core.learning.dataset import find_samples, read_truth
+    from core.perception.pipeline import open_pipeline
+    from core.study.accuracy import score_frame, summarise
+
+    config = _config(model, preset, config_path)
+    samples, truth = find_samples([folder]), read_truth(folder)
+    pipeline = open_pipeline(config.perception)
+    scores = []
+    with progress_bar() as bar:
+        for sample in bar.track(samples, description="frames"):
+            image, vessel, robot = sample.load()
+            scene = pipeline.perceive_single(Frame(0, 0.0, image))
+            size = _working_size(scene)
+            masks = [_at_size(mask, size) for mask in (vessel, robot)]
+            scores.append(score_frame(sample.stem, scene, masks[0], masks[1], truth.get(sample.stem, {})))
+    _print(summarise(scores), as_json, f"accuracy on {folder}")
+
+
+def _working_size(scene: Scene) -> tuple[int, int]:
+    if scene.masks is not None:
+        return scene.masks.vessel.shape[1], scene.masks.vessel.shape[0]
+    return round(scene.source_size[0] * scene.scale), round(scene.source_size[1] * scene.scale)
+
+
+def _at_size(mask: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    if (mask.shape[1], mask.shape[0]) == size:
+        return mask
+    return np.asarray(cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_AREA) > 127)
+
+
+def _print(result: dict[str, Any], as_json: bool, title: str) -> None:
+    if as_json:
+        sys.stdout.write(json.dumps(result) + "\n")
+        return
+    table = Table(title=title, show_header=False)
+    for key, value in result.items():
+        if isinstance(value, dict) and any(isinstance(inner, dict) for inner in value.values()):
+            for inner_key, inner in value.items():
+                table.add_row(f"{key}.{inner_key}", _words(inner))
+        else:
+            table.add_row(key, _words(value))
+    Console().print(table)
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_words(inner)}" for key, inner in value.items()) or "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,112 @@
+"""All keys on one page, over the window."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QRectF, Qt
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QWidget
+
+from app import palette, theme
+from app.widgets.overlays import Layer
+
+KEY_TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
+    (
+        "Move the robot (hold)",
+        (
+            ("\N{LEFTWARDS ARROW}  \N{RIGHTWARDS ARROW}   or   A  D", "bend the head left, right"),
+            ("\N{UPWARDS ARROW}  \N{DOWNWARDS ARROW}   or   W  S", "advance, retract"),
+            ("E   Q", "lift, dip the head"),
+            ("PgUp   PgDn", "sheath forward, back"),
+            ("Space", "stop and straighten, everywhere"),
+        ),
+    ),
+    (
+        "Target",
+        (
+            ("Click", "go there: advice follows the way to it"),
+            ("Right click   or   Esc", "clear the target"),
+        ),
+    ),
+    (
+        "Overlays",
+        (*((layer.value.key, layer.value.label) for layer in Layer), ("0", "all on or off")),
+    ),
+    (
+        "Window",
+        (
+            ("P   or   Ctrl+S", "snapshot: picture, overlay, values"),
+            ("R", "another random phantom"),
+            ("F5", "start the rig again"),
+            ("Wheel, drag, F", "zoom, move, whole picture"),
+            ("F11", "full screen (Esc leaves)"),
+            ("F1", "this page (Esc closes)"),
+            ("Ctrl+Q", "quit"),
+        ),
+    ),
+)
+_COLUMNS = ((0, 1), (2,), (3,))
+_ROW = 30
+_HEAD = 40
+
+
+class HelpOverlay(QWidget):
+    """Covers its parent; a click closes it."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.hide()
+        self.setAccessibleName("Keys")
+        self.setAccessibleDescription("; ".join(f"{key}: {text}" for _, rows in KEY_TABLE for key, text in rows))
+        parent.installEventFilter(self)
+
+    def toggle(self) -> None:
+        self.setGeometry(self.parentWidget().rect())
+        self.setVisible(not self.isVisible())
+        self.raise_()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize:
+            self.setGeometry(self.parentWidget().rect())
+        return False
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self.hide()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.fillRect(self.rect(), theme.colour(palette.INK, 0.78))
+        page = QRectF(0, 0, min(1240, self.width() - 60), 470)
+        page.moveCenter(QRectF(self.rect()).center())
+        painter.setPen(QPen(QColor(palette.LINE), 1))
+        painter.setBrush(QColor(palette.PANEL))
+        painter.drawRoundedRect(page, 12, 12)
+        painter.setPen(QColor(palette.TEXT))
+        painter.setFont(theme.bold(22))
+        painter.drawText(page.adjusted(32, 22, 0, 0), Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, "Keys")
+        width = (page.width() - 64) / len(_COLUMNS)
+        for k, tables in enumerate(_COLUMNS):
+            y = page.top() + 68
+            for index in tables:
+                y = self._paint_table(painter, page.left() + 32 + k * width, y, width - 24, index) + 14
+        painter.end()
+
+    @staticmethod
+    def _paint_table(painter: QPainter, left: float, top: float, width: float, index: int) -> float:
+        title, rows = KEY_TABLE[index]
+        painter.setPen(QColor(palette.SKY))
+        painter.setFont(theme.semi_bold(14))
+        painter.drawText(QRectF(left, top, width, _HEAD - 8), Qt.AlignmentFlag.AlignVCenter, title)
+        top += _HEAD - 6
+        keys_width = 180.0 if index != 2 else 40.0
+        for key, text in rows:
+            painter.setPen(QColor(palette.TEXT))
+            painter.setFont(theme.semi_bold(13))
+            painter.drawText(QRectF(left, top, keys_width, _ROW), Qt.AlignmentFlag.AlignVCenter, key)
+            painter.setPen(QColor(palette.TEXT_DIM))
+            text_font = theme.font(13)
+            painter.setFont(text_font)
+            text = theme.elide(text_font, text, int(width - keys_width))
+            painter.drawText(QRectF(left + keys_width, top, width - keys_width, _ROW), Qt.AlignmentFlag.AlignVCenter, text)
+            top += _ROW
+        return top

@@ -1,0 +1,194 @@
+"""The keys that move the robot, on the screen: they light up when pressed, and can be held with the mouse too."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from app import palette, theme
+from app.jog_keys import Motion
+from core.types import Command, RobotStatus
+
+_LEFT, _RIGHT, _UP, _DOWN = (QPointF(-1, 0), QPointF(1, 0), QPointF(0, -1), QPointF(0, 1))
+
+
+class JogPanel(QWidget):
+    """``pressed`` and ``released`` carry a motion that is held with the mouse; ``stopped`` comes from the stop cap."""
+
+    pressed = Signal(object)
+    released = Signal(object)
+    stopped = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._caps: dict[Motion, _Cap] = {}
+        grid = QGridLayout()
+        grid.setSpacing(4)
+        for motion, row, column, arrow, key, text in (
+            (Motion.PITCH_DOWN, 0, 0, None, "Q", "dip"),
+            (Motion.ADVANCE, 0, 1, _UP, "W", "advance"),
+            (Motion.PITCH_UP, 0, 2, None, "E", "lift"),
+            (Motion.STEER_LEFT, 1, 0, _LEFT, "A", "left"),
+            (Motion.RETRACT, 1, 1, _DOWN, "S", "retract"),
+            (Motion.STEER_RIGHT, 1, 2, _RIGHT, "D", "right"),
+            (Motion.DELIVER, 0, 3, None, "PgUp", "sheath +"),
+            (Motion.WITHDRAW, 1, 3, None, "PgDn", "sheath \N{MINUS SIGN}"),
+        ):
+            cap = _Cap(arrow, key, text)
+            cap.setAccessibleName(motion.value)
+            cap.setToolTip(f"{motion.value}: hold to move, release to stop")
+            cap.pressed.connect(lambda which=motion: self.pressed.emit(which))
+            cap.released.connect(lambda which=motion: self.released.emit(which))
+            grid.addWidget(cap, row, column)
+            self._caps[motion] = cap
+        self._stop = _Cap(None, "Space", "stop and straighten", wide=True)
+        self._stop.setAccessibleName("stop and straighten")
+        self._stop.pressed.connect(self.stopped)
+        grid.addWidget(self._stop, 2, 0, 1, 4)
+        self._readout = _Readout()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(6)
+        row = QHBoxLayout()
+        row.addLayout(grid)
+        column.addLayout(row)
+        column.addWidget(self._readout)
+        column.addStretch(1)
+        self.setAccessibleName("Keys that move the robot")
+
+    def show_held(self, held: frozenset[Motion]) -> None:
+        """Light the caps of what is held."""
+        for motion, cap in self._caps.items():
+            cap.light(motion in held)
+
+    def show_command(self, command: Command, status: RobotStatus | None) -> None:
+        """Bend asked for, and how far in the robot is."""
+        self._readout.show_values(command.bend, command.pitch, status.insertion_mm if status is not None else None)
+
+    def set_enabled(self, enabled: bool, why: str = "") -> None:
+        """Grey the caps out when there is nothing to move."""
+        for cap in (*self._caps.values(), self._stop):
+            cap.setEnabled(enabled)
+        self._readout.setEnabled(enabled)
+        self.setToolTip(why)
+
+
+class _Cap(QWidget):
+    """A key cap. Holding it with the left button is holding the key."""
+
+    pressed = Signal()
+    released = Signal()
+
+    def __init__(self, arrow: QPointF | None, key: str, text: str, *, wide: bool = False) -> None:
+        super().__init__()
+        self._arrow = arrow
+        self._key = key
+        self._text = text
+        self._wide = wide
+        self._lit = False
+        self._held_by_mouse = False
+        self.setMinimumSize(54, 26 if wide else 38)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:
+        return QSize(62, 26 if self._wide else 38)
+
+    @property
+    def is_lit(self) -> bool:
+        return self._lit
+
+    def light(self, on: bool) -> None:
+        if on != self._lit:
+            self._lit = on
+            self.update()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._held_by_mouse = True
+            self.pressed.emit()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._let_go()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        self._let_go()
+        super().hideEvent(event)
+
+    def _let_go(self) -> None:
+        if self._held_by_mouse:
+            self._held_by_mouse = False
+            self.released.emit()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+        back, text, label = palette.RAISED, palette.TEXT, palette.TEXT_DIM
+        if self._lit:
+            back, text, label = palette.SKY, palette.INK, palette.INK
+        elif not self.isEnabled():
+            back, text, label = palette.PANEL, palette.TEXT_FAINT, palette.TEXT_FAINT
+        painter.setPen(QPen(QColor(palette.SKY if self._lit else palette.LINE), 1))
+        painter.setBrush(QColor(back))
+        painter.drawRoundedRect(frame, 5, 5)
+        painter.setPen(QColor(text))
+        if self._wide:
+            painter.setFont(theme.semi_bold(12))
+            painter.drawText(frame, Qt.AlignmentFlag.AlignCenter, f"{self._key}:  {self._text}")
+            return
+        top = QRectF(frame.left(), frame.top() + 3, frame.width(), 17)
+        painter.setFont(theme.semi_bold(13))
+        painter.drawText(top.translated(8 if self._arrow is not None else 0, 0), Qt.AlignmentFlag.AlignCenter, self._key)
+        if self._arrow is not None:
+            self._paint_arrow(painter, QPointF(top.center().x() - 9, top.center().y()), self._arrow, text)
+        painter.setPen(QColor(label))
+        painter.setFont(theme.font(11))
+        painter.drawText(QRectF(frame.left(), frame.top() + 20, frame.width(), 15), Qt.AlignmentFlag.AlignCenter, self._text)
+        painter.end()
+
+    @staticmethod
+    def _paint_arrow(painter: QPainter, middle: QPointF, direction: QPointF, name: str) -> None:
+        across = QPointF(-direction.y(), direction.x())
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(name))
+        painter.drawPolygon(QPolygonF([middle + direction * 5, middle - direction * 4 + across * 5, middle - direction * 4 - across * 5]))
+
+
+class _Readout(QWidget):
+    """How far the head is bent (bar from the middle), and how far the robot is in."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._bend = self._pitch = 0.0
+        self._insertion_mm: float | None = None
+        self.setFixedHeight(20)
+        self.setToolTip("Bend of the head that is asked for (share of the tendons' full pull) and how far the robot is in")
+
+    def show_values(self, bend: float, pitch: float, insertion_mm: float | None) -> None:
+        values = (round(bend, 2), round(pitch, 2), None if insertion_mm is None else round(insertion_mm))
+        if values != (self._bend, self._pitch, self._insertion_mm):
+            self._bend, self._pitch, self._insertion_mm = values
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setFont(theme.font(theme.Size.LABEL))
+        painter.setPen(QColor(palette.TEXT_DIM))
+        middle = Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(QRectF(0, 0, 36, self.height()), middle, "bend")
+        track = QRectF(38, self.height() / 2 - 4, self.width() - 38 - 96, 8)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(palette.RAISED))
+        painter.drawRoundedRect(track, 3, 3)
+        center = track.center().x()
+        end = center + self._bend * track.width() / 2
+        painter.setBrush(QColor(palette.SKY))
+        painter.drawRect(QRectF(min(center, end), track.top(), max(2.0, abs(end - center)), track.height()))
+        painter.setPen(QColor(palette.TEXT_DIM))
+        inserted = "\N{EN DASH}" if self._insertion_mm is None else f"{self._insertion_mm:.0f}"
+        right = Qt.AlignmentFlag.AlignRight | middle
+        painter.drawText(QRectF(self.width() - 94, 0, 94, self.height()), right, f"in {inserted} mm")
+        painter.end()

@@ -1,0 +1,196 @@
+"""The live picture with its overlays; a click sets the target."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, Qt, Signal
+from PySide6.QtGui import QPainter, QTransform
+from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
+
+from app import palette, theme
+from app.scene_shapes import scene_shapes
+from app.widgets.overlays import Layer, Overlay, OverlayItem
+from core.types import Frame, Image, Point, Scene
+
+_VESSEL, _ROBOT, _VESSEL_SKELETON, _ROBOT_SKELETON = 1, 2, 4, 8
+_ZOOM_MAX = 12.0
+
+
+class LiveView(QWidget):
+    """Shows a frame and what was understood of it. Plot items are made once and updated in place.
+
+    ``clicked`` carries a place in source pixels; ``cleared`` comes on a right click.
+    """
+
+    clicked = Signal(float, float)
+    cleared = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setMinimumSize(480, 320)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAccessibleName("Live picture")
+        self.setAccessibleDescription("Click sets the target, right click clears it")
+        self._size: tuple[int, int] | None = None
+        self._scene: Scene | None = None
+        self._target: Point | None = None
+        self._masks_on = self._vessel_on = self._robot_on = True
+        self._view = pg.GraphicsView()
+        self._view.setBackground(palette.INK)
+        self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._box = _PictureBox()
+        self._view.setCentralItem(self._box)
+        self._picture = _SmoothImage(axisOrder="row-major")
+        self._labels = _SmoothImage(axisOrder="row-major")
+        self._labels.setLookupTable(_label_colours())
+        self._marks = OverlayItem()
+        for item in (self._picture, self._labels, self._marks):
+            item.setVisible(False)
+            self._box.addItem(item, ignoreBounds=True)
+        self._box.left_clicked.connect(self._on_left_click)
+        self._box.right_clicked.connect(self.cleared)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self._view)
+
+    @property
+    def scene(self) -> Scene | None:
+        return self._scene
+
+    def show_frame(self, frame: Frame, scene: Scene) -> None:
+        """Show a frame with its scene."""
+        self._show_picture(frame.image)
+        self._scene = scene
+        self._show_labels()
+        self._show_marks()
+
+    def blank_overlays(self) -> None:
+        """Take everything away that was understood: it is not true any more. The last picture and the target stay."""
+        if self._scene is not None:
+            self._scene = None
+            self._show_labels()
+            self._show_marks()
+
+    def show_target(self, target: Point | None) -> None:
+        self._target = target
+        self._show_marks()
+
+    def set_layer(self, layer: Layer, visible: bool) -> None:
+        if layer is Layer.MASKS:
+            self._masks_on = visible
+        elif layer is Layer.VESSEL:
+            self._vessel_on = visible
+        elif layer is Layer.ROBOT:
+            self._robot_on = visible
+        self._marks.set_layer(layer, visible)
+        self._show_labels()
+
+    def fit(self) -> None:
+        """Show the whole picture."""
+        if self._size is not None:
+            self._box.fit(*self._size)
+
+    def _show_picture(self, image: Image) -> None:
+        height, width = image.shape[:2]
+        self._picture.setImage(image, autoLevels=False, levels=None)
+        if self._size != (width, height):
+            self._size = (width, height)
+            self._marks.set_size(width, height)
+            self._picture.setVisible(True)
+            self._marks.setVisible(True)
+            self.fit()
+
+    def _show_labels(self) -> None:
+        """Masks, and skeletons as long as there is no graph or path to draw as lines, as one picture of label bits."""
+        scene = self._scene
+        if scene is None or scene.masks is None:
+            self._labels.setVisible(False)
+            return
+        labels = np.zeros(scene.masks.vessel.shape, np.uint8)
+        if self._masks_on:
+            labels |= scene.masks.vessel.view(np.uint8) * np.uint8(_VESSEL)
+            labels |= scene.masks.robot.view(np.uint8) * np.uint8(_ROBOT)
+        if scene.skeletons is not None:
+            if self._vessel_on and scene.vessel_graph is None:
+                labels |= scene.skeletons.vessel.view(np.uint8) * np.uint8(_VESSEL_SKELETON)
+            if self._robot_on and scene.path is None:
+                labels |= scene.skeletons.robot.view(np.uint8) * np.uint8(_ROBOT_SKELETON)
+        self._labels.setImage(labels, autoLevels=False, levels=None)
+        self._labels.setTransform(QTransform.fromScale(1.0 / scene.scale, 1.0 / scene.scale))
+        self._labels.setVisible(True)
+
+    def _show_marks(self) -> None:
+        scene = self._scene
+        shapes = scene_shapes(scene) if scene is not None else None
+        self._marks.show_overlay(Overlay(shapes, scene.pose if scene is not None else None, self._target))
+
+    def _on_left_click(self, point: QPointF) -> None:
+        if self._size is None:
+            return
+        x, y = point.x() - 0.5, point.y() - 0.5
+        if -0.5 <= x < self._size[0] - 0.5 and -0.5 <= y < self._size[1] - 0.5:
+            self.clicked.emit(x, y)
+
+
+class _SmoothImage(pg.ImageItem):
+    """Interpolated when enlarged; whole pixels would hide where a thin robot is."""
+
+    def paint(self, painter: QPainter, *args: object) -> None:
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        super().paint(painter, *args)
+
+
+class _PictureBox(pg.ViewBox):
+    """A view box whose left click means a place and whose drag moves a zoomed picture."""
+
+    left_clicked = Signal(QPointF)
+    right_clicked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(lockAspect=True, invertY=True, enableMenu=False, defaultPadding=0.0)
+        self._fitted = True
+        self._picture_size = (1, 1)
+
+    def fit(self, width: int, height: int) -> None:
+        self._picture_size = (width, height)
+        self._fitted = True
+        self.setLimits(minXRange=width / _ZOOM_MAX, minYRange=height / _ZOOM_MAX)
+        self.setRange(xRange=(0, width), yRange=(0, height), padding=0)
+
+    def mouseClickEvent(self, event: pg.GraphicsScene.mouseEvents.MouseClickEvent) -> None:
+        event.accept()
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.left_clicked.emit(self.mapSceneToView(event.scenePos()))
+        elif event.button() == Qt.MouseButton.RightButton:
+            self.right_clicked.emit()
+
+    def mouseDragEvent(self, event: pg.GraphicsScene.mouseEvents.MouseDragEvent, axis: int | None = None) -> None:
+        if self._fitted or event.button() == Qt.MouseButton.RightButton:
+            event.ignore()
+            return
+        super().mouseDragEvent(event, axis)
+
+    def wheelEvent(self, event: object, axis: int | None = None) -> None:
+        self._fitted = False
+        super().wheelEvent(event, axis)
+        (left, right), (top, bottom) = self.viewRange()
+        if right - left >= self._picture_size[0] and bottom - top >= self._picture_size[1]:
+            self.fit(*self._picture_size)
+
+
+def _label_colours() -> np.ndarray:
+    """RGBA (16, 4) for every combination of label bits; what is thinner wins."""
+    table = np.zeros((16, 4), np.uint8)
+    for bits in range(16):
+        for bit, name, alpha in (
+            (_ROBOT_SKELETON, palette.ROBOT, 1.0),
+            (_VESSEL_SKELETON, palette.VESSEL, 1.0),
+            (_ROBOT, palette.ROBOT, 0.40),
+            (_VESSEL, palette.VESSEL, 0.24),
+        ):
+            if bits & bit:
+                c = theme.colour(name, alpha)
+                table[bits] = (c.red(), c.green(), c.blue(), c.alpha())
+                break
+    return table

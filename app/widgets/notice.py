@@ -1,0 +1,112 @@
+"""A message over the live picture: starting, no new picture, recording over, fault."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
+
+from app import palette, theme
+
+
+class NoticeKind(Enum):
+    """How serious it is: the colour of the edge, and the word in front."""
+
+    PROGRESS = palette.SKY
+    WARNING = palette.SIM
+    FAULT = palette.FAULT
+
+
+class Notice(QWidget):
+    """A card in the middle of its parent. PROGRESS shows a moving bar; FAULT and an ended recording show a button to start again."""
+
+    restart = Signal()
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._kind = NoticeKind.PROGRESS
+        self._title = ""
+        self._detail = ""
+        self._phase = 0.0
+        self._timer = QTimer(self)
+        self._timer.setInterval(50)
+        self._timer.timeout.connect(self._move_bar)
+        self._button = QPushButton("Start again  (F5)")
+        self._button.clicked.connect(self.restart)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(24, 24, 24, 20)
+        column.addStretch(1)
+        column.addWidget(self._button, 0, Qt.AlignmentFlag.AlignHCenter)
+        parent.installEventFilter(self)
+        self.hide()
+
+    @property
+    def text(self) -> str:
+        return f"{self._title}. {self._detail}" if self._detail else self._title
+
+    def sizeHint(self) -> QSize:
+        return QSize(520, 170)
+
+    def show_notice(self, kind: NoticeKind, title: str, detail: str = "", *, restartable: bool = False) -> None:
+        self._kind, self._title, self._detail = kind, title, detail
+        self._button.setVisible(restartable)
+        self.setAccessibleName(self.text)
+        if kind is NoticeKind.PROGRESS:
+            self._timer.start()
+        else:
+            self._timer.stop()
+        self._place()
+        self.show()
+        self.raise_()
+        self.update()
+
+    def clear(self) -> None:
+        self._timer.stop()
+        self.hide()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize:
+            self._place()
+        return False
+
+    def _place(self) -> None:
+        room = self.parentWidget().rect()
+        width = min(560, room.width() - 40)
+        height = 178 if self._button.isVisibleTo(self) else 132
+        self.setGeometry((room.width() - width) // 2, (room.height() - height) // 2, width, height)
+
+    @Slot()
+    def _move_bar(self) -> None:
+        self._phase = (self._phase + 0.02) % 1.0
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+        painter.setPen(QPen(QColor(self._kind.value), 2))
+        painter.setBrush(theme.colour(palette.PANEL, 0.96))
+        painter.drawRoundedRect(frame, 10, 10)
+        painter.setPen(QColor(palette.TEXT))
+        painter.setFont(theme.fitted(theme.bold(22), self._title, int(frame.width() - 40)))
+        painter.drawText(QRectF(20, 16, frame.width() - 40, 32), Qt.AlignmentFlag.AlignCenter, self._title)
+        painter.setPen(QColor(palette.TEXT_DIM))
+        painter.setFont(theme.font(theme.Size.BODY))
+        flags = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap
+        painter.drawText(QRectF(20, 54, frame.width() - 40, 62), int(flags), self._detail)
+        if self._kind is NoticeKind.PROGRESS:
+            self._paint_bar(painter, QRectF(60, frame.bottom() - 26, frame.width() - 120, 6))
+        painter.end()
+
+    def _paint_bar(self, painter: QPainter, track: QRectF) -> None:
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(palette.RAISED))
+        painter.drawRoundedRect(track, 3, 3)
+        width = track.width() * 0.28
+        left = track.left() - width + (track.width() + width) * self._phase
+        bar = QRectF(max(left, track.left()), track.top(), 0, track.height())
+        bar.setRight(min(left + width, track.right()))
+        painter.setBrush(QColor(self._kind.value))
+        painter.drawRoundedRect(bar, 3, 3)

@@ -1,0 +1,93 @@
+"""The switches of the overlays: a row of chips, each with its key."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QWidget
+
+from app import palette, theme
+from app.widgets.overlays import Layer
+
+_SWATCH = {
+    Layer.MASKS: palette.VESSEL,
+    Layer.VESSEL: palette.VESSEL,
+    Layer.ROBOT: palette.ROBOT,
+    Layer.HEAD: palette.HEAD,
+    Layer.VECTORS: palette.ROBOT_VECTOR,
+    Layer.NEAREST: palette.NEAREST,
+    Layer.DISTANCES: palette.D_HEAD,
+    Layer.ROUTE: palette.ROUTE,
+}
+
+
+class OverlayBar(QWidget):
+    """``toggled`` carries a layer and whether it is on."""
+
+    toggled = Signal(object, bool)
+
+    def __init__(self) -> None:
+        super().__init__()
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        self._chips: dict[Layer, _Chip] = {}
+        for layer in Layer:
+            chip = _Chip(layer)
+            chip.toggled.connect(lambda on, which=layer: self.toggled.emit(which, on))
+            row.addWidget(chip, 1)
+            self._chips[layer] = chip
+        self.setAccessibleName("Overlays")
+
+    def is_on(self, layer: Layer) -> bool:
+        return self._chips[layer].isChecked()
+
+    def toggle(self, layer: Layer) -> None:
+        self._chips[layer].toggle()
+
+    def set_all(self, on: bool) -> None:
+        for chip in self._chips.values():
+            chip.setChecked(on)
+
+
+class _Chip(QAbstractButton):
+    """Key cap, colour and name; filled when on, outlined when off."""
+
+    def __init__(self, layer: Layer) -> None:
+        super().__init__()
+        self._layer = layer
+        self.setCheckable(True)
+        self.setChecked(True)
+        self.setText(layer.value.label)
+        self.setFixedHeight(30)
+        self.setMinimumWidth(54)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setToolTip(f"{layer.value.meaning}  (key {layer.value.key})")
+        self.setAccessibleName(f"Overlay {layer.value.label}")
+
+    def sizeHint(self) -> QSize:
+        return QSize(88, 30)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        on = self.isChecked()
+        frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+        edge = palette.SKY if self.hasFocus() else palette.TEXT_FAINT if self.underMouse() else palette.LINE
+        painter.setPen(QPen(QColor(edge), 1))
+        painter.setBrush(QColor(palette.RAISED) if on else QColor(palette.WINDOW))
+        painter.drawRoundedRect(frame, 6, 6)
+        painter.setPen(QColor(palette.TEXT_DIM if on else palette.TEXT_FAINT))
+        painter.setFont(theme.semi_bold(11))
+        painter.drawText(QRectF(8, 0, 10, self.height()), Qt.AlignmentFlag.AlignCenter, self._layer.value.key)
+        swatch = QRectF(22, self.height() / 2 - 4, 8, 8)
+        painter.setPen(QPen(QColor(_SWATCH[self._layer]), 1.5))
+        painter.setBrush(QColor(_SWATCH[self._layer]) if on else Qt.BrushStyle.NoBrush)
+        painter.drawRoundedRect(swatch, 2, 2)
+        painter.setPen(QColor(palette.TEXT if on else palette.TEXT_FAINT))
+        width = self.width() - 36 - 6
+        text_font = theme.fitted(theme.font(13), self.text(), width, 10)
+        painter.setFont(text_font)
+        painter.drawText(QRectF(36, 0, width, self.height()), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self.text())
+        painter.end()

@@ -1,0 +1,119 @@
+"""Choice of the phantom that the bench twin shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
+from PySide6.QtGui import QFocusEvent, QKeyEvent
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSpinBox, QWidget
+
+_RANDOM = "random"
+_SEED_MAX = 999_999
+
+
+class PhantomPicker(QWidget):
+    """Named phantoms, and "Random" with a seed. ``chosen`` carries the phantom's name as the configuration writes it."""
+
+    chosen = Signal(str)
+
+    def __init__(self, phantoms: Sequence[tuple[str, str]], current: str) -> None:
+        """`phantoms` are (name, title) pairs; `current` is a name or "random:<seed>"."""
+        super().__init__()
+        self._combo = QComboBox()
+        for name, title in phantoms:
+            self._combo.addItem(title, name)
+        self._combo.addItem("Random \N{HORIZONTAL ELLIPSIS}", _RANDOM)
+        self._combo.setMinimumWidth(190)
+        self._combo.setMaxVisibleItems(16)
+        self._combo.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self._combo.setToolTip("The phantom that the bench twin shows")
+        self._combo.setAccessibleName("Phantom")
+        self._seed = _SeedBox()
+        self._roll = QPushButton("New")
+        self._roll.setToolTip("Another random phantom (key R)")
+        self._roll.setAccessibleName("Another random phantom")
+        self._roll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        label = QLabel("Phantom")
+        label.setObjectName("card_title")
+        for widget in (label, self._combo, self._seed, self._roll):
+            row.addWidget(widget)
+        self.show_name(current)
+        self._combo.activated.connect(self._on_choice)
+        self._seed.committed.connect(self._on_choice)
+        self._roll.clicked.connect(self.roll)
+
+    @property
+    def name(self) -> str:
+        """The phantom as the configuration writes it."""
+        data = str(self._combo.currentData())
+        return f"{_RANDOM}:{self._seed.value()}" if data == _RANDOM else data
+
+    @property
+    def title(self) -> str:
+        return f"random {self._seed.value()}" if self._combo.currentData() == _RANDOM else self._combo.currentText()
+
+    def show_name(self, name: str) -> None:
+        """Show `name` without choosing it again."""
+        kind, _, seed = name.partition(":")
+        with QSignalBlocker(self._combo), QSignalBlocker(self._seed):
+            index = self._combo.findData(kind if kind == _RANDOM else name)
+            self._combo.setCurrentIndex(index)
+            if kind == _RANDOM and seed.isdecimal():
+                self._seed.setValue(int(seed))
+        self._show_seed()
+
+    @Slot()
+    def roll(self) -> None:
+        """The random phantom of the next seed."""
+        with QSignalBlocker(self._combo), QSignalBlocker(self._seed):
+            if self._combo.currentData() == _RANDOM:
+                self._seed.setValue(self._seed.value() % _SEED_MAX + 1)
+            self._combo.setCurrentIndex(self._combo.findData(_RANDOM))
+        self._on_choice()
+
+    @Slot()
+    def _on_choice(self) -> None:
+        self._show_seed()
+        self.chosen.emit(self.name)
+
+    def _show_seed(self) -> None:
+        # kept in place when unused, so that the row does not jump
+        self._seed.setEnabled(self._combo.currentData() == _RANDOM)
+
+
+class _SeedBox(QSpinBox):
+    """A seed that counts when it is confirmed, not at each digit. Enter and Escape give the keys back to the robot."""
+
+    committed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setRange(0, _SEED_MAX)
+        self.setValue(1)
+        self.setPrefix("seed ")
+        self.setFixedWidth(120)
+        self.setKeyboardTracking(False)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.setAccessibleName("Seed of the random phantom")
+        self.setToolTip("Seed of the random phantom; the same seed gives the same phantom")
+        self._last = self.value()
+        self.valueChanged.connect(self._on_value)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        super().keyPressEvent(event)
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape):
+            self.clearFocus()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.selectAll()
+
+    @Slot(int)
+    def _on_value(self, value: int) -> None:
+        if value != self._last:
+            self._last = value
+            self.committed.emit()

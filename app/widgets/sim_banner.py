@@ -1,0 +1,83 @@
+"""The permanent banner that tells a simulation, a real rig and a recording apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPolygonF
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app import palette, theme
+
+
+@dataclass(frozen=True, slots=True)
+class BannerText:
+    """Word, colour and explanation."""
+
+    word: str
+    colour: str
+    meaning: str
+
+
+class RigKindBanner(Enum):
+    """What the picture comes from."""
+
+    SIM = BannerText("SIM", palette.SIM, "Bench twin: everything here is simulated, no hardware moves")
+    LIVE = BannerText("LIVE", palette.LIVE, "Real rig: commands move real servos. Keep the hard-wired power cut in reach")
+    PLAYBACK = BannerText("PLAYBACK", palette.PLAYBACK, "Recorded pictures: nothing here is happening now")
+
+
+class SimBanner(QWidget):
+    """A striped word that is always visible, and what it means."""
+
+    def __init__(self, kind: RigKindBanner) -> None:
+        super().__init__()
+        self._text = kind.value
+        self._source = ""
+        self.setFixedHeight(34)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(f"{self._text.word}: {self._text.meaning}")
+        self.setToolTip(self._text.meaning)
+
+    @property
+    def word(self) -> str:
+        return self._text.word
+
+    def sizeHint(self) -> QSize:
+        return QSize(500, 34)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        word_font = theme.bold(18)
+        word_font.setLetterSpacing(word_font.SpacingType.AbsoluteSpacing, 2.0)
+        painter.setFont(word_font)
+        word_width = painter.fontMetrics().horizontalAdvance(self._text.word) + 20
+        plate = QRectF(0, 0, word_width + 48, self.height())
+        self._paint_plate(painter, plate)
+        painter.setPen(QColor(palette.INK))
+        painter.drawText(plate.adjusted(24, 0, -22, 0), Qt.AlignmentFlag.AlignCenter, self._text.word)
+        note_font = theme.font(theme.Size.BODY)
+        painter.setFont(note_font)
+        painter.setPen(QColor(palette.TEXT_DIM))
+        left = plate.right() + 14
+        note = theme.elide(note_font, self._text.meaning, int(self.width() - left))
+        painter.drawText(QRectF(left, 0, self.width() - left, self.height()), Qt.AlignmentFlag.AlignVCenter, note)
+        painter.end()
+
+    def _paint_plate(self, painter: QPainter, plate: QRectF) -> None:
+        """A plate with slanted stripes at both ends, as on a barrier: told by shape, not by colour alone."""
+        clip = QPainterPath()
+        clip.addRoundedRect(plate, 6, 6)
+        painter.save()
+        painter.setClipPath(clip)
+        painter.fillRect(plate, QColor(self._text.colour))
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(theme.colour(palette.INK, 0.85))
+        height = plate.height()
+        for left in (plate.left() - 14, plate.left() + 2, plate.right() - 22, plate.right() - 6):
+            corners = [(left + 14, 0.0), (left + 22, 0.0), (left + 8, height), (left, height)]
+            painter.drawPolygon(QPolygonF([QPointF(x, plate.top() + y) for x, y in corners]))
+        painter.restore()

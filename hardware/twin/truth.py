@@ -1,0 +1,232 @@
+"""What perception should find in the twin's picture, from the geometry itself: no pixels are looked at.
+
+Truth is measured in working pixels (longer side of the image = ``working_size_px``) by the same public functions and the same 40-px rule as
+perception, on the true lines: the local tangent at the tip would differ from the 40-px line by several degrees in a bend.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.config import PerceptionConfig
+from core.perception import polyline
+from core.perception.centerline import centerline_at
+from core.perception.pose import measure
+from core.perception.vectors import fit_robot_vector, fit_vessel_vector
+from core.types import Centerline, GraphEdge, Point, Points, Pose, Reason, Route, Vector, VesselGraph
+from hardware.twin.lumen_field import lumen_discs
+from hardware.twin.phantom import Phantom
+from hardware.twin.view import View
+
+_PATH_STEP_PX = 2.0
+_CLIP_STEP_PX = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """The true scene; points and distances in working px, missing parts None.
+
+    The head is the very tip: the end of the robot's line extended by the radius of its round cap, which is where the robot's mask
+    ends and what perception's head is extended to. The tail is the other end of what is visible (at the image border or, within
+    the picture, extended likewise). Exactly one of ``pose`` and ``reason`` is set.
+
+    Attributes
+    ----------
+    robot_path : visible part that ends in the head, (N, 2), tail -> head, one point every 2 px; None when the head is out of the image.
+    nearest : centerline point nearest to the head; ``lumen_radius_px`` is the lumen's radius there.
+    offset_ratio : distance of the head to ``nearest`` over that radius (0 in the middle).
+    ambiguity : 0..1, how nearly another branch fits as well.
+    head_clearance_mm, body_clearance_mm : least distance between the robot's visible surface and the lumen's wall, at the end of
+        the robot's line and anywhere within the lumen; negative: it overlaps the wall.
+    scale : working px per source px.
+    """
+
+    scale: float
+    reason: Reason | None = None
+    head_xy: Point | None = None
+    tail_xy: Point | None = None
+    robot_path: Points | None = None
+    robot_vector: Vector | None = None
+    vessel_vector: Vector | None = None
+    pose: Pose | None = None
+    nearest: Point | None = None
+    lumen_radius_px: float | None = None
+    offset_ratio: float | None = None
+    ambiguity: float | None = None
+    head_clearance_mm: float | None = None
+    body_clearance_mm: float | None = None
+
+    def to_source(self, point: Point) -> Point:
+        """Working pixels -> source pixels (pixel centres at integers in both)."""
+        return (point[0] + 0.5) / self.scale - 0.5, (point[1] + 0.5) / self.scale - 0.5
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain types with the key names of ``perceive``; points in source px, distances in working px."""
+        pose = self.pose
+        path = [] if self.robot_path is None else [self._plain((x, y)) for x, y in self.robot_path.tolist()]
+        return {
+            "head_xy": self._plain(self.head_xy),
+            "tail_xy": self._plain(self.tail_xy),
+            "robot_path_xy": path,
+            "robot_vector": self._plain_vector(self.robot_vector),
+            "vessel_vector": self._plain_vector(self.vessel_vector),
+            "theta_deg": pose.theta_deg if pose else None,
+            "theta_signed_deg": pose.theta_signed_deg if pose else None,
+            "d_head_px": pose.d_head_px if pose else None,
+            "d_tail_px": pose.d_tail_px if pose else None,
+            "c_head_px": pose.c_head_px if pose else None,
+            "c_tail_px": pose.c_tail_px if pose else None,
+            "crossed": pose.crossed if pose else None,
+            "state": pose.state.value if pose else None,
+            "reason": self.reason.value if self.reason else None,
+            "nearest_xy": self._plain(self.nearest),
+            "lumen_radius_px": self.lumen_radius_px,
+            "offset_ratio": self.offset_ratio,
+            "ambiguity": self.ambiguity,
+            "head_clearance_mm": self.head_clearance_mm,
+            "body_clearance_mm": self.body_clearance_mm,
+        }
+
+    def _plain(self, point: Point | None) -> list[float] | None:
+        return None if point is None else [round(value, 3) for value in self.to_source(point)]
+
+    def _plain_vector(self, vector: Vector | None) -> dict[str, list[float] | None] | None:
+        if vector is None:
+            return None
+        return {"start": self._plain(vector.start), "center": self._plain(vector.center), "end": self._plain(vector.end)}
+
+
+def true_graph(phantom: Phantom, view: View, scale: float = 1.0) -> VesselGraph:
+    """The phantom's centerlines as seen: pixels of the view times `scale`, lumen radii likewise (by the local scale)."""
+    edges = tuple(
+        GraphEdge(edge.start, edge.end, _scaled(view.project(edge.points), scale), edge.radius * view.scales(edge.points) * scale)
+        for edge in phantom.graph.edges
+    )
+    return VesselGraph(_scaled(view.project(phantom.graph.nodes), scale), edges)
+
+
+def truth_of(
+    phantom: Phantom,
+    view: View,
+    robot_points_mm: Points | None,
+    radius_mm: float,
+    config: PerceptionConfig,
+    route: Route | None = None,
+) -> Truth:
+    """The truth of a moment.
+
+    Parameters
+    ----------
+    phantom, view : as given to the renderer.
+    robot_points_mm : the robot's line (N, 2), tail -> head, on the board; None or one point: no robot.
+    radius_mm : the robot's visible radius.
+    config : the same settings as perception's; a robot is refused by the same limits on length and place.
+    route : the operator's route in working px; it decides between branches.
+    """
+    scale = config.working_size_px / max(view.size)
+    if robot_points_mm is None or len(robot_points_mm) < 2:
+        return Truth(scale, Reason.NO_ROBOT)
+    axis = np.asarray(robot_points_mm, np.float64)
+    path = _visible_path(_with_caps(axis, radius_mm), view, scale)
+    if path is None:
+        return Truth(scale, Reason.NO_ROBOT)
+    tail, head = _point(path[0]), _point(path[-1])
+    depths = _depths_mm(axis, phantom.graph)
+    body = depths[_beyond_port(axis, phantom)]
+    robot_vector = fit_robot_vector(path, config.vectors.robot_length_px)
+    graph = true_graph(phantom, view, scale)
+    centerline: Centerline | None = None
+    if robot_vector is not None:
+        centerline = centerline_at(graph, head, robot_vector.direction, config.vectors.vessel_half_length_px, route)
+    vessel_vector = None if centerline is None else fit_vessel_vector(centerline)
+    reason = _refusal(path, view, phantom.graph, robot_vector, vessel_vector, config)
+    pose = None
+    if reason is None and robot_vector is not None and vessel_vector is not None:
+        pose = measure(robot_vector, vessel_vector, config.pose)
+    return Truth(
+        scale=scale,
+        reason=reason,
+        head_xy=head,
+        tail_xy=tail,
+        robot_path=path,
+        robot_vector=robot_vector,
+        vessel_vector=vessel_vector,
+        pose=pose,
+        nearest=centerline.nearest if centerline else None,
+        lumen_radius_px=float(centerline.radius_px) if centerline else None,
+        offset_ratio=float(np.hypot(*np.subtract(head, centerline.nearest)) / centerline.radius_px) if centerline else None,
+        ambiguity=float(centerline.ambiguity) if centerline else None,
+        head_clearance_mm=float(depths[-1]) - radius_mm,
+        body_clearance_mm=float(body.min()) - radius_mm if len(body) else None,
+    )
+
+
+def _refusal(
+    path: Points, view: View, graph: VesselGraph, robot: Vector | None, vessel: Vector | None, config: PerceptionConfig
+) -> Reason | None:
+    """Why perception, seeing perfectly, would refuse; by its own limits."""
+    if robot is None or float(polyline.arc_length(path)[-1]) < config.quality.min_robot_length_px:
+        return Reason.TOO_SHORT
+    total = float(polyline.arc_length(path)[-1])
+    last = polyline.resample(polyline.cut(path, total - config.vectors.robot_length_px, total), 1.0)
+    scale = config.working_size_px / max(view.size)
+    inside = _depths_mm(view.unproject((last + 0.5) / scale - 0.5), graph) > 0
+    if float(np.mean(inside)) < config.quality.min_inside_vessel:
+        return Reason.OUTSIDE_VESSEL
+    return Reason.NO_VESSEL if vessel is None else None
+
+
+def _with_caps(axis: Points, radius_mm: float) -> Points:
+    """The robot's line extended at both ends by the radius of its round caps, to the mask's edge."""
+    keep = np.concatenate([[True], np.any(np.diff(axis, axis=0) != 0, axis=1)])
+    axis = axis[keep]
+    if len(axis) < 2:
+        return axis
+    first, last = axis[0] - axis[1], axis[-1] - axis[-2]
+    start = axis[0] + radius_mm * first / np.linalg.norm(first)
+    end = axis[-1] + radius_mm * last / np.linalg.norm(last)
+    return np.vstack([start, axis, end])
+
+
+def _visible_path(line_mm: Points, view: View, scale: float) -> Points | None:
+    """The last stretch of the line within the picture, in working px; None when the head itself is not in the picture."""
+    if len(line_mm) < 2:
+        return None
+    pixels = polyline.resample(_scaled(view.project(line_mm), scale), _CLIP_STEP_PX)
+    limit = np.array(view.size) * scale - 0.5
+    outside = np.flatnonzero(np.any((pixels < -0.5) | (pixels > limit), axis=1))
+    visible = pixels[int(outside[-1]) + 1 :] if len(outside) else pixels
+    return polyline.resample(visible, _PATH_STEP_PX) if len(visible) >= 2 else None
+
+
+def _depths_mm(points_mm: Points, graph: VesselGraph) -> NDArray[np.float64]:
+    """How deep points (N, 2) lie in the lumen (N,): distance to its wall, negative outside."""
+    centers, radii = lumen_discs(graph)
+    offset = points_mm[:, None, :] - centers[None, :, :]
+    return np.asarray(np.max(radii - np.hypot(offset[..., 0], offset[..., 1]), axis=1))
+
+
+def _beyond_port(points_mm: Points, phantom: Phantom) -> NDArray[np.bool_]:
+    """Which points have passed the port: everything after the last point that still lies behind its cross-section."""
+    port = phantom.graph.nodes[phantom.port]
+    edge = next(edge for edge in phantom.graph.edges if phantom.port in (edge.start, edge.end))
+    line = edge.points if edge.start == phantom.port else edge.points[::-1]
+    radius = edge.radius[0] if edge.start == phantom.port else edge.radius[-1]
+    away = points_mm - port
+    behind = (away @ (line[min(4, len(line) - 1)] - line[0]) <= 0) & (np.hypot(away[:, 0], away[:, 1]) < 3 * radius)
+    passed = np.ones(len(points_mm), bool)
+    if behind.any():
+        passed[: int(np.flatnonzero(behind)[-1]) + 1] = False
+    return passed
+
+
+def _scaled(pixels: Points, scale: float) -> Points:
+    return np.asarray((pixels + 0.5) * scale - 0.5)
+
+
+def _point(values: Points) -> Point:
+    return float(values[0]), float(values[1])

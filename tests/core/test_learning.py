@@ -1,0 +1,123 @@
+"""Data set layout, augmentation and the training loop on a toy task."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.images import read_image
+from core.learning.augment import random_clutter, random_crop, random_look
+from core.learning.dataset import DatasetError, find_samples, read_truth, write_mask, write_png
+from core.learning.training import Progress, TrainingPlan, train
+from core.perception.unet import DualUNet, UNetShape
+
+
+def _toy_set(folder: Path, count: int) -> Path:
+    """Grey boards with a bright vertical band (vessel) and a dark line in it (robot)."""
+    (folder / "images").mkdir(parents=True)
+    (folder / "masks").mkdir()
+    rng = np.random.default_rng(0)
+    for i in range(count):
+        x = int(rng.integers(30, 90))
+        vessel = np.zeros((96, 128), bool)
+        vessel[:, x - 12 : x + 12] = True
+        robot = np.zeros_like(vessel)
+        robot[:60, x - 2 : x + 2] = True
+        image = np.full((96, 128, 3), 90, np.uint8)
+        image[vessel], image[robot] = 200, 10
+        write_png(folder / "images" / f"{i:03d}.png", image)
+        write_mask(folder / "masks" / f"{i:03d}_vessel.png", vessel)
+        write_mask(folder / "masks" / f"{i:03d}_robot.png", robot)
+    return folder
+
+
+def test_samples_come_back_as_they_were_written(tmp_path: Path) -> None:
+    samples = find_samples([_toy_set(tmp_path / "set", 2)])
+    image, vessel, robot = samples[0].load()
+    assert image.shape == (96, 128, 3)
+    assert vessel.sum() == 96 * 24
+    assert robot.sum() == 60 * 4
+    assert image[robot].max() == 10
+
+
+def test_a_folder_without_labels_says_what_it_needs(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="needs images/NAME.png"):
+        find_samples([tmp_path])
+
+
+def test_a_mask_of_another_size_is_named(tmp_path: Path) -> None:
+    folder = _toy_set(tmp_path / "set", 1)
+    write_mask(folder / "masks" / "000_robot.png", np.zeros((5, 5), bool))
+    with pytest.raises(DatasetError, match=r"000_robot.png: 5x5, but its image is 128x96"):
+        find_samples([folder])[0].load()
+
+
+def test_truth_skips_a_cut_last_line_and_names_any_other(tmp_path: Path) -> None:
+    path = tmp_path / "truth.jsonl"
+    path.write_text('{"stem": "a"}\n{"stem": "b", "x"')
+    assert list(read_truth(tmp_path)) == ["a"]
+    path.write_text('{"stem": "a"\n{"stem": "b"}\n')
+    with pytest.raises(DatasetError, match="line 1 is damaged"):
+        read_truth(tmp_path)
+
+
+def test_crops_keep_image_and_labels_together(tmp_path: Path) -> None:
+    image, vessel, robot = find_samples([_toy_set(tmp_path / "set", 1)])[0].load()
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        cut, cut_vessel, cut_robot = random_crop(image, vessel, robot, (64, 80), rng)
+        assert cut.shape == (64, 80, 3)
+        inner = cut_robot & (np.roll(cut_robot, 1, 0) & np.roll(cut_robot, -1, 0) & np.roll(cut_robot, 1, 1) & np.roll(cut_robot, -1, 1))
+        assert not (cut_robot & ~cut_vessel)[2:-2, 2:-2].any()
+        if inner.any():
+            assert np.median(cut[inner]) < 60
+
+
+def test_looks_and_clutter_are_pictures() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        picture = random_look(random_clutter((40, 50), rng), rng)
+        assert picture.shape == (40, 50, 3)
+        assert picture.dtype == np.uint8
+
+
+def _toy_training(folder: Path, steps: int, **kwargs: object) -> tuple[DualUNet, int]:
+    import torch
+
+    torch.manual_seed(0)
+    network = DualUNet(UNetShape((4, 8, 8, 8, 8), (4, 8, 8, 8), 1, 2))
+    plan = TrainingPlan(steps=steps, batch=4, learning_rate=1e-2, warmup_steps=5, crop=(64, 64), workers=0, average_decay=0.9, threads=1)
+    return train(network, find_samples([folder]), plan, **kwargs)  # type: ignore[arg-type]
+
+
+def test_training_learns_a_toy_task_and_reports(tmp_path: Path) -> None:
+    reports: list[Progress] = []
+    checkpoints: list[int] = []
+    folder = _toy_set(tmp_path / "set", 6)
+    _, done = _toy_training(folder, 40, on_progress=reports.append, report_every=10, checkpoint_every=20, on_checkpoint=lambda _n, s: checkpoints.append(s))
+    assert done == 40
+    assert [r.step for r in reports] == [10, 20, 30, 40]
+    assert reports[-1].loss < reports[0].loss * 0.9
+    assert reports[-1].vessel_dice > reports[0].vessel_dice
+    assert checkpoints == [20]
+
+
+def test_training_repeats_bit_for_bit_and_can_be_stopped(tmp_path: Path) -> None:
+    folder = _toy_set(tmp_path / "set", 4)
+    first, _ = _toy_training(folder, 6)
+    second, _ = _toy_training(folder, 6)
+    for a, b in zip(first.state_dict().values(), second.state_dict().values(), strict=True):
+        assert a.equal(b)
+    stops = iter([False, False, True])
+    _, done = _toy_training(folder, 6, should_stop=lambda: next(stops))
+    assert done == 3
+
+
+def test_masks_are_readable_pictures(tmp_path: Path) -> None:
+    write_mask(tmp_path / "m.png", np.eye(4, dtype=bool))
+    assert read_image(tmp_path / "m.png")[:, :, 0].tolist() == (np.eye(4) * 255).tolist()
+
+
+def test_an_unwritable_place_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="none"):
+        write_mask(tmp_path / "none" / "m.png", np.eye(4, dtype=bool))

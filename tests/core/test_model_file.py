@@ -1,0 +1,108 @@
+"""A model folder: written whole, verified by hash, never half loaded."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from core.learning.model_file import INFO, ONNX, WEIGHTS, ModelError, load_network, model_folder, read_model_info, save_model, write_figures
+from core.perception.segmentation import OpenVinoSegmenter, TorchSegmenter, to_working
+from core.perception.unet import DualUNet, UNetShape
+
+TINY = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    torch.manual_seed(1)
+    folder = tmp_path_factory.mktemp("models") / "tiny"
+    save_model(DualUNet(TINY).eval(), folder, training={"steps": 0}, figures={})
+    return folder
+
+
+@pytest.fixture
+def model(saved: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(saved, tmp_path / "tiny"))
+
+
+def test_both_engines_see_the_same_at_any_size(model: Path) -> None:
+    image = np.random.default_rng(0).integers(0, 255, (75, 101, 3), np.uint8)
+    first, second = OpenVinoSegmenter(model, 1)(image), TorchSegmenter(model, 1)(image)
+    for a, b in zip(first, second, strict=True):
+        assert a.shape == (75, 101)
+        assert a.dtype == np.float32
+        np.testing.assert_allclose(a, b, atol=2e-4)
+
+
+def test_results_are_not_overwritten_by_the_next_call(model: Path) -> None:
+    segmenter = OpenVinoSegmenter(model, 1)
+    first = segmenter(np.zeros((64, 64, 3), np.uint8))[0]
+    kept = first.copy()
+    segmenter(np.full((64, 64, 3), 255, np.uint8))
+    np.testing.assert_array_equal(first, kept)
+
+
+@pytest.mark.parametrize("name", [WEIGHTS, ONNX])
+@pytest.mark.parametrize("damage", ["cut", "flip", "missing", "empty"])
+def test_a_damaged_file_is_one_clear_error(model: Path, name: str, damage: str) -> None:
+    path = model / name
+    data = bytearray(path.read_bytes())
+    if damage == "missing":
+        path.unlink()
+    else:
+        data[len(data) // 2] ^= 1
+        path.write_bytes({"cut": data[: len(data) // 2], "flip": data, "empty": b""}[damage])
+    with pytest.raises(ModelError, match="restore the model folder") as caught:
+        OpenVinoSegmenter(model, 1) if name == ONNX else TorchSegmenter(model, 1)
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 2}', "null", '{"format": 1, "name": "x", "extra": 1}'])
+def test_a_damaged_manifest_is_one_clear_error(model: Path, text: str) -> None:
+    (model / INFO).write_text(text)
+    with pytest.raises(ModelError, match="damaged") as caught:
+        read_model_info(model)
+    assert "\n" not in str(caught.value)
+
+
+def test_weights_of_another_shape_are_refused(model: Path) -> None:
+    info = json.loads((model / INFO).read_text())
+    info["shape"]["widths"] = [4, 4, 8, 8, 16]
+    (model / INFO).write_text(json.dumps(info))
+    with pytest.raises(ModelError, match="does not fit the shape"):
+        load_network(model)
+
+
+def test_an_unknown_model_names_the_known_ones(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="no model 'nope'"):
+        model_folder("nope")
+    with pytest.raises(ModelError, match="installed models"):
+        model_folder(str(tmp_path))
+
+
+def test_weights_survive_the_round_trip(model: Path) -> None:
+    torch.manual_seed(1)
+    original = DualUNet(TINY).eval().state_dict()
+    loaded, info = load_network(model)
+    assert info.stride == 32
+    for name, tensor in loaded.state_dict().items():
+        torch.testing.assert_close(tensor, original[name])
+
+
+def test_figures_are_added_without_touching_the_rest(model: Path) -> None:
+    before = read_model_info(model)
+    write_figures(model, {"theta_median_deg": 0.5})
+    after = read_model_info(model)
+    assert after.figures == {"theta_median_deg": 0.5}
+    assert after.weights_sha256 == before.weights_sha256
+
+
+@pytest.mark.parametrize(("size", "working"), [((480, 640), (480, 640)), ((1080, 1920), (360, 640)), ((300, 200), (640, 427)), ((7, 5000), (1, 640))])
+def test_working_size_keeps_the_aspect(size: tuple[int, int], working: tuple[int, int]) -> None:
+    image, scale = to_working(np.zeros((*size, 3), np.uint8), 640)
+    assert image.shape[:2] == working
+    assert scale == 640 / max(size)
