@@ -1,4 +1,4 @@
-"""``benchmark``: speed against the paper-literal baseline in the same run, accuracy on a labelled set, and the window's own pace."""
+"""``benchmark``: speed against the paper-literal baseline in the same run, accuracy on a labelled set, the window's pace."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ def quantiles(values: Sequence[float]) -> dict[str, float]:
 def run_speed(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
     """Time perception frame by frame on twin pictures, with a baseline frame in between every eighth."""
     from core.perception.pipeline import open_pipeline
+
     from core.study.paper_baseline import PaperBaseline
 
     config = _config(model, preset, config_path)
@@ -95,7 +96,7 @@ def _pictures(count: int) -> Iterator[Image]:
 
 
 def _first_frame_s() -> float | None:
-    """Seconds from starting ``main.py`` to its first overlaid frame, in a process of its own (offscreen when there is no display)."""
+    """Seconds from starting ``main.py`` to its first overlaid frame, in a process of its own (offscreen without a display)."""
     main = Path(sys.modules["__main__"].__file__ or "main.py").resolve()
     environment = dict(os.environ)
     if sys.platform.startswith("linux") and not environment.get("DISPLAY") and not environment.get("WAYLAND_DISPLAY"):
@@ -112,8 +113,9 @@ def _first_frame_s() -> float | None:
 
 def run_accuracy(folder: Path, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
     """Perceive every frame of a synth set as a single image and compare with its truth."""
-    from core.learning.dataset import find_samples, read_truth
     from core.perception.pipeline import open_pipeline
+
+    from core.learning.dataset import find_samples, read_truth
     from core.study.accuracy import score_frame, summarise
 
     config = _config(model, preset, config_path)

@@ -110,7 +110,9 @@ def train(
     batch: Annotated[int, typer.Option(min=1, max=512)] = 6,
     rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 2e-3,
     crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 384,
-    base: Annotated[int | None, typer.Option(min=4, max=128, help="plain U-Net of this base width instead of the folded one")] = None,
+    base: Annotated[
+        int | None, typer.Option(min=4, max=128, help="plain U-Net of this base width instead of the folded one")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0)] = 0,
     threads: Annotated[int, typer.Option(min=0, max=256, help="CPU threads; 0 = all")] = 0,
 ) -> None:

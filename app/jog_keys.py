@@ -122,6 +122,11 @@ class JogKeys(QObject):
             self._timer.stop()
             self._announce()
 
+    def reset(self) -> None:
+        """Forget everything, for a robot that has just been opened: nothing is held, the head is straight."""
+        self.release_all()
+        self._bend = self._pitch = 0.0
+
     @Slot()
     def stop(self) -> None:
         """Stop all motion and straighten the head."""

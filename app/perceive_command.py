@@ -32,11 +32,18 @@ class Outputs:
 
 
 def run_perceive(
-    paths: list[Path], outputs: Outputs, *, targets_path: Path | None, model: str | None, preset: str | None, config_path: Path | None
+    paths: list[Path],
+    outputs: Outputs,
+    *,
+    targets_path: Path | None,
+    model: str | None,
+    preset: str | None,
+    config_path: Path | None,
 ) -> None:
     """Perceive everything in `paths`; raises UsageError when nothing could be done, ConfigError, ModelError."""
-    from app.learning_commands import progress_bar
     from core.perception.pipeline import open_pipeline
+
+    from app.learning_commands import progress_bar
 
     overrides: dict[str, Any] = {"perception": {"segmentation": {"model": model}}} if model else {}
     config = load_config(config_path, preset, overrides)

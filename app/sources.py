@@ -1,4 +1,4 @@
-"""What ``perceive`` is given: pictures, folders of pictures, videos. One item per picture, in order; unreadable ones are items too."""
+"""What ``perceive`` is given: pictures, folders of pictures, videos. One item per picture, in order, unreadable ones too."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ VIDEO_ENDINGS = (".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SourcePicture:
-    """One picture of the input. ``image`` is None when it cannot be read; then ``problem`` says why. ``time_s`` is set in videos."""
+    """One picture of the input; unreadable: ``image`` is None and ``problem`` says why. ``time_s`` is set in videos."""
 
     name: str
     stem: str

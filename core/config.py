@@ -64,6 +64,14 @@ class PathConfig(_Section):
     cosine: Literal["signed", "absolute"] = Field("signed", description="absolute = the paper's |cos|, blind to hairpins")
     min_length_px: float = Field(12.0, ge=2.0, le=500.0)
     border_px: float = Field(6.0, ge=0.0, le=100.0, description="an end this near to the image border counts as the entry")
+    port_px: float = Field(25.0, ge=0.0, le=300.0, description="an end this near to the insertion port counts as the entry")
+    junction_turn_px: float = Field(
+        40.0, ge=0.0, le=500.0, description="a right-angled turn at a junction costs a branch this length"
+    )
+    outlier_share: Share = Field(
+        0.5, description="pieces shorter than this share of the longest are outliers; 0 = only the score decides"
+    )
+    smoothing_px: float = Field(3.0, ge=0.0, le=20.0, description="smoothing and sub-pixel centring of the path; 0 = raw pixels")
     max_candidates: int = Field(200, ge=1, le=10_000)
 
 
@@ -72,7 +80,9 @@ class VectorConfig(_Section):
 
     robot_length_px: float = Field(40.0, ge=4.0, le=400.0)
     vessel_half_length_px: float = Field(20.0, ge=2.0, le=200.0)
-    vessel_rule: Literal["graph", "window"] = Field("graph", description="window = all skeleton pixels near the head, the paper's way")
+    vessel_rule: Literal["graph", "window"] = Field(
+        "graph", description="window = all skeleton pixels near the head, the paper's way"
+    )
 
 
 class PoseConfig(_Section):
@@ -104,6 +114,7 @@ class TrackingConfig(_Section):
 
     enabled: bool = True
     max_head_speed_px_s: float = Field(600.0, gt=0.0, le=100_000.0)
+    head_jump_px: float = Field(15.0, ge=0.0, le=640.0, description="allowed between two frames whatever the speed")
     memory_s: float = Field(0.5, ge=0.0, le=10.0)
 
 
@@ -151,11 +162,18 @@ class RigConfig(_Section):
     source: str | None = Field(None, description="path of the video or folder")
 
 
+class WindowConfig(_Section):
+    """The operator window."""
+
+    pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; default: LumenPilot in the user's pictures")
+
+
 class Config(_Section):
     rig: RigConfig = RigConfig()
     twin: TwinConfig = TwinConfig()
     perception: PerceptionConfig = PerceptionConfig()
     advice: AdviceConfig = AdviceConfig()
+    window: WindowConfig = WindowConfig()
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a camera and a robot are to the rest of the program. Drivers live in ``hardware``; twin and real ones pass one contract suite."""
+"""What a camera and a robot are to the rest of the program. Drivers live in ``hardware`` and pass one contract suite."""
 
 from __future__ import annotations
 

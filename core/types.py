@@ -78,7 +78,7 @@ class RobotPath:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraphEdge:
-    """One piece of vessel between two nodes: ``points`` (N, 2) from node ``start`` to node ``end``, lumen ``radius`` (N,) along it."""
+    """A piece of vessel: ``points`` (N, 2) from node ``start`` to node ``end``, lumen ``radius`` (N,) along it."""
 
     start: int
     end: int

@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 venv=.venv
 stamp=$venv/.ready # holds what .venv was made from; written last, so an interrupted set-up leaves none
 
-# Shared library that is missing on a bare Debian 12 -> the package that has it. (Found by trying, not by reading: docs/bench.md.)
+# Shared library that is missing on a bare Debian 12 -> the package that has it.
 libraries="
 libGL.so.1 libgl1
 libEGL.so.1 libegl1

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from hardware.rig import RigKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,21 +21,19 @@ class BannerText:
     meaning: str
 
 
-class RigKindBanner(Enum):
-    """What the picture comes from."""
-
-    SIM = BannerText("SIM", palette.SIM, "Bench twin: everything here is simulated, no hardware moves")
-    LIVE = BannerText("LIVE", palette.LIVE, "Real rig: commands move real servos. Keep the hard-wired power cut in reach")
-    PLAYBACK = BannerText("PLAYBACK", palette.PLAYBACK, "Recorded pictures: nothing here is happening now")
+BANNERS = {
+    RigKind.SIM: BannerText("SIM", palette.SIM, "Bench twin: everything here is simulated, no hardware moves"),
+    RigKind.LIVE: BannerText("LIVE", palette.LIVE, "Real rig: commands move real servos. Keep the hard-wired power cut in reach"),
+    RigKind.PLAYBACK: BannerText("PLAYBACK", palette.PLAYBACK, "Recorded pictures: nothing here is happening now"),
+}
 
 
 class SimBanner(QWidget):
     """A striped word that is always visible, and what it means."""
 
-    def __init__(self, kind: RigKindBanner) -> None:
+    def __init__(self, kind: RigKind) -> None:
         super().__init__()
-        self._text = kind.value
-        self._source = ""
+        self._text = BANNERS[kind]
         self.setFixedHeight(34)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(f"{self._text.word}: {self._text.meaning}")

@@ -9,8 +9,8 @@ from core.types import Advice, Pose, PoseState, Scene, Speed
 def table_policy(scene: Scene, config: AdviceConfig) -> Advice | None:
     """The paper's advice for a scene; None when there is no pose (nothing stale is ever shown).
 
-    A: fast, no steering. B: slow, no steering. C: slowest, steer hardest. D: moderate, steer. The degree follows theta, and the turn
-    is always the one that closes theta.
+    A: fast, no steering. B: slow, no steering. C: slowest, steer hardest. D: moderate, steer. The degree follows theta, and
+    the turn is always the one that closes theta.
     """
     pose = scene.pose
     if pose is None:
@@ -30,17 +30,3 @@ def table_policy(scene: Scene, config: AdviceConfig) -> Advice | None:
 
 def _limited(steer_deg: float, config: AdviceConfig) -> float:
     return max(-config.max_steer_deg, min(config.max_steer_deg, steer_deg))
-
-
-def in_words(pose: Pose, config_d_allow_px: float, config_theta_allow_deg: float) -> str:
-    """Why the pose has its state, with the numbers that decided."""
-    side = "right" if pose.theta_signed_deg > 0 else "left"
-    angle = f"theta {pose.theta_deg:.0f}\N{DEGREE SIGN} {side}"
-    head, tail = f"d_head {pose.d_head_px:.0f} px", f"d_tail {pose.d_tail_px:.0f} px"
-    if pose.state is PoseState.A:
-        return f"On course: {head} and {tail} below {config_d_allow_px:g} px, {angle} below {config_theta_allow_deg:g}\N{DEGREE SIGN}"
-    if pose.state is PoseState.D:
-        return f"Crossed the centerline: head and tail on opposite sides, {angle}"
-    if pose.state is PoseState.B:
-        return f"Coming back to the centerline: {head} < {tail}, {angle}"
-    return f"Moving away from the centerline: {head} \N{GREATER-THAN OR EQUAL TO} {tail}, {angle}"

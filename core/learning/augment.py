@@ -27,7 +27,9 @@ def random_crop(image: Image, vessel: Mask, robot: Mask, size: tuple[int, int], 
     # What lies beyond the picture is one colour without labels; mirrored, robots would meet their own reflection.
     fill = tuple(float(v) for v in image[int(rng.integers(image.shape[0])), int(rng.integers(image.shape[1]))])
     cut = cv2.warpAffine(image, matrix, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=fill)
-    masks = [cv2.warpAffine(m.astype(np.uint8) * 255, matrix, (width, height), flags=cv2.INTER_LINEAR) > 127 for m in (vessel, robot)]
+    masks = [
+        cv2.warpAffine(m.astype(np.uint8) * 255, matrix, (width, height), flags=cv2.INTER_LINEAR) > 127 for m in (vessel, robot)
+    ]
     return np.asarray(cut, np.uint8), np.asarray(masks[0]), np.asarray(masks[1])
 
 
@@ -78,17 +80,28 @@ def random_clutter(size: tuple[int, int], rng: Generator) -> Image:
     height, width = size
     image = np.full((height, width, 3), rng.integers(0, 256, 3), np.float32)
     if rng.random() < 0.6:
-        image += cv2.resize(rng.normal(0, rng.uniform(5, 60), (6, 6, 3)).astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC)
+        image += cv2.resize(
+            rng.normal(0, rng.uniform(5, 60), (6, 6, 3)).astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC
+        )
     for _ in range(int(rng.integers(0, 9))):
         color = tuple(float(c) for c in rng.integers(0, 256, 3))
         points = np.cumsum(rng.normal(0, 60, (8, 2)), axis=0) + rng.uniform(0, (width, height))
         kind = rng.random()
         if kind < 0.5:
-            curve = cv2.resize(points.astype(np.float32).reshape(8, 1, 2), (1, 160), interpolation=cv2.INTER_CUBIC).reshape(-1, 1, 2)
+            curve = cv2.resize(points.astype(np.float32).reshape(8, 1, 2), (1, 160), interpolation=cv2.INTER_CUBIC).reshape(
+                -1, 1, 2
+            )
             cv2.polylines(image, [curve.astype(np.int32)], False, color, int(rng.integers(1, 14)), cv2.LINE_AA)
         elif kind < 0.75:
             cv2.fillPoly(image, [points.astype(np.int32)], color, cv2.LINE_AA)
         else:
-            cv2.circle(image, (int(points[0, 0]), int(points[0, 1])), int(rng.integers(3, 90)), color, int(rng.choice([-1, 2, 5])), cv2.LINE_AA)
+            cv2.circle(
+                image,
+                (int(points[0, 0]), int(points[0, 1])),
+                int(rng.integers(3, 90)),
+                color,
+                int(rng.choice([-1, 2, 5])),
+                cv2.LINE_AA,
+            )
     image += rng.normal(0, rng.uniform(0, 12), image.shape)
     return np.asarray(np.clip(image, 0, 255).astype(np.uint8))

@@ -55,7 +55,9 @@ def find_samples(folders: Sequence[Path]) -> list[Sample]:
         found = [Sample(p.stem, p, masks / f"{p.stem}_vessel.png", masks / f"{p.stem}_robot.png") for p in images]
         complete = [s for s in found if s.vessel.is_file() and s.robot.is_file()]
         if not complete:
-            raise DatasetError(f"{folder}: no labelled frames; needs images/NAME.png with masks/NAME_vessel.png and masks/NAME_robot.png")
+            raise DatasetError(
+                f"{folder}: no labelled frames; needs images/NAME.png with masks/NAME_vessel.png and masks/NAME_robot.png"
+            )
         samples += complete
     return samples
 
@@ -85,7 +87,9 @@ def write_mask(path: Path, mask: Mask) -> None:
 
 def write_png(path: Path, image: np.ndarray) -> None:
     """RGB or grey uint8 as PNG; raises OSError."""
-    ok, data = cv2.imencode(".png", image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    ok, data = cv2.imencode(
+        ".png", image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 1]
+    )
     if not ok:
         raise OSError(f"{path}: cannot be encoded")
     path.write_bytes(data.tobytes())

@@ -28,7 +28,7 @@ class ModelError(Exception):
 
 
 class ModelInfo(BaseModel):
-    """What ``model.json`` says. ``stride``: image height and width must be multiples of it; ``figures`` are measured, with commands."""
+    """What ``model.json`` says. Image height and width must be multiples of ``stride``; ``figures`` are measured."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -20,7 +20,7 @@ from core.perception.unet import DualUNet
 
 @dataclass(frozen=True, slots=True)
 class TrainingPlan:
-    """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show neither vessel nor robot."""
+    """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours."""
 
     steps: int = 6000
     batch: int = 6
@@ -120,7 +120,7 @@ def train(
     if plan.threads:
         torch.set_num_threads(plan.threads)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    network = network.to(device, memory_format=torch.channels_last).train()
+    network = network.to(device, memory_format=torch.channels_last).train()  # type: ignore[call-overload]
     average = copy.deepcopy(network).eval()
     optimizer = torch.optim.AdamW(network.parameters(), lr=plan.learning_rate, weight_decay=plan.weight_decay)
     smooth_loss, smooth_dice = 0.0, np.zeros(2)

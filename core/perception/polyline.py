@@ -58,3 +58,23 @@ def distance_to_segments(start: Points, end: Points, point: Point) -> tuple[NDAr
     share = np.clip(np.einsum("ij,ij->i", offset, step) / square, 0.0, 1.0)
     gap = offset - share[:, None] * step
     return np.hypot(gap[:, 0], gap[:, 1]), share
+
+
+def smooth(points: Points, sigma: float) -> Points:
+    """Gaussian smoothing along a polyline, `sigma` in points; both ends stay where they are."""
+    pad = min(len(points) - 1, int(np.ceil(3.0 * sigma)))
+    if pad < 1:
+        return points
+    reach = np.arange(-pad, pad + 1)
+    kernel = np.exp(-0.5 * (reach / sigma) ** 2)
+    kernel /= kernel.sum()
+    # Mirrored through its end point, the line goes on straight there: no shrinking, and the end itself is kept.
+    longer = np.concatenate([2.0 * points[0] - points[pad:0:-1], points, 2.0 * points[-1] - points[-2 : -pad - 2 : -1]])
+    return np.column_stack([np.convolve(longer[:, axis], kernel, mode="valid") for axis in (0, 1)])
+
+
+def normals(points: Points) -> Points:
+    """Unit vectors across a polyline of at least two points, (N, 2)."""
+    tangent = np.gradient(points, axis=0)
+    length = np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-9)
+    return np.column_stack([-tangent[:, 1] / length, tangent[:, 0] / length])

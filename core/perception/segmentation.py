@@ -35,7 +35,8 @@ def to_working(image: Image, working_size_px: int) -> tuple[Image, float]:
         return image, 1.0
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
     # Area averaging keeps thin structures when shrinking; it would show blocks when enlarging.
-    return cv2.resize(image, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR), scale
+    resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    return np.asarray(resized, np.uint8), scale
 
 
 def _padded(image: Image, stride: int) -> Image:
@@ -45,7 +46,7 @@ def _padded(image: Image, stride: int) -> Image:
     if not down and not right:
         return image
     border = cv2.BORDER_REFLECT_101 if min(height, width) > stride else cv2.BORDER_REPLICATE
-    return cv2.copyMakeBorder(image, 0, down, 0, right, border)
+    return np.asarray(cv2.copyMakeBorder(image, 0, down, 0, right, border), np.uint8)
 
 
 class OpenVinoSegmenter:
@@ -104,7 +105,7 @@ class TorchSegmenter:
         self._device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         if self._device.type == "cpu":
             torch.set_num_threads(threads or os.cpu_count() or 1)
-        self._network = Probabilities(network).to(self._device, memory_format=torch.channels_last)
+        self._network = Probabilities(network).to(self._device, memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     @property
     def engine(self) -> str:

@@ -1,9 +1,9 @@
-"""The dual-decoder multi-task U-Net (METHOD section 1; the paper, "Vascular Structure Segmentation and Interventional Robot Detection").
+"""The dual-decoder multi-task U-Net (the paper, "Vascular Structure Segmentation and Interventional Robot Detection").
 
 One encoder with four down-samplings, and for each task a decoder of its own with four up-samplings and skip connections. Two things
-are ours, chosen by measurement (docs/method.md): ``fold`` rearranges blocks of fold x fold pixels into channels before the first
-convolution and back after the last one, so that the network works on a quarter of the positions and yet tells every pixel apart; and
-the decoders may be narrower than the encoder. ``UNetShape(base=64, fold=1)`` with equal decoders is the paper's network.
+are ours, chosen by measurement (docs/method.md): ``fold`` rearranges blocks of fold x fold pixels into channels before the
+first convolution and back after the last one, so that the network works on a quarter of the positions and yet tells every pixel
+apart; and the decoders may be narrower than the encoder. ``UNetShape(base=64, fold=1)`` with equal decoders is the paper's network.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class UNetShape:
         fold, convolutions = int(data["fold"]), int(data["decoder_convolutions"])
         if fold not in (1, 2, 4) or convolutions not in (1, 2):
             raise ValueError("fold is 1, 2 or 4 and decoder_convolutions 1 or 2")
-        return cls(widths, decoder, convolutions, fold)  # type: ignore[arg-type]
+        return cls(widths, decoder, convolutions, fold)
 
 
 def _convolutions(inputs: int, outputs: int, count: int) -> nn.Sequential:
@@ -86,7 +86,7 @@ class _Decoder(nn.Module):
 
 
 class DualUNet(nn.Module):
-    """RGB images (N, 3, H, W), 0..1 -> logits (N, 2, H, W): channel 0 vessel, channel 1 robot. H, W multiples of ``shape.stride``."""
+    """RGB images (N, 3, H, W), 0..1 -> logits (N, 2, H, W), vessel and robot. H, W are multiples of ``shape.stride``."""
 
     def __init__(self, shape: UNetShape) -> None:
         super().__init__()

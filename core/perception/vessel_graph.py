@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from core.config import CleaningConfig
 from core.perception import pixel_graph, polyline
+from core.perception.junctions import Arm, rebuild
 from core.types import GraphEdge, Mask, Points, VesselGraph
 
 STEP_PX = 2.0
@@ -26,6 +27,7 @@ class _Line:
     start: int
     end: int
     points: Points
+    radius: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
 
 class _RadiusMap:
@@ -58,15 +60,40 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
             if len(kept) == len(lines):
                 break
             lines = _merged(kept)
-    degrees = _degrees(lines, len(traced.nodes))
     for line in lines:
         line.points = _centred(line.points, radius)
-    nodes = traced.nodes
-    edges = []
-    for line in lines:
-        points = line.points
-        edges.append(GraphEdge(line.start, line.end, points, radius.at(points)))
-    return VesselGraph(nodes, tuple(edges))
+        line.radius = radius.at(line.points)
+    nodes = traced.nodes.copy()
+    if config.prune_spurs:
+        _rebuild_junctions(lines, nodes, radius)
+    return _packed(lines, nodes)
+
+
+def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: _RadiusMap) -> None:
+    degrees = _degrees(lines, len(nodes))
+    sizes = radius.at(nodes)
+    for node in np.flatnonzero(degrees >= 3).tolist():
+        touching = [(line, True) for line in lines if line.start == node] + [(line, False) for line in lines if line.end == node]
+        arms = [
+            Arm(line.points, line.radius, bool(degrees[line.end] >= 3))
+            if outward
+            else Arm(line.points[::-1], line.radius[::-1], bool(degrees[line.start] >= 3))
+            for line, outward in touching
+        ]
+        anew = rebuild(nodes[node], float(sizes[node]), arms)
+        if anew is None:
+            continue
+        nodes[node] = anew[0]
+        for (line, outward), arm in zip(touching, anew[1], strict=True):
+            line.points, line.radius = (arm.points, arm.radius) if outward else (arm.points[::-1], arm.radius[::-1])
+
+
+def _packed(lines: list[_Line], nodes: Points) -> VesselGraph:
+    """The graph with only those nodes that are still used."""
+    used = sorted({node for line in lines for node in (line.start, line.end)})
+    number = {node: index for index, node in enumerate(used)}
+    edges = tuple(GraphEdge(number[line.start], number[line.end], line.points, line.radius) for line in lines)
+    return VesselGraph(nodes[used], edges)
 
 
 def _degrees(lines: list[_Line], count: int) -> NDArray[np.int64]:
@@ -115,24 +142,10 @@ def _merged(lines: list[_Line]) -> list[_Line]:
 
 
 def _centred(points: Points, radius: _RadiusMap) -> Points:
-    even = smooth(polyline.resample(points, STEP_PX), SMOOTHING_PX / STEP_PX)
+    even = polyline.smooth(polyline.resample(points, STEP_PX), SMOOTHING_PX / STEP_PX)
     if len(even) < 3:
         return even
-    tangent = np.gradient(even, axis=0)
-    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-9)[:, None]
+    normal = polyline.normals(even)
     probe = 0.5 * radius.at(even)[:, None] * normal
     shift = 0.5 * (radius.at(even + probe) - radius.at(even - probe))
-    return smooth(even + shift[:, None] * normal, SMOOTHING_PX / STEP_PX)
-
-
-def smooth(points: Points, sigma: float) -> Points:
-    """Gaussian smoothing along the polyline, `sigma` in points; both ends stay where they are."""
-    pad = min(len(points) - 1, int(np.ceil(3.0 * sigma)))
-    if pad < 1:
-        return points
-    reach = np.arange(-pad, pad + 1)
-    kernel = np.exp(-0.5 * (reach / sigma) ** 2)
-    kernel /= kernel.sum()
-    # Mirrored through its end point, the line goes on straight there: no shrinking, and the end itself is kept.
-    longer = np.concatenate([2.0 * points[0] - points[pad:0:-1], points, 2.0 * points[-1] - points[-2 : -pad - 2 : -1]])
-    return np.column_stack([np.convolve(longer[:, axis], kernel, mode="valid") for axis in (0, 1)])
+    return polyline.smooth(even + shift[:, None] * normal, SMOOTHING_PX / STEP_PX)

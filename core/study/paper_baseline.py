@@ -1,5 +1,5 @@
-"""The paper's method as it is written down, for comparison only: base-64 dual-decoder U-Net in fp32 at 256x256, thinning, Algorithm 1,
-recursive path tracing, line fits. The time it takes is what ``benchmark`` compares with; its weights are random, which costs the same.
+"""The paper's method as it is written down, for comparison only: base-64 dual-decoder U-Net in fp32 at 256x256, thinning,
+Algorithm 1, recursive path tracing. ``benchmark`` compares with its time; its weights are random, which costs the same.
 """
 
 from __future__ import annotations
@@ -91,7 +91,9 @@ def connect_gaps(skeleton: Mask, gap_threshold: float) -> Mask:
     return np.asarray(joined > 0)
 
 
-def _longest(pixel: tuple[int, int], pixels: set[tuple[int, int]], visited: set[tuple[int, int]], depth: int) -> list[tuple[int, int]]:
+def _longest(
+    pixel: tuple[int, int], pixels: set[tuple[int, int]], visited: set[tuple[int, int]], depth: int
+) -> list[tuple[int, int]]:
     visited.add(pixel)
     best: list[tuple[int, int]] = []
     if depth < _MAX_DEPTH:

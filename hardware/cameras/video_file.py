@@ -11,7 +11,11 @@ import av.error
 import numpy as np
 
 from core.devices import DeviceError, EndOfStream
-from core.types import Frame
+from core.types import Frame, Image
+
+
+def _rgb(frame: av.VideoFrame) -> Image:
+    return np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
 
 
 class VideoFile:
@@ -54,13 +58,13 @@ class VideoFile:
             frame, at_s = self._decode()
             self._index += 1
             if not self._paced:
-                return Frame(self._index, at_s, frame.to_ndarray(format="rgb24"))
+                return Frame(self._index, at_s, _rgb(frame))
             due = self._start_s + at_s
             late = time.monotonic() - due
             if late < 0.1:
                 if late < 0:
                     time.sleep(-late)
-                return Frame(self._index, time.monotonic(), frame.to_ndarray(format="rgb24"))
+                return Frame(self._index, time.monotonic(), _rgb(frame))
 
     def _decode(self) -> tuple[av.VideoFrame, float]:
         if self._frames is None:

@@ -145,8 +145,8 @@ def random_appearance(seed: int, family: str | None = None) -> Appearance:
 def make_view(appearance: Appearance, size: tuple[int, int], phantom: Phantom | None = None) -> View:
     """The camera's view of the board for an image of `size` (width, height).
 
-    The lumen's middle (without a phantom: the board's) comes to the image's middle, plus ``offset_mm``. With a `phantom`, offset and
-    zoom give way until the port and three quarters of the centerlines are in the picture.
+    The lumen's middle (without a phantom: the board's) comes to the image's middle, plus ``offset_mm``. With a `phantom`, offset
+    and zoom give way until the port and three quarters of the centerlines are in the picture.
     """
     points = None if phantom is None else np.vstack([edge.points for edge in phantom.graph.edges])
     middle = np.array(BOARD_MM) / 2 if points is None else (points.min(axis=0) + points.max(axis=0)) / 2

@@ -21,7 +21,7 @@ def smooth_noise(rng: Generator, shape: tuple[int, int], cell_px: float) -> F32:
     # Drawn at about two samples a feature and blurred there: plain interpolation of one sample a feature shows its lattice.
     step = max(1.0, 0.4 * cell_px)
     coarse = rng.standard_normal((int(height / step) + 8, int(width / step) + 8), np.float32)
-    coarse = cv2.GaussianBlur(coarse, (0, 0), 0.4 * cell_px / step, borderType=cv2.BORDER_REFLECT)[3:-3, 3:-3]
+    coarse = np.asarray(cv2.GaussianBlur(coarse, (0, 0), 0.4 * cell_px / step)[3:-3, 3:-3], np.float32)
     coarse *= np.float32(0.45 / max(float(coarse.std()), 1e-6))
     return np.asarray(np.clip(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC), -1, 1), np.float32)
 

@@ -108,7 +108,7 @@ def _vignette(appearance: Appearance, size: tuple[int, int]) -> F32 | None:
 
 
 def _noise_pool(appearance: Appearance, size: tuple[int, int], rng: Generator) -> NDArray[np.int16] | None:
-    """A field of noise somewhat larger than the picture; each frame takes another cut-out of it, which is much cheaper than drawing."""
+    """A field of noise larger than the picture; each frame takes another cut-out of it, which is much cheaper than drawing."""
     if not appearance.noise:
         return None
     shape = (size[1] + _NOISE_SLACK, size[0] + _NOISE_SLACK)

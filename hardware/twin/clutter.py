@@ -1,4 +1,4 @@
-"""Foreign things: cables, ruler, stickers and stains beside the vessel; fittings, bubbles and dust on it. None of them is ever labelled."""
+"""Foreign things, never labelled: cables, ruler, stickers and stains beside the vessel; fittings, bubbles and dust on it."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _ruler(appearance: Appearance, canvas: U8, view: View, field: LumenField, rn
     wide = rng.uniform(12, 24)
     for _ in range(6):
         along = bool(rng.random() < 0.6)
-        start = np.array([rng.uniform(0, 80), rng.uniform(-wide, BOARD_MM[1])]) if along else np.array([rng.uniform(-wide, BOARD_MM[0]), 0.0])
+        start = rng.uniform((0, -wide), (80, BOARD_MM[1])) if along else rng.uniform((-wide, 0), (BOARD_MM[0], 30))
         run, side = (np.array([120.0, 0]), np.array([0, wide])) if along else (np.array([0, 120.0]), np.array([wide, 0]))
         corners = view.project(np.array([start, start + run, start + run + side, start + side]))
         mask = np.zeros(canvas.shape[:2], np.uint8)

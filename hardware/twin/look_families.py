@@ -33,6 +33,10 @@ def _hue(rng: Generator, hue: float, spread: float, saturation: tuple[float, flo
     return colorsys.hsv_to_rgb((hue + rng.uniform(-spread, spread)) % 1.0, rng.uniform(*saturation), rng.uniform(*value))
 
 
+def _any_hue(rng: Generator, saturation: tuple[float, float], value: tuple[float, float]) -> Rgb:
+    return _hue(rng, float(rng.random()), 0.0, saturation, value)
+
+
 def _pick(rng: Generator, *choices: Any) -> Any:
     return choices[int(rng.integers(len(choices)))]
 
@@ -63,7 +67,7 @@ def _common(rng: Generator) -> Knobs:
         "tube_shadow": _uniform(rng, 0.0, 0.45),
         "shadow_mm": _uniform(rng, 0.5, 5.0),
         "fittings": int(rng.choice([0, 1, 2, 3, 4], p=[0.35, 0.25, 0.2, 0.1, 0.1])),
-        "fitting_rgb": _grey(rng, 0.1, 1.0, 0.05) if rng.random() < 0.6 else _hue(rng, rng.random(), 0.0, (0.3, 0.9), (0.3, 0.95)),
+        "fitting_rgb": _grey(rng, 0.1, 1.0, 0.05) if rng.random() < 0.6 else _any_hue(rng, (0.3, 0.9), (0.3, 0.95)),
         "fitting_opacity": _uniform(rng, 0.35, 0.92),
         "end_fittings": bool(rng.random() < 0.6),
         "bubbles": int(rng.integers(1, 12)) if rng.random() < 0.3 else 0,
@@ -122,7 +126,8 @@ def _silicone_dark(rng: Generator) -> Knobs:
 
 def _silicone_colour(rng: Generator) -> Knobs:
     board = _hue(rng, float(rng.choice([0.08, 0.11, 0.33, 0.42, 0.55, 0.6, 0.65, 0.8])), 0.03, (0.25, 0.85), (0.25, 0.9))
-    return {"board_rgb": board, "board_texture": _pick(rng, "plain", "speckle", "wood", "grid", "cloth", "wood"), **_clear_liquid(rng)}
+    texture = _pick(rng, "plain", "speckle", "wood", "grid", "cloth", "wood")
+    return {"board_rgb": board, "board_texture": texture, **_clear_liquid(rng)}
 
 
 def _tinted_liquid(rng: Generator) -> Knobs:
@@ -135,11 +140,11 @@ def _tinted_liquid(rng: Generator) -> Knobs:
 
 
 def _opaque_channel(rng: Generator) -> Knobs:
-    body = _grey(rng, 0.2, 0.95, 0.05) if rng.random() < 0.5 else _hue(rng, float(rng.random()), 0.0, (0.15, 0.8), (0.35, 0.95))
+    body = _grey(rng, 0.2, 0.95, 0.05) if rng.random() < 0.5 else _any_hue(rng, (0.15, 0.8), (0.35, 0.95))
     floor = rng.uniform(0.45, 1.02)
     liquid = (body[0] * floor, body[1] * floor, body[2] * floor)
     if rng.random() < 0.35:
-        liquid = _grey(rng, 0.1, 0.95, 0.06) if rng.random() < 0.5 else _hue(rng, float(rng.random()), 0.0, (0.2, 0.8), (0.3, 0.9))
+        liquid = _grey(rng, 0.1, 0.95, 0.06) if rng.random() < 0.5 else _any_hue(rng, (0.2, 0.8), (0.3, 0.9))
     return {
         "material": "channel",
         "board_rgb": body,
@@ -186,6 +191,7 @@ def _xray(rng: Generator) -> Knobs:
         "lamps": 0,
         "highlight": 0.0,
         "objects": 0,
+        "cables": int(rng.choice([0, 1, 2, 3], p=[0.4, 0.3, 0.2, 0.1])),
         "fittings": int(rng.choice([0, 1, 2], p=[0.6, 0.25, 0.15])),
         "fitting_opacity": _uniform(rng, 0.1, 0.5),
         "fitting_rgb": _grey(rng, 0.0, 0.3, 0.0),
@@ -205,11 +211,13 @@ def _xray(rng: Generator) -> Knobs:
 
 
 def _fluoroscopy(rng: Generator) -> Knobs:
+    opacity = _uniform(rng, 0.16, 0.5)
     return {
         **_xray(rng),
         "board_rgb": _grey(rng, 0.45, 0.85, 0.0),
-        "texture_strength": _uniform(rng, 0.15, 0.8),
-        "liquid_opacity": _uniform(rng, 0.12, 0.45),
+        "liquid_opacity": opacity,
+        # Tissue may hide the lumen nearly, not wholly.
+        "texture_strength": min(_uniform(rng, 0.15, 0.8), 2.0 * opacity),
     }
 
 
@@ -220,7 +228,7 @@ def _subtraction(rng: Generator) -> Knobs:
         "board_rgb": _grey(rng, 0.35, 0.65, 0.0),
         "texture_strength": _uniform(rng, 0.0, 0.2),
         "liquid_rgb": (1.0, 1.0, 1.0) if bright else (0.0, 0.0, 0.0),
-        "liquid_opacity": _uniform(rng, 0.15, 0.5),
+        "liquid_opacity": _uniform(rng, 0.18, 0.5),
     }
 
 
@@ -256,7 +264,7 @@ def draw_robot_look(look: str, rng: Generator) -> Knobs:
         "robot_veil": _uniform(rng, 0.0, 0.35),
         "robot_shadow": _uniform(rng, 0.0, 0.4),
         "sheath_extra_mm": _uniform(rng, 0.25, 0.8),
-        "sheath_rgb": _grey(rng, 0.1, 0.95, 0.05) if rng.random() < 0.5 else _hue(rng, float(rng.random()), 0.0, (0.2, 0.8), (0.4, 0.95)),
+        "sheath_rgb": _grey(rng, 0.1, 0.95, 0.05) if rng.random() < 0.5 else _any_hue(rng, (0.2, 0.8), (0.4, 0.95)),
         "sheath_opacity": _uniform(rng, 0.25, 0.7),
     }
     special: dict[str, Knobs] = {
@@ -269,7 +277,7 @@ def draw_robot_look(look: str, rng: Generator) -> Knobs:
         "black_wire": {"robot_rgb": _grey(rng, 0.0, 0.1, 0.01), "robot_radius_mm": _uniform(rng, 0.5, 0.8), "tip_contrast": 1.0},
         "translucent": {"robot_rgb": _grey(rng, 0.3, 0.85, 0.08), "robot_opacity": _uniform(rng, 0.4, 0.65)},
         "banded": {"robot_rgb": _grey(rng, 0.75, 0.95, 0.03), "robot_accent_rgb": _grey(rng, 0.02, 0.25, 0.02)},
-        "coloured": {"robot_rgb": _hue(rng, float(rng.random()), 0.0, (0.5, 1.0), (0.35, 0.95))},
+        "coloured": {"robot_rgb": _any_hue(rng, (0.5, 1.0), (0.35, 0.95))},
     }
     knobs.update(special.get(look, {}))
     if look == "translucent":

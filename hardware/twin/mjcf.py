@@ -85,7 +85,7 @@ def build_model(walls: list[Wall], port: Port, shaft_links: int, specimen: Speci
     return mujoco.MjModel.from_xml_string(f"""
 <mujoco>
   <compiler angle="radian" autolimits="true"/>
-  <option timestep="{TIMESTEP_S}" gravity="0 0 0" integrator="discrete" solver="Newton" jacobian="dense" iterations="20" tolerance="1e-8"/>
+  <option timestep="{TIMESTEP_S}" gravity="0 0 0" integrator="discrete" solver="Newton" jacobian="sparse" cone="elliptic" iterations="20" tolerance="1e-8"/>
   <default>
     <joint armature="0.05"/>
     <geom condim="3" friction="{specimen.friction} 0.001 0.0001" solref=".004 1" solimp=".9 .95 .05"/>

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from core.types import Command, Point, Points, RobotStatus
+from hardware.twin.chain import Chain
 from hardware.twin.lumen_field import lumen_discs
 from hardware.twin.mjcf import (
     FEED_KP_MN_MM,
@@ -20,8 +21,6 @@ from hardware.twin.mjcf import (
     STEERABLE_LINKS,
     TIMESTEP_S,
     Specimen,
-    build_model,
-    link_lengths_mm,
 )
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantom_check import node_distances_mm
@@ -32,10 +31,8 @@ STEERABLE_MM = STEERABLE_LINKS * LINK_MM
 OUTSIDE_MM = 30.0
 """How much of the straight robot behind the port ``robot_points_mm`` shows."""
 _SPARE_MM = 24.0
-_GUIDE_EI = 1e6
-_GUIDE_DAMPING_S = 0.05
-_GUIDE_MM = 3.0
-_SHEATH_EI = 6e4
+_CHAIN_STEP_LINKS = 20
+_SWAP_MM, _SWAP_BACK_MM = 8.0, 20.0
 _CONTACT_LOWPASS_S = 0.1
 _POINTS_PER_LINK = 4
 
@@ -59,56 +56,59 @@ class TwinPhysics:
         self.specimen = Specimen.drawn(seed)
         walls, self._port = wall_boxes(phantom)
         ways = node_distances_mm(phantom)[phantom.port, list(phantom.targets)]
-        shaft_links = math.ceil((float(ways.max()) + _SPARE_MM - STEERABLE_MM) / SHAFT_LINK_MM)
-        self._lengths = link_lengths_mm(shaft_links)
-        self.chain_mm = float(self._lengths.sum())
-        self._model = build_model(walls, self._port, shaft_links, self.specimen)
-        self._data = mujoco.MjData(self._model)
+        self._shaft_links = math.ceil((float(ways.max()) + _SPARE_MM - STEERABLE_MM) / SHAFT_LINK_MM)
+        self.chain_mm = self._shaft_links * SHAFT_LINK_MM + STEERABLE_MM
+        self._walls = walls
         self._discs = lumen_discs(phantom.graph)
         self._centers = cKDTree(self._discs[0])
         self._outline = cKDTree(np.concatenate(lumen_outline(phantom.graph)))
         self._lock = threading.RLock()
         self._bend, self._pitch = TendonDrive(drive or DriveProperties()), TendonDrive(drive or DriveProperties())
-        self._index_model()
+        self._chains: dict[int, Chain] = {}
         self.reset()
-
-    def _index_model(self) -> None:
-        """Which entries of MuJoCo's arrays belong to which link."""
-        model, links = self._model, len(self._lengths)
-        self._bodies = np.flatnonzero(np.arange(model.nbody) >= model.nbody - links)
-        self._geoms = np.array([model.body_geomadr[body] for body in self._bodies])
-        joints = np.arange(1, model.njnt)
-        self._joints, self._dofs = joints, model.jnt_dofadr[joints].copy()
-        self._joint_link = np.searchsorted(self._bodies, model.jnt_bodyid[joints])
-        self._starts_mm = np.concatenate([[0.0], np.cumsum(self._lengths)[:-1]]) - self.chain_mm
-        self._joint_length = self._lengths[self._joint_link]
-        self._own_stiffness = model.jnt_stiffness[joints].copy().reshape(len(joints), -1)[:, 0]
 
     def reset(self) -> None:
         """Back to the start: the tip at the port, tendons slack, time 0."""
         with self._lock:
-            mujoco.mj_resetData(self._model, self._data)
+            self._chain = self._chain_of(0)
+            self._chain.reset()
             self._bend.reset()
             self._pitch.reset()
             self._feed_mm = 0.0
             self._delivery_mm = 0.0
             self._contact_mn = 0.0
             self._due_s = 0.0
-            self._shaped_for: tuple[float, float] | None = None
-            self._shape_chain()
-            mujoco.mj_forward(self._model, self._data)
-            self._slack_mm = self._data.ten_length.copy()
-            self._data.ctrl[:4] = self._slack_mm
+
+    def _chain_of(self, size: int) -> Chain:
+        """The chain with `size` + 1 times twenty shaft links, at most what the phantom's longest way needs.
+
+        What lies far outside the port cannot matter, and the cost of a step grows faster than the number of links.
+        """
+        shaft_links = min(self._shaft_links, (size + 1) * _CHAIN_STEP_LINKS)
+        if size not in self._chains:
+            self._chains[size] = Chain(self._walls, self._port, shaft_links, self.specimen)
+        self._size = size
+        return self._chains[size]
+
+    def _fit_chain(self) -> None:
+        """Swap to a longer or shorter chain when the insertion asks for it."""
+        insertion_mm, now = self._chain.insertion_mm, self._chain
+        if now.length_mm < self.chain_mm and insertion_mm > now.length_mm - _SWAP_MM:
+            self._chain = self._chain_of(self._size + 1)
+        elif self._size > 0 and insertion_mm < self._size * _CHAIN_STEP_LINKS * SHAFT_LINK_MM + STEERABLE_MM - _SWAP_BACK_MM:
+            self._chain = self._chain_of(self._size - 1)
+        if self._chain is not now:
+            self._chain.take_over(now)
 
     @property
     def time_s(self) -> float:
         """Simulated time."""
-        return float(self._data.time)
+        return float(self._chain.data.time)
 
     @property
     def insertion_mm(self) -> float:
         """Length of robot beyond the port."""
-        return float(np.clip(self._data.qpos[0], 0.0, self.chain_mm))
+        return max(0.0, min(self.chain_mm, self._chain.insertion_mm))
 
     @property
     def delivery_mm(self) -> float:
@@ -121,30 +121,30 @@ class TwinPhysics:
             self._due_s += duration_s
             while self._due_s >= TIMESTEP_S / 2:
                 self._due_s -= TIMESTEP_S
+                self._fit_chain()
                 self._actuate(command)
-                mujoco.mj_step(self._model, self._data)
-                force = self._data.efc_force[self._data.efc_type == mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL].sum()
-                self._contact_mn += (float(force) - self._contact_mn) * TIMESTEP_S / _CONTACT_LOWPASS_S
+                mujoco.mj_step(self._chain.model, self._chain.data)
+                self._contact_mn += (self._chain.wall_force_mn() - self._contact_mn) * TIMESTEP_S / _CONTACT_LOWPASS_S
 
     def _actuate(self, command: Command) -> None:
-        control = self._data.ctrl
+        chain = self._chain
+        control, slack = chain.data.ctrl, chain.slack_mm
         bend = self._bend.step(command.bend, TIMESTEP_S)
         pitch = self._pitch.step(command.pitch, TIMESTEP_S)
         # The antagonist pays out as much as the other takes in: held still it would halve the bend.
-        control[0], control[1] = self._slack_mm[0] - bend, self._slack_mm[1] + bend
-        control[2], control[3] = self._slack_mm[2] - pitch, self._slack_mm[3] + pitch
+        control[0], control[1] = slack[0] - bend, slack[1] + bend
+        control[2], control[3] = slack[2] - pitch, slack[3] + pitch
         control[4] = self._feed(command.advance_mm_s)
-        insertion_mm = float(self._data.qpos[0])
-        reach_mm = max(0.0, insertion_mm - STEERABLE_MM)
+        reach_mm = max(0.0, chain.insertion_mm - STEERABLE_MM)
         self._delivery_mm = max(0.0, min(reach_mm, self._delivery_mm + command.delivery_mm_s * TIMESTEP_S))
-        self._shape_chain()
+        chain.shape(self._delivery_mm)
 
     def _feed(self, advance_mm_s: float) -> float:
         """The feed's next goal. A stalled drive slips: its goal stays within reach of its greatest force.
 
         The limit acts on the goal, because a saturated force inside the solver is explicit and swings from step to step.
         """
-        insertion_mm, speed_mm_s = float(self._data.qpos[0]), float(self._data.qvel[0])
+        insertion_mm, speed_mm_s = self._chain.insertion_mm, float(self._chain.data.qvel[0])
         slip_mm, lag_s = self.specimen.feed_force_mn / FEED_KP_MN_MM, FEED_KV / FEED_KP_MN_MM
         moved = self._feed_mm + advance_mm_s * TIMESTEP_S
         moved = max(insertion_mm - slip_mm, min(insertion_mm + slip_mm, moved))
@@ -154,30 +154,6 @@ class TwinPhysics:
         coasting = insertion_mm + lag_s * speed_mm_s
         return max(coasting - slip_mm, min(coasting + slip_mm, goal))
 
-    def _shape_chain(self) -> None:
-        """Stiffen what the guide behind the port and the sheath cover; links touch walls only once they are inside.
-
-        Joints outside are held straight by stiffness, so the robot cannot buckle there and comes back clean.
-        """
-        insertion_mm = float(self._data.qpos[0])
-        key = round(insertion_mm, 1), round(self._delivery_mm, 1)
-        if key == self._shaped_for:
-            return
-        self._shaped_for = key
-        starts = insertion_mm + self._starts_mm
-        inside = (starts >= 0.0).astype(np.int32)
-        self._model.geom_contype[self._geoms] = inside
-        self._model.geom_conaffinity[self._geoms] = 2 * inside
-        at = starts[self._joint_link]
-        guided = np.clip((_GUIDE_MM - at) / _GUIDE_MM, 0.0, 1.0) ** 3
-        covered = np.clip((self._delivery_mm - at) / self._joint_length, 0.0, 1.0)
-        own = self._own_stiffness + covered * _SHEATH_EI / self._joint_length
-        held = guided * _GUIDE_EI / self._joint_length
-        stiffness = own + held
-        damping = own * self.specimen.damping_s + held * _GUIDE_DAMPING_S
-        self._model.jnt_stiffness[self._joints] = stiffness
-        self._model.dof_damping[self._dofs] = damping
-
     def robot_points_mm(self) -> Points:
         """The robot's centerline on the board (N, 2) in mm, tail -> head.
 
@@ -185,12 +161,10 @@ class TwinPhysics:
         round nose, one robot radius beyond the end of the last link's axis.
         """
         with self._lock:
-            joints = self._data.xpos[self._bodies][:, :2]
-            last = self._data.xmat[self._bodies[-1]].reshape(3, 3)[:2, 0]
-            insertion_mm = self.insertion_mm
-        first = max(0, int(np.searchsorted(self._starts_mm + insertion_mm, -OUTSIDE_MM)) - 1)
-        nose = joints[-1] + last * LINK_MM, joints[-1] + last * (LINK_MM + ROBOT_RADIUS_MM)
-        return _smooth(np.vstack([joints[first:], *nose]))
+            corners = self._chain.corners_mm(OUTSIDE_MM)
+        if (corners[0] - self._port.point) @ self._port.inward > -OUTSIDE_MM:
+            corners = np.vstack([self._port.point - OUTSIDE_MM * self._port.inward, corners])
+        return _smooth(corners)
 
     @property
     def head_mm(self) -> Point:
@@ -201,8 +175,8 @@ class TwinPhysics:
     def status(self) -> RobotStatus:
         """What the robot reports, on simulated time."""
         with self._lock:
-            pull = self._slack_mm - self._data.ten_length
-            force = -self._data.actuator_force[:4]
+            data = self._chain.data
+            pull, force = self._chain.slack_mm - data.ten_length, -data.actuator_force[:4]
             return RobotStatus(
                 time_s=self.time_s,
                 insertion_mm=self.insertion_mm,
@@ -216,9 +190,10 @@ class TwinPhysics:
         """Present contacts with the walls: place on the board (mm) and normal force (mN)."""
         found, force = [], np.zeros(6)
         with self._lock:
-            for index in range(self._data.ncon):
-                mujoco.mj_contactForce(self._model, self._data, index, force)
-                x, y = self._data.contact[index].pos[:2]
+            model, data = self._chain.model, self._chain.data
+            for index in range(data.ncon):
+                mujoco.mj_contactForce(model, data, index, force)
+                x, y = data.contact[index].pos[:2]
                 if force[0] > 0.0:
                     found.append(((float(x), float(y)), float(force[0])))
         return found
@@ -230,9 +205,13 @@ class TwinPhysics:
         if len(inside) == 0:
             return self._port.radius - ROBOT_RADIUS_MM
         away, _ = self._outline.query(inside)
-        gap, disc = self._centers.query(inside, k=4)
-        within = (gap < self._discs[1][disc]).any(axis=1)
-        return float(np.where(within, away, -away).min()) - ROBOT_RADIUS_MM
+        gap, disc = self._centers.query(inside)
+        centers, radii = self._discs
+        doubtful = np.flatnonzero(gap >= radii[disc])
+        for index in doubtful:
+            within = np.any(np.linalg.norm(centers - inside[index], axis=1) < radii)
+            away[index] *= 1.0 if within else -1.0
+        return float(away.min()) - ROBOT_RADIUS_MM
 
 
 def _smooth(corners: Points) -> Points:

@@ -25,7 +25,7 @@ from hardware.twin.view import View
 
 F32 = NDArray[np.float32]
 
-_REACH_MM = 4.0
+_REACH_MM = 2.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)

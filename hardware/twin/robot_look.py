@@ -13,16 +13,16 @@ from hardware.twin.view import View
 
 F32 = NDArray[np.float32]
 
-_LONGEST_PIECE_MM = 2.0
+_LONGEST_PIECE_MM = 2.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Band:
     """Pixels near the robot's body line, arrays of shape (K,).
 
-    ``pixel`` is the flat index into the image, ``distance_mm`` the distance to the line (both ends round), ``from_tip_mm`` and ``from_tail_mm`` the
-    arc length from either end to the foot point, ``side`` the signed lateral place (-1..1 over the robot's width) and ``normal`` (K, 2) the line's
-    normal that belongs to it.
+    ``pixel`` is the flat index into the image, ``distance_mm`` the distance to the line (both ends round), ``from_tip_mm`` and
+    ``from_tail_mm`` the arc length from either end to the foot point, ``side`` the signed lateral place (-1..1 over the robot's
+    width) and ``normal`` (K, 2) the line's normal that belongs to it.
     """
 
     pixel: NDArray[np.int64]
@@ -45,8 +45,7 @@ def measure_band(points_mm: Points, radius_mm: float, reach_mm: float, view: Vie
     start, step, length = start[length > 0], step[length > 0], length[length > 0]
     before = np.concatenate([[0.0], np.cumsum(length)])
     middle = start + step / 2
-    near = _pairs(middle, length / 2 + reach_mm, view)
-    piece, pixel = near
+    piece, pixel = _pairs(middle, length / 2 + reach_mm, view)
     flat = grid_mm.reshape(-1, 2)
     offset = flat[pixel] - start[piece].astype(np.float32)
     along_unit, unit = step[piece].astype(np.float32), (step / length[:, None]).astype(np.float32)
@@ -59,7 +58,7 @@ def measure_band(points_mm: Points, radius_mm: float, reach_mm: float, view: Vie
     # Written far to near, the nearest piece has the last word for each pixel.
     owner = np.empty(height * width, np.int64)
     owner[pixel[keep]] = keep
-    chosen = np.unique(owner[pixel[keep]])
+    chosen = keep[owner[pixel[keep]] == keep]
     piece, pixel, distance, share = piece[chosen], pixel[chosen], distance[chosen], share[chosen]
     normal = np.column_stack([-unit[piece, 1], unit[piece, 0]])
     lateral = np.sum(offset[chosen] * normal, axis=1)
@@ -69,12 +68,14 @@ def measure_band(points_mm: Points, radius_mm: float, reach_mm: float, view: Vie
 
 
 def _subdivide(points: Points) -> Points:
-    """The same polyline with no piece longer than 2 mm, so that one window size suits all pieces."""
+    """The same polyline with no piece longer than 2.2 mm, so that one window size suits all pieces."""
     pieces = np.maximum(1, np.ceil(np.linalg.norm(np.diff(points, axis=0), axis=1) / _LONGEST_PIECE_MM)).astype(int)
     if len(pieces) and pieces.max() == 1:
         return points
-    parts = [np.linspace(a, b, count, endpoint=False) for a, b, count in zip(points[:-1], points[1:], pieces, strict=True)]
-    return np.vstack([*parts, points[-1:]])
+    index = np.repeat(np.arange(len(pieces)), pieces)
+    first = np.cumsum(pieces) - pieces
+    share = (np.arange(len(index)) - first[index]) / pieces[index]
+    return np.vstack([points[index] + share[:, None] * np.diff(points, axis=0)[index], points[-1:]])
 
 
 def _pairs(middle_mm: Points, reach_mm: NDArray[np.float64], view: View) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -94,7 +95,7 @@ def _pairs(middle_mm: Points, reach_mm: NDArray[np.float64], view: View) -> tupl
 
 
 def paint_sheath(canvas: F32, band: Band, coverage: F32, appearance: Appearance) -> None:
-    """Blend the catheter sheath over the flat `canvas` (H * W, 3): a translucent tube around the proximal robot, brighter at its edges."""
+    """Blend the catheter sheath over the flat `canvas` (H * W, 3): a translucent tube around the robot, brighter at its edges."""
     edge = np.clip(band.distance_mm / np.float32(appearance.robot_radius_mm + appearance.sheath_extra_mm), 0, 1) ** 4
     alpha = (coverage * appearance.sheath_opacity * (0.7 + 0.3 * edge))[:, None]
     colour = np.asarray(appearance.sheath_rgb, np.float32) * (0.85 + 0.3 * edge)[:, None]

@@ -65,7 +65,9 @@ def robot_shapes(phantom: Phantom, seed: int, count: int) -> list[tuple[Points, 
     rng = np.random.default_rng((seed, 11))
     physics = TwinPhysics(phantom, seed)
     target = int(rng.choice(phantom.targets))
-    follower = RouteFollower(phantom, target, lookahead_mm=float(rng.uniform(6, 14)), wander=float(rng.choice((0.0, 0.4, 0.9))), seed=seed)
+    follower = RouteFollower(
+        phantom, target, lookahead_mm=float(rng.uniform(6, 14)), wander=float(rng.choice((0.0, 0.4, 0.9))), seed=seed
+    )
     moments = np.sort(rng.uniform(0.12, 0.98, count)) * follower.length_mm
     shapes: list[tuple[Points, float, float]] = []
     sheath_speed = float(rng.choice((0.0, 0.0, 6.0, 14.0)))
@@ -178,7 +180,12 @@ def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int],
 
 
 def _prepare(plan: SynthPlan) -> None:
-    described = {"seed": plan.seed, "size": list(plan.size), "families": plan.families and list(plan.families), "phantom": plan.phantom}
+    described = {
+        "seed": plan.seed,
+        "size": list(plan.size),
+        "families": plan.families and list(plan.families),
+        "phantom": plan.phantom,
+    }
     path = plan.out / "plan.json"
     try:
         for name in ("images", "masks", "episodes"):

@@ -1,7 +1,7 @@
 """What perception should find in the twin's picture, from the geometry itself: no pixels are looked at.
 
-Truth is measured in working pixels (longer side of the image = ``working_size_px``) by the same public functions and the same 40-px rule as
-perception, on the true lines: the local tangent at the tip would differ from the 40-px line by several degrees in a bend.
+Truth is measured in working pixels (longer side of the image = ``working_size_px``) by the same public functions and the same 40-px
+rule as perception, on the true lines: the local tangent at the tip would differ from the 40-px line by several degrees in a bend.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Truth:
 
     Attributes
     ----------
-    robot_path : visible part that ends in the head, (N, 2), tail -> head, one point every 2 px; None when the head is out of the image.
+    robot_path : visible part that ends in the head, (N, 2), tail -> head, a point every 2 px; None: the head is out of the image.
     nearest : centerline point nearest to the head; ``lumen_radius_px`` is the lumen's radius there.
     offset_ratio : distance of the head to ``nearest`` over that radius (0 in the middle).
     ambiguity : 0..1, how nearly another branch fits as well.

@@ -1,7 +1,7 @@
 """How the lumen and its wall look: silicone tube, clear block, open channel, or X-ray contrast.
 
-A picture has two layers. ``under`` (H, W, 3) is what lies behind the robot; ``front_alpha`` (H, W) and ``front`` (H, W, 3, already multiplied
-by alpha) lie over it: highlights of the tube, lamp reflections, fittings.
+A picture has two layers. ``under`` (H, W, 3) is what lies behind the robot; ``front_alpha`` (H, W) and ``front`` (H, W, 3, already
+multiplied by alpha) lie over it: highlights of the tube, lamp reflections, fittings.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ def _fill_liquid(appearance: Appearance, layers: Layers, surface: Surface) -> No
 
 
 def _edges(appearance: Appearance, layers: Layers, surface: Surface, places_mm: tuple[float, ...]) -> None:
-    """Refraction lines along the walls, a dark and a bright one side by side; the lamp's direction makes them stronger or weaker."""
+    """Refraction lines along the walls, a dark and a bright one side by side; the lamp decides which is stronger."""
     width = appearance.edge_mm
     for place in places_mm:
         dark = surface.line(place - 0.4 * width, width) * (0.55 - 0.45 * surface.facing)
@@ -202,7 +202,7 @@ def _highlight(
     shine = np.exp(-(((place - np.float32(0.55)) / width) ** 2))
     shine += np.float32(0.35) * np.exp(-(((place + np.float32(0.7)) / width) ** 2))
     broken = np.clip(0.8 + 0.8 * smooth_noise(rng, ratio.shape, 14 * surface.scale), 0, 1)
-    alpha = np.float32(0.8 * strength * appearance.highlight) * shine * across * broken * body
+    alpha = np.float32(strength * appearance.highlight) * shine * across * broken * body
     layers.cover(np.clip(alpha, 0, 0.92).astype(np.float32), np.ones(3, np.float32))
 
 

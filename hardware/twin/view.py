@@ -25,12 +25,12 @@ class View:
         """Board millimetres (N, 2) -> pixels (N, 2)."""
         points = np.asarray(points_mm, np.float64)
         mapped = np.column_stack([points, np.ones(len(points))]) @ self.homography.T
-        plane = mapped[:, :2] / mapped[:, 2:]
+        plane = np.asarray(mapped[:, :2] / mapped[:, 2:])
         if not self.distortion:
-            return np.asarray(plane)
+            return plane
         offset, half = self._normalise(plane)
         radius2 = np.sum(offset**2, axis=1, keepdims=True)
-        return self._center + half * offset * (1 + self.distortion * radius2)
+        return np.asarray(self._center + half * offset * (1 + self.distortion * radius2))
 
     def unproject(self, points_px: Points) -> Points:
         """Pixels (N, 2) -> board millimetres (N, 2); the distortion is inverted by Newton steps on the radius (error < 1e-9 px)."""

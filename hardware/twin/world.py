@@ -26,9 +26,9 @@ _CATCH_UP_S = 0.2
 class TwinWorld:
     """Steps the physics under the robot's current command and renders frames.
 
-    Lock-step: call ``advance`` and ``frame``; nothing runs by itself, and the same seeds and commands give the same bits. Real time:
-    ``start`` runs both in a thread; its clock gives up what it cannot catch up within 0.2 s, so a busy machine slows the world down
-    instead of making it jump.
+    Lock-step: call ``advance`` and ``frame``; nothing runs by itself, and the same seeds and commands give the same bits.
+    Real time: ``start`` runs both in a thread; its clock gives up what it cannot catch up within 0.2 s, so a busy machine slows
+    the world down instead of making it jump.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class TwinWorld:
                 left -= step
 
     def insert(self, length_mm: float, speed_mm_s: float = 40.0, target: int | None = None) -> None:
-        """Feed the robot to an insertion length along the route to `target` (default: the farthest), so that there is something to see."""
+        """Feed the robot to an insertion length along the route to `target` (default: the farthest), so that there is a view."""
         nodes = self.phantom.targets
         follower = max((RouteFollower(self.phantom, node) for node in nodes), key=lambda f: f.length_mm)
         if target is not None:

@@ -41,7 +41,7 @@ def test_samples_come_back_as_they_were_written(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_labels_says_what_it_needs(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="needs images/NAME.png"):
+    with pytest.raises(DatasetError, match=r"needs images/NAME\.png"):
         find_samples([tmp_path])
 
 
@@ -67,7 +67,9 @@ def test_crops_keep_image_and_labels_together(tmp_path: Path) -> None:
     for _ in range(20):
         cut, cut_vessel, cut_robot = random_crop(image, vessel, robot, (64, 80), rng)
         assert cut.shape == (64, 80, 3)
-        inner = cut_robot & (np.roll(cut_robot, 1, 0) & np.roll(cut_robot, -1, 0) & np.roll(cut_robot, 1, 1) & np.roll(cut_robot, -1, 1))
+        inner = cut_robot & (
+            np.roll(cut_robot, 1, 0) & np.roll(cut_robot, -1, 0) & np.roll(cut_robot, 1, 1) & np.roll(cut_robot, -1, 1)
+        )
         assert not (cut_robot & ~cut_vessel)[2:-2, 2:-2].any()
         if inner.any():
             assert np.median(cut[inner]) < 60
@@ -86,7 +88,9 @@ def _toy_training(folder: Path, steps: int, **kwargs: object) -> tuple[DualUNet,
 
     torch.manual_seed(0)
     network = DualUNet(UNetShape((4, 8, 8, 8, 8), (4, 8, 8, 8), 1, 2))
-    plan = TrainingPlan(steps=steps, batch=4, learning_rate=1e-2, warmup_steps=5, crop=(64, 64), workers=0, average_decay=0.9, threads=1)
+    plan = TrainingPlan(
+        steps=steps, batch=4, learning_rate=1e-2, warmup_steps=5, crop=(64, 64), workers=0, average_decay=0.9, threads=1
+    )
     return train(network, find_samples([folder]), plan, **kwargs)  # type: ignore[arg-type]
 
 
@@ -94,7 +98,14 @@ def test_training_learns_a_toy_task_and_reports(tmp_path: Path) -> None:
     reports: list[Progress] = []
     checkpoints: list[int] = []
     folder = _toy_set(tmp_path / "set", 6)
-    _, done = _toy_training(folder, 40, on_progress=reports.append, report_every=10, checkpoint_every=20, on_checkpoint=lambda _n, s: checkpoints.append(s))
+    _, done = _toy_training(
+        folder,
+        40,
+        on_progress=reports.append,
+        report_every=10,
+        checkpoint_every=20,
+        on_checkpoint=lambda _n, s: checkpoints.append(s),
+    )
     assert done == 40
     assert [r.step for r in reports] == [10, 20, 30, 40]
     assert reports[-1].loss < reports[0].loss * 0.9

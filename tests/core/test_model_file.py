@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 import torch
 
-from core.learning.model_file import INFO, ONNX, WEIGHTS, ModelError, load_network, model_folder, read_model_info, save_model, write_figures
+from core.learning.model_file import (
+    INFO,
+    ONNX,
+    WEIGHTS,
+    ModelError,
+    load_network,
+    model_folder,
+    read_model_info,
+    save_model,
+    write_figures,
+)
 from core.perception.segmentation import OpenVinoSegmenter, TorchSegmenter, to_working
 from core.perception.unet import DualUNet, UNetShape
 
@@ -101,7 +111,9 @@ def test_figures_are_added_without_touching_the_rest(model: Path) -> None:
     assert after.weights_sha256 == before.weights_sha256
 
 
-@pytest.mark.parametrize(("size", "working"), [((480, 640), (480, 640)), ((1080, 1920), (360, 640)), ((300, 200), (640, 427)), ((7, 5000), (1, 640))])
+@pytest.mark.parametrize(
+    ("size", "working"), [((480, 640), (480, 640)), ((1080, 1920), (360, 640)), ((300, 200), (640, 427)), ((7, 5000), (1, 640))]
+)
 def test_working_size_keeps_the_aspect(size: tuple[int, int], working: tuple[int, int]) -> None:
     image, scale = to_working(np.zeros((*size, 3), np.uint8), 640)
     assert image.shape[:2] == working

@@ -1,0 +1,51 @@
+"""A message that goes away by itself, at the lower edge of the live picture."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtWidgets import QLabel, QWidget
+
+from app import palette
+
+_SHOWN_MS = 6000
+
+
+class Toast(QLabel):
+    """One line or two; the newest message replaces the one before."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWordWrap(True)
+        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self.hide)
+        parent.installEventFilter(self)
+        self.hide()
+
+    def show_message(self, text: str, *, is_fault: bool = False) -> None:
+        edge = palette.FAULT if is_fault else palette.LINE
+        self.setStyleSheet(
+            f"background: {palette.RAISED}; color: {palette.TEXT}; border: 1px solid {edge}; border-radius: 8px; padding: 8px 16px;"
+            "font-size: 14px;"
+        )
+        self.setText(text)
+        self.setAccessibleName(text)
+        self._place()
+        self.show()
+        self.raise_()
+        self._timer.start(_SHOWN_MS)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self._place()
+        return False
+
+    def _place(self) -> None:
+        room = self.parentWidget().rect()
+        widest = max(200, room.width() - 40)
+        self.setFixedWidth(min(widest, self.fontMetrics().horizontalAdvance(self.text()) + 60))
+        self.setFixedHeight(self.heightForWidth(self.width()))
+        self.move((room.width() - self.width()) // 2, room.height() - self.height() - 16)

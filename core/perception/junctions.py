@@ -1,0 +1,164 @@
+"""Where vessels meet: the junction put where the branches' own centerlines meet, not where the skeleton does.
+
+In the widened lumen of a bifurcation the skeleton leaves the trunk's centerline towards the opening, by some pixels over some two radii
+to each side. So the part of each branch within the opening is replaced: a trunk goes on smoothly through it, a side branch runs
+straight to the trunk, and where no two branches form a trunk all run straight to the point that fits their directions best.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.perception import polyline
+from core.types import Point, Points
+
+STEP_PX = 2.0
+OPENING_MIN_RADII = 0.8
+OPENING_MAX_RADII = 2.5
+"""The opening ends where the lumen is as narrow as the branch itself, looked for between these multiples of the junction's radius."""
+SETTLED = 1.06
+TRUNK_MAX_TURN_DEG = 50.0
+TRUNK_LEAD_DEG = 15.0
+"""Two branches are a trunk if they turn less than this, and by so much less than any other two."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arm:
+    """One branch seen from a junction: its centerline outwards (N, 2), the radius along it, and whether it is free to its far end."""
+
+    points: Points
+    radius: NDArray[np.float64]
+    far_is_junction: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Gate:
+    """Where a branch leaves the opening: the place, the outward direction, and the arc length up to there."""
+
+    place: NDArray[np.float64]
+    outward: NDArray[np.float64]
+    position_px: float
+    radius_px: float
+
+
+def rebuild(centre: Points, radius_px: float, arms: list[Arm]) -> tuple[Points, list[Arm]] | None:
+    """The junction's place (2,) and its arms anew, or None where too few arms are long enough to tell.
+
+    Parameters
+    ----------
+    centre : the skeleton's junction (2,).
+    radius_px : lumen radius there.
+    arms : all branches at the junction, outwards.
+    """
+    gates = [_gate(arm, radius_px) for arm in arms]
+    known = [index for index, gate in enumerate(gates) if gate is not None]
+    if len(known) < 2:
+        return None
+    trunk = _trunk({index: gate for index in known if (gate := gates[index]) is not None})
+    if trunk is None:
+        place = _meeting_point([gate for gate in gates if gate is not None], centre, radius_px)
+        bridges = {}
+    else:
+        place, bridges = _on_trunk(trunk, gates, centre, radius_px)
+    rebuilt = []
+    for index, (arm, gate) in enumerate(zip(arms, gates, strict=True)):
+        if gate is None:
+            rebuilt.append(Arm(np.concatenate([place[None], arm.points[1:]]), arm.radius, arm.far_is_junction))
+            continue
+        bridge = bridges.get(index)
+        if bridge is None:
+            bridge = _straight(place, gate.place)
+        rest = polyline.arc_length(arm.points) > gate.position_px + 0.5 * STEP_PX
+        points = np.concatenate([bridge, arm.points[rest]])
+        radius = np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest]])
+        rebuilt.append(Arm(points, radius, arm.far_is_junction))
+    return place, rebuilt
+
+
+def _gate(arm: Arm, radius_px: float) -> _Gate | None:
+    along = polyline.arc_length(arm.points)
+    usable = along[-1] * (0.5 if arm.far_is_junction else 1.0) - 8.0
+    beyond = (along >= OPENING_MIN_RADII * radius_px) & (along <= min(OPENING_MAX_RADII * radius_px, usable))
+    if not beyond.any():
+        return None
+    plain = arm.radius[(along >= radius_px) & (along <= 4.0 * radius_px)]
+    own = float(np.percentile(plain, 40)) if len(plain) else float(arm.radius[beyond].min())
+    settled = beyond & (arm.radius <= SETTLED * own + 0.3)
+    index = int(np.argmax(settled)) if settled.any() else int(np.flatnonzero(beyond)[-1])
+    heading = polyline.cut(arm.points, float(along[index]), float(along[index]) + max(12.0, radius_px))
+    chord = heading[-1] - heading[0]
+    return _Gate(arm.points[index], chord / max(float(np.hypot(chord[0], chord[1])), 1e-9), float(along[index]), own)
+
+
+def _trunk(gates: dict[int, _Gate]) -> dict[int, _Gate] | None:
+    """The two arms that go on smoothly through the junction, if two clearly do."""
+    turns = []
+    for i, j in combinations(gates, 2):
+        turn = float(np.degrees(np.arccos(np.clip(-gates[i].outward @ gates[j].outward, -1.0, 1.0))))
+        turns.append((turn, i, j))
+    turns.sort()
+    best, i, j = turns[0]
+    second = next((turn for turn, *pair in turns[1:] if i in pair or j in pair), np.inf)
+    if best > TRUNK_MAX_TURN_DEG or second < best + TRUNK_LEAD_DEG:
+        return None
+    return {i: gates[i], j: gates[j]}
+
+
+def _on_trunk(
+    trunk: dict[int, _Gate], gates: list[_Gate | None], centre: Points, radius_px: float
+) -> tuple[Points, dict[int, Points]]:
+    """The place on the trunk where the other arms arrive, and the trunk's curve from there to its two gates."""
+    (i, first), (j, second) = trunk.items()
+    curve = _hermite(first.place, -first.outward, second.place, second.outward)
+    others = [gate for index, gate in enumerate(gates) if gate is not None and index not in trunk]
+    marks = []
+    for gate in others:
+        behind = gate.place - curve
+        across = np.abs(behind[:, 0] * gate.outward[1] - behind[:, 1] * gate.outward[0])
+        on_way = behind @ gate.outward > 0.0
+        if on_way.any():
+            marks.append(int(np.argmin(np.where(on_way, across, np.inf))))
+    if not marks:
+        marks = [int(np.argmin(np.hypot(*(curve - centre).T)))]
+    nearest = int(np.argmin(np.hypot(*(curve - centre).T)))
+    reach = int(np.ceil(1.5 * radius_px / STEP_PX))
+    mark = int(np.clip(round(float(np.mean(marks))), max(nearest - reach, 1), min(nearest + reach, len(curve) - 2)))
+    return curve[mark], {i: curve[mark::-1], j: curve[mark:]}
+
+
+def _hermite(start: Points, start_direction: Points, end: Points, end_direction: Points) -> Points:
+    """A smooth curve between two places with given unit directions, a point about every ``STEP_PX``; at least 4 points."""
+    span = float(np.hypot(*(end - start)))
+    t = np.linspace(0.0, 1.0, max(4, round(span / STEP_PX) + 1))[:, None]
+    return np.asarray(
+        (2 * t**3 - 3 * t**2 + 1) * start
+        + (t**3 - 2 * t**2 + t) * span * start_direction
+        + (3 * t**2 - 2 * t**3) * end
+        + (t**3 - t**2) * span * end_direction
+    )
+
+
+def _meeting_point(gates: list[_Gate], centre: Points, radius_px: float) -> Points:
+    """Least-squares meeting point of the arms' lines, held to the skeleton's junction by a small weight and by its radius."""
+    normal_matrix, right = 0.05 * np.eye(2), 0.05 * centre
+    for gate in gates:
+        across = np.eye(2) - np.outer(gate.outward, gate.outward)
+        normal_matrix = normal_matrix + across
+        right = right + across @ gate.place
+    shift = np.linalg.solve(normal_matrix, right) - centre
+    length = float(np.hypot(shift[0], shift[1]))
+    return np.asarray(centre + shift * min(1.0, radius_px / max(length, 1e-9)))
+
+
+def _straight(start: Points, end: Points) -> Points:
+    count = max(2, round(float(np.hypot(*(end - start))) / STEP_PX) + 1)
+    return np.asarray(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start))
+
+
+def as_point(place: Points) -> Point:
+    """A place (2,) as a plain pair."""
+    return float(place[0]), float(place[1])

@@ -1,0 +1,69 @@
+"""Labelled sets from the twin: complete, repeatable, continued after an interruption, disjoint by seed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.learning.dataset import find_samples, read_truth
+from hardware.twin import synth
+from hardware.twin.synth import SynthError, SynthPlan, write_set
+
+
+@pytest.fixture(scope="module")
+def small_set(tmp_path_factory: pytest.TempPathFactory) -> SynthPlan:
+    plan = SynthPlan(tmp_path_factory.mktemp("synth") / "set", 5, 3, size=(320, 240))
+    write_set(plan)
+    return plan
+
+
+def test_every_frame_has_image_masks_and_truth(small_set: SynthPlan) -> None:
+    samples, truth = find_samples([small_set.out]), read_truth(small_set.out)
+    assert [s.stem for s in samples] == list(truth) == [f"{i:06d}" for i in range(5)]
+    for sample in samples:
+        image, vessel, robot = sample.load()
+        row = truth[sample.stem]
+        assert image.shape == (240, 320, 3)
+        assert vessel.any()
+        assert row["robot_visible"] == bool(robot.any())
+        assert row["seed"] == 3
+        assert (row["state"] is None) == (row["theta_deg"] is None)
+
+
+def test_the_same_plan_gives_the_same_bytes(small_set: SynthPlan, tmp_path: Path) -> None:
+    again = SynthPlan(tmp_path / "again", 5, 3, size=(320, 240))
+    write_set(again)
+    for name in ("images/000003.png", "masks/000003_robot.png", "truth.jsonl"):
+        assert (again.out / name).read_bytes() == (small_set.out / name).read_bytes()
+
+
+def test_an_interrupted_set_goes_on_and_keeps_what_is_there(small_set: SynthPlan, monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[int] = []
+    original = synth._write_episode
+    monkeypatch.setattr(synth, "_write_episode", lambda plan, episode: written.append(episode) or original(plan, episode))
+    progress: list[int] = []
+    assert write_set(small_set, on_progress=progress.append) == 5
+    assert written == []
+    assert progress == [5]
+    (small_set.out / "episodes" / "00000.jsonl").unlink()
+    before = (small_set.out / "images" / "000001.png").read_bytes()
+    write_set(small_set)
+    assert written == [0]
+    assert (small_set.out / "images" / "000001.png").read_bytes() == before
+
+
+def test_another_plan_does_not_overwrite_a_set(small_set: SynthPlan) -> None:
+    with pytest.raises(SynthError, match="other settings"):
+        write_set(SynthPlan(small_set.out, 5, 4, size=(320, 240)))
+
+
+def test_an_unwritable_folder_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(SynthError, match="cannot be written"):
+        write_set(SynthPlan(tmp_path / "file" / "set", 1, 0))
+
+
+def test_masks_fit_the_picture_of_a_clear_look() -> None:
+    frame = next(synth.episode_frames(SynthPlan(Path("unused"), 1, 8, size=(320, 240), families=("silicone_white",)), 0))
+    assert frame.picture.vessel.shape == (240, 320)
+    assert 0.01 < np.mean(frame.picture.vessel) < 0.6
