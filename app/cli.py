@@ -8,10 +8,7 @@ from typing import Annotated
 
 import typer
 
-from core.config import ConfigError
-from core.devices import DeviceError
-from core.learning.dataset import DatasetError
-from core.learning.model_file import ModelError
+from core.errors import UserError
 
 app = typer.Typer(
     name="lumenpilot",
@@ -29,17 +26,11 @@ SourceOption = Annotated[Path | None, typer.Option("--source", help="video, pict
 JsonOption = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
 
 
-class UsageError(Exception):
-    """The command cannot be carried out as given; the message is one line and says what to do."""
-
-
 def main() -> None:
     """Run the command line. Known errors end as one line on standard error and exit code 2; Ctrl-C as exit code 130."""
-    from hardware.twin.synth import SynthError
-
     try:
         app()
-    except (ConfigError, DeviceError, ModelError, DatasetError, SynthError, UsageError) as error:
+    except UserError as error:
         sys.stderr.write(f"error: {error}\n")
         sys.exit(2)
     except KeyboardInterrupt:
@@ -55,15 +46,20 @@ def _window(context: typer.Context, rig: RigOption = "twin", config: ConfigOptio
 
 
 @app.command()
-def gui(rig: RigOption = "twin", config: ConfigOption = None, source: SourceOption = None) -> None:
+def gui(
+    rig: RigOption = "twin",
+    config: ConfigOption = None,
+    source: SourceOption = None,
+    until_first_frame: Annotated[bool, typer.Option("--until-first-frame", hidden=True)] = False,
+) -> None:
     """The operator window (the same as no command)."""
-    _open_window(rig, config, source)
+    _open_window(rig, config, source, until_first_frame)
 
 
-def _open_window(rig: str, config_path: Path | None, source: Path | None) -> None:
+def _open_window(rig: str, config_path: Path | None, source: Path | None, until_first_frame: bool = False) -> None:
     from app.window_command import run_window
 
-    sys.exit(run_window(rig, config_path, source))
+    sys.exit(run_window(rig, config_path, source, until_first_frame=until_first_frame))
 
 
 @app.command()

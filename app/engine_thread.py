@@ -120,7 +120,7 @@ class EngineThread(QThread):
             self._serve(order)
         except EndOfStream as error:
             return EngineStatus(Phase.ENDED, _one_line(error))
-        except Exception as error:  # the one top of this thread: everything becomes a visible fault
+        except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible fault
             return EngineStatus(Phase.FAULT, _one_line(error))
         return EngineStatus(Phase.IDLE)
 

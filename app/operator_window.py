@@ -15,6 +15,7 @@ from app import palette, theme
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
 from app.heartbeat import Heartbeat
 from app.jog_keys import JogKeys, Motion
+from app.pace import Pace
 from app.snapshot import SnapshotWriter, pictures_folder
 from app.widgets.advice_line import AdviceLine
 from app.widgets.card import Card
@@ -41,6 +42,7 @@ from hardware.rig import RigKind
 OpenEngineFor = Callable[[Config], EngineLike]
 
 SHOW_EVERY_S = 1.0 / 30.0
+TEXT_EVERY_S = 0.2
 STALE_AFTER_S = 0.5
 _CHECK_EVERY_MS = 100
 _STOP_WITHIN_MS = 20_000
@@ -70,6 +72,7 @@ class OperatorWindow(QMainWindow):
         self._shown_s = 0.0
         self._due_s = 0.0
         self._is_shut = False
+        self._text_pace = Pace(TEXT_EVERY_S)
         self._thread = EngineThread(self)
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
         self._heartbeat = Heartbeat(parent=self)
@@ -143,7 +146,7 @@ class OperatorWindow(QMainWindow):
         limits = self._config.perception.pose
         measures = QHBoxLayout()
         measures.setSpacing(theme.GAP)
-        measures.addWidget(Card("Angle to the vessel, \N{GREEK SMALL LETTER THETA}", self._gauge, f"allowed {limits.theta_allow_deg:g}°"), 1)
+        measures.addWidget(Card("Angle to the vessel", self._gauge, f"allowed {limits.theta_allow_deg:g}°"), 1)
         measures.addWidget(Card("Distance from the centerline", self._bars, f"allowed {limits.d_allow_px:g} px"), 1)
         hands = QHBoxLayout()
         hands.setSpacing(theme.GAP)
@@ -152,7 +155,7 @@ class OperatorWindow(QMainWindow):
         column = QVBoxLayout()
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(theme.GAP)
-        column.addWidget(Card("", self._badge))
+        column.addWidget(Card("Pose state", self._badge))
         column.addLayout(measures, 3)
         column.addWidget(Card("Last 30 seconds", self._trends, _trend_legend()), 3)
         column.addLayout(hands, 2)
@@ -221,10 +224,26 @@ class OperatorWindow(QMainWindow):
         if self._picker is not None:
             self._picker.chosen.connect(self._choose_phantom)
 
+    @property
+    def shown_tick(self) -> Tick | None:
+        """The tick on screen; None while there is none."""
+        return self._tick
+
+    @property
+    def max_block_ms(self) -> float:
+        """The longest time that the GUI thread was blocked in the last ten seconds."""
+        return self._heartbeat.max_block_ms
+
+    @property
+    def shown_tick(self) -> Tick | None:
+        """The tick that is on the screen, None before the first and after the last."""
+        return self._tick
+
     # ---- the rig
 
     def start(self) -> None:
         """Open the rig; the window shows progress until the first picture comes."""
+        self._live.setFocus()
         self._heartbeat.start()
         self._check.start()
         self._start_rig()
@@ -307,12 +326,13 @@ class OperatorWindow(QMainWindow):
         first = self._tick is None
         self._tick = tick
         scene, pose = tick.scene, tick.scene.pose
+        renew_text = self._text_pace.due()
         self._live.show_frame(tick.frame, scene)
-        self._badge.show_scene(scene)
-        self._gauge.show_pose(pose)
-        self._bars.show_pose(pose)
+        self._badge.show_scene(scene, renew_text=renew_text)
+        self._gauge.show_pose(pose, renew_text=renew_text)
+        self._bars.show_pose(pose, renew_text=renew_text)
         why_none = refusal_line(scene.refusal) if scene.refusal is not None else "no pose"
-        self._advice.show_advice(tick.advice, pose.state if pose is not None else None, why_none)
+        self._advice.show_advice(tick.advice, pose.state if pose is not None else None, why_none, renew_text=renew_text)
         self._trends.add(scene)
         self._performance.add(tick, self._heartbeat.max_block_ms)
         self._jog_panel.show_command(self._jog.command, tick.status)

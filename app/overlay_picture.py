@@ -194,7 +194,8 @@ def _caption(scene: Scene, advice: Advice | None, width: int) -> Image:
     if advice is not None:
         text = advice_headline(advice)
         size = round(30 * unit)
-        _put_text(strip, text, (width - _text_width(text, "Bold", size) - round(26 * unit), round(46 * unit)), palette.TEXT, "Bold", size)
+        x = width - _text_width(text, "Bold", size) - round(26 * unit)
+        _put_text(strip, text, (x, round(46 * unit)), palette.TEXT, "Bold", size)
     return strip
 
 

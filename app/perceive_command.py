@@ -12,12 +12,12 @@ from typing import IO, Any
 import cv2
 import numpy as np
 
-from app.cli import UsageError
 from app.overlay_picture import draw_overlay
 from app.scene_json import scene_to_json, unread_to_json
 from app.sources import SourcePicture, expand, pictures
 from core.config import load_config
 from core.control.policy import table_policy
+from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.types import Frame, Mask, Point, Scene
 
@@ -40,17 +40,16 @@ def run_perceive(
     preset: str | None,
     config_path: Path | None,
 ) -> None:
-    """Perceive everything in `paths`; raises UsageError when nothing could be done, ConfigError, ModelError."""
-    from core.perception.pipeline import open_pipeline
-
+    """Perceive everything in `paths`; raises UserError when nothing could be done, ConfigError, ModelError."""
     from app.learning_commands import progress_bar
+    from core.perception.pipeline import open_pipeline
 
     overrides: dict[str, Any] = {"perception": {"segmentation": {"model": model}}} if model else {}
     config = load_config(config_path, preset, overrides)
     targets = _read_targets(targets_path)
     files = expand(paths)
     if not files:
-        raise UsageError(f"{', '.join(map(str, paths))}: no pictures or videos there")
+        raise UserError(f"{', '.join(map(str, paths))}: no pictures or videos there")
     for folder in (outputs.masks, outputs.overlay):
         if folder is not None:
             _make_folder(folder)
@@ -68,12 +67,12 @@ def run_perceive(
                 try:
                     _write_pictures(outputs, picture.stem, picture.image, scene, config.advice)
                 except OSError as error:
-                    raise UsageError(f"{error.filename or outputs.masks}: cannot be written ({error.strerror or error})") from None
+                    raise UserError(f"{error.filename or outputs.masks}: cannot be written ({error.strerror or error})") from None
                 done += 1
             lines.write(json.dumps(record, allow_nan=False) + "\n")
             bar.advance(task)
     if not done:
-        raise UsageError(f"none of {failed} pictures could be read; the first: {next(iter(files))}")
+        raise UserError(f"none of {failed} pictures could be read; the first: {next(iter(files))}")
 
 
 def _perceive_one(pipeline: Any, picture: SourcePicture, image: Any, index: int, targets: dict[str, Point]) -> Scene:
@@ -114,7 +113,7 @@ def _make_folder(folder: Path) -> None:
         probe.write_bytes(b"")
         probe.unlink()
     except OSError as error:
-        raise UsageError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+        raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 
 
 def _open_lines(path: Path | None) -> IO[str]:
@@ -124,7 +123,7 @@ def _open_lines(path: Path | None) -> IO[str]:
         path.parent.mkdir(parents=True, exist_ok=True)
         return path.open("w", encoding="utf-8", buffering=1)
     except OSError as error:
-        raise UsageError(f"{path}: cannot be written ({error.strerror}); choose another file") from None
+        raise UserError(f"{path}: cannot be written ({error.strerror}); choose another file") from None
 
 
 def _read_targets(path: Path | None) -> dict[str, Point]:
@@ -135,15 +134,15 @@ def _read_targets(path: Path | None) -> dict[str, Point]:
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read ({error.strerror})") from None
+        raise UserError(f"{path}: cannot be read ({error.strerror})") from None
     except (ValueError, RecursionError):
-        raise UsageError(f"{path}: not valid JSON; needs {wanted}") from None
+        raise UserError(f"{path}: not valid JSON; needs {wanted}") from None
     if not isinstance(data, dict):
-        raise UsageError(f"{path}: needs {wanted}")
+        raise UserError(f"{path}: needs {wanted}")
     targets: dict[str, Point] = {}
     for stem, point in data.items():
         numbers = isinstance(point, list) and len(point) == 2 and all(type(v) in (int, float) and math.isfinite(v) for v in point)
         if not numbers:
-            raise UsageError(f"{path}: {stem}: needs {wanted}")
+            raise UserError(f"{path}: {stem}: needs {wanted}")
         targets[stem] = (float(point[0]), float(point[1]))
     return targets

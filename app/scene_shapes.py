@@ -8,7 +8,7 @@ import numpy as np
 
 from core.types import Point, Points, Scene, Vector
 
-_MIN_STEP_PX = 2.0
+_MIN_STEP_PX = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +34,7 @@ class SceneShapes:
 
 
 def scene_shapes(scene: Scene) -> SceneShapes:
-    """The shapes of `scene`, mapped to source pixels; polylines are thinned to steps of about 2 working pixels."""
+    """The shapes of `scene`, mapped to source pixels; polylines are thinned to steps of about 5 working pixels."""
     robot, vessel = _vector(scene, scene.robot_vector), _vector(scene, scene.vessel_vector)
     both = robot is not None and vessel is not None and scene.pose is not None
     return SceneShapes(

@@ -8,7 +8,13 @@ import numpy as np
 
 from core.types import Point, Points, PoseState
 
-LETTER_HEIGHT: dict[PoseState | None, float] = {None: 0.60, PoseState.A: 0.60, PoseState.B: 0.64, PoseState.C: 0.50, PoseState.D: 0.54}
+LETTER_HEIGHT: dict[PoseState | None, float] = {
+    None: 0.60,
+    PoseState.A: 0.60,
+    PoseState.B: 0.64,
+    PoseState.C: 0.50,
+    PoseState.D: 0.54,
+}
 """Font size over the box's side."""
 LETTER_DROP: dict[PoseState | None, float] = {PoseState.C: 0.13}
 """How far below the middle of the box the letter sits, over the box's side: a triangle's visual middle is lower."""

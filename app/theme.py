@@ -126,7 +126,8 @@ QComboBox, QSpinBox {{ background: {RAISED}; color: {TEXT}; border: 1px solid {L
 QComboBox:focus, QSpinBox:focus, QPushButton:focus {{ border: 1px solid {SKY}; }}
 QComboBox QAbstractItemView {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE};
     selection-background-color: {SKY}; selection-color: {INK}; outline: none; }}
-QPushButton {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; border-radius: 5px; padding: 4px 12px; min-height: 22px; }}
+QPushButton {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; border-radius: 5px;
+    padding: 4px 12px; min-height: 22px; }}
 QPushButton:hover {{ border-color: {TEXT_FAINT}; }}
 QPushButton:pressed {{ background: {LINE}; }}
 QPushButton:disabled {{ color: {TEXT_FAINT}; }}

@@ -92,9 +92,8 @@ def why_line(pose: Pose, limits: PoseConfig) -> str:
     head, tail = pose.d_head_px, pose.d_tail_px
     digits = 1 if round(head) == round(tail) else 0
     if pose.state is PoseState.A:
-        line = (
-            f"d_head {head:.0f} px and d_tail {tail:.0f} px (allowed {limits.d_allow_px:g}), {angle} (allowed {limits.theta_allow_deg:g}°)"
-        )
+        allowed_px, allowed_deg = f"allowed {limits.d_allow_px:g}", f"allowed {limits.theta_allow_deg:g}°"
+        line = f"d_head {head:.0f} px, d_tail {tail:.0f} px ({allowed_px}), {angle} ({allowed_deg})"
     elif pose.state is PoseState.D:
         line = f"head {head:.0f} px {side(pose.c_head_px)}, tail {tail:.0f} px {side(pose.c_tail_px)} of the centerline, {angle}"
     elif pose.state is PoseState.B:
@@ -122,6 +121,5 @@ def caption(pose: Pose | None, refusal: Refusal | None) -> str:
     """State and values, or the reason, as one line under a picture."""
     if pose is None:
         return f"no pose: {refusal}" if refusal is not None else "no pose"
-    return (
-        f"{STATE_TITLE[pose.state]}   θ {pose.theta_signed_deg:+.1f}°   d_head {pose.d_head_px:.1f} px   d_tail {pose.d_tail_px:.1f} px"
-    )
+    values = f"θ {pose.theta_signed_deg:+.1f}°   d_head {pose.d_head_px:.1f} px   d_tail {pose.d_tail_px:.1f} px"
+    return f"{STATE_TITLE[pose.state]}   {values}"

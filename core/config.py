@@ -12,12 +12,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from core.errors import UserError
+
 RESOURCES = Path(__file__).resolve().parent.parent / "resources"
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-class ConfigError(Exception):
+class ConfigError(UserError):
     """The configuration cannot be used; the message names file, key and allowed range in one line."""
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from core.errors import UserError
 from core.types import Command, Frame, RobotStatus
 
 
-class DeviceError(Exception):
+class DeviceError(UserError):
     """A device cannot do what was asked. The message is one line and says what to do."""
 
 

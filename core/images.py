@@ -8,13 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from core.errors import UserError
 from core.types import Image
 
 MAX_PIXELS = 120_000_000
 """8k (33 million pixels) passes easily; far beyond it a file is rather damaged or hostile than a photograph."""
 
 
-class ImageError(Exception):
+class ImageError(UserError):
     """A picture cannot be read; the message is one line with the file's name."""
 
 

@@ -9,11 +9,9 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.pace import Pace
 from app.wording import advice_headline
 from core.types import Advice, PoseState, Speed
 
-_TEXT_EVERY_S = 0.25
 _CHEVRONS = {Speed.STOP: 0, Speed.SLOWEST: 1, Speed.SLOW: 2, Speed.MODERATE: 3, Speed.FAST: 4}
 
 
@@ -28,7 +26,6 @@ class AdviceLine(QWidget):
         self._advice: Advice | None = None
         self._state: PoseState | None = None
         self._why_none = "waiting for the first picture"
-        self._pace = Pace(_TEXT_EVERY_S)
         self.setFixedHeight(68)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Advice")
@@ -47,12 +44,10 @@ class AdviceLine(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(600, 68)
 
-    def show_advice(self, advice: Advice | None, state: PoseState | None, why_none: str) -> None:
+    def show_advice(self, advice: Advice | None, state: PoseState | None, why_none: str, *, renew_text: bool = True) -> None:
         """The advice for `state`, or why there is none."""
         changed = (advice is None) is not (self._advice is None) or state is not self._state or why_none != self._why_none
-        if changed:
-            self._pace.reset()
-        if not self._pace.due():
+        if not changed and not renew_text:
             return
         self._advice, self._state, self._why_none = advice, state, why_none
         self.setAccessibleDescription(self.text)
@@ -88,12 +83,13 @@ class AdviceLine(QWidget):
         headline = advice_headline(advice)
         painter.setPen(QColor(palette.TEXT))
         painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), headline, int(width)))
-        painter.drawText(QRectF(left, frame.top() + 6, width, 34), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, headline)
+        place = Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft
+        painter.drawText(QRectF(left, frame.top() + 6, width, 34), place, headline)
         painter.setPen(QColor(palette.TEXT_DIM))
         why_font = theme.font(15)
         painter.setFont(why_font)
         why = theme.elide(why_font, advice.why, int(width))
-        painter.drawText(QRectF(left, frame.top() + 40, width, 22), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, why)
+        painter.drawText(QRectF(left, frame.top() + 40, width, 22), place, why)
 
 
 def _paint_arrow(painter: QPainter, middle: QPointF, size: float, turn_deg: float, colour_name: str) -> None:

@@ -7,12 +7,10 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.pace import Pace
 from app.wording import QUANTITY_MEANING, side
 from core.types import Pose
 
 _RANGE_IN_LIMITS = 5.0
-_TEXT_EVERY_S = 0.15
 
 
 class DistanceBars(QWidget):
@@ -26,7 +24,7 @@ class DistanceBars(QWidget):
         self._allow_px = d_allow_px
         self._offsets: tuple[float, float] | None = None
         self._numbers: tuple[float, float] | None = None
-        self._pace = Pace(_TEXT_EVERY_S)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMinimumSize(200, 150)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Distances from the centerline")
@@ -42,19 +40,20 @@ class DistanceBars(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(240, 160)
 
-    def show_pose(self, pose: Pose | None) -> None:
-        """The bars follow at once, the numbers a few times a second."""
+    def show_pose(self, pose: Pose | None, *, renew_text: bool = True) -> None:
+        """The bars follow at once, the numbers when it is time to renew texts."""
         if pose is None and self._offsets is None:
             return
         changed = (pose is None) is not (self._offsets is None)
         self._offsets = (pose.c_head_px, pose.c_tail_px) if pose is not None else None
-        if self._pace.due() or changed:
+        if renew_text or changed:
             self._numbers = self._offsets
             self.setAccessibleDescription("d_head {}, d_tail {}".format(*self.texts))
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(palette.PANEL))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         row = (self.height() - 20) / 2
         for k, (name, colour_name) in enumerate((("d_head", palette.D_HEAD), ("d_tail", palette.D_TAIL))):

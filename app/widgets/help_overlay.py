@@ -106,7 +106,7 @@ class HelpOverlay(QWidget):
             painter.setPen(QColor(palette.TEXT_DIM))
             text_font = theme.font(13)
             painter.setFont(text_font)
-            text = theme.elide(text_font, text, int(width - keys_width))
-            painter.drawText(QRectF(left + keys_width, top, width - keys_width, _ROW), Qt.AlignmentFlag.AlignVCenter, text)
+            shown = theme.elide(text_font, text, int(width - keys_width))
+            painter.drawText(QRectF(left + keys_width, top, width - keys_width, _ROW), Qt.AlignmentFlag.AlignVCenter, shown)
             top += _ROW
         return top

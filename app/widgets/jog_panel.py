@@ -153,7 +153,8 @@ class _Cap(QWidget):
         across = QPointF(-direction.y(), direction.x())
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(name))
-        painter.drawPolygon(QPolygonF([middle + direction * 5, middle - direction * 4 + across * 5, middle - direction * 4 - across * 5]))
+        back = middle - direction * 4
+        painter.drawPolygon(QPolygonF([middle + direction * 5, back + across * 5, back - across * 5]))
 
 
 class _Readout(QWidget):

@@ -180,8 +180,8 @@ class _PictureBox(pg.ViewBox):
 
 
 def _label_colours() -> np.ndarray:
-    """RGBA (16, 4) for every combination of label bits; what is thinner wins."""
-    table = np.zeros((16, 4), np.uint8)
+    """RGBA (256, 4) for every combination of label bits; what is thinner wins. A uint8 image is looked up in 256 rows."""
+    table = np.zeros((256, 4), np.uint8)
     for bits in range(16):
         for bit, name, alpha in (
             (_ROBOT_SKELETON, palette.ROBOT, 1.0),

@@ -20,7 +20,7 @@ class NoticeKind(Enum):
 
 
 class Notice(QWidget):
-    """A card in the middle of its parent. PROGRESS shows a moving bar; FAULT and an ended recording show a button to start again."""
+    """A card in the middle of its parent. PROGRESS has a moving bar; a fault or an ended recording has a button to start again."""
 
     restart = Signal()
 

@@ -89,5 +89,5 @@ class _Chip(QAbstractButton):
         width = self.width() - 36 - 6
         text_font = theme.fitted(theme.font(13), self.text(), width, 10)
         painter.setFont(text_font)
-        painter.drawText(QRectF(36, 0, width, self.height()), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self.text())
+        painter.drawText(QRectF(36, 0, width, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
         painter.end()

@@ -16,6 +16,8 @@ from app.scene_shapes import SceneShapes
 from core.types import Point, Points, Pose, Vector
 
 _ARC_RADIUS = 44.0
+_LABEL_GAP = 16.0
+_CLEAR_OFFSET_PX = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +52,20 @@ class Overlay:
 
 
 class OverlayItem(pg.GraphicsObject):
-    """Paints in screen pixels, so that lines and texts keep their size at any zoom; a dark edge keeps them visible on any picture."""
+    """Paints in screen pixels: lines and texts keep their size at any zoom. A dark edge keeps them visible on any picture."""
 
     def __init__(self) -> None:
         super().__init__()
         self._overlay = Overlay(None, None, None)
         self._bounds = QRectF(0, 0, 1, 1)
         self._visible = set(Layer)
+        self._head_side = self._tail_side = 1.0
 
     def show_overlay(self, overlay: Overlay) -> None:
         self._overlay = overlay
+        if overlay.pose is not None:
+            self._head_side = _steady_side(self._head_side, overlay.pose.c_head_px)
+            self._tail_side = _steady_side(self._tail_side, overlay.pose.c_tail_px)
         self.update()
 
     def set_layer(self, layer: Layer, visible: bool) -> None:
@@ -88,9 +94,9 @@ class OverlayItem(pg.GraphicsObject):
             if Layer.ROBOT in self._visible:
                 _draw_robot(pencil, shapes)
             if Layer.VECTORS in self._visible:
-                _draw_vectors(pencil, shapes, pose)
+                _draw_vectors(pencil, shapes, pose, -self._head_side)
             if Layer.DISTANCES in self._visible and pose is not None:
-                _draw_distances(pencil, shapes, pose)
+                _draw_distances(pencil, shapes, pose, (self._head_side, self._tail_side))
             if Layer.NEAREST in self._visible and shapes.nearest is not None:
                 pencil.diamond(shapes.nearest, palette.NEAREST, 6.0)
             if Layer.HEAD in self._visible and shapes.head is not None:
@@ -106,21 +112,32 @@ def _draw_robot(pencil: _Pencil, shapes: SceneShapes) -> None:
         pencil.polylines((np.array([first, second]),), palette.TEXT, 2.0, Qt.PenStyle.DotLine)
 
 
-def _draw_vectors(pencil: _Pencil, shapes: SceneShapes, pose: Pose | None) -> None:
+def _draw_vectors(pencil: _Pencil, shapes: SceneShapes, pose: Pose | None, angle_side: float) -> None:
     if shapes.vessel_vector is not None:
         pencil.arrow(shapes.vessel_vector, palette.VESSEL_VECTOR, 3.0)
     if shapes.robot_vector is not None:
         pencil.arrow(shapes.robot_vector, palette.ROBOT_VECTOR, 3.0)
-    if shapes.angle_arc is not None and shapes.robot_vector is not None and pose is not None:
-        pencil.angle(shapes.robot_vector.start, shapes.angle_arc, palette.THETA, f"θ {pose.theta_signed_deg:+.0f}°")
-
-
-def _draw_distances(pencil: _Pencil, shapes: SceneShapes, pose: Pose) -> None:
-    robot = shapes.robot_vector
-    if robot is None or shapes.head_foot is None or shapes.tail_foot is None:
+    if shapes.angle_arc is None or shapes.robot_vector is None or shapes.vessel_vector is None or pose is None:
         return
-    pencil.measure(shapes.head_foot, robot.end, palette.D_HEAD, f"d_head {pose.d_head_px:.0f}", Qt.PenStyle.SolidLine)
-    pencil.measure(shapes.tail_foot, robot.start, palette.D_TAIL, f"d_tail {pose.d_tail_px:.0f}", Qt.PenStyle.DotLine)
+    pencil.angle(shapes.robot_vector.start, shapes.angle_arc, palette.THETA)
+    # on the side of the vessel where the head is not: there is the least to cover
+    vessel = shapes.vessel_vector
+    pencil.label_beside(vessel.center, vessel, angle_side, f"θ {pose.theta_signed_deg:+.0f}°", palette.THETA)
+
+
+def _draw_distances(pencil: _Pencil, shapes: SceneShapes, pose: Pose, sides: tuple[float, float]) -> None:
+    robot, vessel = shapes.robot_vector, shapes.vessel_vector
+    if robot is None or vessel is None or shapes.head_foot is None or shapes.tail_foot is None:
+        return
+    pencil.measure(shapes.head_foot, robot.end, palette.D_HEAD, Qt.PenStyle.SolidLine)
+    pencil.measure(shapes.tail_foot, robot.start, palette.D_TAIL, Qt.PenStyle.DotLine)
+    pencil.label_beside(robot.end, vessel, sides[0], f"d_head {pose.d_head_px:.0f}", palette.D_HEAD)
+    pencil.label_beside(robot.start, vessel, sides[1], f"d_tail {pose.d_tail_px:.0f}", palette.D_TAIL)
+
+
+def _steady_side(side: float, offset_px: float) -> float:
+    """Side of the vessel line that a label is on; it changes only when the offset is clear, or labels would flicker at zero."""
+    return side if abs(offset_px) < _CLEAR_OFFSET_PX else (1.0 if offset_px > 0 else -1.0)
 
 
 class _Pencil:
@@ -148,11 +165,11 @@ class _Pencil:
 
     def _stroke(self, path: QPainterPath, name: str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> None:
         halo = QPen(theme.colour(palette.INK, 0.55), width + 2.0)
-        halo.setCapStyle(Qt.PenCapStyle.RoundCap)
-        halo.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+        halo.setCapStyle(Qt.PenCapStyle.FlatCap)
+        halo.setJoinStyle(Qt.PenJoinStyle.BevelJoin)
         pen = QPen(QColor(name), width, style)
         pen.setCapStyle(Qt.PenCapStyle.FlatCap if style == Qt.PenStyle.DashLine else Qt.PenCapStyle.RoundCap)
-        pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+        pen.setJoinStyle(Qt.PenJoinStyle.BevelJoin)
         self._painter.setBrush(Qt.BrushStyle.NoBrush)
         for one in (halo, pen):
             self._painter.setPen(one)
@@ -179,7 +196,7 @@ class _Pencil:
         self._painter.setBrush(QColor(name))
         self._painter.drawPolygon(head)
 
-    def angle(self, corner: Point, unit_arc: Points, name: str, text: str) -> None:
+    def angle(self, corner: Point, unit_arc: Points, name: str) -> None:
         """The arc from the vessel's direction to the robot's, the vessel's direction as a thin line through the corner."""
         middle = self._at(corner)
         arc = [middle + QPointF(x, y) * _ARC_RADIUS for x, y in unit_arc.tolist()]
@@ -188,20 +205,18 @@ class _Pencil:
         for point in arc[1:]:
             path.lineTo(point)
         self._stroke(path, name, 2.0)
-        outward = _unit(arc[len(arc) // 2] - middle)
-        self._label(middle + outward * (_ARC_RADIUS + 34.0), text, name)
 
-    def measure(self, foot: Point, point: Point, name: str, text: str, style: Qt.PenStyle) -> None:
-        """A distance from `foot` on the line to `point`, with its value beside the point, on the side away from the line."""
-        first, second = self._at(foot), self._at(point)
-        self._segment(first, second, name, 2.5, style)
-        away = second - first
-        direction = _unit(away) if abs(away.x()) + abs(away.y()) > 1e-6 else QPointF(0.0, -1.0)
-        self._label(second + QPointF(direction.x() * 52.0, direction.y() * 24.0), text, name)
+    def measure(self, foot: Point, point: Point, name: str, style: Qt.PenStyle) -> None:
+        """A distance from `foot` on the line to `point`."""
+        self._segment(self._at(foot), self._at(point), name, 2.5, style)
 
-    def _label(self, middle: QPointF, text: str, name: str) -> None:
-        text_font = theme.semi_bold(theme.Size.LABEL)
+    def label_beside(self, point: Point, line: Vector, side: float, text: str, name: str) -> None:
+        """A text beside `point`, on one side of `line` (+1: to the right of its direction)."""
+        text_font = theme.semi_bold(13)
         width = QFontMetricsF(text_font).horizontalAdvance(text) + 12.0
+        across = QPointF(-line.direction[1], line.direction[0]) * side
+        reach = _LABEL_GAP + abs(across.x()) * width / 2 + abs(across.y()) * 10.0
+        middle = self._at(point) + across * reach
         box = QRectF(middle.x() - width / 2, middle.y() - 10.0, width, 20.0)
         self._painter.setPen(Qt.PenStyle.NoPen)
         self._painter.setBrush(theme.colour(palette.INK, 0.72))

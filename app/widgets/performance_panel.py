@@ -31,6 +31,7 @@ class PerformancePanel(QWidget):
         self._pace = Pace(_DRAW_EVERY_S)
         self._heads: tuple[tuple[str, str, bool], ...] = _heads(None, None, None, None)
         self._rows: tuple[tuple[str, str, str], ...] = ()
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMinimumSize(210, 120)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Performance")
@@ -82,6 +83,7 @@ class PerformancePanel(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(palette.PANEL))
         width = self.width() / 4
         for k, (name, value, is_bad) in enumerate(self._heads):
             painter.setPen(QColor(palette.FAULT if is_bad else palette.TEXT))
@@ -94,7 +96,8 @@ class PerformancePanel(QWidget):
         painter.end()
 
     def _paint_table(self, painter: QPainter, top: float) -> None:
-        left, right = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        middle = Qt.AlignmentFlag.AlignVCenter
+        left, right = Qt.AlignmentFlag.AlignLeft | middle, Qt.AlignmentFlag.AlignRight | middle
         rows = (("ms per frame", "p50", "p95"), *self._rows)
         height = min(18.0, max(12.0, (self.height() - top) / max(len(rows), 1)))
         for k, (name, half, most) in enumerate(rows):
@@ -116,5 +119,5 @@ def _heads(
         ("shown/s", none if shown is None else f"{shown:.0f}", False),
         ("perceived/s", none if engine is None else f"{engine:.0f}", False),
         ("dropped", none if dropped is None else f"{dropped}", False),
-        ("GUI block ms", none if block_ms is None else f"{block_ms:.0f}", block_ms is not None and block_ms > _BLOCK_LIMIT_MS),
+        ("block ms", none if block_ms is None else f"{block_ms:.0f}", block_ms is not None and block_ms > _BLOCK_LIMIT_MS),
     )

@@ -9,13 +9,12 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.pace import Pace
 from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
 from app.wording import REASON_TEXT, STATE_MEANING, STATE_TITLE, refusal_line, why_line
 from core.config import PoseConfig
 from core.types import PoseState, Scene
 
-_TEXT_EVERY_S = 0.25
+_HEIGHT = 124
 
 
 class StateBadge(QWidget):
@@ -27,8 +26,8 @@ class StateBadge(QWidget):
         self._state: PoseState | None = None
         self._title = "Waiting"
         self._why = ""
-        self._pace = Pace(_TEXT_EVERY_S)
-        self.setFixedHeight(112)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Pose state")
         self.setToolTip("\n".join(STATE_MEANING.values()))
@@ -46,29 +45,26 @@ class StateBadge(QWidget):
         return self._why
 
     def sizeHint(self) -> QSize:
-        return QSize(440, 112)
+        return QSize(440, _HEIGHT)
 
-    def show_scene(self, scene: Scene) -> None:
-        """The state of `scene`, or the reason why it has none. The sentence is renewed four times a second, the letter at once."""
+    def show_scene(self, scene: Scene, *, renew_text: bool = True) -> None:
+        """The state of `scene`, or the reason why it has none. A new letter or title always renews the sentence too."""
         pose = scene.pose
         if pose is not None:
-            self._set(pose.state, STATE_TITLE[pose.state], lambda: why_line(pose, self._limits))
+            self._set(pose.state, STATE_TITLE[pose.state], lambda: why_line(pose, self._limits), renew_text)
         elif scene.refusal is not None:
             refusal = scene.refusal
-            self._set(None, REASON_TEXT[refusal.reason].title, lambda: refusal_line(refusal))
+            self._set(None, REASON_TEXT[refusal.reason].title, lambda: refusal_line(refusal), renew_text)
         else:
             self.show_nothing("No pose", "")
 
     def show_nothing(self, title: str, why: str) -> None:
         """No state, for a cause outside perception: starting, no new picture, fault."""
-        self._pace.reset()
-        self._set(None, title, lambda: why)
+        self._set(None, title, lambda: why, True)
 
-    def _set(self, state: PoseState | None, title: str, why: Callable[[], str]) -> None:
+    def _set(self, state: PoseState | None, title: str, why: Callable[[], str], renew_text: bool) -> None:
         changed = state is not self._state or title != self._title
-        if changed:
-            self._pace.reset()
-        if not self._pace.due():
+        if not changed and not renew_text:
             return
         text = why()
         if not changed and text == self._why:
@@ -79,6 +75,7 @@ class StateBadge(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(palette.PANEL))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         side = self.height() - 4.0
         box = QRectF(2.0, 2.0, side, side)
@@ -87,11 +84,11 @@ class StateBadge(QWidget):
         width = self.width() - left - 2
         painter.setPen(QColor(palette.TEXT))
         painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), self._title, int(width)))
-        painter.drawText(QRectF(left, 4, width, 36), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self._title)
+        painter.drawText(QRectF(left, 8, width, 38), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self._title)
         painter.setPen(QColor(palette.TEXT_DIM))
         painter.setFont(theme.font(theme.Size.WHY))
         flags = Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap
-        painter.drawText(QRectF(left, 42, width, self.height() - 44), int(flags), self._why)
+        painter.drawText(QRectF(left, 52, width, self.height() - 52), int(flags), self._why)
         painter.end()
 
 

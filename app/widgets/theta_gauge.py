@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.pace import Pace
 from app.wording import QUANTITY_MEANING, side
 from core.types import Pose
 
 _OVERFLOW_DEG = 22.0
-_TEXT_EVERY_S = 0.15
 
 
 class ThetaGauge(QWidget):
@@ -28,7 +26,8 @@ class ThetaGauge(QWidget):
         self._allow_deg = theta_allow_deg
         self._theta_deg: float | None = None
         self._number: float | None = None
-        self._pace = Pace(_TEXT_EVERY_S)
+        self._scale: QPixmap | None = None
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMinimumSize(200, 150)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("theta")
@@ -46,28 +45,41 @@ class ThetaGauge(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(240, 160)
 
-    def show_pose(self, pose: Pose | None) -> None:
-        """The needle follows at once, the number a few times a second."""
+    def show_pose(self, pose: Pose | None, *, renew_text: bool = True) -> None:
+        """The needle follows at once, the number when it is time to renew texts."""
         if pose is None and self._theta_deg is None:
             return
         changed = (pose is None) is not (self._theta_deg is None)
         self._theta_deg = pose.theta_signed_deg if pose is not None else None
-        if self._pace.due() or changed:
+        if renew_text or changed:
             self._number = self._theta_deg
             self.setAccessibleDescription(f"theta {self.text} {self.direction}")
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         # room: tick labels outside the arc, the number under the hub
-        radius = min(self.width() / 2 - 26.0, self.height() - 74.0)
+        radius = min(self.width() / 2 - 30.0, self.height() - 72.0)
         hub = QPointF(self.width() / 2, 22.0 + radius)
-        self._paint_scale(painter, hub, radius)
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._dial(hub, radius))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._theta_deg is not None:
             self._paint_needle(painter, hub, radius, self._theta_deg)
         self._paint_number(painter, hub)
         painter.end()
+
+    def _dial(self, hub: QPointF, radius: float) -> QPixmap:
+        """The scale, painted once per size: it costs more than the needle and never changes."""
+        size = self.size() * self.devicePixelRatioF()
+        if self._scale is None or self._scale.size() != size:
+            self._scale = QPixmap(size)
+            self._scale.setDevicePixelRatio(self.devicePixelRatioF())
+            self._scale.fill(QColor(palette.PANEL))
+            painter = QPainter(self._scale)
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            self._paint_scale(painter, hub, radius)
+            painter.end()
+        return self._scale
 
     def _paint_scale(self, painter: QPainter, hub: QPointF, radius: float) -> None:
         rim = QRectF(hub.x() - radius, hub.y() - radius, 2 * radius, 2 * radius)

@@ -42,7 +42,7 @@ class TrendPlot(QWidget):
         view.setBackground(palette.PANEL)
         view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         view.viewport().setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        view.ci.layout.setContentsMargins(0, 2, 4, 0)
+        view.ci.layout.setContentsMargins(0, 4, 14, 0)
         view.ci.layout.setVerticalSpacing(6)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -94,7 +94,9 @@ class TrendPlot(QWidget):
 class _Chart:
     """One plot with a fixed time axis and a value axis that steps through a few ranges."""
 
-    def __init__(self, view: pg.GraphicsLayoutWidget, row: int, ranges: tuple[float, ...], *, is_signed: bool, allowed: float) -> None:
+    def __init__(
+        self, view: pg.GraphicsLayoutWidget, row: int, ranges: tuple[float, ...], *, is_signed: bool, allowed: float
+    ) -> None:
         self._ranges = ranges
         self._is_signed = is_signed
         self._range = 0.0
@@ -153,7 +155,7 @@ class _StateBand:
         bottom = self._plot.getAxis("bottom")
         _style_axis(bottom)
         bottom.setHeight(18)
-        bottom.setTicks([[(-30.0, "-30 s"), (-20.0, "-20"), (-10.0, "-10"), (0.0, "now")]])
+        bottom.setTicks([[(-30.0, "\N{MINUS SIGN}30"), (-20.0, "\N{MINUS SIGN}20"), (-10.0, "\N{MINUS SIGN}10"), (0.0, "0 s")]])
         self._plot.setFixedHeight(27)
         colours = [theme.colour(palette.LINE, 0.6)] + [QColor(palette.STATE_COLOUR[state]) for state in PoseState]
         self._table = np.array([[c.red(), c.green(), c.blue(), c.alpha()] for c in colours], np.uint8)
@@ -175,6 +177,7 @@ class _StateBand:
 def _style_axis(axis: pg.AxisItem) -> None:
     axis.setPen(QPen(QColor(palette.LINE)))
     axis.setTextPen(QPen(QColor(palette.TEXT_DIM)))
-    axis.setStyle(tickFont=theme.font(theme.Size.LABEL), tickLength=-3, autoExpandTextSpace=False, autoReduceTextSpace=False)
+    axis.setStyle(tickFont=theme.font(theme.Size.LABEL), tickLength=-3, hideOverlappingLabels=False)
+    axis.setStyle(autoExpandTextSpace=False, autoReduceTextSpace=False)
     if axis.orientation == "left":
         axis.setWidth(40)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from core.config import AdviceConfig
-from core.types import Advice, Pose, PoseState, Scene, Speed
+from core.types import Advice, PoseState, Scene, Speed
 
 
 def table_policy(scene: Scene, config: AdviceConfig) -> Advice | None:

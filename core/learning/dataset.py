@@ -14,13 +14,14 @@ from typing import Any
 import cv2
 import numpy as np
 
+from core.errors import UserError
 from core.images import ImageError, read_image
 from core.types import Image, Mask
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 
-class DatasetError(Exception):
+class DatasetError(UserError):
     """A data folder cannot be used; the message is one line and says what to do."""
 
 

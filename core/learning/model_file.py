@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.config import RESOURCES
+from core.errors import UserError
 
 if TYPE_CHECKING:
     from core.perception.unet import DualUNet
@@ -23,7 +24,7 @@ WEIGHTS, ONNX, INFO = "weights.safetensors", "network.onnx", "model.json"
 MODELS = RESOURCES / "models"
 
 
-class ModelError(Exception):
+class ModelError(UserError):
     """A model cannot be used; the message is one line and says what to do."""
 
 

@@ -12,9 +12,9 @@ from core.perception import polyline
 from core.types import Masks, Point, Points, RobotPath, VesselGraph
 
 END_PART_PX = 20.0
-THICKER_BY = 1.25
-"""A tail this much thicker than the head is taken for one; less is noise of the mask."""
+"""How much of each end is compared for thickness."""
 NEARER_BY = 0.6
+"""An end is at the vessel's end only if the other end is clearly farther from one: this share or less of its distance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,35 +37,43 @@ def is_entry(place: Points, around: Surroundings) -> bool:
     return around.port is not None and float(np.hypot(x - around.port[0], y - around.port[1])) <= around.config.port_px
 
 
-def tail_first(points: Points, radius_px: float, around: Surroundings) -> Points:
+def tail_first(points: Points, around: Surroundings) -> Points:
     """The path ordered from tail to head.
 
-    Asked in this order, the first clear answer counts: the one end at border or port; the last frame's tail and head; the one end
-    outside the vessel; the end at an end of the vessel; the thicker end; and at last the end nearer to an end of the vessel.
+    Asked in this order, the first clear answer counts: the one end at border or port; the last frame's tail and head; the end that
+    lies farther outside the vessel; the one end at an end of the vessel; the thicker end; and at last the end nearer to an end of
+    the vessel.
     """
-    for tail_score in (_entry, _as_before, _outside_vessel, _at_vessel_end, _thickness, _vessel_end_distance):
-        first, last = tail_score(points, radius_px, around), tail_score(points[::-1], radius_px, around)
-        if first != last:
-            return points if first > last else points[::-1]
+    for looks_like_tail, margin in (
+        (_entry, 0.5),
+        (_as_before, 1.0),
+        (_outside_vessel, 10.0),
+        (_at_vessel_end, 0.5),
+        (_thickness, 0.2),
+        (_vessel_end_distance, 0.0),
+    ):
+        lead = looks_like_tail(points, around) - looks_like_tail(points[::-1], around)
+        if abs(lead) > margin:
+            return points if lead > 0 else points[::-1]
     return points
 
 
-def _entry(points: Points, _radius_px: float, around: Surroundings) -> float:
+def _entry(points: Points, around: Surroundings) -> float:
     return float(is_entry(points[0], around))
 
 
-def _as_before(points: Points, _radius_px: float, around: Surroundings) -> float:
+def _as_before(points: Points, around: Surroundings) -> float:
     if around.previous is None:
         return 0.0
     before = around.previous.points
     return -float(np.hypot(*(points[0] - before[0])) + np.hypot(*(points[-1] - before[-1])))
 
 
-def _outside_vessel(points: Points, radius_px: float, around: Surroundings) -> float:
-    part = np.rint(polyline.cut(points, 0.0, max(3.0 * radius_px, 6.0))).astype(int)
-    height, width = around.masks.vessel.shape
-    inside = around.masks.vessel[np.clip(part[:, 1], 0, height - 1), np.clip(part[:, 0], 0, width - 1)]
-    return float(inside.mean() < 0.5)
+def _outside_vessel(points: Points, around: Surroundings) -> float:
+    """How far the path runs outside the vessel before it enters it, in px."""
+    places = np.rint(points).astype(int)
+    inside = around.masks.vessel[places[:, 1], places[:, 0]]
+    return float(polyline.arc_length(points)[np.argmax(inside)]) if inside.any() else 0.0
 
 
 def _distance_to_vessel_end(place: Points, vessel: VesselGraph) -> tuple[float, float]:
@@ -80,7 +88,7 @@ def _distance_to_vessel_end(place: Points, vessel: VesselGraph) -> tuple[float, 
     return min(found, default=(np.inf, 0.0))
 
 
-def _at_vessel_end(points: Points, _radius_px: float, around: Surroundings) -> float:
+def _at_vessel_end(points: Points, around: Surroundings) -> float:
     if around.vessel is None or not around.vessel.edges:
         return 0.0
     here, radius = _distance_to_vessel_end(points[0], around.vessel)
@@ -88,20 +96,19 @@ def _at_vessel_end(points: Points, _radius_px: float, around: Surroundings) -> f
     return float(here <= 2.0 * radius + 5.0 and here < NEARER_BY * there)
 
 
-def _thickness(points: Points, _radius_px: float, around: Surroundings) -> float:
-    distance = cv2.distanceTransform(np.ascontiguousarray(around.masks.robot).view(np.uint8), cv2.DIST_L2, 3)
+def _thickness(points: Points, around: Surroundings) -> float:
+    """Logarithm of the robot's radius near this end."""
+    x, y, width, height = cv2.boundingRect(np.rint(points).astype(np.int32))
+    margin = 32
+    left, top = max(x - margin, 0), max(y - margin, 0)
+    window = np.ascontiguousarray(around.masks.robot[top : y + height + margin, left : x + width + margin])
+    distance = cv2.distanceTransform(window.view(np.uint8), cv2.DIST_L2, 3)
+    part_px = min(END_PART_PX, 0.3 * float(polyline.arc_length(points)[-1]))
+    places = np.rint(polyline.cut(points, 0.2 * part_px, part_px)).astype(int) - (left, top)
+    return float(np.log(max(np.median(distance[places[:, 1], places[:, 0]]), 0.5)))
 
-    def thick(part: Points) -> float:
-        places = np.rint(part).astype(int)
-        return float(np.median(distance[places[:, 1], places[:, 0]]))
 
-    length = float(polyline.arc_length(points)[-1])
-    part = min(END_PART_PX, 0.3 * length)
-    here, there = thick(polyline.cut(points, 0.2 * part, part)), thick(polyline.cut(points, length - part, length - 0.2 * part))
-    return float(here > THICKER_BY * there)
-
-
-def _vessel_end_distance(points: Points, _radius_px: float, around: Surroundings) -> float:
+def _vessel_end_distance(points: Points, around: Surroundings) -> float:
     if around.vessel is None or not around.vessel.edges:
         return 0.0
     return -_distance_to_vessel_end(points[0], around.vessel)[0]

@@ -20,9 +20,11 @@ STEP_PX = 2.0
 OPENING_MIN_RADII = 0.8
 OPENING_MAX_RADII = 2.5
 """The opening ends where the lumen is as narrow as the branch itself, looked for between these multiples of the junction's radius."""
-SETTLED = 1.06
+SETTLED = 1.1
+CLEAR_RADII = 1.0
+ROUNDS = 3
 TRUNK_MAX_TURN_DEG = 50.0
-TRUNK_LEAD_DEG = 15.0
+TRUNK_LEAD_DEG = 10.0
 """Two branches are a trunk if they turn less than this, and by so much less than any other two."""
 
 
@@ -54,43 +56,52 @@ def rebuild(centre: Points, radius_px: float, arms: list[Arm]) -> tuple[Points, 
     radius_px : lumen radius there.
     arms : all branches at the junction, outwards.
     """
-    gates = [_gate(arm, radius_px) for arm in arms]
-    known = [index for index, gate in enumerate(gates) if gate is not None]
-    if len(known) < 2:
-        return None
-    trunk = _trunk({index: gate for index in known if (gate := gates[index]) is not None})
-    if trunk is None:
-        place = _meeting_point([gate for gate in gates if gate is not None], centre, radius_px)
-        bridges = {}
-    else:
-        place, bridges = _on_trunk(trunk, gates, centre, radius_px)
+    along = [polyline.arc_length(arm.points) for arm in arms]
+    gates: list[_Gate | None] = [_gate(arm, way, radius_px, 0.0) for arm, way in zip(arms, along, strict=True)]
+    for _ in range(ROUNDS):
+        known = {index: gate for index, gate in enumerate(gates) if gate is not None}
+        if len(known) < 2:
+            return None
+        trunk = _trunk(known)
+        if trunk is None:
+            place, bridges = _meeting_point(list(known.values()), centre, radius_px), {}
+        else:
+            place, bridges = _on_trunk(trunk, gates, centre, radius_px)
+        # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
+        inner = [
+            0.0 if gate is None else gate.position_px + CLEAR_RADII * gate.radius_px - float((gate.place - place) @ gate.outward)
+            for gate in gates
+        ]
+        if all(gate is None or gate.position_px >= needed for gate, needed in zip(gates, inner, strict=True)):
+            break
+        gates = [_gate(arm, way, radius_px, needed) for arm, way, needed in zip(arms, along, inner, strict=True)]
     rebuilt = []
-    for index, (arm, gate) in enumerate(zip(arms, gates, strict=True)):
+    for index, (arm, way, gate) in enumerate(zip(arms, along, gates, strict=True)):
         if gate is None:
             rebuilt.append(Arm(np.concatenate([place[None], arm.points[1:]]), arm.radius, arm.far_is_junction))
             continue
         bridge = bridges.get(index)
         if bridge is None:
             bridge = _straight(place, gate.place)
-        rest = polyline.arc_length(arm.points) > gate.position_px + 0.5 * STEP_PX
+        rest = way > gate.position_px + 0.5 * STEP_PX
         points = np.concatenate([bridge, arm.points[rest]])
         radius = np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest]])
         rebuilt.append(Arm(points, radius, arm.far_is_junction))
     return place, rebuilt
 
 
-def _gate(arm: Arm, radius_px: float) -> _Gate | None:
-    along = polyline.arc_length(arm.points)
+def _gate(arm: Arm, along: NDArray[np.float64], radius_px: float, at_least_px: float) -> _Gate | None:
+    """Where an arm has left the opening: where its lumen has become as narrow as it stays. None for an arm that is too short to tell."""
+    low = max(OPENING_MIN_RADII * radius_px, at_least_px)
     usable = along[-1] * (0.5 if arm.far_is_junction else 1.0) - 8.0
-    beyond = (along >= OPENING_MIN_RADII * radius_px) & (along <= min(OPENING_MAX_RADII * radius_px, usable))
-    if not beyond.any():
+    first, last = np.searchsorted(along, (low, min(max(OPENING_MAX_RADII * radius_px, low + radius_px), usable)))
+    if first >= last:
         return None
-    plain = arm.radius[(along >= radius_px) & (along <= 4.0 * radius_px)]
-    own = float(np.percentile(plain, 40)) if len(plain) else float(arm.radius[beyond].min())
-    settled = beyond & (arm.radius <= SETTLED * own + 0.3)
-    index = int(np.argmax(settled)) if settled.any() else int(np.flatnonzero(beyond)[-1])
-    heading = polyline.cut(arm.points, float(along[index]), float(along[index]) + max(12.0, radius_px))
-    chord = heading[-1] - heading[0]
+    plain = np.sort(arm.radius[np.searchsorted(along, radius_px) : np.searchsorted(along, 4.0 * radius_px)])
+    own = float(plain[int(0.4 * len(plain))]) if len(plain) else float(arm.radius[first:last].min())
+    settled = arm.radius[first:last] <= SETTLED * own + 0.3
+    index = int(first + np.argmax(settled)) if settled.any() else int(last - 1)
+    chord = arm.points[min(index + round(max(12.0, radius_px) / STEP_PX), len(along) - 1)] - arm.points[index]
     return _Gate(arm.points[index], chord / max(float(np.hypot(chord[0], chord[1])), 1e-9), float(along[index]), own)
 
 

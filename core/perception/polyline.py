@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,16 +67,22 @@ def smooth(points: Points, sigma: float) -> Points:
     pad = min(len(points) - 1, int(np.ceil(3.0 * sigma)))
     if pad < 1:
         return points
-    reach = np.arange(-pad, pad + 1)
-    kernel = np.exp(-0.5 * (reach / sigma) ** 2)
-    kernel /= kernel.sum()
+    kernel = _gaussian(pad, sigma)
     # Mirrored through its end point, the line goes on straight there: no shrinking, and the end itself is kept.
     longer = np.concatenate([2.0 * points[0] - points[pad:0:-1], points, 2.0 * points[-1] - points[-2 : -pad - 2 : -1]])
-    return np.column_stack([np.convolve(longer[:, axis], kernel, mode="valid") for axis in (0, 1)])
+    return np.column_stack([np.convolve(longer[:, 0], kernel, mode="valid"), np.convolve(longer[:, 1], kernel, mode="valid")])
+
+
+@lru_cache(maxsize=64)
+def _gaussian(pad: int, sigma: float) -> NDArray[np.float64]:
+    kernel = np.exp(-0.5 * (np.arange(-pad, pad + 1) / sigma) ** 2)
+    return np.asarray(kernel / kernel.sum())
 
 
 def normals(points: Points) -> Points:
     """Unit vectors across a polyline of at least two points, (N, 2)."""
-    tangent = np.gradient(points, axis=0)
+    tangent = np.empty_like(points)
+    tangent[1:-1] = points[2:] - points[:-2]
+    tangent[0], tangent[-1] = points[1] - points[0], points[-1] - points[-2]
     length = np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-9)
     return np.column_stack([-tangent[:, 1] / length, tangent[:, 0] / length])

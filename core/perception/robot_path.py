@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 
 import cv2
 import numpy as np
@@ -76,7 +75,7 @@ def find(
     if not candidates:
         return _why_no_candidate(graph, config.path)
     best = max(candidates, key=lambda candidate: candidate.score + candidate.continuity)
-    points = tail_first(best.trail.points, radius_px, around)
+    points = tail_first(best.trail.points, around)
     line, radius_px = path_shape.refine(points, masks, radius_px, config.path.smoothing_px, config.cleaning.extend_ends)
     return RobotPath(
         points=line,

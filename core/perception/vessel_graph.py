@@ -14,7 +14,7 @@ from core.perception.junctions import Arm, rebuild
 from core.types import GraphEdge, Mask, Points, VesselGraph
 
 STEP_PX = 2.0
-SMOOTHING_PX = 5.0
+SMOOTHING_PX = 8.0
 """Standard deviation of the smoothing along the way: more than a radius of boundary noise, less than a bend."""
 SPUR_RADII = 1.5
 """A spur of thinning runs from the middle to a bump or corner of the wall: at most about one and a half lumen radii."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.types import Points
-from hardware.twin.look_families import LOOK_FAMILIES, ROBOT_LOOKS, draw_family
+from hardware.twin.look_families import LOOK_FAMILIES, draw_family
 from hardware.twin.phantom import BOARD_MM, Phantom
+from hardware.twin.robot_families import ROBOT_LOOKS
 from hardware.twin.view import View
 
 __all__ = ["LOOK_FAMILIES", "ROBOT_LOOKS", "Appearance", "default_appearance", "make_view", "random_appearance"]

@@ -5,14 +5,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
-from core.types import Points
+from hardware.twin.drawing import U8, fill, stroke
 from hardware.twin.lumen_field import LumenField
 from hardware.twin.phantom import BOARD_MM
 from hardware.twin.view import View
-
-U8 = NDArray[np.uint8]
 
 _SKIN_AND_GLOVES = ((225, 180, 150), (190, 135, 105), (120, 80, 60), (90, 130, 200), (120, 100, 190), (235, 235, 230), (50, 55, 60))
 
@@ -56,7 +53,7 @@ def _box(mask: U8, view: View, rng: Generator) -> None:
     place = rng.uniform((-10, -10), np.array(BOARD_MM) + 10)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * side / 2 @ turn + place
-    cv2.fillPoly(mask, [_fixed(view.project(corners))], 255, cv2.LINE_AA, 4)
+    fill(mask, view.project(corners), 255)
 
 
 def _hand(mask: U8, view: View, rng: Generator) -> None:
@@ -76,8 +73,4 @@ def _hand(mask: U8, view: View, rng: Generator) -> None:
         bend = direction + rng.normal(0, 0.3)
         middle = knuckle + rng.uniform(12, 22) * scale * np.array([np.cos(direction), np.sin(direction)])
         tip = middle + rng.uniform(10, 20) * scale * np.array([np.cos(bend), np.sin(bend)])
-        cv2.polylines(mask, [_fixed(np.array([knuckle, middle, tip]))], False, 255, max(2, int(13 * scale)), cv2.LINE_AA, 4)
-
-
-def _fixed(points: Points) -> NDArray[np.int32]:
-    return np.rint(np.clip(points, -4000, 12000) * 16).astype(np.int32)
+        stroke(mask, np.array([knuckle, middle, tip]), 255, 13 * scale)

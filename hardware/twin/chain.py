@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import logging
+
 import mujoco
 import numpy as np
 
 from core.types import Points
-from hardware.twin.mjcf import ROBOT_RADIUS_MM, STEERABLE_LINKS, Specimen, build_model, link_lengths_mm
+from hardware.twin.mjcf import ROBOT_RADIUS_MM, Specimen, build_model, link_lengths_mm
 from hardware.twin.walls import Port, Wall
 
+_log = logging.getLogger(__name__)
+_FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 _GUIDE_EI = 1e6
 _GUIDE_DAMPING_S = 0.05
 _GUIDE_MM = 3.0
 _SHEATH_EI = 6e4
+
+
+def _on_warning(message: str) -> None:
+    _log.warning("MuJoCo: %s", message)
+
+
+# Without a callback MuJoCo writes its warnings to a file in the working directory.
+mujoco.set_mju_user_warning(_on_warning)
 
 
 class Chain:
@@ -55,6 +67,18 @@ class Chain:
         self.data.ctrl[:4] = self.slack_mm
         self.shape(0.0)
         mujoco.mj_forward(self.model, self.data)
+
+    def step(self) -> None:
+        """One time step.
+
+        Raises
+        ------
+        FloatingPointError
+            When the state is no longer finite. It was never seen; MuJoCo would silently start again from the straight robot.
+        """
+        mujoco.mj_step(self.model, self.data)
+        if any(self.data.warning[kind].number for kind in _FATAL):
+            raise FloatingPointError(f"the twin's physics diverged at {self.data.time:.3f} s")
 
     def take_over(self, other: Chain) -> None:
         """Carry on from the state of a shorter or longer chain: the distal joints are copied, further ones are straight."""

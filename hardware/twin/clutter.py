@@ -1,4 +1,4 @@
-"""Foreign things, never labelled: cables, ruler, stickers and stains beside the vessel; fittings, bubbles and dust on it."""
+"""Foreign things, never labelled: cables, ruler, stickers and stains beside the vessel."""
 
 from __future__ import annotations
 
@@ -10,19 +10,15 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from core.types import GraphEdge, Points
+from core.types import Points
 from hardware.twin.appearance import Appearance
 from hardware.twin.bulky import cast_shadow, place_object
+from hardware.twin.drawing import U8, fill, level, normals, random_edge, stroke
 from hardware.twin.lumen_field import LumenField
 from hardware.twin.phantom import BOARD_MM, Phantom
-from hardware.twin.vessel_look import Layers
 from hardware.twin.view import View
 
 F32 = NDArray[np.float32]
-U8 = NDArray[np.uint8]
-Level = tuple[int, int, int]
-
-_SHIFT = 4  # cv2 draws with 1/16 px
 
 
 def add_board_clutter(appearance: Appearance, board: F32, view: View, phantom: Phantom, field: LumenField, rng: Generator) -> F32:
@@ -41,46 +37,6 @@ def add_board_clutter(appearance: Appearance, board: F32, view: View, phantom: P
         if path is not None:
             _cable(appearance, canvas, path, scale, rng)
     return np.asarray(canvas.astype(np.float32) / 255, np.float32)
-
-
-def add_fittings(appearance: Appearance, layers: Layers, phantom: Phantom, view: View, rng: Generator) -> None:
-    """Clips over the lumen, connectors at its ends (behind the robot, which enters through one), bubbles and dust."""
-    scale = view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
-    shape = layers.front_alpha.shape
-    if appearance.end_fittings and appearance.material not in ("xray", "channel"):
-        colour, alpha = np.zeros((*shape, 3), np.uint8), np.zeros(shape, np.uint8)
-        for node in (phantom.port, *phantom.targets):
-            _connector(appearance, colour, alpha, phantom, node, view, rng)
-        share = (alpha.astype(np.float32) * np.float32(0.9 / 255))[..., None]
-        layers.under += share * (colour.astype(np.float32) / 255 - layers.under)
-    colour, alpha = np.zeros((*shape, 3), np.uint8), np.zeros(shape, np.uint8)
-    for _ in range(appearance.fittings):
-        _clip(appearance, colour, alpha, phantom, view, rng)
-    for _ in range(appearance.bubbles):
-        _bubble(colour, alpha, phantom, view, rng)
-    for _ in range(appearance.dust):
-        _dust(colour, alpha, scale, rng)
-    if alpha.any():
-        opacity = np.asarray(alpha, np.float32) / np.float32(255)
-        layers.cover(opacity, np.asarray(colour, np.float32) / np.float32(255))
-
-
-def _fixed(points: Points) -> NDArray[np.int32]:
-    """Pixel points in cv2's fixed point."""
-    return np.rint(np.clip(points, -4000, 12000) * (1 << _SHIFT)).astype(np.int32)
-
-
-def _stroke(canvas: U8, points: Points, colour: Level | int, width_px: float) -> None:
-    cv2.polylines(canvas, [_fixed(points)], False, colour, max(1, round(width_px)), cv2.LINE_AA, _SHIFT)
-
-
-def _fill(canvas: U8, points: Points, colour: Level | int) -> None:
-    cv2.fillPoly(canvas, [_fixed(points)], colour, cv2.LINE_AA, _SHIFT)
-
-
-def _level(rgb: tuple[float, float, float] | NDArray[np.float64], gain: float = 1.0) -> Level:
-    r, g, b = (int(np.clip(255 * gain * value, 0, 255)) for value in rgb)
-    return r, g, b
 
 
 def _random_colour(appearance: Appearance, rng: Generator) -> tuple[float, float, float]:
@@ -119,9 +75,9 @@ def _sticker(appearance: Appearance, canvas: U8, view: View, rng: Generator) -> 
     paper = rng.random() < 0.7 and appearance.material != "xray"
     if paper:
         colour = (0.95, 0.95, 0.92) if rng.random() < 0.6 else _random_colour(appearance, rng)
-        _fill(canvas, pixels, _level(colour))
-        _stroke(canvas, np.vstack([pixels, pixels[:1]]), _level(colour, 0.8), 1)
-    ink = _level(rng.uniform(0, 0.4, 3)) if paper or np.mean(appearance.board_rgb) > 0.4 else _level((0.9, 0.9, 0.9))
+        fill(canvas, pixels, level(colour))
+        stroke(canvas, np.vstack([pixels, pixels[:1]]), level(colour, 0.8), 1)
+    ink = level(rng.uniform(0, 0.4, 3)) if paper or np.mean(appearance.board_rgb) > 0.4 else level((0.9, 0.9, 0.9))
     text = "".join(rng.choice(list("ABCDEFGHKLMNPRSTUVXYZ0123456789-"), int(rng.integers(1, 8))))
     size = max(0.25, 0.022 * tall * view.pixels_per_mm((float(place[0]), float(place[1]))))
     x, y = pixels[3] + 0.2 * (pixels[1] - pixels[3])
@@ -137,18 +93,18 @@ def _ruler(appearance: Appearance, canvas: U8, view: View, field: LumenField, rn
         run, side = (np.array([120.0, 0]), np.array([0, wide])) if along else (np.array([0, 120.0]), np.array([wide, 0]))
         corners = view.project(np.array([start, start + run, start + run + side, start + side]))
         mask = np.zeros(canvas.shape[:2], np.uint8)
-        _fill(mask, corners, 255)
+        fill(mask, corners, 255)
         if not np.any((mask > 0) & (field.distance_mm < 1.0)):
             break
     else:
         return
     colour = _random_colour(appearance, rng) if rng.random() < 0.5 else (0.8, 0.8, 0.78)
-    ink = _level((0.05, 0.05, 0.05)) if np.mean(colour) > 0.4 else _level((0.95, 0.95, 0.95))
-    _fill(canvas, corners, _level(colour))
+    ink = level((0.05, 0.05, 0.05)) if np.mean(colour) > 0.4 else level((0.95, 0.95, 0.95))
+    fill(canvas, corners, level(colour))
     for millimetre in range(0, 121):
         tick = wide * (0.45 if millimetre % 10 == 0 else 0.32 if millimetre % 5 == 0 else 0.2)
         foot = start + run * millimetre / 120
-        _stroke(canvas, view.project(np.array([foot, foot + side / wide * tick])), ink, 1)
+        stroke(canvas, view.project(np.array([foot, foot + side / wide * tick])), ink, 1)
         if millimetre % 10 == 0:
             x, y = view.project((foot + side * 0.75)[None])[0]
             if abs(x) < 10_000 and abs(y) < 10_000:
@@ -181,8 +137,8 @@ def _across(view: View, rng: Generator) -> Points:
 
 def _beside(view: View, phantom: Phantom, rng: Generator) -> Points:
     """A line that runs along a vessel outside of its wall."""
-    edge = _random_edge(phantom, rng)
-    normal = _normals(edge.points)
+    edge = random_edge(phantom, rng)
+    normal = normals(edge.points)
     away = (float(edge.radius.max()) + rng.uniform(3.0, 12.0)) * rng.choice([-1.0, 1.0])
     line = edge.points + normal * (away + rng.uniform(-2, 2) * np.sin(np.linspace(0, rng.uniform(1, 8), len(normal))))[:, None]
     pixels = view.project(line)
@@ -214,100 +170,15 @@ def _cable(appearance: Appearance, canvas: U8, path: Points, scale: float, rng: 
     lamp = np.array([np.cos(angle), np.sin(angle)])
     if appearance.material == "xray":
         dark = canvas.copy()
-        _stroke(dark, points, (0, 0, 0), max(1.0, 0.6 * wide))
+        stroke(dark, points, (0, 0, 0), max(1.0, 0.6 * wide))
         cv2.addWeighted(dark, 0.6, canvas, 0.4, 0, dst=canvas)
         return
     shadow = np.zeros(canvas.shape[:2], np.uint8)
-    _stroke(shadow, points - lamp * 0.6 * wide, 255, wide)
+    stroke(shadow, points - lamp * 0.6 * wide, 255, wide)
     cast_shadow(canvas, shadow, 0.25 + 0.5 * appearance.tube_shadow, 0.8 * scale)
-    _stroke(canvas, points, _level(colour, 0.7), wide)
-    _stroke(canvas, points + lamp * 0.1 * wide, _level(colour), max(1.0, 0.65 * wide))
+    stroke(canvas, points, level(colour, 0.7), wide)
+    stroke(canvas, points + lamp * 0.1 * wide, level(colour), max(1.0, 0.65 * wide))
     if rng.random() < 0.7:
-        _stroke(canvas, points + lamp * 0.22 * wide, _level(np.asarray(colour) * 0.5 + 0.5), max(1.0, 0.2 * wide))
+        stroke(canvas, points + lamp * 0.22 * wide, level(np.asarray(colour) * 0.5 + 0.5), max(1.0, 0.2 * wide))
     if rng.random() < 0.4:
-        _stroke(canvas, points[-max(2, int(8 * scale * len(points) / len(path))) :], _level(rng.uniform(0.3, 0.9, 3)), 0.8 * wide)
-
-
-def _random_edge(phantom: Phantom, rng: Generator) -> GraphEdge:
-    lengths = np.array([len(edge.points) for edge in phantom.graph.edges], float)
-    return phantom.graph.edges[int(rng.choice(len(lengths), p=lengths / lengths.sum()))]
-
-
-def _normals(points: Points) -> Points:
-    tangent = np.gradient(points, axis=0)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
-    return np.column_stack([-tangent[:, 1], tangent[:, 0]])
-
-
-def _clip(appearance: Appearance, colour: U8, alpha: U8, phantom: Phantom, view: View, rng: Generator) -> None:
-    """A clip or a joint across the tube; the lumen goes on beneath it."""
-    edge = _random_edge(phantom, rng)
-    place = int(rng.integers(int(0.1 * len(edge.points)), max(int(0.9 * len(edge.points)), 1)))
-    normal = _normals(edge.points)[place]
-    tangent = np.array([normal[1], -normal[0]])
-    across = (edge.radius[place] + appearance.wall_mm + rng.uniform(0.5, 3.0)) * normal
-    along = rng.uniform(1.0, 2.8) * tangent
-    corners = view.project(edge.points[place] + np.array([across + along, -across + along, -across - along, across - along]))
-    opacity = int(255 * appearance.fitting_opacity)
-    tone = appearance.fitting_rgb
-    _fill(alpha, corners, opacity)
-    _fill(colour, corners, _level(tone))
-    middle = corners.mean(axis=0)
-    _fill(colour, middle + (corners - middle) * (0.96, 0.45), _level(tone, 1.15))
-    _stroke(colour, np.vstack([corners, corners[:1]]), _level(tone, 0.6), 1)
-
-
-def _connector(appearance: Appearance, colour: U8, alpha: U8, phantom: Phantom, node: int, view: View, rng: Generator) -> None:
-    """A luer connector at an end of the vessel, pointing outwards."""
-    for edge in phantom.graph.edges:
-        if node in (edge.start, edge.end):
-            points = edge.points if edge.end == node else edge.points[::-1]
-            radius = edge.radius[-1] if edge.end == node else edge.radius[0]
-            break
-    outward = points[-1] - points[max(-6, -len(points))]
-    outward = outward / max(float(np.linalg.norm(outward)), 1e-9)
-    normal = np.array([-outward[1], outward[0]])
-    half, start = radius + appearance.wall_mm, points[-1] + 0.4 * radius * outward
-    for begin, finish, wide in ((0.0, rng.uniform(4, 7), 1.15), (4.0, rng.uniform(8, 14), rng.uniform(0.6, 0.9))):
-        box = np.array([[begin, wide * half], [finish, wide * half], [finish, -wide * half], [begin, -wide * half]])
-        corners = view.project(start + box[:, :1] * outward + box[:, 1:] * normal)
-        _fill(alpha, corners, int(255 * max(0.6, appearance.fitting_opacity)))
-        _fill(colour, corners, _level(appearance.fitting_rgb, 0.9))
-        middle = corners.mean(axis=0)
-        _fill(colour, middle + (corners - middle) * 0.6, _level(appearance.fitting_rgb, 1.12))
-        _stroke(colour, np.vstack([corners, corners[:1]]), _level(appearance.fitting_rgb, 0.6), 1)
-
-
-def _bubble(colour: U8, alpha: U8, phantom: Phantom, view: View, rng: Generator) -> None:
-    """An air bubble: a dark ring with a bright spot, half see-through."""
-    edge = _random_edge(phantom, rng)
-    place = int(rng.integers(len(edge.points)))
-    radius = edge.radius[place] * rng.uniform(0.15, 0.6)
-    shift = _normals(edge.points)[place] * (edge.radius[place] - radius) * rng.uniform(-0.8, 0.8)
-    x, y = view.project((edge.points[place] + shift)[None])[0]
-    size = max(1, round(radius * view.pixels_per_mm((float(edge.points[place, 0]), float(edge.points[place, 1])))))
-    if not (-50 < x < view.size[0] + 50 and -50 < y < view.size[1] + 50):
-        return
-    at = int(x), int(y)
-    cv2.circle(alpha, at, size, 40, -1, cv2.LINE_AA)
-    cv2.circle(colour, at, size, (235, 235, 235), -1, cv2.LINE_AA)
-    cv2.circle(alpha, at, size, 150, 1, cv2.LINE_AA)
-    cv2.circle(colour, at, size, (60, 60, 60), 1, cv2.LINE_AA)
-    spot = at[0] - size // 3, at[1] - size // 3
-    cv2.circle(alpha, spot, max(1, size // 4), 220, -1, cv2.LINE_AA)
-    cv2.circle(colour, spot, max(1, size // 4), (255, 255, 255), -1, cv2.LINE_AA)
-
-
-def _dust(colour: U8, alpha: U8, scale: float, rng: Generator) -> None:
-    """A speck or a short fibre."""
-    height, width = alpha.shape
-    at, tone = rng.uniform((0, 0), (width, height)), int(rng.choice([rng.integers(0, 90), rng.integers(200, 256)]))
-    if rng.random() < 0.8:
-        spot = int(at[0]), int(at[1])
-        size = int(rng.integers(0, max(2, int(0.35 * scale))))
-        cv2.circle(alpha, spot, size, int(rng.integers(60, 220)), -1, cv2.LINE_AA)
-        cv2.circle(colour, spot, size, (tone, tone, tone), -1, cv2.LINE_AA)
-        return
-    fibre = at + np.cumsum(rng.normal(0, 0.6 * scale, (5, 2)) + rng.normal(0, 0.5 * scale, 2), axis=0)
-    _stroke(alpha, fibre, int(rng.integers(60, 150)), 1)
-    _stroke(colour, fibre, (tone, tone, tone), 1)
+        stroke(canvas, points[-max(2, int(8 * scale * len(points) / len(path))) :], level(rng.uniform(0.3, 0.9, 3)), 0.8 * wide)

@@ -22,8 +22,8 @@ class LumenField:
     """Per pixel of a view, arrays of shape (H, W).
 
     ``distance_mm`` is the signed distance to the lumen's wall: the least of |p - c| - r over the discs along the centerlines
-    (negative inside; its sign is exact, its value good to 0.05 mm up to ``reach_mm`` outside, where it is cut). ``ratio`` is the least |p - c| / r (0 on the centerline,
-    1 at the wall) and ``outer_ratio`` the same for the tube's outside, r + wall.
+    (negative inside; its sign is exact, its value good to 0.05 mm up to ``reach_mm`` outside, where it is cut). ``ratio`` is the
+    least |p - c| / r (0 on the centerline, 1 at the wall) and ``outer_ratio`` the same for the tube's outside, r + wall.
     """
 
     distance_mm: F32
@@ -38,21 +38,22 @@ class LumenField:
 
 
 def lumen_discs(graph: VesselGraph, spacing_mm: float = _LABEL_SPACING_MM) -> tuple[Points, NDArray[np.float64]]:
-    """Centres (N, 2) and radii (N,) of the discs whose union is the lumen; samples denser than half of `spacing_mm` are thinned.
+    """Centres (N, 2) and radii (N,) of the discs whose union is the lumen.
 
-    Wider gaps than `spacing_mm` are filled by linear interpolation.
+    Samples much denser than `spacing_mm` are thinned; gaps much wider are filled by linear interpolation.
     """
     centers, radii = [graph.nodes[:0]], [np.zeros(0)]
     for edge in graph.edges:
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(edge.points, axis=0), axis=1))])
         keep = np.concatenate([[True], np.diff(along) > 0])
+        wanted = np.linspace(0.0, along[-1], max(2, int(np.ceil(along[-1] / spacing_mm)) + 1))
         gap = along[-1] / max(len(along) - 1, 1)
-        if 0.5 * spacing_mm <= gap <= 1.3 * spacing_mm:
+        if gap > 1.3 * spacing_mm:  # sparse samples are corners of the centerline: none of them may be cut
+            wanted = np.union1d(wanted, along)
+        elif gap >= 0.5 * spacing_mm:
             wanted = along
-        else:
-            wanted = np.linspace(0.0, along[-1], max(2, int(np.ceil(along[-1] / spacing_mm)) + 1))
-            if gap > spacing_mm:  # sparse samples are corners of the centerline: none of them may be cut
-                wanted = np.union1d(wanted, along)
+        else:  # the phantom's own samples, so that few discs never cover more than all
+            wanted = along[np.unique(np.searchsorted(along, wanted).clip(max=len(along) - 1))]
         centers.append(np.column_stack([np.interp(wanted, along[keep], edge.points[keep, axis]) for axis in (0, 1)]))
         radii.append(np.interp(wanted, along[keep], edge.radius[keep]))
     return np.vstack(centers), np.concatenate(radii)
@@ -61,8 +62,8 @@ def lumen_discs(graph: VesselGraph, spacing_mm: float = _LABEL_SPACING_MM) -> tu
 def measure_lumen(graph: VesselGraph, view: View, grid_mm: F32, wall_mm: float, reach_mm: float) -> LumenField:
     """The field of `graph` seen through `view`; `grid_mm` (H, W, 2) holds the board position of every pixel centre.
 
-    Each disc only touches a small window around it, which costs about 60 us. So the discs stand 1 mm apart at first; what that makes
-    too small is a scallop of at most 0.05 mm along the wall, whose few pixels are then compared with all discs.
+    Each disc only touches a small window around it, which costs about 60 us. So the discs stand 1 mm apart at first; what is
+    missing then is a scallop of at most 0.05 mm along the wall, whose few pixels are then compared with all discs.
     """
     height, width = grid_mm.shape[:2]
     distance = np.full((height, width), reach_mm, np.float32)

@@ -35,12 +35,12 @@ class Specimen:
     the steerable part keeps with slack tendons (positive: right), ``friction`` that against the wall.
     """
 
-    shaft_ei: float = 2.5e4
+    shaft_ei: float = 2e4
     tip_ei: float = 8e3
-    damping_s: float = 0.02
+    damping_s: float = 0.04
     friction: float = 0.1
     tip_set_deg: float = 0.0
-    feed_force_mn: float = 1500.0
+    feed_force_mn: float = 600.0
 
     @staticmethod
     def drawn(seed: int) -> Specimen:
@@ -49,7 +49,7 @@ class Specimen:
             return Specimen()
         rng = np.random.default_rng([seed, 40427])
         return Specimen(
-            shaft_ei=2.5e4 * rng.uniform(0.8, 1.5),
+            shaft_ei=rng.uniform(1.8e4, 3.5e4),
             tip_ei=8e3 * rng.uniform(0.9, 1.15),
             friction=rng.uniform(0.06, 0.15),
             tip_set_deg=float(np.clip(rng.normal(0.0, 2.0), -5.0, 5.0)),

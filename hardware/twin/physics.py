@@ -123,7 +123,7 @@ class TwinPhysics:
                 self._due_s -= TIMESTEP_S
                 self._fit_chain()
                 self._actuate(command)
-                mujoco.mj_step(self._chain.model, self._chain.data)
+                self._chain.step()
                 self._contact_mn += (self._chain.wall_force_mn() - self._contact_mn) * TIMESTEP_S / _CONTACT_LOWPASS_S
 
     def _actuate(self, command: Command) -> None:

@@ -16,7 +16,9 @@ from core.types import Image, Mask, Points
 from hardware.twin.appearance import Appearance, make_view
 from hardware.twin.background import light_field, paint_board
 from hardware.twin.camera_effects import CameraEffects
-from hardware.twin.clutter import add_board_clutter, add_fittings
+from hardware.twin.clutter import add_board_clutter
+from hardware.twin.drawing import stroke
+from hardware.twin.fittings import add_fittings
 from hardware.twin.lumen_field import measure_lumen
 from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.robot_look import Band, measure_band, paint_robot, paint_sheath
@@ -143,8 +145,7 @@ class Renderer:
         pixels = self.view.project(points) - (window[1].start, window[0].start)
         pixels = pixels - np.asarray(self._lamp) * 0.5 * self.appearance.shadow_mm * self._scale
         mask = np.zeros(scene.shape[:2], np.uint8)
-        fixed = np.rint(np.clip(pixels, -4000, 12000) * 16).astype(np.int32)
-        cv2.polylines(mask, [fixed], False, 255, max(1, round(2 * self.robot_radius_mm * self._scale)), cv2.LINE_AA, 4)
+        stroke(mask, pixels, 255, 2 * self.robot_radius_mm * self._scale)
         soft = cv2.blur(mask, (3, 3) if self._scale < 2 else (5, 5))
         soft = cv2.blur(soft, (5, 5))
         scene *= (1 - np.float32(self.appearance.robot_shadow / 255) * soft.astype(np.float32))[..., None]

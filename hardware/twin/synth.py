@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from core.config import PerceptionConfig
+from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.types import Points
 from hardware.twin.appearance import Appearance, make_view, random_appearance
@@ -143,7 +144,7 @@ def _is_complete(plan: SynthPlan, episode: int) -> bool:
     return path.is_file() and len(path.read_text(encoding="utf-8").splitlines()) >= expected
 
 
-class SynthError(Exception):
+class SynthError(UserError):
     """The set cannot be written; the message is one line and says what to do."""
 
 

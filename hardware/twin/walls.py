@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from hardware.twin.phantom import Phantom
 
 _THICKNESSES_MM = (1.0, 0.6, 0.35, 0.2)
 _GRID_MM = 0.25
-_TOLERANCE_MM = 0.15
+_TOLERANCE_MM = 0.1
 _MAX_PIECE_MM = 6.0
 
 
@@ -75,7 +76,7 @@ def wall_boxes(phantom: Phantom) -> tuple[list[Wall], Port]:
     walls = []
     for outline in lumen_outline(phantom.graph):
         corners = approximate_polygon(outline, _TOLERANCE_MM)
-        for start, end in zip(corners[:-1], corners[1:], strict=True):
+        for start, end in itertools.pairwise(corners):
             length = float(np.linalg.norm(end - start))
             if length < 1e-6:
                 continue

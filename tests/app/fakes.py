@@ -1,4 +1,4 @@
-"""A bench without physics and without a network: a drawn tube, a robot that swings in it, and poses that follow from the drawing."""
+"""A bench without physics or network: a drawn tube, a robot that swings in it, and poses that follow from the drawing."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class FakeBench:
         board = 205 - 0.00022 * ((x - 250) ** 2 + (y - 190) ** 2)
         soft = cv2.GaussianBlur(self._vessel.astype(np.float32), (0, 0), 4)
         wall = np.abs(cv2.Sobel(soft, cv2.CV_32F, 1, 0)) + np.abs(cv2.Sobel(soft, cv2.CV_32F, 0, 1))
-        grey = board - 28 * soft - 190 * wall + rng.normal(0, 2.0, board.shape)
+        grey = board - 20 * soft - 70 * wall + rng.normal(0, 2.0, board.shape)
         colour = np.stack([grey, grey - 6 - 10 * soft, grey - 12 - 16 * soft], axis=2)
         return np.clip(colour, 0, 255).astype(np.uint8)
 
@@ -239,7 +239,8 @@ class FakeEngine:
         image, scene = self._bench.scene_at(self._index, now - self._start_s, self._target)
         scene = replace(scene, captured_s=now)
         if self.refusal is not None:
-            scene = replace(scene, pose=None, refusal=self.refusal, robot_vector=None, vessel_vector=None, path=None, centerline=None)
+            scene = replace(scene, pose=None, refusal=self.refusal, robot_vector=None, vessel_vector=None)
+            scene = replace(scene, path=None, centerline=None)
         if self._edit is not None:
             scene = self._edit(scene)
         sent = self.commands[-1] if self.commands else None

@@ -1,0 +1,142 @@
+"""Opens the operator window on a rig."""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.sources import VIDEO_ENDINGS
+from core.config import Config, PerceptionConfig, load_config
+from core.control.engine import Engine, Perceive
+from core.control.policy import table_policy
+from core.devices import DeviceError
+from core.learning.model_file import ModelError
+from core.types import Advice, Scene
+from hardware.rig import RigKind, open_rig
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
+
+    from app.operator_window import OperatorWindow
+
+RIGS = ("twin",)
+
+
+class EngineMaker:
+    """Opens rig and engine for a configuration, in the engine's thread. The network is loaded once and kept."""
+
+    def __init__(self) -> None:
+        self._perceive: Perceive | None = None
+        self._loaded: PerceptionConfig | None = None
+
+    def __call__(self, config: Config) -> Engine:
+        """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame with the reason."""
+        perceive = self._perception(config.perception)
+        rig = open_rig(config)
+
+        def advise(scene: Scene) -> Advice | None:
+            return table_policy(scene, config.advice)
+
+        return Engine(rig.camera, rig.robot, perceive, advise, rig.close)
+
+    def _perception(self, config: PerceptionConfig) -> Perceive:
+        from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
+
+        if self._perceive is None or self._loaded != config:
+            try:
+                self._perceive = open_pipeline(config)
+                self._loaded = config
+            except ModelError as error:
+                # Not remembered: once the model is restored, starting the rig again is enough.
+                return NoPerception(str(error))
+        if isinstance(self._perceive, Pipeline):
+            self._perceive.reset()
+        return self._perceive
+
+
+def window_config(rig: str, config_path: Path | None, source: Path | None) -> tuple[Config, RigKind]:
+    """The configuration of a rig or of a recorded source, and what the banner says. Raises ConfigError, DeviceError."""
+    if source is None:
+        if rig not in RIGS:
+            raise DeviceError(f"unknown rig {rig!r}; known: {', '.join(RIGS)}")
+        config = load_config(config_path)
+    else:
+        if not source.exists():
+            raise DeviceError(f"{source}: no such file or folder")
+        camera = "video_file" if source.suffix.lower() in VIDEO_ENDINGS else "image_folder"
+        config = load_config(config_path, overrides={"rig": {"camera": camera, "robot": "none", "source": str(source)}})
+    return config, RigKind.SIM if config.rig.camera == "twin" else RigKind.PLAYBACK
+
+
+def make_window(config: Config, kind: RigKind) -> OperatorWindow:
+    """The window, not shown yet. There must be an application."""
+    from app.operator_window import OperatorWindow
+    from hardware.twin.phantoms import PHANTOM_NAMES, make_phantom
+
+    phantoms = [(name, make_phantom(name).title) for name in PHANTOM_NAMES] if kind is RigKind.SIM else []
+    return OperatorWindow(config, EngineMaker(), kind, phantoms)
+
+
+def make_application() -> QApplication:
+    """The one application object, with theme and names."""
+    from PySide6.QtWidgets import QApplication
+
+    from app import theme
+
+    application = QApplication.instance() or QApplication([sys.argv[0]])
+    assert isinstance(application, QApplication)
+    application.setApplicationName("LumenPilot")
+    theme.apply_theme(application)
+    return application
+
+
+def run_window(rig: str, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False) -> int:
+    """Show the window until it is closed; returns the exit code. Raises ConfigError, DeviceError for what is wrong before it opens."""
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    config, kind = window_config(rig, config_path, source)
+    application = make_application()
+    window = make_window(config, kind)
+    application.aboutToQuit.connect(window.shut_down)
+    timers = [_quit_on_signal(application)]
+    window.show()
+    window.start()
+    if until_first_frame:
+        timers.append(_leave_after_first_frame(window))
+    return application.exec()
+
+
+def _quit_on_signal(application: QApplication) -> Any:
+    """Ctrl-C and a termination request close the window properly. Python sees signals only between Qt events, hence the timer."""
+    import signal
+
+    from PySide6.QtCore import QTimer
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: application.closeAllWindows())
+    timer = QTimer(application)
+    timer.timeout.connect(lambda: None)
+    timer.start(200)
+    return timer
+
+
+def _leave_after_first_frame(window: OperatorWindow) -> Any:
+    """For ``benchmark``: say when the first understood frame was on screen, and close."""
+    from PySide6.QtCore import QTimer
+
+    timer = QTimer(window)
+
+    def look() -> None:
+        tick = window.shown_tick
+        if tick is not None and tick.scene.path is not None:
+            timer.stop()
+            window.repaint()
+            sys.stdout.write(json.dumps({"first_frame_monotonic_s": time.monotonic()}) + "\n")
+            window.close()
+
+    timer.timeout.connect(look)
+    timer.start(5)
+    return timer
