@@ -122,6 +122,13 @@ class JogKeys(QObject):
             self._timer.stop()
             self._announce()
 
+    def detach(self) -> None:
+        """Release everything and listen no more."""
+        self.release_all()
+        application = QApplication.instance()
+        if application is not None:
+            application.removeEventFilter(self)
+
     def reset(self) -> None:
         """Forget everything, for a robot that has just been opened: nothing is held, the head is straight."""
         self.release_all()

@@ -34,7 +34,7 @@ from app.widgets.state_badge import StateBadge
 from app.widgets.theta_gauge import ThetaGauge
 from app.widgets.toast import Toast
 from app.widgets.trend_plot import TrendPlot
-from app.wording import refusal_line
+from app.wording import REASON_TEXT
 from core.config import Config
 from core.types import Command, Point, Tick
 from hardware.rig import RigKind
@@ -123,7 +123,9 @@ class OperatorWindow(QMainWindow):
             header.addWidget(self._picker)
         header.addWidget(self._mode)
         rows.addLayout(header)
-        columns = QHBoxLayout()
+        stage = QWidget()
+        columns = QHBoxLayout(stage)
+        columns.setContentsMargins(0, 0, 0, 0)
         columns.setSpacing(theme.GAP)
         columns.addLayout(self._left_column(), 62)
         right = QWidget()
@@ -131,8 +133,8 @@ class OperatorWindow(QMainWindow):
         right.setMinimumWidth(470)
         right.setMaximumWidth(660)
         columns.addWidget(right, 38)
-        rows.addLayout(columns, 1)
-        self._help = HelpOverlay(central)
+        rows.addWidget(stage, 1)
+        self._help = HelpOverlay(stage)  # the banner stays in sight
 
     def _left_column(self) -> QVBoxLayout:
         column = QVBoxLayout()
@@ -147,7 +149,7 @@ class OperatorWindow(QMainWindow):
         measures = QHBoxLayout()
         measures.setSpacing(theme.GAP)
         measures.addWidget(Card("Angle to the vessel", self._gauge, f"allowed {limits.theta_allow_deg:g}°"), 1)
-        measures.addWidget(Card("Distance from the centerline", self._bars, f"allowed {limits.d_allow_px:g} px"), 1)
+        measures.addWidget(Card("Distances", self._bars, f"allowed {limits.d_allow_px:g} px"), 1)
         hands = QHBoxLayout()
         hands.setSpacing(theme.GAP)
         hands.addWidget(Card("Move the robot", self._jog_panel, "hold"), 1)
@@ -155,7 +157,7 @@ class OperatorWindow(QMainWindow):
         column = QVBoxLayout()
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(theme.GAP)
-        column.addWidget(Card("Pose state", self._badge))
+        column.addWidget(Card("", self._badge))
         column.addLayout(measures, 3)
         column.addWidget(Card("Last 30 seconds", self._trends, _trend_legend()), 3)
         column.addLayout(hands, 2)
@@ -225,11 +227,6 @@ class OperatorWindow(QMainWindow):
             self._picker.chosen.connect(self._choose_phantom)
 
     @property
-    def shown_tick(self) -> Tick | None:
-        """The tick on screen; None while there is none."""
-        return self._tick
-
-    @property
     def max_block_ms(self) -> float:
         """The longest time that the GUI thread was blocked in the last ten seconds."""
         return self._heartbeat.max_block_ms
@@ -278,8 +275,8 @@ class OperatorWindow(QMainWindow):
         self._trends.clear()
         what = self._picker.title if self._picker is not None else self._config.rig.source or self._config.rig.name
         if phase is Phase.STARTING:
-            self._blank(f"Starting {what}", "")
-            self._notice.show_notice(NoticeKind.PROGRESS, f"Starting {what}", "Opening camera and robot, loading the network")
+            self._blank("Starting", what)
+            self._notice.show_notice(NoticeKind.PROGRESS, f"Starting: {what}", "Opening camera and robot, loading the network")
         elif phase is Phase.RUNNING:
             self._blank("Waiting for the first picture", "")
             self._notice.show_notice(NoticeKind.PROGRESS, "Waiting for the first picture", what)
@@ -331,7 +328,7 @@ class OperatorWindow(QMainWindow):
         self._badge.show_scene(scene, renew_text=renew_text)
         self._gauge.show_pose(pose, renew_text=renew_text)
         self._bars.show_pose(pose, renew_text=renew_text)
-        why_none = refusal_line(scene.refusal) if scene.refusal is not None else "no pose"
+        why_none = REASON_TEXT[scene.refusal.reason].title.lower() if scene.refusal is not None else "no pose"
         self._advice.show_advice(tick.advice, pose.state if pose is not None else None, why_none, renew_text=renew_text)
         self._trends.add(scene)
         self._performance.add(tick, self._heartbeat.max_block_ms)
@@ -426,7 +423,7 @@ class OperatorWindow(QMainWindow):
         if self._is_shut:
             return
         self._is_shut = True
-        self._jog.release_all()
+        self._jog.detach()
         for timer in (self._check, self._show_later):
             timer.stop()
         self._heartbeat.stop()

@@ -12,10 +12,11 @@ from app.scene_shapes import SceneShapes, scene_shapes
 from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
 from app.wording import REASON_TEXT, STATE_TITLE, advice_headline
 from core.config import RESOURCES
-from core.types import Advice, Image, Mask, Point, Points, PoseState, Scene, Vector
+from core.types import Advice, Image, Mask, Point, Points, Pose, PoseState, Scene, Vector
 
 _SHIFT = 4  # OpenCV draws at 1/16 px
-_MASK_OPACITY = {"vessel": 0.20, "robot": 0.38}
+_INSET_SPAN_PX = 112.0
+_INSET_MAX_COVERED = 0.35
 
 
 def draw_overlay(image: Image, scene: Scene, advice: Advice | None = None, *, longer_side_px: int = 1280, stamp: str = "") -> Image:
@@ -27,7 +28,7 @@ def draw_overlay(image: Image, scene: Scene, advice: Advice | None = None, *, lo
     scene : what was understood; what is missing is not drawn.
     advice : adds speed and steering to the caption.
     longer_side_px : small pictures are enlarged to this, so that lines and texts are fine; larger ones keep their size.
-    stamp : a word in the upper left corner, such as "SIM".
+    stamp : a word in the lower left corner, such as "SIM".
 
     Returns
     -------
@@ -35,31 +36,84 @@ def draw_overlay(image: Image, scene: Scene, advice: Advice | None = None, *, lo
     """
     height, width = image.shape[:2]
     zoom = max(1.0, longer_side_px / max(height, width))
-    size = (round(width * zoom), round(height * zoom))
-    # area averaging would do nothing when enlarging; Lanczos would ring beside the highlights
-    canvas = cv2.resize(image, size, interpolation=cv2.INTER_CUBIC) if zoom > 1.0 else image.copy()
-    if scene.masks is not None:
-        canvas = _tint(canvas, scene.masks.vessel, palette.VESSEL, _MASK_OPACITY["vessel"])
-        canvas = _tint(canvas, scene.masks.robot, palette.ROBOT, _MASK_OPACITY["robot"])
-    brush = _Brush(canvas, zoom, max(1.0, max(size) / 1280))
-    _draw_shapes(brush, scene, scene_shapes(scene))
+    canvas = _tinted(image, scene, zoom)
+    unit = max(1.0, max(canvas.shape[:2]) / 1280)
+    shapes = scene_shapes(scene)
+    corner = _free_corner(canvas, scene, zoom)
+    brush = _Brush(canvas, zoom, (0.0, 0.0), unit)
+    _draw_shapes(brush, scene, shapes, labels=corner is None)
+    if corner is not None:
+        _draw_inset(brush, corner, image, scene, shapes)
     if stamp:
         brush.stamp(stamp)
-    return np.concatenate([canvas, _caption(scene, advice, size[0])])
+    return np.concatenate([canvas, _caption(scene, advice, canvas.shape[1])])
+
+
+def _tinted(image: Image, scene: Scene, zoom: float) -> Image:
+    """The picture, enlarged, with both masks in colour and their edges as thin lines."""
+    size = (max(1, round(image.shape[1] * zoom)), max(1, round(image.shape[0] * zoom)))
+    # Lanczos would ring beside the highlights
+    canvas = cv2.resize(image, size, interpolation=cv2.INTER_CUBIC) if zoom > 1.0 else image.copy()
+    if scene.masks is None:
+        return canvas
+    for mask, name, opacity in ((scene.masks.vessel, palette.VESSEL, 0.20), (scene.masks.robot, palette.ROBOT, 0.38)):
+        canvas = _tint(canvas, mask, name, opacity)
+    return canvas
 
 
 def _tint(canvas: Image, mask: Mask, name: str, opacity: float) -> Image:
-    """Blend a colour into the mask's pixels; its edge gets a thin line."""
     size = (canvas.shape[1], canvas.shape[0])
-    soft = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
-    edge = cv2.morphologyEx((soft > 0.5).astype(np.uint8), cv2.MORPH_GRADIENT, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3)))
-    share = np.maximum(soft * opacity, edge * 0.8)[:, :, None]
-    tinted = canvas * (1.0 - share) + np.array(palette.rgb(name), np.float32) * share
-    return np.ascontiguousarray(tinted.round().astype(np.uint8))
+    step = size[0] / mask.shape[1]
+    blur = max(0.6, 0.7 * step)
+    soft = cv2.GaussianBlur(cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_LINEAR), (0, 0), blur)
+    # across the edge `soft` climbs from 0 to 1 with a slope of about 1 / (2.5 blur), so this is a line about 2 px wide
+    edge = np.clip(1.4 - np.abs(soft - 0.5) * (2.5 * blur), 0.0, 1.0)
+    share = np.maximum(np.clip(1.5 * soft - 0.25, 0.0, 1.0) * opacity, edge * 0.8)
+    colour = np.empty_like(canvas)
+    colour[:] = palette.rgb(name)
+    return cv2.blendLinear(colour, canvas, share, 1.0 - share)
 
 
-def _draw_shapes(brush: _Brush, scene: Scene, shapes: SceneShapes) -> None:
-    pose = scene.pose
+def _free_corner(canvas: Image, scene: Scene, zoom: float) -> tuple[int, int, int, int] | None:
+    """Left, top, width and height of the corner where a magnified head covers least; None when it would cover much."""
+    if scene.pose is None or scene.masks is None or scene.path is None:
+        return None
+    height, width = canvas.shape[:2]
+    box_width, box_height = round(0.34 * width), round(0.38 * height)
+    busy = scene.masks.vessel.astype(np.float32) + 4.0 * scene.masks.robot
+    scale = scene.scale / zoom
+    head = np.array(scene.path.head) / scale
+    best, best_share = None, _INSET_MAX_COVERED
+    for left in (0, width - box_width):
+        for top in (0, height - box_height):
+            rows = slice(round(top * scale), round((top + box_height) * scale))
+            columns = slice(round(left * scale), round((left + box_width) * scale))
+            part = busy[rows, columns]
+            away = np.abs(head - (left + box_width / 2, top + box_height / 2)) / (box_width, box_height)
+            is_beside = bool(away.max() > 0.6)
+            if part.size and is_beside and float(part.mean()) < best_share:
+                best, best_share = (left, top, box_width, box_height), float(part.mean())
+    return best
+
+
+def _draw_inset(brush: _Brush, corner: tuple[int, int, int, int], image: Image, scene: Scene, shapes: SceneShapes) -> None:
+    """The surroundings of the head, magnified, with the labels; a frame shows where they are."""
+    left, top, width, height = corner
+    if shapes.robot_vector is None or shapes.vessel_vector is None:
+        return
+    span = _INSET_SPAN_PX / scene.scale
+    zoom = width / span
+    middle = (np.array(shapes.robot_vector.center) + np.array(shapes.vessel_vector.center)) / 2
+    origin = middle - np.array([span, height / zoom]) / 2
+    shift = (0.5 - origin) * zoom - 0.5
+    place = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
+    inset = cv2.warpAffine(image, place, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    _draw_shapes(_Brush(inset, zoom, (float(origin[0]), float(origin[1])), brush.unit), scene, shapes, labels=True)
+    brush.frame(origin, (span, height / zoom))
+    brush.paste(inset, left, top)
+
+
+def _draw_shapes(brush: _Brush, scene: Scene, shapes: SceneShapes, *, labels: bool) -> None:
     brush.polylines(shapes.vessel_lines, palette.VESSEL, 2.5)
     if shapes.route is not None:
         brush.polylines((shapes.route,), palette.ROUTE, 4.0)
@@ -75,26 +129,43 @@ def _draw_shapes(brush: _Brush, scene: Scene, shapes: SceneShapes) -> None:
         brush.diamond(shapes.nearest, palette.NEAREST, 8.0)
     if shapes.head is not None:
         brush.ring(shapes.head, palette.HEAD, 11.0)
-    robot = shapes.robot_vector
-    if pose is not None and robot is not None and shapes.head_foot is not None and shapes.tail_foot is not None:
-        brush.measure(shapes.head_foot, robot.end, palette.D_HEAD, f"d_head {pose.d_head_px:.1f} px")
-        brush.measure(shapes.tail_foot, robot.start, palette.D_TAIL, f"d_tail {pose.d_tail_px:.1f} px")
-        if shapes.angle_arc is not None:
-            brush.angle(robot.start, shapes.angle_arc, palette.THETA, f"θ {pose.theta_signed_deg:+.1f}°")
     if scene.route is not None:
         brush.ring(scene.to_source(scene.route.target), palette.TARGET, 14.0)
+    if scene.pose is not None:
+        _draw_measures(brush, scene.pose, shapes, labels)
+
+
+def _draw_measures(brush: _Brush, pose: Pose, shapes: SceneShapes, labels: bool) -> None:
+    robot, vessel = shapes.robot_vector, shapes.vessel_vector
+    if robot is None or vessel is None or shapes.head_foot is None or shapes.tail_foot is None or shapes.angle_arc is None:
+        return
+    brush.line(shapes.head_foot, robot.end, palette.D_HEAD, 3.0)
+    brush.line(shapes.tail_foot, robot.start, palette.D_TAIL, 3.0)
+    if labels:
+        brush.angle(robot.start, shapes.angle_arc, palette.THETA)
+        head_side = 1.0 if pose.c_head_px > 0 else -1.0
+        # on the side of the vessel where the head is not: there is the least to cover
+        brush.label_beside(vessel.center, vessel, -head_side, f"θ {pose.theta_signed_deg:+.1f}°", palette.THETA)
+        brush.label_beside(robot.end, vessel, head_side, f"d_head {pose.d_head_px:.1f} px", palette.D_HEAD)
+        tail_side = 1.0 if pose.c_tail_px > 0 else -1.0
+        brush.label_beside(robot.start, vessel, tail_side, f"d_tail {pose.d_tail_px:.1f} px", palette.D_TAIL)
 
 
 class _Brush:
     """Draws marks at source-pixel places on the enlarged picture; widths are pixels of a picture 1280 px wide."""
 
-    def __init__(self, canvas: Image, zoom: float, thickness: float) -> None:
+    def __init__(self, canvas: Image, zoom: float, origin: Point, unit: float) -> None:
         self._canvas = canvas
         self._zoom = zoom
-        self._unit = thickness
+        self._origin = np.array(origin)
+        self._unit = unit
+
+    @property
+    def unit(self) -> float:
+        return self._unit
 
     def _at(self, points: Points | list[Point]) -> Points:
-        return (np.asarray(points, np.float64) + 0.5) * self._zoom - 0.5
+        return np.asarray((np.asarray(points, np.float64) + 0.5 - self._origin) * self._zoom - 0.5)
 
     def _width(self, width: float) -> int:
         return max(1, round(width * self._unit))
@@ -139,24 +210,39 @@ class _Brush:
         (middle,) = self._at([point])
         self._fill(middle + np.array([(0, -1), (1, 0), (0, 1), (-1, 0)]) * radius * self._unit, name)
 
-    def measure(self, foot: Point, point: Point, name: str, text: str) -> None:
-        first, second = self._at([foot, point])
-        self._lines([np.array([first, second])], name, 3.0)
-        away = second - first
-        length = float(np.linalg.norm(away))
-        away = away / length if length > 1e-6 else np.array([0.0, -1.0])
-        self._label(second + away * np.array([80.0, 34.0]) * self._unit, text, name)
+    def line(self, first: Point, second: Point, name: str, width: float) -> None:
+        self._lines([self._at([first, second])], name, width)
 
-    def angle(self, corner: Point, unit_arc: Points, name: str, text: str) -> None:
+    def angle(self, corner: Point, unit_arc: Points, name: str) -> None:
+        """The arc from the vessel's direction to the robot's, with the vessel's direction as a thin line through the corner."""
         (middle,) = self._at([corner])
-        arc = middle + unit_arc * 62.0 * self._unit
+        arc = middle + unit_arc * 70.0 * self._unit
         self._lines([np.array([middle, middle + (arc[0] - middle) * 1.3])], palette.VESSEL_VECTOR, 1.5)
         self._lines([arc], name, 2.5)
-        outward = unit_arc[len(unit_arc) // 2]
-        self._label(middle + outward * 112.0 * self._unit, text, name)
+
+    def label_beside(self, point: Point, line: Vector, side: float, text: str, name: str) -> None:
+        """A text beside `point`, on one side of `line` (+1: to the right of its direction)."""
+        across = np.array([-line.direction[1], line.direction[0]]) * side
+        width = _text_width(text, "SemiBold", round(20 * self._unit)) + 20 * self._unit
+        reach = 22.0 * self._unit + abs(across[0]) * width / 2 + abs(across[1]) * 15.0 * self._unit
+        (middle,) = self._at([point])
+        self._label(middle + across * reach, text, name)
+
+    def frame(self, origin: Points, size: Point) -> None:
+        """A thin rectangle from `origin`, source pixels."""
+        corners = origin + np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * np.array(size)
+        self._lines([self._at(corners)], palette.TEXT, 1.5, closed=True)
+
+    def paste(self, inset: Image, left: int, top: int) -> None:
+        """Put a picture into a corner, with a frame."""
+        height, width = inset.shape[:2]
+        edge = self._width(3.0)
+        cv2.rectangle(inset, (0, 0), (width - 1, height - 1), palette.rgb(palette.INK), edge + 2)
+        cv2.rectangle(inset, (1, 1), (width - 2, height - 2), palette.rgb(palette.TEXT), edge - 1)
+        self._canvas[top : top + height, left : left + width] = inset
 
     def stamp(self, text: str) -> None:
-        self._label(np.array([44.0, 30.0]) * self._unit, text, palette.SIM)
+        self._label(np.array([44.0, self._canvas.shape[0] / self._unit - 30.0]) * self._unit, text, palette.SIM)
 
     def _label(self, middle: Points, text: str, name: str) -> None:
         """A text on a dark plate around `middle`, moved inside the picture."""

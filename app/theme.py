@@ -124,11 +124,14 @@ QToolTip {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; paddi
 QComboBox, QSpinBox {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; border-radius: 5px; padding: 3px 8px;
     min-height: 22px; selection-background-color: {SKY}; selection-color: {INK}; }}
 QComboBox:focus, QSpinBox:focus, QPushButton:focus {{ border: 1px solid {SKY}; }}
+QComboBox::drop-down {{ border: none; width: 24px; }}
+QComboBox::down-arrow {{ width: 0; height: 0; border-left: 4px solid {RAISED}; border-right: 4px solid {RAISED};
+    border-top: 5px solid {TEXT_DIM}; margin-right: 10px; }}
 QComboBox QAbstractItemView {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE};
     selection-background-color: {SKY}; selection-color: {INK}; outline: none; }}
 QPushButton {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; border-radius: 5px;
     padding: 4px 12px; min-height: 22px; }}
 QPushButton:hover {{ border-color: {TEXT_FAINT}; }}
 QPushButton:pressed {{ background: {LINE}; }}
-QPushButton:disabled {{ color: {TEXT_FAINT}; }}
+QPushButton:disabled, QSpinBox:disabled {{ color: {TEXT_FAINT}; background: {WINDOW}; }}
 """

@@ -88,26 +88,33 @@ def literal_state(pose: Pose, limits: PoseConfig) -> PoseState:
 
 def why_line(pose: Pose, limits: PoseConfig) -> str:
     """Why the pose has its state, in one plain sentence with the values that decided it."""
-    angle = f"theta {pose.theta_deg:.0f}° {side(pose.theta_signed_deg)}"
     head, tail = pose.d_head_px, pose.d_tail_px
     digits = 1 if round(head) == round(tail) else 0
+    angle = f"theta\N{NO-BREAK SPACE}{pose.theta_deg:.0f}°\N{NO-BREAK SPACE}{side(pose.theta_signed_deg)}"
+    d_head, d_tail = _pixels("d_head", head, digits), _pixels("d_tail", tail, digits)
+    compared = f"{d_head} {'<' if head < tail else '>' if head > tail else '='} {d_tail}"
     if pose.state is PoseState.A:
         allowed_px, allowed_deg = f"allowed {limits.d_allow_px:g}", f"allowed {limits.theta_allow_deg:g}°"
-        line = f"d_head {head:.0f} px, d_tail {tail:.0f} px ({allowed_px}), {angle} ({allowed_deg})"
+        line = f"{d_head}, {d_tail} ({allowed_px}), {angle} ({allowed_deg})"
     elif pose.state is PoseState.D:
         line = f"head {head:.0f} px {side(pose.c_head_px)}, tail {tail:.0f} px {side(pose.c_tail_px)} of the centerline, {angle}"
     elif pose.state is PoseState.B:
-        line = f"back to the centerline: d_head {head:.{digits}f} px < d_tail {tail:.{digits}f} px, {angle}"
+        line = f"to the centerline: {compared}, {angle}"
     else:
-        line = f"from the centerline: d_head {head:.{digits}f} px > d_tail {tail:.{digits}f} px, {angle}"
-    # in a stream a state is kept for a moment beyond its limit; then the values alone would contradict the letter
-    return line if literal_state(pose, limits) is pose.state else f"{line}; about to change"
+        line = f"from the centerline: {compared}, {angle}"
+    # hysteresis keeps a state for a moment beyond its limit; without a word about it the values would contradict the letter
+    return line if literal_state(pose, limits) is pose.state else f"{line} (kept for a moment)"
+
+
+def _pixels(name: str, value: float, digits: int) -> str:
+    """Name, value and unit, kept together when the sentence wraps."""
+    return f"{name} {value:.{digits}f} px".replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def refusal_line(refusal: Refusal) -> str:
-    """What was measured, and what to do about it."""
-    text = REASON_TEXT[refusal.reason]
-    return f"{refusal.detail}: {text.what_to_do}" if refusal.detail else text.what_to_do[0].upper() + text.what_to_do[1:]
+    """What to do about a refusal, and what was measured."""
+    advice = REASON_TEXT[refusal.reason].what_to_do
+    return f"{advice[0].upper()}{advice[1:]}. {refusal.detail}".rstrip(". ")
 
 
 def advice_headline(advice: Advice) -> str:
@@ -115,11 +122,3 @@ def advice_headline(advice: Advice) -> str:
     if abs(advice.steer_deg) < 0.5:
         return f"{SPEED_WORD[advice.speed]}, straight"
     return f"{SPEED_WORD[advice.speed]}, {abs(advice.steer_deg):.0f}° {side(advice.steer_deg)}"
-
-
-def caption(pose: Pose | None, refusal: Refusal | None) -> str:
-    """State and values, or the reason, as one line under a picture."""
-    if pose is None:
-        return f"no pose: {refusal}" if refusal is not None else "no pose"
-    values = f"θ {pose.theta_signed_deg:+.1f}°   d_head {pose.d_head_px:.1f} px   d_tail {pose.d_tail_px:.1f} px"
-    return f"{STATE_TITLE[pose.state]}   {values}"

@@ -44,7 +44,8 @@ class CleaningConfig(_Section):
     min_robot_area_px: int = Field(40, ge=0, le=100_000)
     max_hole_area_px: int = Field(150, ge=0, le=100_000)
     prune_spurs: bool = Field(True, description="drop vessel spurs shorter than the local lumen radius")
-    extend_ends: bool = Field(True, description="extend the robot's end along its tangent to the mask's edge")
+    extend_ends: bool = Field(True, description="extend ends along their tangent to the edge of mask or image")
+    rebuild_junctions: bool = Field(True, description="lead vessel branches straight into their trunk where the skeleton bends")
     half_size_thinning: bool = Field(True, description="thin the vessel on every second pixel: faster, same topology")
 
 
@@ -116,7 +117,6 @@ class TrackingConfig(_Section):
 
     enabled: bool = True
     max_head_speed_px_s: float = Field(600.0, gt=0.0, le=100_000.0)
-    head_jump_px: float = Field(15.0, ge=0.0, le=640.0, description="allowed between two frames whatever the speed")
     memory_s: float = Field(0.5, ge=0.0, le=10.0)
 
 

@@ -17,13 +17,13 @@ KEY_TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("\N{UPWARDS ARROW}  \N{DOWNWARDS ARROW}   or   W  S", "advance, retract"),
             ("E   Q", "lift, dip the head"),
             ("PgUp   PgDn", "sheath forward, back"),
-            ("Space", "stop and straighten, everywhere"),
+            ("Space", "stop, straighten (always)"),
         ),
     ),
     (
         "Target",
         (
-            ("Click", "go there: advice follows the way to it"),
+            ("Click", "destination: advice goes there"),
             ("Right click   or   Esc", "clear the target"),
         ),
     ),
@@ -34,7 +34,7 @@ KEY_TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
         "Window",
         (
-            ("P   or   Ctrl+S", "snapshot: picture, overlay, values"),
+            ("P   or   Ctrl+S", "snapshot into your pictures"),
             ("R", "another random phantom"),
             ("F5", "start the rig again"),
             ("Wheel, drag, F", "zoom, move, whole picture"),
@@ -44,8 +44,9 @@ KEY_TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
         ),
     ),
 )
-_COLUMNS = ((0, 1), (2,), (3,))
+_COLUMNS = (((0, 1), 0.41), ((2,), 0.19), ((3,), 0.40))  # tables, share of the width
 _ROW = 30
+_OVERLAY_TABLE = 2
 _HEAD = 40
 
 
@@ -76,7 +77,7 @@ class HelpOverlay(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(self.rect(), theme.colour(palette.INK, 0.78))
-        page = QRectF(0, 0, min(1240, self.width() - 60), 470)
+        page = QRectF(0, 0, min(1180, self.width() - 40), 460)
         page.moveCenter(QRectF(self.rect()).center())
         painter.setPen(QPen(QColor(palette.LINE), 1))
         painter.setBrush(QColor(palette.PANEL))
@@ -84,11 +85,13 @@ class HelpOverlay(QWidget):
         painter.setPen(QColor(palette.TEXT))
         painter.setFont(theme.bold(22))
         painter.drawText(page.adjusted(32, 22, 0, 0), Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, "Keys")
-        width = (page.width() - 64) / len(_COLUMNS)
-        for k, tables in enumerate(_COLUMNS):
+        left = page.left() + 32
+        for tables, share in _COLUMNS:
+            width = (page.width() - 40) * share
             y = page.top() + 68
             for index in tables:
-                y = self._paint_table(painter, page.left() + 32 + k * width, y, width - 24, index) + 14
+                y = self._paint_table(painter, left, y, width - 16, index) + 14
+            left += width
         painter.end()
 
     @staticmethod
@@ -98,7 +101,7 @@ class HelpOverlay(QWidget):
         painter.setFont(theme.semi_bold(14))
         painter.drawText(QRectF(left, top, width, _HEAD - 8), Qt.AlignmentFlag.AlignVCenter, title)
         top += _HEAD - 6
-        keys_width = 180.0 if index != 2 else 40.0
+        keys_width = 36.0 if index == _OVERLAY_TABLE else 158.0
         for key, text in rows:
             painter.setPen(QColor(palette.TEXT))
             painter.setFont(theme.semi_bold(13))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette, theme
 from app.jog_keys import Motion
@@ -49,10 +49,8 @@ class JogPanel(QWidget):
         self._readout = _Readout()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(6)
-        row = QHBoxLayout()
-        row.addLayout(grid)
-        column.addLayout(row)
+        column.setSpacing(4)
+        column.addLayout(grid)
         column.addWidget(self._readout)
         column.addStretch(1)
         self.setAccessibleName("Keys that move the robot")
@@ -88,11 +86,11 @@ class _Cap(QWidget):
         self._wide = wide
         self._lit = False
         self._held_by_mouse = False
-        self.setMinimumSize(54, 26 if wide else 38)
+        self.setMinimumSize(46, self.sizeHint().height())
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def sizeHint(self) -> QSize:
-        return QSize(62, 26 if self._wide else 38)
+        return QSize(62, 24 if self._wide else 34)
 
     @property
     def is_lit(self) -> bool:
@@ -138,14 +136,14 @@ class _Cap(QWidget):
             painter.setFont(theme.semi_bold(12))
             painter.drawText(frame, Qt.AlignmentFlag.AlignCenter, f"{self._key}:  {self._text}")
             return
-        top = QRectF(frame.left(), frame.top() + 3, frame.width(), 17)
+        top = QRectF(frame.left(), frame.top() + 2, frame.width(), 16)
         painter.setFont(theme.semi_bold(13))
         painter.drawText(top.translated(8 if self._arrow is not None else 0, 0), Qt.AlignmentFlag.AlignCenter, self._key)
         if self._arrow is not None:
             self._paint_arrow(painter, QPointF(top.center().x() - 9, top.center().y()), self._arrow, text)
         painter.setPen(QColor(label))
         painter.setFont(theme.font(11))
-        painter.drawText(QRectF(frame.left(), frame.top() + 20, frame.width(), 15), Qt.AlignmentFlag.AlignCenter, self._text)
+        painter.drawText(QRectF(frame.left(), frame.top() + 18, frame.width(), 14), Qt.AlignmentFlag.AlignCenter, self._text)
         painter.end()
 
     @staticmethod
@@ -164,7 +162,7 @@ class _Readout(QWidget):
         super().__init__()
         self._bend = self._pitch = 0.0
         self._insertion_mm: float | None = None
-        self.setFixedHeight(20)
+        self.setFixedHeight(18)
         self.setToolTip("Bend of the head that is asked for (share of the tendons' full pull) and how far the robot is in")
 
     def show_values(self, bend: float, pitch: float, insertion_mm: float | None) -> None:

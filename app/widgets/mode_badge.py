@@ -14,13 +14,13 @@ class ModeBadge(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setFixedSize(300, 34)
+        self.setFixedSize(214, 34)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Mode: ADVISORY")
         self.setToolTip("ADVISORY: you steer, the program only advises. It is the only mode of this version.")
 
     def sizeHint(self) -> QSize:
-        return QSize(300, 34)
+        return QSize(214, 34)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -37,5 +37,5 @@ class ModeBadge(QWidget):
         painter.drawText(frame.adjusted(14, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, "ADVISORY")
         painter.setFont(theme.font(13))
         painter.setPen(QColor(palette.TEXT_DIM))
-        painter.drawText(frame.adjusted(14 + width + 12, 0, -8, 0), Qt.AlignmentFlag.AlignVCenter, "you steer, it only advises")
+        painter.drawText(frame.adjusted(14 + width + 12, 0, -8, 0), Qt.AlignmentFlag.AlignVCenter, "you steer")
         painter.end()

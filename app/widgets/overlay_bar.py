@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QWidget
 
 from app import palette, theme
@@ -35,7 +35,7 @@ class OverlayBar(QWidget):
         for layer in Layer:
             chip = _Chip(layer)
             chip.toggled.connect(lambda on, which=layer: self.toggled.emit(which, on))
-            row.addWidget(chip, 1)
+            row.addWidget(chip, chip.sizeHint().width())
             self._chips[layer] = chip
         self.setAccessibleName("Overlays")
 
@@ -67,7 +67,7 @@ class _Chip(QAbstractButton):
         self.setAccessibleName(f"Overlay {layer.value.label}")
 
     def sizeHint(self) -> QSize:
-        return QSize(88, 30)
+        return QSize(44 + QFontMetrics(theme.font(13)).horizontalAdvance(self.text()), 30)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -81,13 +81,15 @@ class _Chip(QAbstractButton):
         painter.setPen(QColor(palette.TEXT_DIM if on else palette.TEXT_FAINT))
         painter.setFont(theme.semi_bold(11))
         painter.drawText(QRectF(8, 0, 10, self.height()), Qt.AlignmentFlag.AlignCenter, self._layer.value.key)
-        swatch = QRectF(22, self.height() / 2 - 4, 8, 8)
-        painter.setPen(QPen(QColor(_SWATCH[self._layer]), 1.5))
-        painter.setBrush(QColor(_SWATCH[self._layer]) if on else Qt.BrushStyle.NoBrush)
-        painter.drawRoundedRect(swatch, 2, 2)
+        text_font = theme.font(13)
+        left = 22.0
+        if self.width() >= self.sizeHint().width():  # no room for the colour in a narrow window
+            painter.setPen(QPen(QColor(_SWATCH[self._layer]), 1.5))
+            painter.setBrush(QColor(_SWATCH[self._layer]) if on else Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(QRectF(left, self.height() / 2 - 4, 8, 8), 2, 2)
+            left = 36.0
         painter.setPen(QColor(palette.TEXT if on else palette.TEXT_FAINT))
-        width = self.width() - 36 - 6
-        text_font = theme.fitted(theme.font(13), self.text(), width, 10)
-        painter.setFont(text_font)
-        painter.drawText(QRectF(36, 0, width, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
+        width = self.width() - left - 4
+        painter.setFont(theme.fitted(text_font, self.text(), int(width), 10))
+        painter.drawText(QRectF(left, 0, width, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
         painter.end()

@@ -17,8 +17,8 @@ from core.types import Tick
 
 _SAMPLES = 300
 _DRAW_EVERY_S = 0.5
-_ROWS_MAX = 8
 _BLOCK_LIMIT_MS = 50.0
+_ROW_MIN = 13.0
 
 
 class PerformancePanel(QWidget):
@@ -73,9 +73,8 @@ class PerformancePanel(QWidget):
         return (len(self._shown_s) - 1) / max(self._shown_s[-1] - self._shown_s[0], 1e-6)
 
     def _percentiles(self) -> tuple[tuple[str, str, str], ...]:
-        names = [name for name in self._stages if name != "total"][: _ROWS_MAX - 1]
         rows = []
-        for name in [*names, "total"]:
+        for name in ["total", *(name for name in self._stages if name != "total")]:
             if name in self._stages:
                 half, most = np.percentile(self._stages[name], (50, 95))
                 rows.append((name.replace("_", " "), f"{half:.1f}", f"{most:.1f}"))
@@ -92,14 +91,15 @@ class PerformancePanel(QWidget):
             painter.setPen(QColor(palette.TEXT_FAINT))
             painter.setFont(theme.font(11))
             painter.drawText(QRectF(k * width, 22, width, 14), Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, name)
-        self._paint_table(painter, 44.0)
+        self._paint_table(painter, 40.0)
         painter.end()
 
     def _paint_table(self, painter: QPainter, top: float) -> None:
         middle = Qt.AlignmentFlag.AlignVCenter
         left, right = Qt.AlignmentFlag.AlignLeft | middle, Qt.AlignmentFlag.AlignRight | middle
         rows = (("ms per frame", "p50", "p95"), *self._rows)
-        height = min(18.0, max(12.0, (self.height() - top) / max(len(rows), 1)))
+        height = min(18.0, max(_ROW_MIN, (self.height() - top) / max(len(rows), 1)))
+        rows = rows[: int((self.height() - top) / height)]
         for k, (name, half, most) in enumerate(rows):
             y = top + k * height
             is_total = name == "total"
@@ -117,7 +117,7 @@ def _heads(
     none = "\N{EN DASH}"
     return (
         ("shown/s", none if shown is None else f"{shown:.0f}", False),
-        ("perceived/s", none if engine is None else f"{engine:.0f}", False),
+        ("frames/s", none if engine is None else f"{engine:.0f}", False),
         ("dropped", none if dropped is None else f"{dropped}", False),
         ("block ms", none if block_ms is None else f"{block_ms:.0f}", block_ms is not None and block_ms > _BLOCK_LIMIT_MS),
     )

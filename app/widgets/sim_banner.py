@@ -14,17 +14,18 @@ from hardware.rig import RigKind
 
 @dataclass(frozen=True, slots=True)
 class BannerText:
-    """Word, colour and explanation."""
+    """Word, colour, a note that fits beside it, and the explanation."""
 
     word: str
     colour: str
+    note: str
     meaning: str
 
 
 BANNERS = {
-    RigKind.SIM: BannerText("SIM", palette.SIM, "Bench twin: everything here is simulated, no hardware moves"),
-    RigKind.LIVE: BannerText("LIVE", palette.LIVE, "Real rig: commands move real servos. Keep the hard-wired power cut in reach"),
-    RigKind.PLAYBACK: BannerText("PLAYBACK", palette.PLAYBACK, "Recorded pictures: nothing here is happening now"),
+    RigKind.SIM: BannerText("SIM", palette.SIM, "simulated bench twin", "Everything here is simulated; no hardware moves"),
+    RigKind.LIVE: BannerText("LIVE", palette.LIVE, "real servos move", "Commands move real servos. Keep the power cut in reach"),
+    RigKind.PLAYBACK: BannerText("PLAYBACK", palette.PLAYBACK, "recorded, not live", "Nothing here is happening now"),
 }
 
 
@@ -61,7 +62,7 @@ class SimBanner(QWidget):
         painter.setFont(note_font)
         painter.setPen(QColor(palette.TEXT_DIM))
         left = plate.right() + 14
-        note = theme.elide(note_font, self._text.meaning, int(self.width() - left))
+        note = theme.elide(note_font, self._text.note, int(self.width() - left))
         painter.drawText(QRectF(left, 0, self.width() - left, self.height()), Qt.AlignmentFlag.AlignVCenter, note)
         painter.end()
 

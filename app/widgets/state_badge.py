@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
@@ -14,7 +14,8 @@ from app.wording import REASON_TEXT, STATE_MEANING, STATE_TITLE, refusal_line, w
 from core.config import PoseConfig
 from core.types import PoseState, Scene
 
-_HEIGHT = 124
+_HEIGHT = 104
+_WRAPPED = int(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap)
 
 
 class StateBadge(QWidget):
@@ -84,12 +85,21 @@ class StateBadge(QWidget):
         width = self.width() - left - 2
         painter.setPen(QColor(palette.TEXT))
         painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), self._title, int(width)))
-        painter.drawText(QRectF(left, 8, width, 38), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self._title)
+        painter.drawText(QRectF(left, 2, width, 36), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self._title)
         painter.setPen(QColor(palette.TEXT_DIM))
-        painter.setFont(theme.font(theme.Size.WHY))
-        flags = Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap
-        painter.drawText(QRectF(left, 52, width, self.height() - 52), int(flags), self._why)
+        place = QRectF(left, 42, width, self.height() - 42)
+        painter.setFont(_wrapped_font(self._why, place))
+        painter.drawText(place, _WRAPPED, self._why)
         painter.end()
+
+
+def _wrapped_font(text: str, place: QRectF) -> QFont:
+    """The largest of a few sizes at which `text` fits into `place` when wrapped."""
+    for size in (17, 15, 13):
+        result = theme.font(size)
+        if QFontMetricsF(result).boundingRect(place, _WRAPPED, text).height() <= place.height():
+            break
+    return result
 
 
 def paint_state(painter: QPainter, box: QRectF, state: PoseState | None) -> None:

@@ -28,7 +28,7 @@ class ThetaGauge(QWidget):
         self._number: float | None = None
         self._scale: QPixmap | None = None
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setMinimumSize(200, 150)
+        self.setMinimumSize(200, 146)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("theta")
         self.setToolTip(QUANTITY_MEANING["theta"])
@@ -65,7 +65,7 @@ class ThetaGauge(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._theta_deg is not None:
             self._paint_needle(painter, hub, radius, self._theta_deg)
-        self._paint_number(painter, hub)
+        self._paint_number(painter, hub, radius)
         painter.end()
 
     def _dial(self, hub: QPointF, radius: float) -> QPixmap:
@@ -122,17 +122,16 @@ class ThetaGauge(QWidget):
         painter.setBrush(QColor(palette.TEXT))
         painter.drawEllipse(hub, 4.0, 4.0)
 
-    def _paint_number(self, painter: QPainter, hub: QPointF) -> None:
+    def _paint_number(self, painter: QPainter, hub: QPointF, radius: float) -> None:
         shown = self._number is not None
         painter.setPen(QColor(palette.TEXT if shown else palette.TEXT_FAINT))
         painter.setFont(theme.bold(theme.Size.NUMBER))
         painter.drawText(QRectF(hub.x() - 90, hub.y() + 10, 180, 34), Qt.AlignmentFlag.AlignCenter, self.text)
-        if self.direction:
-            sign = -1 if self.direction == "left" else 1
-            painter.setPen(QColor(palette.TEXT_DIM))
-            painter.setFont(theme.semi_bold(theme.Size.LABEL))
-            box = QRectF(hub.x() + sign * 92 - 30, hub.y() + 17, 60, 22)
-            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, self.direction)
+        painter.setFont(theme.semi_bold(13))
+        for sign in (-1.0, 1.0):
+            painter.setPen(QColor(palette.TEXT if side(sign) == self.direction else palette.TEXT_FAINT))
+            box = QRectF(hub.x() + sign * radius * 0.56 - 30, hub.y() - 20, 60, 20)
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, side(sign))
 
 
 def _dial_angle(theta_deg: float) -> float:

@@ -17,6 +17,7 @@ SPAN_S = 30.0
 _CAPACITY = 1024
 _DRAW_EVERY_S = 0.1
 _CELL_S = 0.1
+_ROOM_FOR_TICKS = 44.0
 _STATES: tuple[PoseState | None, ...] = (None, *PoseState)
 _ANGLE_RANGES = (20.0, 45.0, 90.0, 180.0)
 _DISTANCE_RANGES = (15.0, 30.0, 60.0, 120.0, 640.0)
@@ -34,7 +35,7 @@ class TrendPlot(QWidget):
         self._values = np.full((3, _CAPACITY), np.nan)
         self._states = np.zeros(_CAPACITY, np.uint8)
         self._pace = Pace(_DRAW_EVERY_S)
-        self.setMinimumHeight(120)
+        self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Trends of theta, d_head and d_tail over the last 30 seconds")
         self.setToolTip("theta (above), d_head and d_tail (below, dotted) and the state over the last 30 s; gaps: no pose")
@@ -43,7 +44,7 @@ class TrendPlot(QWidget):
         view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         view.viewport().setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         view.ci.layout.setContentsMargins(0, 4, 14, 0)
-        view.ci.layout.setVerticalSpacing(6)
+        view.ci.layout.setVerticalSpacing(8)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(view)
@@ -100,6 +101,7 @@ class _Chart:
         self._ranges = ranges
         self._is_signed = is_signed
         self._range = 0.0
+        self._ticks: tuple[float, ...] = ()
         self._plot = view.addPlot(row=row, col=0)
         self._plot.setMenuEnabled(False)
         self._plot.hideButtons()
@@ -131,13 +133,15 @@ class _Chart:
         largest = float(np.abs(finite).max()) if finite.size else 0.0
         wanted = next((r for r in self._ranges if largest <= r), self._ranges[-1])
         if wanted < self._range and largest > 0.8 * wanted:
-            return
+            wanted = self._range
+        low = -wanted if self._is_signed else 0.0
         if wanted != self._range:
             self._range = wanted
-            low = -wanted if self._is_signed else 0.0
             self._plot.setYRange(low, wanted, padding=0.04)
-            ticks = (low, 0.0, wanted) if self._is_signed else (0.0, wanted / 2, wanted)
-            self._plot.getAxis("left").setTicks([[(tick, f"{tick:g}") for tick in ticks]])
+        ticks = (low, (low + wanted) / 2, wanted) if self._plot.vb.height() > _ROOM_FOR_TICKS else (0.0, wanted)
+        if ticks != self._ticks:
+            self._ticks = ticks
+            self._plot.getAxis("left").setTicks([[(tick, f"{tick:g}".replace("-", "\N{MINUS SIGN}")) for tick in ticks]])
 
 
 class _StateBand:

@@ -5,17 +5,18 @@ Lengths are in the graph's own unit: pixels in perception, and the same function
 
 from __future__ import annotations
 
-import heapq
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from core.config import VectorConfig
 from core.perception import polyline
+from core.perception.route import incidence_of, plan_route
 from core.perception.vessel_graph import build_graph
-from core.types import Centerline, Point, Points, Route, VesselGraph
+from core.types import Centerline, Mask, Point, Points, Route, VesselGraph
 
-__all__ = ["build_graph", "centerline_at", "plan_route", "window_at"]
+__all__ = ["build_graph", "centerline_at", "find", "plan_route", "window_at"]
 
 MIN_PIECE_SHARE = 0.2
 """A piece shorter than this share of the wanted length (8 of 40 px) gives no direction."""
@@ -43,15 +44,47 @@ class _Candidate:
         return np.asarray(chord / max(float(np.hypot(chord[0], chord[1])), 1e-9))
 
 
+def find(
+    graph: VesselGraph, skeleton: Mask, head: Point, robot_direction: Point, config: VectorConfig, route: Route | None = None
+) -> Centerline | None:
+    """The piece beside the head by the configured rule: along one path of the graph, or the paper's window of skeleton pixels."""
+    if config.vessel_rule == "window":
+        return window_at(skeleton, head, robot_direction, config.vessel_half_length_px)
+    return centerline_at(graph, head, robot_direction, config.vessel_half_length_px, route)
+
+
+def window_at(skeleton: Mask, head: Point, robot_direction: Point, half_length_px: float) -> Centerline | None:
+    """The paper's way: all vessel-skeleton pixels within `half_length_px` of the one nearest to the head, whatever branch they are
+    of.
+
+    The pixels have no order, so the piece is the straight line through them; the radius is not known (0). None where they are fewer
+    than ``MIN_PIECE_SHARE`` of the wanted length.
+    """
+    rows, columns = np.nonzero(skeleton)
+    pixels = np.column_stack([columns, rows]).astype(np.float64)
+    if len(pixels) == 0:
+        return None
+    nearest = pixels[np.argmin(np.hypot(*(pixels - head).T))]
+    window = pixels[np.hypot(*(pixels - nearest).T) <= half_length_px]
+    if len(window) < MIN_PIECE_SHARE * 2.0 * half_length_px:
+        return None
+    mean = window.mean(axis=0)
+    axis = np.linalg.svd(window - mean, full_matrices=False)[2][0]
+    axis = axis if float(axis @ np.asarray(robot_direction)) >= 0.0 else -axis
+    along = (window - mean) @ axis
+    piece = mean + np.outer([along.min(), along.max()], axis)
+    return Centerline(piece, (float(nearest[0]), float(nearest[1])), 0.0)
+
+
 def centerline_at(
     graph: VesselGraph, head: Point, robot_direction: Point, half_length_px: float, route: Route | None = None
 ) -> Centerline | None:
     """The piece of centerline beside the head, along one path of the vessel graph, in the robot's direction of travel.
 
-    Near a junction the nearest edge may be a side branch that the robot merely passes. So every path that leads past the head within
-    reach is a candidate, and the one is taken that the robot's straight line fits best, in direction and in place (and that keeps to
-    the route, if there is one). The cost changes smoothly with head and direction, so that a small disturbance changes the choice
-    only where two branches fit equally well; `ambiguity` says how near that is.
+    Near a junction the nearest edge may be a side branch that the robot merely passes. So every path that leads past the head
+    within reach is a candidate, and the one is taken that the robot's straight line fits best, in direction and in place (and that
+    keeps to the route, if there is one). The cost changes smoothly with head and direction, so that a small disturbance changes
+    the choice only where two branches fit equally well; `ambiguity` says how near that is.
 
     Parameters
     ----------
@@ -66,7 +99,7 @@ def centerline_at(
     The piece, or None when the graph is empty or ends too soon (less than ``MIN_PIECE_SHARE`` of the wanted length).
     """
     feet = _feet(graph, head, half_length_px)
-    incidence = _incidence(graph)
+    incidence = incidence_of(graph)
     ahead = _route_ahead(route, head, half_length_px, max((radius for _, _, radius in feet), default=0.0))
     direction = np.asarray(robot_direction, np.float64)
     candidates = []
@@ -105,15 +138,6 @@ def _feet(graph: VesselGraph, head: Point, half_length: float) -> list[tuple[int
         for distance, index, position, radius in found
         if distance <= max(least + 0.25 * radius_there, 1.1 * radius)
     ]
-
-
-def _incidence(graph: VesselGraph) -> list[list[tuple[int, bool]]]:
-    """For each node the edges that touch it, as (edge, whether the edge starts here)."""
-    touching: list[list[tuple[int, bool]]] = [[] for _ in range(len(graph.nodes))]
-    for index, edge in enumerate(graph.edges):
-        touching[edge.start].append((index, True))
-        touching[edge.end].append((index, False))
-    return touching
 
 
 def _walks(
@@ -195,73 +219,3 @@ def _rivalry(best: _Candidate, other: _Candidate) -> float:
     closeness = max(0.0, 1.0 - (other.cost - best.cost) / TIE_COST)
     angle_deg = float(np.degrees(np.arccos(np.clip(best.direction @ other.direction, -1.0, 1.0))))
     return closeness * min(1.0, angle_deg / TIE_ANGLE_DEG)
-
-
-def plan_route(graph: VesselGraph, start: Point, target: Point) -> Route | None:
-    """The shortest way along the graph from the place beside `start` to the place nearest to `target`.
-
-    Returns
-    -------
-    The route, or None when the graph is empty or has no way between the two places.
-    """
-    here, there = _place(graph, start), _place(graph, target)
-    if here is None or there is None:
-        return None
-    (edge, position), (last_edge, last_position) = here, there
-    lengths = [float(polyline.arc_length(e.points)[-1]) for e in graph.edges]
-    reached, came_by = _distances(graph, lengths, edge, position)
-    last = graph.edges[last_edge]
-    ways: list[tuple[float, int | None]] = [
-        (reached[last.start] + last_position, last.start),
-        (reached[last.end] + lengths[last_edge] - last_position, last.end),
-    ]
-    if edge == last_edge:
-        ways.append((abs(last_position - position), None))
-    length, node = min(ways, key=lambda way: way[0])
-    if not np.isfinite(length):
-        return None
-    if node is None:
-        low, high = sorted((position, last_position))
-        points = polyline.cut(last.points, low, high)
-        return Route(points if position <= last_position else points[::-1], length, target)
-    final = polyline.cut(last.points, 0.0, last_position) if node == last.start else polyline.cut(last.points, last_position, np.inf)[::-1]
-    pieces = [final]
-    while (via := came_by[node]) is not None:
-        points = graph.edges[via].points
-        pieces.append(points if graph.edges[via].end == node else points[::-1])
-        node = graph.edges[via].start if graph.edges[via].end == node else graph.edges[via].end
-    first = graph.edges[edge]
-    leaves_by_end = node == first.end and (node != first.start or 2.0 * position > lengths[edge])
-    pieces.append(polyline.cut(first.points, position, np.inf) if leaves_by_end else polyline.cut(first.points, 0.0, position)[::-1])
-    points = np.concatenate(pieces[::-1])
-    distinct = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])
-    return Route(points[distinct], length, target)
-
-
-def _place(graph: VesselGraph, point: Point) -> tuple[int, float] | None:
-    """The edge nearest to a point and the arc-length position on it."""
-    best = min(
-        ((*polyline.nearest(edge.points, point)[:2], index) for index, edge in enumerate(graph.edges) if len(edge.points) > 1),
-        default=None,
-    )
-    return None if best is None else (best[2], best[1])
-
-
-def _distances(graph: VesselGraph, lengths: list[float], edge: int, position: float) -> tuple[list[float], list[int | None]]:
-    """Dijkstra from a place on an edge: the distance to every node and the edge it is reached by (None: straight from the place)."""
-    reached = [np.inf] * len(graph.nodes)
-    came_by: list[int | None] = [None] * len(graph.nodes)
-    incidence = _incidence(graph)
-    first = graph.edges[edge]
-    queue: list[tuple[float, int, int]] = [(position, first.start, -1), (lengths[edge] - position, first.end, -1)]
-    heapq.heapify(queue)
-    while queue:
-        distance, node, via = heapq.heappop(queue)
-        if distance >= reached[node]:
-            continue
-        reached[node], came_by[node] = distance, via if via >= 0 else None
-        for index, starts in incidence[node]:
-            following = graph.edges[index].end if starts else graph.edges[index].start
-            if distance + lengths[index] < reached[following]:
-                heapq.heappush(queue, (distance + lengths[index], following, index))
-    return reached, came_by

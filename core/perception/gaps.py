@@ -26,9 +26,9 @@ class _End:
 def repair(skeletons: Skeletons, config: GapConfig) -> Skeletons:
     """The same skeletons with the robot's gaps bridged, and the bridges listed.
 
-    With ``rule = "components"`` ends of different components are joined, nearest first, where the robot would not have to turn by more
-    than ``max_turn_deg``; each end is used once. With ``rule = "every_pair"`` every two ends nearer than the threshold are joined,
-    as the paper's pseudocode says: also the two ends of one short piece.
+    With ``rule = "components"`` ends of different components are joined, nearest first, where the robot would not have to turn by
+    more than ``max_turn_deg``; each end is used once. With ``rule = "every_pair"`` every two ends nearer than the threshold are
+    joined, as the paper's pseudocode says: also the two ends of one short piece.
     """
     ends = _ends(skeletons.robot)
     if config.rule == "every_pair":
@@ -49,7 +49,8 @@ def _ends(skeleton: Mask) -> list[_End]:
     if len(places) < 2:
         return []
     x, y, width, height = cv2.boundingRect(skeleton.view(np.uint8))
-    _, labels = cv2.connectedComponents(np.ascontiguousarray(skeleton[y : y + height, x : x + width]).view(np.uint8), connectivity=8)
+    window = np.ascontiguousarray(skeleton[y : y + height, x : x + width])
+    _, labels = cv2.connectedComponents(window.view(np.uint8), connectivity=8)
     return [_End((u, v), end_direction(skeleton, (u, v)), int(labels[v - y, u - x])) for u, v in places]
 
 

@@ -1,8 +1,8 @@
 """Where vessels meet: the junction put where the branches' own centerlines meet, not where the skeleton does.
 
-In the widened lumen of a bifurcation the skeleton leaves the trunk's centerline towards the opening, by some pixels over some two radii
-to each side. So the part of each branch within the opening is replaced: a trunk goes on smoothly through it, a side branch runs
-straight to the trunk, and where no two branches form a trunk all run straight to the point that fits their directions best.
+In the widened lumen of a bifurcation the skeleton leaves the trunk's centerline towards the opening, by some pixels over some two
+radii to each side. So the part of each branch within the opening is replaced: a trunk goes on smoothly through it, a side branch
+runs straight to the trunk, and where no two branches form a trunk all run straight to the point that fits their directions best.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
-from core.types import Point, Points
+from core.types import Points
 
 STEP_PX = 2.0
 OPENING_MIN_RADII = 0.8
 OPENING_MAX_RADII = 2.5
-"""The opening ends where the lumen is as narrow as the branch itself, looked for between these multiples of the junction's radius."""
+"""An opening ends where the lumen is as narrow as the branch itself: looked for between these multiples of its junction's
+radius."""
 SETTLED = 1.1
 CLEAR_RADII = 1.0
 ROUNDS = 3
@@ -30,7 +31,7 @@ TRUNK_LEAD_DEG = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
-    """One branch seen from a junction: its centerline outwards (N, 2), the radius along it, and whether it is free to its far end."""
+    """A branch seen from a junction: its centerline outwards (N, 2), the radius along it (N,), and what its far end is."""
 
     points: Points
     radius: NDArray[np.float64]
@@ -64,7 +65,8 @@ def rebuild(centre: Points, radius_px: float, arms: list[Arm]) -> tuple[Points, 
             return None
         trunk = _trunk(known)
         if trunk is None:
-            place, bridges = _meeting_point(list(known.values()), centre, radius_px), {}
+            place = _meeting_point(list(known.values()), centre, radius_px)
+            bridges: dict[int, Points] = {}
         else:
             place, bridges = _on_trunk(trunk, gates, centre, radius_px)
         # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
@@ -91,7 +93,7 @@ def rebuild(centre: Points, radius_px: float, arms: list[Arm]) -> tuple[Points, 
 
 
 def _gate(arm: Arm, along: NDArray[np.float64], radius_px: float, at_least_px: float) -> _Gate | None:
-    """Where an arm has left the opening: where its lumen has become as narrow as it stays. None for an arm that is too short to tell."""
+    """Where an arm has left the opening: its lumen is as narrow there as it stays. None for an arm too short to tell."""
     low = max(OPENING_MIN_RADII * radius_px, at_least_px)
     usable = along[-1] * (0.5 if arm.far_is_junction else 1.0) - 8.0
     first, last = np.searchsorted(along, (low, min(max(OPENING_MAX_RADII * radius_px, low + radius_px), usable)))
@@ -169,7 +171,3 @@ def _straight(start: Points, end: Points) -> Points:
     count = max(2, round(float(np.hypot(*(end - start))) / STEP_PX) + 1)
     return np.asarray(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start))
 
-
-def as_point(place: Points) -> Point:
-    """A place (2,) as a plain pair."""
-    return float(place[0]), float(place[1])

@@ -19,9 +19,10 @@ def clean(vessel_probability: NDArray[np.float32], robot_probability: NDArray[np
     config : thresholds (``segmentation``) and limits of area (``cleaning``).
     """
     cleaning, thresholds = config.cleaning, config.segmentation
+    vessel, robot = vessel_probability >= thresholds.vessel_threshold, robot_probability >= thresholds.robot_threshold
     return Masks(
-        vessel=clean_mask(vessel_probability >= thresholds.vessel_threshold, cleaning.min_vessel_area_px, cleaning.max_hole_area_px),
-        robot=clean_mask(robot_probability >= thresholds.robot_threshold, cleaning.min_robot_area_px, cleaning.max_hole_area_px),
+        vessel=clean_mask(vessel, cleaning.min_vessel_area_px, cleaning.max_hole_area_px),
+        robot=clean_mask(robot, cleaning.min_robot_area_px, cleaning.max_hole_area_px),
         vessel_probability=vessel_probability,
         robot_probability=robot_probability,
     )
@@ -51,7 +52,7 @@ def clean_mask(mask: Mask, min_area_px: int, max_hole_area_px: int) -> Mask:
     return cleaned.view(np.bool_)
 
 
-def _enclosed_pixels(contour: NDArray[np.int32], is_hole: bool) -> float:
+def _enclosed_pixels(contour: cv2.typing.MatLike, is_hole: bool) -> float:
     """Pixels on and inside an outer contour, or strictly inside a hole's contour, by Pick's theorem on the pixel grid."""
     border = len(contour) if len(contour) > 1 else 0
     return cv2.contourArea(contour) + (-0.5 if is_hole else 0.5) * border + 1.0

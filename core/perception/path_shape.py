@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,7 +46,7 @@ def _centred(line: Points, probability: NDArray[np.float32], radius_px: float) -
     offsets = np.arange(-side, side + 1, dtype=np.float64)
     across = polyline.normals(line)
     places = line[:, None, :] + offsets[None, :, None] * across[:, None, :]
-    weight = cv2.remap(probability, places.astype(np.float32), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    weight = polyline.sample(probability, places)
     # Looking outwards the weight may only fall: another stretch of robot close by does not pull.
     weight[:, side:] = np.minimum.accumulate(weight[:, side:], axis=1)
     weight[:, side::-1] = np.minimum.accumulate(weight[:, side::-1], axis=1)
@@ -76,7 +75,7 @@ def _to_edge(line: Points, masks: Masks, radius_px: float) -> Points:
 
 
 def edge_distance(origin: Points, direction: Points, mask: Mask, probability: NDArray[np.float32], limit_px: float) -> float:
-    """How far it is from `origin` inside a mask to its edge, in px; to a fraction of a pixel where the probability falls through 0.5."""
+    """How far it is from `origin` in a mask to its edge: to a fraction of a pixel, where the probability falls through 0.5."""
     steps = np.arange(0.0, limit_px)
     places = origin + steps[:, None] * direction
     height, width = mask.shape
@@ -87,8 +86,7 @@ def edge_distance(origin: Points, direction: Points, mask: Mask, probability: ND
     if len(outside) == 0 or outside[0] == 0:
         return 0.0
     last = int(outside[0]) - 1
-    ray = places[max(last - 1, 0) : last + 3].astype(np.float32).reshape(-1, 1, 2)
-    level = cv2.remap(probability, ray, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).ravel()
+    level = polyline.sample(probability, places[max(last - 1, 0) : last + 3])
     falls = np.flatnonzero((level[:-1] >= 0.5) & (level[1:] < 0.5))
     if len(falls) == 0:
         return float(last)

@@ -7,16 +7,16 @@ from contextlib import contextmanager
 from dataclasses import replace
 from time import perf_counter
 
-import numpy as np
-
 from core.config import PerceptionConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton
-from core.perception.centerline import centerline_at, plan_route
+from core.perception.centerline import find as find_centerline
 from core.perception.pose import StateFilter, measure
+from core.perception.route import plan_route
 from core.perception.segmentation import Segmenter, open_segmenter, to_working
+from core.perception.tracking import Memory, check_jump, recall
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
-from core.types import Frame, Point, Reason, Refusal, RobotPath, Scene
+from core.types import Frame, Masks, Point, Reason, Refusal, RobotPath, Scene
 
 
 class _Stopwatch:
@@ -42,16 +42,15 @@ class _Stopwatch:
 class Pipeline:
     """Perception of single images or of a stream.
 
-    A call perceives a frame of a stream: the last frames decide between near-equal paths, an impossible jump of the head is refused,
-    and the state is steadied. ``perceive_single`` knows nothing of other frames and leaves the stream's memory alone.
+    A call perceives a frame of a stream: the last frames decide between near-equal paths, an impossible jump of the head is
+    refused, and the state is steadied. ``perceive_single`` knows nothing of other frames and leaves the stream's memory alone.
     """
 
     def __init__(self, segmenter: Segmenter, config: PerceptionConfig) -> None:
         self._segment = segmenter
         self._config = config
         self._states = StateFilter(config.pose)
-        self._previous: RobotPath | None = None
-        self._previous_s = 0.0
+        self._memory: Memory | None = None
 
     @property
     def engine(self) -> str:
@@ -60,7 +59,7 @@ class Pipeline:
 
     def reset(self) -> None:
         """Forget the stream's past."""
-        self._previous = None
+        self._memory = None
         self._states.update(None)
 
     def perceive_single(self, frame: Frame, target: Point | None = None) -> Scene:
@@ -74,22 +73,14 @@ class Pipeline:
         if not tracking.enabled:
             return self.perceive_single(frame, target)
         watch = _Stopwatch()
-        age_s = frame.captured_s - self._previous_s
-        previous = self._previous if self._previous is not None and 0 <= age_s <= tracking.memory_s else None
-        scene = self._perceive(frame, target, previous, watch)
-        if scene.pose is not None and scene.path is not None and previous is not None:
-            moved = float(np.hypot(scene.path.head[0] - previous.head[0], scene.path.head[1] - previous.head[1]))
-            allowed = tracking.max_head_speed_px_s * age_s + tracking.head_jump_px
-            if moved > allowed:
-                # The memory is not renewed: a robot that really is elsewhere is believed once the memory has faded.
-                detail = f"{moved:.0f} px in {age_s * 1e3:.0f} ms, at most {allowed:.0f} px is possible"
-                scene = replace(scene, pose=None, refusal=Refusal(Reason.HEAD_JUMP, detail))
-                self._states.update(None)
-                return watch.finish(scene)
-        if scene.pose is not None:
-            self._previous, self._previous_s = scene.path, frame.captured_s
-        steadied = self._states.update(scene.pose)
-        return watch.finish(replace(scene, pose=steadied))
+        scene = self._perceive(frame, target, recall(self._memory, frame.captured_s, tracking), watch)
+        if scene.pose is not None and scene.path is not None:
+            jump = check_jump(scene.path, self._memory, frame.captured_s, tracking)
+            if jump is None:
+                self._memory = Memory(scene.path, frame.captured_s)
+            else:
+                scene = replace(scene, pose=None, refusal=jump)
+        return watch.finish(replace(scene, pose=self._states.update(scene.pose)))
 
     def _perceive(self, frame: Frame, target: Point | None, previous: RobotPath | None, watch: _Stopwatch) -> Scene:
         config = self._config
@@ -119,31 +110,32 @@ class Pipeline:
             path = robot_path.find(skeletons, found, config, previous, graph)
         if isinstance(path, Refusal):
             return replace(scene, refusal=path)
-        scene = replace(scene, path=path)
         with watch.stage("pose"):
-            return self._pose(scene, path, target)
+            return self._pose(replace(scene, path=path), path, found, target)
 
-    def _pose(self, scene: Scene, path: RobotPath, target: Point | None) -> Scene:
-        """Vectors, centerline piece, pose and the last word of the quality gate."""
+    def _pose(self, scene: Scene, path: RobotPath, found: Masks, target: Point | None) -> Scene:
+        """Vectors, the centerline's piece, the pose, and the quality gate's word on each."""
         config = self._config
-        assert scene.masks is not None
-        assert scene.vessel_graph is not None
-        graph = scene.vessel_graph
+        graph, skeletons = scene.vessel_graph, scene.skeletons
+        assert graph is not None
+        assert skeletons is not None
         if target is not None:
             scene = replace(scene, route=plan_route(graph, path.head, scene.to_working(target)))
         robot_vector = fit_robot_vector(path.points, config.vectors.robot_length_px)
-        if robot_vector is None:
-            return replace(scene, refusal=Refusal(Reason.TOO_SHORT, "no line can be fitted to it"))
-        half_px = config.vectors.vessel_half_length_px
-        centerline = centerline_at(graph, path.head, robot_vector.direction, half_px, scene.route)
+        refusal = quality.check_path(path, found, config)
+        if robot_vector is None or refusal is not None:
+            return replace(scene, robot_vector=robot_vector, refusal=refusal or Refusal(Reason.TOO_SHORT, "it has no direction"))
+        centerline = find_centerline(graph, skeletons.vessel, path.head, robot_vector.direction, config.vectors, scene.route)
         vessel_vector = fit_vessel_vector(centerline) if centerline is not None else None
         scene = replace(scene, robot_vector=robot_vector, centerline=centerline, vessel_vector=vessel_vector)
-        if centerline is None or vessel_vector is None:
-            return replace(scene, refusal=Refusal(Reason.NO_VESSEL, "no centerline beside the robot's head"))
-        judged = quality.judge(scene.masks, path, centerline, config)
-        if isinstance(judged, Refusal):
-            return replace(scene, refusal=judged)
-        return replace(scene, pose=measure(robot_vector, vessel_vector, config.pose, judged))
+        refusal = quality.check_centerline(centerline, config.quality)
+        if centerline is None or vessel_vector is None or refusal is not None:
+            return replace(scene, refusal=refusal or Refusal(Reason.NO_VESSEL, "the centerline beside the head has no direction"))
+        confidence = quality.confidence(path, centerline, found, config)
+        refusal = quality.check_confidence(confidence, config.quality)
+        if refusal is not None:
+            return replace(scene, refusal=refusal)
+        return replace(scene, pose=measure(robot_vector, vessel_vector, config.pose, confidence))
 
 
 def open_pipeline(config: PerceptionConfig) -> Pipeline:

@@ -43,8 +43,9 @@ class PixelGraph:
 def trace(skeleton: Mask) -> PixelGraph:
     """The pixel graph of a one-pixel skeleton, in the skeleton's own pixel coordinates.
 
-    Neighbouring pixels are linked; a diagonal link is left out where a straight neighbour already makes it, so that a staircase is a
-    chain and not a row of junctions. Pixels with three or more links are junctions, and touching ones are one node at their mean.
+    Neighbouring pixels are linked; a diagonal link is left out where a straight neighbour already makes it, so that a staircase is
+    a chain and not a row of junctions. Pixels with three or more links are junctions, and touching ones are one node at their
+    mean.
     """
     places, neighbours = _linked_pixels(skeleton)
     links = (neighbours >= 0).sum(axis=1)
@@ -76,7 +77,7 @@ def _linked_pixels(skeleton: Mask) -> tuple[Points, NDArray[np.int32]]:
         beside = (neighbours[:, _STEPS.index((dy, 0))] >= 0) | (neighbours[:, _STEPS.index((0, dx))] >= 0)
         neighbours[beside, diagonal] = -1
     rows, columns = np.divmod(flat, stride)
-    return np.column_stack([columns + (x - 1.0), rows + (y - 1.0)]), neighbours
+    return np.column_stack([columns + (x - 1.0), rows + (y - 1.0)]), np.asarray(neighbours)
 
 
 @dataclass(slots=True, eq=False)
@@ -122,11 +123,13 @@ class _Walk:
             self.seen[pixel] = True
             self._new_node(pixel)
             return
-        origin, walked, current = previous, [], pixel
-        while current >= 0 and self.cluster[current] < 0:
-            self.seen[current] = True
+        origin, current = previous, pixel
+        walked: list[int] = []
+        cluster, seen, two = self.cluster, self.seen, self._two  # this loop is the hot spot: a turn for every pixel
+        while current >= 0 and cluster[current] < 0:
+            seen[current] = True
             walked.append(current)
-            a, b = self._two[current]
+            a, b = two[current]
             previous, current = current, b if a == previous else a
         start = self.cluster[origin] if origin >= 0 else self._new_node(pixel)
         end = self.cluster[current] if current >= 0 else self._new_node(walked[-1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,6 +72,13 @@ def smooth(points: Points, sigma: float) -> Points:
     # Mirrored through its end point, the line goes on straight there: no shrinking, and the end itself is kept.
     longer = np.concatenate([2.0 * points[0] - points[pad:0:-1], points, 2.0 * points[-1] - points[-2 : -pad - 2 : -1]])
     return np.column_stack([np.convolve(longer[:, 0], kernel, mode="valid"), np.convolve(longer[:, 1], kernel, mode="valid")])
+
+
+def sample(values: NDArray[np.float32], points: Points) -> NDArray[np.float64]:
+    """A map (h, w) at sub-pixel places (..., 2), bilinear; places beyond its border get the border's value. Shape (...)."""
+    x, y = (np.ascontiguousarray(points[..., axis], np.float32).reshape(-1, 1) for axis in (0, 1))
+    found = cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(found, np.float64).reshape(points.shape[:-1])
 
 
 @lru_cache(maxsize=64)

@@ -43,7 +43,9 @@ def signed_distance(point: Point, line: Vector) -> float:
     return v[0] * (point[1] - p[1]) - v[1] * (point[0] - p[0])
 
 
-def classify(c_head_px: float, c_tail_px: float, theta_deg: float, config: PoseConfig, current: PoseState | None = None) -> PoseState:
+def classify(
+    c_head_px: float, c_tail_px: float, theta_deg: float, config: PoseConfig, current: PoseState | None = None
+) -> PoseState:
     """The one state of a pose.
 
     The paper's four descriptions overlap and leave holes; asked in the order A, D, B, C every pose has exactly one state.
@@ -74,8 +76,8 @@ def classify(c_head_px: float, c_tail_px: float, theta_deg: float, config: PoseC
 class StateFilter:
     """Steadies the state of a stream: a hysteresis on every threshold and a dwell time, so that the badge does not chatter.
 
-    A new state must show for ``dwell_frames`` frames in a row. A frame without a pose forgets everything: the next pose starts anew,
-    and no stale state is ever shown.
+    A new state must show for ``dwell_frames`` frames in a row. A frame without a pose forgets everything: the next pose starts
+    anew, and no stale state is ever shown.
     """
 
     def __init__(self, config: PoseConfig) -> None:

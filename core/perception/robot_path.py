@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from core.config import PathConfig, PerceptionConfig
 from core.perception import gaps, path_shape, polyline, trails
@@ -43,8 +42,9 @@ def find(
 ) -> RobotPath | Refusal:
     """The robot's path, tail -> head, or why there is none.
 
-    Starts are the ends at the image border or at the insertion port; a robot that enters inside the image starts at any end. From each
-    start the longest branch is kept (shortened by what its turns at junctions cost), and the best scored of these is the robot.
+    Starts are the ends at the image border or at the insertion port; a robot that enters inside the image starts at any end. From
+    each start the longest branch is kept (shortened by what its turns at junctions cost), and the best scored of these is the
+    robot.
 
     Parameters
     ----------
@@ -138,12 +138,11 @@ def _share_inside(points: Points, masks: Masks) -> float:
 
 def _several(graph: PixelGraph, pieces: list[tuple[list[int], float]], config: PerceptionConfig) -> Refusal | None:
     """Refuse when a second piece is too large to be an outlier, or when the robot goes on beyond a gap that was not repaired."""
-    degrees = graph.degrees()
     share = config.quality.several_robots_share
     for nodes, size in pieces[1:] if share < 1.0 else []:
         if size < config.path.min_length_px:
             continue
-        gap_px = _facing_gap(graph, degrees, pieces[0][0], nodes, config)
+        gap_px = _facing_gap(graph, pieces[0][0], nodes, config)
         if gap_px is not None and size >= min(share * pieces[0][1], config.quality.min_robot_length_px):
             detail = f"two pieces of the robot are {gap_px:.0f} px apart (repaired up to {config.gaps.gap_threshold_px:.0f} px)"
             return Refusal(Reason.GAP_TOO_LONG, detail)
@@ -153,8 +152,9 @@ def _several(graph: PixelGraph, pieces: list[tuple[list[int], float]], config: P
     return None
 
 
-def _facing_gap(graph: PixelGraph, degrees: NDArray[np.int64], first: list[int], second: list[int], config: PerceptionConfig) -> float | None:
+def _facing_gap(graph: PixelGraph, first: list[int], second: list[int], config: PerceptionConfig) -> float | None:
     """The gap between two pieces if an end of one looks at an end of the other, else None."""
+    degrees = graph.degrees()
     headings = {}
     for chain in graph.chains:
         for node, outward in ((chain.start, chain.points[::-1]), (chain.end, chain.points)):

@@ -13,6 +13,8 @@ from core.perception import polyline
 from core.perception.pixel_graph import Chain, PixelGraph
 from core.types import Points
 
+Steps = tuple[tuple[int, bool], ...]
+"""Chains in walking order, each with whether it is walked from its start to its end."""
 HEADING_PX = 10.0
 """Directions at a junction are taken over this length of each chain."""
 
@@ -32,13 +34,14 @@ def explore(graph: PixelGraph, start: int, config: PathConfig) -> list[Trail]:
     """All ways from an end of the skeleton to its other ends, without using a chain twice; longest (effective) first.
 
     A node may be passed twice: a robot that crosses itself does. Straight continuations are tried first, so that the limit of
-    ``max_candidates`` drops the unlikely ones. Where no other end can be reached (the robot's head lies against its own body) the ways
-    that stop at a junction are given instead.
+    ``max_candidates`` drops the unlikely ones. Where no other end can be reached (the robot's head lies against its own body) the
+    ways that stop at a junction are given instead.
     """
     leaving = _chains_at(graph)
     degrees = graph.degrees()
-    finished, stopped = [], []
-    pending: list[tuple[int, tuple[tuple[int, bool], ...], float]] = [(start, (), 0.0)]
+    finished: list[tuple[Steps, float]] = []
+    stopped: list[tuple[Steps, float]] = []
+    pending: list[tuple[int, Steps, float]] = [(start, (), 0.0)]
     budget = 20 * config.max_candidates
     while pending and budget > 0 and len(finished) < config.max_candidates:
         budget -= 1
@@ -77,7 +80,7 @@ def _heading(chain: Chain, from_start: bool) -> NDArray[np.float64]:
     return np.asarray(chord / max(float(np.hypot(chord[0], chord[1])), 1e-9))
 
 
-def _trail(graph: PixelGraph, steps: tuple[tuple[int, bool], ...], turning: float, config: PathConfig) -> Trail:
+def _trail(graph: PixelGraph, steps: Steps, turning: float, config: PathConfig) -> Trail:
     chains = [(graph.chains[index], onward) for index, onward in steps]
     lines = [chain.points if onward else chain.points[::-1] for chain, onward in chains]
     points = np.concatenate([lines[0], *(line[1:] for line in lines[1:])])
@@ -99,7 +102,8 @@ def score(points: Points, length_share: float, config: PathConfig) -> float:
     ----------
     points : the path (N, 2).
     length_share : its length against the longest candidate, 0..1; the paper prefers shorter ones, so its weight is negative.
-    config : weights, the step over which directions are taken, and whether a reversal counts as -1 (signed) or, as in the paper, as +1.
+    config : weights, the step over which directions are taken, and whether a reversal counts as -1 (signed) or, as in the paper,
+        as +1 (absolute).
     """
     # Steps of one pixel only know multiples of 45 degrees; the paper's form takes them as they are.
     line = polyline.resample(points, config.step_px) if config.step_px > 1.0 else points

@@ -51,7 +51,8 @@ def fit_line(piece: Points) -> Vector | None:
     first, last = float((piece[0] - mean) @ direction), float((piece[-1] - mean) @ direction)
     if abs(last - first) < 1e-6:
         return None
-    return Vector(_point(mean + first * direction), _point(mean + 0.5 * (first + last) * direction), _point(mean + last * direction))
+    start, center, end = (_point(mean + along * direction) for along in (first, 0.5 * (first + last), last))
+    return Vector(start, center, end)
 
 
 def _point(values: Points) -> Point:

@@ -18,7 +18,7 @@ SMOOTHING_PX = 8.0
 """Standard deviation of the smoothing along the way: more than a radius of boundary noise, less than a bend."""
 SPUR_RADII = 1.5
 """A spur of thinning runs from the middle to a bump or corner of the wall: at most about one and a half lumen radii."""
-END_TRIM_RADII = 0.7
+END_TRIM_RADII = 1.0
 """Thinning turns the last part of a vessel towards a corner of its end."""
 
 
@@ -35,11 +35,10 @@ class _RadiusMap:
 
     def __init__(self, mask: Mask) -> None:
         half = cv2.erode(mask.view(np.uint8), np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)[::2, ::2]
-        self._map = cv2.distanceTransform(np.ascontiguousarray(half), cv2.DIST_L2, 5)
+        self._map = np.asarray(cv2.distanceTransform(np.ascontiguousarray(half), cv2.DIST_L2, 5), np.float32)
 
     def at(self, points: Points) -> NDArray[np.float64]:
-        places = (points / 2.0).astype(np.float32).reshape(-1, 1, 2)
-        return 2.0 * cv2.remap(self._map, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).ravel().astype(np.float64)
+        return 2.0 * polyline.sample(self._map, points / 2.0)
 
 
 def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGraph:
@@ -55,8 +54,9 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
     radius = _RadiusMap(mask)
     lines = [_Line(chain.start, chain.end, chain.points) for chain in traced.chains]
     if config.prune_spurs:
+        radius_at = radius.at(traced.nodes)
         for _ in range(3):
-            kept = _without_spurs(lines, traced.nodes, radius)
+            kept = _without_spurs(lines, _degrees(lines, len(traced.nodes)), radius_at)
             if len(kept) == len(lines):
                 break
             lines = _merged(kept)
@@ -64,9 +64,47 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
         line.points = _centred(line.points, radius)
         line.radius = radius.at(line.points)
     nodes = traced.nodes.copy()
-    if config.prune_spurs:
+    if config.rebuild_junctions:
         _rebuild_junctions(lines, nodes, radius)
+    if config.extend_ends:
+        _straighten_ends(lines, nodes, radius, mask.shape)
     return _packed(lines, nodes)
+
+
+def _straighten_ends(lines: list[_Line], nodes: Points, radius: _RadiusMap, shape: tuple[int, ...]) -> None:
+    """Ends of vessels without the hook that thinning leaves there; at the image border they go on to the border."""
+    degrees = _degrees(lines, len(nodes))
+    for line in lines:
+        for node, backwards in ((line.start, True), (line.end, False)):
+            if degrees[node] != 1 or len(line.points) < 4:
+                continue
+            points = _straight_end(line.points[::-1] if backwards else line.points, float(radius.at(nodes[node, None])[0]), shape)
+            line.points = points[::-1] if backwards else points
+            line.radius = radius.at(line.points)
+            nodes[node] = points[-1]
+
+
+def _straight_end(points: Points, radius_px: float, shape: tuple[int, ...]) -> Points:
+    kept = points[: len(points) - min(round(END_TRIM_RADII * radius_px / STEP_PX), len(points) // 3)]
+    chord = kept[-1] - kept[max(len(kept) - 1 - round(max(radius_px, 10.0) / STEP_PX), 0)]
+    direction = chord / max(float(np.hypot(chord[0], chord[1])), 1e-9)
+    to_border = border_distance(kept[-1], direction, shape)
+    reach = to_border if to_border < 3.0 * radius_px else float(np.hypot(*(points[-1] - kept[-1])))
+    if reach < 0.5:
+        return kept
+    steps = np.append(np.arange(STEP_PX, reach, STEP_PX), reach)
+    return np.concatenate([kept, kept[-1] + steps[:, None] * direction])
+
+
+def border_distance(place: Points, direction: Points, shape: tuple[int, ...]) -> float:
+    """How far it is from a place (2,) along a unit direction to the image's last row or column of pixels."""
+    limits = (shape[1] - 1.0, shape[0] - 1.0)
+    reaches = [
+        ((limit if step > 0 else 0.0) - start) / step
+        for start, step, limit in zip(place.tolist(), direction.tolist(), limits, strict=True)
+        if abs(step) > 1e-9
+    ]
+    return max(0.0, min(reaches, default=0.0))
 
 
 def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: _RadiusMap) -> None:
@@ -97,27 +135,24 @@ def _packed(lines: list[_Line], nodes: Points) -> VesselGraph:
 
 
 def _degrees(lines: list[_Line], count: int) -> NDArray[np.int64]:
-    return np.bincount([node for line in lines for node in (line.start, line.end)], minlength=count)
+    return np.bincount(np.array([node for line in lines for node in (line.start, line.end)], np.int64), minlength=count)
 
 
-def _length(line: _Line) -> float:
-    return float(polyline.arc_length(line.points)[-1])
-
-
-def _without_spurs(lines: list[_Line], nodes: Points, radius: _RadiusMap) -> list[_Line]:
-    degrees = _degrees(lines, len(nodes))
-    at_node = radius.at(nodes)
-    spurs: dict[int, list[_Line]] = {}
-    for line in lines:
-        for tip, root in ((line.start, line.end), (line.end, line.start)):
-            if degrees[tip] == 1 and degrees[root] >= 3 and _length(line) < SPUR_RADII * at_node[root]:
-                spurs.setdefault(root, []).append(line)
+def _without_spurs(lines: list[_Line], degrees: NDArray[np.int64], radius_at: NDArray[np.float64]) -> list[_Line]:
+    spurs: dict[int, list[tuple[float, int]]] = {}
+    for index, line in enumerate(lines):
+        ends = (line.start, line.end) if degrees[line.start] == 1 else (line.end, line.start)
+        tip, root = ends
+        if degrees[tip] == 1 and degrees[root] >= 3:
+            length = float(polyline.arc_length(line.points)[-1])
+            if length < SPUR_RADII * radius_at[root]:
+                spurs.setdefault(root, []).append((length, index))
     doomed: set[int] = set()
     for root, found in spurs.items():
         # A junction that has nothing but spurs is a blob: its longest spur stays, as the vessel.
-        found.sort(key=_length)
-        doomed |= {id(line) for line in (found[:-1] if len(found) == degrees[root] else found)}
-    return [line for line in lines if id(line) not in doomed]
+        found.sort()
+        doomed |= {index for _, index in (found[:-1] if len(found) == degrees[root] else found)}
+    return [line for index, line in enumerate(lines) if index not in doomed]
 
 
 def _merged(lines: list[_Line]) -> list[_Line]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from numpy.random import Generator
 
-from hardware.twin.draws import Knobs, any_hue, grey, hue, uniform
+from hardware.twin.draws import Knobs, Rgb, any_hue, grey, hue, uniform
 
 ROBOT_LOOKS = ("ringed", "plain_dark", "white", "blue_gold", "metallic", "black_wire", "translucent", "banded", "coloured")
 
-_LEAST_CONTRAST = 0.28
+_LEAST_BODY_CONTRAST = 0.17
+_LEAST_TIP_CONTRAST = 0.11
+_LUMA = (0.299, 0.587, 0.114)
 
 
 def draw_robot_look(look: str, rng: Generator) -> Knobs:
@@ -22,7 +24,7 @@ def draw_robot_look(look: str, rng: Generator) -> Knobs:
         "ring_share": uniform(rng, 0.15, 0.5),
         "tip_mm": uniform(rng, 1.5, 9.0),
         "tip_rgb": grey(rng, 0.05, 0.9, 0.05) if rng.random() < 0.6 else hue(rng, 0.12, 0.03, (0.4, 0.8), (0.6, 0.95)),
-        "tip_contrast": float(rng.choice([1.0, rng.uniform(0.45, 0.9), rng.uniform(0.22, 0.45)], p=[0.55, 0.3, 0.15])),
+        "tip_contrast": float(rng.choice([1.0, rng.uniform(0.5, 0.9), rng.uniform(0.25, 0.5)], p=[0.6, 0.3, 0.1])),
         "robot_opacity": uniform(rng, 0.85, 1.0),
         "robot_gloss": uniform(rng, 0.0, 0.7),
         "robot_veil": uniform(rng, 0.0, 0.35),
@@ -39,7 +41,7 @@ def draw_robot_look(look: str, rng: Generator) -> Knobs:
         },
         "metallic": {"robot_rgb": grey(rng, 0.4, 0.7, 0.03), "robot_gloss": uniform(rng, 0.5, 1.0)},
         "black_wire": {"robot_rgb": grey(rng, 0.0, 0.1, 0.01), "robot_radius_mm": uniform(rng, 0.5, 0.8), "tip_contrast": 1.0},
-        "translucent": {"robot_rgb": grey(rng, 0.3, 0.85, 0.08), "robot_opacity": uniform(rng, 0.4, 0.65)},
+        "translucent": {"robot_rgb": grey(rng, 0.3, 0.85, 0.08), "robot_opacity": uniform(rng, 0.45, 0.75)},
         "banded": {"robot_rgb": grey(rng, 0.75, 0.95, 0.03), "robot_accent_rgb": grey(rng, 0.02, 0.25, 0.02)},
         "coloured": {"robot_rgb": any_hue(rng, (0.5, 1.0), (0.35, 0.95))},
     }
@@ -50,15 +52,40 @@ def draw_robot_look(look: str, rng: Generator) -> Knobs:
 
 
 def stand_out(knobs: Knobs) -> None:
-    """Make the robot lighter or darker where it would vanish against the liquid: a label that nobody could see teaches nothing."""
-    opacity, board = float(knobs["liquid_opacity"]), knobs["board_rgb"]
-    behind = [b + (c - b) * opacity for b, c in zip(board, knobs["liquid_rgb"], strict=True)]
-    robot = knobs["robot_rgb"]
-    contrast = max(abs(r - b) for r, b in zip(robot, behind, strict=True))
-    if contrast >= _LEAST_CONTRAST:
-        return
-    shift = _LEAST_CONTRAST if sum(behind) < 1.5 else -_LEAST_CONTRAST
-    knobs["robot_rgb"] = tuple(min(max(b + shift, 0.0), 1.0) for b in behind)
+    """Change body and tip where they would vanish before the liquid: a label that nobody could see teaches nothing.
+
+    A faint tip is drawn on purpose, by ``tip_contrast``.
+    """
+    behind = _behind(knobs)
+    amount = float(knobs["robot_opacity"]) * (1 - float(knobs["robot_veil"]))
+    knobs["robot_rgb"] = _apart(knobs["robot_rgb"], behind, _LEAST_BODY_CONTRAST / amount)
+    knobs["tip_rgb"] = _apart(knobs["tip_rgb"], behind, _LEAST_TIP_CONTRAST / amount)
+
+
+def _behind(knobs: Knobs) -> Rgb:
+    """About the colour of the lumen's middle, as the vessel's look paints it."""
+    if knobs.get("material") == "channel":
+        return tuple(knobs["liquid_rgb"])
+    colour = []
+    amount, haze = float(knobs["liquid_opacity"]), float(knobs["wall_haze"])
+    for board, wall, liquid in zip(knobs["board_rgb"], knobs["wall_rgb"], knobs["liquid_rgb"], strict=True):
+        hazed = board + haze * (wall - board)
+        scattered = 0.75 * amount
+        colour.append(hazed * (1 - amount * (1 - liquid)) * (1 - scattered) + liquid * scattered)
+    return colour[0], colour[1], colour[2]
+
+
+def _apart(colour: Rgb, behind: Rgb, least: float) -> Rgb:
+    """`colour`, or one that is `least` lighter or darker than `behind` if it is hard to tell from it."""
+    step = [c - b for c, b in zip(colour, behind, strict=True)]
+    luma = sum(weight * s for weight, s in zip(_LUMA, step, strict=True))
+    if abs(luma) >= least or 0.6 * max(map(abs, step)) >= least:
+        return colour
+    level = sum(weight * b for weight, b in zip(_LUMA, behind, strict=True))
+    lighter = luma > 0 if least < min(level, 1 - level) else level < 0.5
+    shift = least if lighter else -least
+    r, g, b = (min(max(value + shift, 0.0), 1.0) for value in behind)
+    return r, g, b
 
 
 def absorb(knobs: Knobs, rng: Generator) -> None:

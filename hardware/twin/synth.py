@@ -1,7 +1,7 @@
 """Labelled data sets from the twin: random phantoms, physical robot shapes, random looks, exact masks and truth.
 
 Frame ``i`` of a set belongs to episode ``i // FRAMES_PER_EPISODE``; an episode is one random phantom (seed = first seed + episode)
-through which the robot is driven once, with a look that changes every few frames. A frame depends on its episode's seed alone, so a
+through which the robot is driven once; every frame has a look of its own. A frame depends on its episode's seed alone, so a
 set can be continued after an interruption, and two sets are disjoint when their seed ranges are.
 """
 
@@ -30,7 +30,6 @@ from hardware.twin.renderer import Picture, Renderer
 from hardware.twin.truth import truth_of
 
 FRAMES_PER_EPISODE = 16
-FRAMES_PER_LOOK = 2
 _EMPTY_SHARE = 0.03
 _STEP_S = 0.02
 _FEED_MM_S = 40.0
@@ -93,15 +92,13 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
     rng = np.random.default_rng((seed, 13))
     config = PerceptionConfig()
     shapes = robot_shapes(phantom, seed, FRAMES_PER_EPISODE)
-    # The order is shuffled so that a look sees short and long robots.
-    order = rng.permutation(FRAMES_PER_EPISODE)
     first = episode * FRAMES_PER_EPISODE
+    first_look = seed * FRAMES_PER_EPISODE
     for place in range(min(FRAMES_PER_EPISODE, plan.count - first)):
-        if place % FRAMES_PER_LOOK == 0:
-            appearance = _look(plan, seed * 16 + place // FRAMES_PER_LOOK, rng)
-            view = make_view(appearance, plan.size, phantom)
-            renderer = Renderer(phantom, appearance, plan.size, seed)
-        points, sheath_mm, clearance_mm = shapes[order[place]]
+        appearance = _look(plan, first_look + place, rng)
+        view = make_view(appearance, plan.size, phantom)
+        renderer = Renderer(phantom, appearance, plan.size, seed)
+        points, sheath_mm, clearance_mm = shapes[place]
         empty = bool(rng.random() < _EMPTY_SHARE)
         robot = None if empty else points
         picture = renderer.render(robot, 0.0 if empty else sheath_mm, noise_seed=place)

@@ -1,0 +1,131 @@
+"""When perception does not answer, and how sure it is when it does.
+
+Each check gives a ``Refusal`` that names the measured value and its limit in plain words, or None. The limits are settings; the
+confidence is a product of shares, each 1 when nothing speaks against the answer.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from core.config import PerceptionConfig, QualityConfig
+from core.perception import polyline
+from core.types import Centerline, Image, Mask, Masks, Reason, Refusal, RobotPath
+
+SAMPLE_STEP = 4
+"""Brightness is judged on every fourth pixel."""
+
+
+def check_image(image: Image, config: QualityConfig) -> Refusal | None:
+    """BLACK, WHITE or BLURRED, from the RGB image (h, w, 3) alone."""
+    if image.shape[0] == 0 or image.shape[1] == 0:
+        return Refusal(Reason.UNREADABLE, "it has no pixels")
+    brightness = np.sort(image[::SAMPLE_STEP, ::SAMPLE_STEP].max(axis=2), axis=None)
+    brightest = float(brightness[int(0.99 * (len(brightness) - 1))])
+    if brightest < config.black_level:
+        return Refusal(Reason.BLACK, f"99 % of it is darker than {brightest:.0f} (black below {config.black_level:.0f} of 255)")
+    darkest = np.sort(image[::SAMPLE_STEP, ::SAMPLE_STEP].min(axis=2), axis=None)
+    dimmest = float(darkest[int(0.01 * (len(darkest) - 1))])
+    if dimmest > config.white_level:
+        detail = f"99 % of it is brighter than {dimmest:.0f} (overexposed above {config.white_level:.0f} of 255)"
+        return Refusal(Reason.WHITE, detail)
+    if config.min_sharpness > 0.0:
+        found = sharpness(image)
+        if found < config.min_sharpness:
+            return Refusal(Reason.BLURRED, f"sharpness {found:.3f} (at least {config.min_sharpness:.3f})")
+    return None
+
+
+def sharpness(image: Image) -> float:
+    """Steepest brightness step against the image's whole contrast, per px: 0.3 and more for a sharp edge, 1/width for a blurred
+    one.
+
+    It does not depend on exposure, and a light smoothing keeps noise from passing for sharpness.
+    """
+    grey = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), (0, 0), 1.5)
+    across, down = cv2.Sobel(grey, cv2.CV_16S, 1, 0, ksize=3), cv2.Sobel(grey, cv2.CV_16S, 0, 1, ksize=3)
+    steepness = np.sort(np.hypot(across[::2, ::2].astype(np.float32), down[::2, ::2]), axis=None)
+    levels = np.sort(grey[::SAMPLE_STEP, ::SAMPLE_STEP], axis=None)
+    contrast = float(levels[int(0.99 * (len(levels) - 1))]) - float(levels[int(0.01 * (len(levels) - 1))])
+    steepest = float(steepness[int(0.995 * (len(steepness) - 1))]) / 8.0
+    return steepest / max(contrast, 1.0)
+
+
+def check_masks(masks: Masks) -> Refusal | None:
+    """NO_VESSEL or NO_ROBOT, when nothing is left of a mask after cleaning."""
+    if not masks.vessel.any():
+        return Refusal(Reason.NO_VESSEL, f"highest vessel probability {float(masks.vessel_probability.max(initial=0.0)):.2f}")
+    if not masks.robot.any():
+        return Refusal(Reason.NO_ROBOT, f"highest robot probability {float(masks.robot_probability.max(initial=0.0)):.2f}")
+    return None
+
+
+def check_path(path: RobotPath, masks: Masks, config: PerceptionConfig) -> Refusal | None:
+    """TOO_SHORT, GAP_TOO_LONG or OUTSIDE_VESSEL."""
+    limits = config.quality
+    length_px = float(polyline.arc_length(path.points)[-1])
+    if length_px < limits.min_robot_length_px:
+        return Refusal(Reason.TOO_SHORT, f"{length_px:.0f} px long (at least {limits.min_robot_length_px:.0f} px)")
+    bridged = path.bridged_px / length_px
+    if bridged > limits.max_bridged_share:
+        detail = f"{100 * bridged:.0f} % of the robot is bridged (at most {100 * limits.max_bridged_share:.0f} %)"
+        return Refusal(Reason.GAP_TOO_LONG, detail)
+    inside = inside_share(path, masks.vessel, config.vectors.robot_length_px)
+    if inside < limits.min_inside_vessel:
+        detail = f"{100 * inside:.0f} % of its last {config.vectors.robot_length_px:.0f} px lie in the vessel"
+        return Refusal(Reason.OUTSIDE_VESSEL, f"{detail} (at least {100 * limits.min_inside_vessel:.0f} %)")
+    return None
+
+
+def check_centerline(centerline: Centerline | None, config: QualityConfig) -> Refusal | None:
+    """NO_VESSEL when there is no centerline beside the head, AMBIGUOUS_BRANCH when two branches fit it equally well."""
+    if centerline is None:
+        return Refusal(Reason.NO_VESSEL, "no centerline beside the robot's head")
+    if centerline.ambiguity > config.max_ambiguity:
+        detail = f"a second branch fits {100 * centerline.ambiguity:.0f} % as well (at most {100 * config.max_ambiguity:.0f} %)"
+        return Refusal(Reason.AMBIGUOUS_BRANCH, detail)
+    return None
+
+
+def check_confidence(confidence: float, config: QualityConfig) -> Refusal | None:
+    """LOW_CONFIDENCE."""
+    if confidence < config.min_confidence:
+        return Refusal(Reason.LOW_CONFIDENCE, f"{100 * confidence:.0f} % (at least {100 * config.min_confidence:.0f} %)")
+    return None
+
+
+def inside_share(path: RobotPath, vessel: Mask, length_px: float) -> float:
+    """Share of the robot's last `length_px` that lies in the vessel's mask."""
+    total = float(polyline.arc_length(path.points)[-1])
+    return _mean_at(vessel, polyline.resample(polyline.cut(path.points, total - length_px, total), 1.0))
+
+
+def confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> float:
+    """How far the answer can be trusted, 0..1: the product of
+
+    - how clearly the network saw the robot's last 40 px, and the vessel beside them,
+    - how much of them lies in the vessel,
+    - how much of the path was seen and not bridged,
+    - how far the next best path is behind,
+    - how far the next best branch is behind.
+    """
+    total = float(polyline.arc_length(path.points)[-1])
+    tip = polyline.resample(polyline.cut(path.points, total - config.vectors.robot_length_px, total), 1.0)
+    seen = _clearness(_mean_at(masks.robot_probability, tip)) * _clearness(_mean_at(masks.vessel_probability, centerline.piece))
+    inside = min(1.0, inside_share(path, masks.vessel, config.vectors.robot_length_px) / 0.9)
+    unbridged = 1.0 - min(1.0, path.bridged_px / max(total, 1.0))
+    lead = 1.0 if path.runner_up is None else float(np.clip(0.6 + (path.score - path.runner_up) / 0.5, 0.4, 1.0))
+    return float(seen * inside * unbridged * lead * (1.0 - 0.5 * centerline.ambiguity))
+
+
+def _clearness(probability: float) -> float:
+    """0.5 says nothing, 0.9 is as clear as it gets."""
+    return float(np.clip((probability - 0.5) / 0.4, 0.0, 1.0))
+
+
+def _mean_at(values: np.ndarray, points: np.ndarray) -> float:
+    """Mean of a map (h, w) at the pixels nearest to `points`; places beyond the image count as its border."""
+    columns = np.clip(np.rint(points[:, 0]).astype(int), 0, values.shape[1] - 1)
+    rows = np.clip(np.rint(points[:, 1]).astype(int), 0, values.shape[0] - 1)
+    return float(values[rows, columns].mean())

@@ -1,0 +1,89 @@
+"""The operator's route: the shortest way along the vessel graph to a destination. Lengths are in the graph's own unit."""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+
+from core.perception import polyline
+from core.types import Point, Route, VesselGraph
+
+
+def plan_route(graph: VesselGraph, start: Point, target: Point) -> Route | None:
+    """The shortest way along the graph from the place beside `start` to the place nearest to `target`.
+
+    Returns
+    -------
+    The route, or None when the graph is empty or has no way between the two places.
+    """
+    here, there = _place(graph, start), _place(graph, target)
+    if here is None or there is None:
+        return None
+    (edge, position), (last_edge, last_position) = here, there
+    lengths = [float(polyline.arc_length(e.points)[-1]) for e in graph.edges]
+    reached, came_by = _distances(graph, lengths, edge, position)
+    last = graph.edges[last_edge]
+    ways: list[tuple[float, int | None]] = [
+        (reached[last.start] + last_position, last.start),
+        (reached[last.end] + lengths[last_edge] - last_position, last.end),
+    ]
+    if edge == last_edge:
+        ways.append((abs(last_position - position), None))
+    length, node = min(ways, key=lambda way: way[0])
+    if not np.isfinite(length):
+        return None
+    if node is None:
+        low, high = sorted((position, last_position))
+        points = polyline.cut(last.points, low, high)
+        return Route(points if position <= last_position else points[::-1], length, target)
+    by_start = node == last.start and reached[last.start] + last_position == length
+    pieces = [polyline.cut(last.points, 0.0, last_position) if by_start else polyline.cut(last.points, last_position, np.inf)[::-1]]
+    while (via := came_by[node]) is not None:
+        points = graph.edges[via].points
+        pieces.append(points if graph.edges[via].end == node else points[::-1])
+        node = graph.edges[via].start if graph.edges[via].end == node else graph.edges[via].end
+    first = graph.edges[edge]
+    leaves_by_end = node == first.end and (node != first.start or 2.0 * position > lengths[edge])
+    pieces.append(polyline.cut(first.points, *((position, np.inf) if leaves_by_end else (0.0, position)))[:: 1 if leaves_by_end else -1])
+    points = np.concatenate(pieces[::-1])
+    distinct = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])
+    return Route(points[distinct], length, target)
+
+
+def _place(graph: VesselGraph, point: Point) -> tuple[int, float] | None:
+    """The edge nearest to a point and the arc-length position on it."""
+    best = min(
+        ((*polyline.nearest(edge.points, point)[:2], index) for index, edge in enumerate(graph.edges) if len(edge.points) > 1),
+        default=None,
+    )
+    return None if best is None else (best[2], best[1])
+
+
+def _distances(graph: VesselGraph, lengths: list[float], edge: int, position: float) -> tuple[list[float], list[int | None]]:
+    """Dijkstra from a place on an edge: each node's distance, and the edge it is reached by (None: straight from the place)."""
+    reached = [np.inf] * len(graph.nodes)
+    came_by: list[int | None] = [None] * len(graph.nodes)
+    incidence = incidence_of(graph)
+    first = graph.edges[edge]
+    queue: list[tuple[float, int, int]] = [(position, first.start, -1), (lengths[edge] - position, first.end, -1)]
+    heapq.heapify(queue)
+    while queue:
+        distance, node, via = heapq.heappop(queue)
+        if distance >= reached[node]:
+            continue
+        reached[node], came_by[node] = distance, via if via >= 0 else None
+        for index, starts in incidence[node]:
+            following = graph.edges[index].end if starts else graph.edges[index].start
+            if distance + lengths[index] < reached[following]:
+                heapq.heappush(queue, (distance + lengths[index], following, index))
+    return reached, came_by
+
+
+def incidence_of(graph: VesselGraph) -> list[list[tuple[int, bool]]]:
+    """For each node the edges that touch it, as (edge, whether the edge starts here)."""
+    touching: list[list[tuple[int, bool]]] = [[] for _ in range(len(graph.nodes))]
+    for index, edge in enumerate(graph.edges):
+        touching[edge.start].append((index, True))
+        touching[edge.end].append((index, False))
+    return touching

@@ -1,0 +1,71 @@
+"""Fixtures for the windows: no screen needed, warnings of Qt fail a test (see pyproject), nothing may be left over."""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections.abc import Callable, Iterator
+
+import pytest
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.operator_window import OperatorWindow
+from app.theme import apply_theme
+from core.config import Config
+from hardware.rig import RigKind
+from tests.app.fakes import FakeBench, FakeEngine
+
+PHANTOMS = (("s_curve", "S-curve"), ("tree", "Tree"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def themed(qapp: QApplication) -> None:
+    apply_theme(qapp)
+
+
+@pytest.fixture(scope="session")
+def bench() -> FakeBench:
+    return FakeBench()
+
+
+@pytest.fixture(autouse=True)
+def no_leaks(qapp: QApplication) -> Iterator[None]:
+    """Every window that a test makes is gone after it."""
+    before = set(QApplication.topLevelWidgets())
+    yield
+    gc.collect()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    qapp.processEvents()
+    left = [widget for widget in QApplication.topLevelWidgets() if widget not in before]
+    assert not left, f"left over: {left}"
+
+
+MakeWindow = Callable[..., OperatorWindow]
+
+
+@pytest.fixture
+def make_window(qtbot: QtBot, bench: FakeBench) -> Iterator[MakeWindow]:
+    """Makes operator windows over fake engines; at the end each is closed, and its thread must have ended."""
+    windows: list[OperatorWindow] = []
+
+    def make(
+        open_engine: Callable[[Config], FakeEngine] | None = None,
+        config: Config | None = None,
+        kind: RigKind = RigKind.SIM,
+    ) -> OperatorWindow:
+        opener = open_engine or (lambda _config: FakeEngine(bench))
+        window = OperatorWindow(config or Config(), opener, kind, PHANTOMS if kind is RigKind.SIM else ())
+        qtbot.addWidget(window)
+        windows.append(window)
+        window.show()
+        return window
+
+    yield make
+    for window in windows:
+        window.close()
+        assert not window._thread.isRunning()
