@@ -37,7 +37,6 @@ def quantiles(values: Sequence[float]) -> dict[str, float]:
 def run_speed(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
     """Time perception frame by frame on twin pictures, with a baseline frame in between every eighth."""
     from core.perception.pipeline import open_pipeline
-
     from core.study.paper_baseline import PaperBaseline
 
     config = _config(model, preset, config_path)
@@ -111,11 +110,19 @@ def _first_frame_s() -> float | None:
         return None
 
 
+def run_window_pace(seconds: float, *, config_path: Path | None, as_json: bool) -> None:
+    """Run the operator window and measure it (offscreen when there is no display)."""
+    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY") and not os.environ.get("WAYLAND_DISPLAY"):
+        os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    from app.benchmark_window import measure_window
+
+    _print(measure_window(seconds, config_path), as_json, "window")
+
+
 def run_accuracy(folder: Path, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
     """Perceive every frame of a synth set as a single image and compare with its truth."""
-    from core.perception.pipeline import open_pipeline
-
     from core.learning.dataset import find_samples, read_truth
+    from core.perception.pipeline import open_pipeline
     from core.study.accuracy import score_frame, summarise
 
     config = _config(model, preset, config_path)

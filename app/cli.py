@@ -124,15 +124,18 @@ def train(
 def benchmark(
     json: JsonOption = False,
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
+    window: Annotated[float | None, typer.Option(min=5.0, help="run the window for so many seconds and measure its pace")] = None,
     frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
     model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
 ) -> None:
     """Latency per stage, throughput, memory and start-up, against the paper-literal baseline in the same run; or accuracy."""
-    from app.benchmark_command import run_accuracy, run_speed
+    from app.benchmark_command import run_accuracy, run_speed, run_window_pace
 
-    if accuracy is not None:
+    if window is not None:
+        run_window_pace(window, config_path=config, as_json=json)
+    elif accuracy is not None:
         run_accuracy(accuracy, model=model, preset=preset, config_path=config, as_json=json)
     else:
         run_speed(frames, model=model, preset=preset, config_path=config, as_json=json)

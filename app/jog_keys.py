@@ -161,8 +161,8 @@ class JogKeys(QObject):
                 self.stop()
             return True
         motion = _MOTION_OF_KEY.get(key)
-        # A text field keeps its letters and arrows; the stop key above works everywhere.
-        if motion is None or isinstance(watched, QAbstractSpinBox | QLineEdit | QComboBox):
+        # A field keeps its letters and arrows, and what it does not use must not reach the robot by way of its parent.
+        if motion is None or isinstance(self._window.focusWidget(), QAbstractSpinBox | QLineEdit | QComboBox):
             return False
         if not event.isAutoRepeat():
             self.press(key, motion)

@@ -236,6 +236,10 @@ class OperatorWindow(QMainWindow):
         """The tick that is on the screen, None before the first and after the last."""
         return self._tick
 
+    def drive(self, command: Command) -> None:
+        """Command the robot as the operator's keys do."""
+        self._on_jog(command)
+
     # ---- the rig
 
     def start(self) -> None:

@@ -53,7 +53,7 @@ def _tinted(image: Image, scene: Scene, zoom: float) -> Image:
     """The picture, enlarged, with both masks in colour and their edges as thin lines."""
     size = (max(1, round(image.shape[1] * zoom)), max(1, round(image.shape[0] * zoom)))
     # Lanczos would ring beside the highlights
-    canvas = cv2.resize(image, size, interpolation=cv2.INTER_CUBIC) if zoom > 1.0 else image.copy()
+    canvas = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_CUBIC), np.uint8) if zoom > 1.0 else image.copy()
     if scene.masks is None:
         return canvas
     for mask, name, opacity in ((scene.masks.vessel, palette.VESSEL, 0.20), (scene.masks.robot, palette.ROBOT, 0.38)):
@@ -71,7 +71,7 @@ def _tint(canvas: Image, mask: Mask, name: str, opacity: float) -> Image:
     share = np.maximum(np.clip(1.5 * soft - 0.25, 0.0, 1.0) * opacity, edge * 0.8)
     colour = np.empty_like(canvas)
     colour[:] = palette.rgb(name)
-    return cv2.blendLinear(colour, canvas, share, 1.0 - share)
+    return np.asarray(cv2.blendLinear(colour, canvas, share, 1.0 - share), np.uint8)
 
 
 def _free_corner(canvas: Image, scene: Scene, zoom: float) -> tuple[int, int, int, int] | None:
@@ -107,7 +107,8 @@ def _draw_inset(brush: _Brush, corner: tuple[int, int, int, int], image: Image, 
     origin = middle - np.array([span, height / zoom]) / 2
     shift = (0.5 - origin) * zoom - 0.5
     place = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
-    inset = cv2.warpAffine(image, place, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    warped = cv2.warpAffine(image, place, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    inset = np.asarray(warped, np.uint8)
     _draw_shapes(_Brush(inset, zoom, (float(origin[0]), float(origin[1])), brush.unit), scene, shapes, labels=True)
     brush.frame(origin, (span, height / zoom))
     brush.paste(inset, left, top)

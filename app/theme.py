@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from functools import cache
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QFontMetrics, QPalette
@@ -39,8 +40,9 @@ def colour(name: str, alpha: float = 1.0) -> QColor:
     return result
 
 
+@cache
 def font(size: Size | int = Size.BODY, weight: QFont.Weight = QFont.Weight.Normal) -> QFont:
-    """The interface font with digits of equal width, so that nothing moves when a number changes."""
+    """The interface font with digits of equal width, so that nothing moves when a number changes. Copy it before you change it."""
     result = QFont()
     result.setFamilies(_FAMILIES)
     result.setPixelSize(size if isinstance(size, int) else _PIXELS[size])

@@ -55,19 +55,20 @@ class HelpOverlay(QWidget):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
+        self._parent = parent
         self.hide()
         self.setAccessibleName("Keys")
         self.setAccessibleDescription("; ".join(f"{key}: {text}" for _, rows in KEY_TABLE for key, text in rows))
         parent.installEventFilter(self)
 
     def toggle(self) -> None:
-        self.setGeometry(self.parentWidget().rect())
+        self.setGeometry(self._parent.rect())
         self.setVisible(not self.isVisible())
         self.raise_()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize:
-            self.setGeometry(self.parentWidget().rect())
+            self.setGeometry(self._parent.rect())
         return False
 
     def mousePressEvent(self, event: QMouseEvent) -> None:

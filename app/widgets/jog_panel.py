@@ -47,13 +47,17 @@ class JogPanel(QWidget):
         self._stop.pressed.connect(self.stopped)
         grid.addWidget(self._stop, 2, 0, 1, 4)
         self._readout = _Readout()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
-        column.addLayout(grid)
-        column.addWidget(self._readout)
-        column.addStretch(1)
+        rows = QVBoxLayout(self)
+        rows.setContentsMargins(0, 0, 0, 0)
+        rows.setSpacing(4)
+        rows.addLayout(grid)
+        rows.addWidget(self._readout)
+        rows.addStretch(1)
         self.setAccessibleName("Keys that move the robot")
+
+    @property
+    def readout(self) -> str:
+        return self._readout.text
 
     def show_held(self, held: frozenset[Motion]) -> None:
         """Light the caps of what is held."""
@@ -165,6 +169,14 @@ class _Readout(QWidget):
         self.setFixedHeight(18)
         self.setToolTip("Bend of the head that is asked for (share of the tendons' full pull) and how far the robot is in")
 
+    @property
+    def text(self) -> str:
+        return f"bend {self._bend:.2f}, pitch {self._pitch:.2f}, in {self._inserted} mm"
+
+    @property
+    def _inserted(self) -> str:
+        return "\N{EN DASH}" if self._insertion_mm is None else f"{self._insertion_mm:.0f}"
+
     def show_values(self, bend: float, pitch: float, insertion_mm: float | None) -> None:
         values = (round(bend, 2), round(pitch, 2), None if insertion_mm is None else round(insertion_mm))
         if values != (self._bend, self._pitch, self._insertion_mm):
@@ -187,7 +199,6 @@ class _Readout(QWidget):
         painter.setBrush(QColor(palette.SKY))
         painter.drawRect(QRectF(min(center, end), track.top(), max(2.0, abs(end - center)), track.height()))
         painter.setPen(QColor(palette.TEXT_DIM))
-        inserted = "\N{EN DASH}" if self._insertion_mm is None else f"{self._insertion_mm:.0f}"
         right = Qt.AlignmentFlag.AlignRight | middle
-        painter.drawText(QRectF(self.width() - 94, 0, 94, self.height()), right, f"in {inserted} mm")
+        painter.drawText(QRectF(self.width() - 94, 0, 94, self.height()), right, f"in {self._inserted} mm")
         painter.end()

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette, theme
 from app.scene_shapes import scene_shapes
+from app.widgets.head_loupe import HeadLoupe
 from app.widgets.overlays import Layer, Overlay, OverlayItem
 from core.types import Frame, Image, Point, Scene
 
@@ -35,7 +36,8 @@ class LiveView(QWidget):
         self._size: tuple[int, int] | None = None
         self._scene: Scene | None = None
         self._target: Point | None = None
-        self._masks_on = self._vessel_on = self._robot_on = True
+        self._masks_on = self._vessel_on = self._robot_on = self._loupe_on = True
+        self._image: Image | None = None
         self._view = pg.GraphicsView()
         self._view.setBackground(palette.INK)
         self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -53,6 +55,7 @@ class LiveView(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self._view)
+        self._loupe = HeadLoupe(self, self._marks)
 
     @property
     def scene(self) -> Scene | None:
@@ -62,8 +65,10 @@ class LiveView(QWidget):
         """Show a frame with its scene."""
         self._show_picture(frame.image)
         self._scene = scene
+        self._image = frame.image
         self._show_labels()
         self._show_marks()
+        self._show_loupe()
 
     def blank_overlays(self) -> None:
         """Take everything away that was understood: it is not true any more. The last picture and the target stay."""
@@ -71,6 +76,7 @@ class LiveView(QWidget):
             self._scene = None
             self._show_labels()
             self._show_marks()
+            self._show_loupe()
 
     def show_target(self, target: Point | None) -> None:
         self._target = target
@@ -83,8 +89,11 @@ class LiveView(QWidget):
             self._vessel_on = visible
         elif layer is Layer.ROBOT:
             self._robot_on = visible
+        elif layer is Layer.LOUPE:
+            self._loupe_on = visible
         self._marks.set_layer(layer, visible)
         self._show_labels()
+        self._show_loupe()
 
     def fit(self) -> None:
         """Show the whole picture."""
@@ -124,6 +133,15 @@ class LiveView(QWidget):
         scene = self._scene
         shapes = scene_shapes(scene) if scene is not None else None
         self._marks.show_overlay(Overlay(shapes, scene.pose if scene is not None else None, self._target))
+
+    def _show_loupe(self) -> None:
+        scene, image = self._scene, self._image
+        if not self._loupe_on or scene is None or image is None or scene.path is None:
+            self._loupe.hide()
+            return
+        x, y = scene.to_source(scene.path.head)
+        at = self._box.mapViewToScene(QPointF(x + 0.5, y + 0.5))
+        self._loupe.show_head(image, scene, QPointF(self._view.mapFromScene(at)))
 
     def _on_left_click(self, point: QPointF) -> None:
         if self._size is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
@@ -29,7 +29,7 @@ class ModeBadge(QWidget):
         painter.setPen(QPen(QColor(palette.SKY), 1.5))
         painter.setBrush(QColor(palette.PANEL))
         painter.drawRoundedRect(frame, 6, 6)
-        name_font = theme.bold(15)
+        name_font = QFont(theme.bold(15))
         name_font.setLetterSpacing(name_font.SpacingType.AbsoluteSpacing, 1.0)
         painter.setFont(name_font)
         width = painter.fontMetrics().horizontalAdvance("ADVISORY")

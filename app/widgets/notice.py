@@ -26,6 +26,7 @@ class Notice(QWidget):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
+        self._parent = parent
         self._kind = NoticeKind.PROGRESS
         self._title = ""
         self._detail = ""
@@ -72,7 +73,7 @@ class Notice(QWidget):
         return False
 
     def _place(self) -> None:
-        room = self.parentWidget().rect()
+        room = self._parent.rect()
         width = min(560, room.width() - 40)
         height = 178 if self._button.isVisibleTo(self) else 132
         self.setGeometry((room.width() - width) // 2, (room.height() - height) // 2, width, height)

@@ -18,6 +18,7 @@ _SWATCH = {
     Layer.NEAREST: palette.NEAREST,
     Layer.DISTANCES: palette.D_HEAD,
     Layer.ROUTE: palette.ROUTE,
+    Layer.LOUPE: palette.TEXT,
 }
 
 
@@ -30,7 +31,7 @@ class OverlayBar(QWidget):
         super().__init__()
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
+        row.setSpacing(5)
         self._chips: dict[Layer, _Chip] = {}
         for layer in Layer:
             chip = _Chip(layer)
@@ -67,7 +68,7 @@ class _Chip(QAbstractButton):
         self.setAccessibleName(f"Overlay {layer.value.label}")
 
     def sizeHint(self) -> QSize:
-        return QSize(44 + QFontMetrics(theme.font(13)).horizontalAdvance(self.text()), 30)
+        return QSize(40 + QFontMetrics(theme.font(12)).horizontalAdvance(self.text()), 30)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -81,13 +82,13 @@ class _Chip(QAbstractButton):
         painter.setPen(QColor(palette.TEXT_DIM if on else palette.TEXT_FAINT))
         painter.setFont(theme.semi_bold(11))
         painter.drawText(QRectF(8, 0, 10, self.height()), Qt.AlignmentFlag.AlignCenter, self._layer.value.key)
-        text_font = theme.font(13)
+        text_font = theme.font(12)
         left = 22.0
         if self.width() >= self.sizeHint().width():  # no room for the colour in a narrow window
             painter.setPen(QPen(QColor(_SWATCH[self._layer]), 1.5))
             painter.setBrush(QColor(_SWATCH[self._layer]) if on else Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(QRectF(left, self.height() / 2 - 4, 8, 8), 2, 2)
-            left = 36.0
+            left = 35.0
         painter.setPen(QColor(palette.TEXT if on else palette.TEXT_FAINT))
         width = self.width() - left - 4
         painter.setFont(theme.fitted(text_font, self.text(), int(width), 10))

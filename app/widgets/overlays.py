@@ -18,6 +18,7 @@ from core.types import Point, Points, Pose, Vector
 _ARC_RADIUS = 44.0
 _LABEL_GAP = 16.0
 _CLEAR_OFFSET_PX = 3.0
+_MARGIN = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,7 @@ class Layer(Enum):
     NEAREST = LayerText("6", "Nearest", "The centerline point nearest to the head")
     DISTANCES = LayerText("7", "Distances", "d_head and d_tail: from the vessel line to both ends of the robot vector")
     ROUTE = LayerText("8", "Route", "The operator's target and the way to it")
+    LOUPE = LayerText("9", "Loupe", "The surroundings of the head, magnified, in a corner of the picture")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +86,12 @@ class OverlayItem(pg.GraphicsObject):
         return self._bounds
 
     def paint(self, painter: QPainter, option: QStyleOptionGraphicsItem, widget: QWidget | None = None) -> None:
-        pencil = _Pencil(painter, painter.worldTransform())
+        # the loupe shows the same values larger
+        self.draw(painter, 0 if Layer.LOUPE in self._visible else 13)
+
+    def draw(self, painter: QPainter, label_px: int) -> None:
+        """Paint through the painter's transform, which maps source pixels to the screen; labels in that size, 0 for none."""
+        pencil = _Pencil(painter, painter.worldTransform(), label_px)
         shapes, pose = self._overlay.shapes, self._overlay.pose
         if shapes is not None:
             if Layer.VESSEL in self._visible:
@@ -143,9 +150,11 @@ def _steady_side(side: float, offset_px: float) -> float:
 class _Pencil:
     """Draws marks of constant screen size at source-pixel places."""
 
-    def __init__(self, painter: QPainter, to_screen: QTransform) -> None:
+    def __init__(self, painter: QPainter, to_screen: QTransform, label_px: int) -> None:
         self._painter = painter
         self._to_screen = to_screen
+        self._label_px = label_px
+        self._room = QRectF(painter.window())
         painter.resetTransform()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
 
@@ -154,14 +163,18 @@ class _Pencil:
         return self._to_screen.map(QPointF(point[0] + 0.5, point[1] + 0.5))
 
     def _path(self, lines: tuple[Points, ...]) -> QPainterPath:
-        """All polylines as one path on the screen."""
+        """All polylines as one path on the screen; what lies outside is left out, because stroking it costs as much."""
         points = np.concatenate(lines) + 0.5
         connect = np.ones(len(points), np.int32)
         connect[np.cumsum([len(line) for line in lines]) - 1] = 0
-        t = self._to_screen
+        t, room = self._to_screen, self._room
         x = points[:, 0] * t.m11() + points[:, 1] * t.m21() + t.dx()
         y = points[:, 0] * t.m12() + points[:, 1] * t.m22() + t.dy()
-        return pg.arrayToQPath(x, y, connect=connect, finiteCheck=False)
+        inside = (x > room.left() - _MARGIN) & (x < room.right() + _MARGIN)
+        inside &= (y > room.top() - _MARGIN) & (y < room.bottom() + _MARGIN)
+        connect[:-1] &= inside[:-1] | inside[1:]
+        path: QPainterPath = pg.arrayToQPath(x, y, connect=connect, finiteCheck=False)
+        return path
 
     def _stroke(self, path: QPainterPath, name: str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> None:
         halo = QPen(theme.colour(palette.INK, 0.55), width + 2.0)
@@ -171,9 +184,13 @@ class _Pencil:
         pen.setCapStyle(Qt.PenCapStyle.FlatCap if style == Qt.PenStyle.DashLine else Qt.PenCapStyle.RoundCap)
         pen.setJoinStyle(Qt.PenJoinStyle.BevelJoin)
         self._painter.setBrush(Qt.BrushStyle.NoBrush)
-        for one in (halo, pen):
-            self._painter.setPen(one)
-            self._painter.drawPath(path)
+        # the dark edge costs a quarter without antialiasing, and the line covers its inner border
+        self._painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        self._painter.setPen(halo)
+        self._painter.drawPath(path)
+        self._painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._painter.setPen(pen)
+        self._painter.drawPath(path)
 
     def polylines(self, lines: tuple[Points, ...], name: str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> None:
         lines = tuple(line for line in lines if len(line) > 1)
@@ -212,12 +229,16 @@ class _Pencil:
 
     def label_beside(self, point: Point, line: Vector, side: float, text: str, name: str) -> None:
         """A text beside `point`, on one side of `line` (+1: to the right of its direction)."""
-        text_font = theme.semi_bold(13)
-        width = QFontMetricsF(text_font).horizontalAdvance(text) + 12.0
+        if self._label_px == 0:
+            return
+        text_font = theme.semi_bold(self._label_px)
+        width, height = QFontMetricsF(text_font).horizontalAdvance(text) + 12.0, self._label_px + 7.0
         across = QPointF(-line.direction[1], line.direction[0]) * side
-        reach = _LABEL_GAP + abs(across.x()) * width / 2 + abs(across.y()) * 10.0
+        reach = _LABEL_GAP + (abs(across.x()) * width + abs(across.y()) * height) / 2
         middle = self._at(point) + across * reach
-        box = QRectF(middle.x() - width / 2, middle.y() - 10.0, width, 20.0)
+        box = QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height)
+        box.moveLeft(max(self._room.left() + 4, min(box.left(), self._room.right() - width - 4)))
+        box.moveTop(max(self._room.top() + 4, min(box.top(), self._room.bottom() - height - 4)))
         self._painter.setPen(Qt.PenStyle.NoPen)
         self._painter.setBrush(theme.colour(palette.INK, 0.72))
         self._painter.drawRoundedRect(box, 4.0, 4.0)
@@ -252,4 +273,4 @@ class _Pencil:
 
 def _unit(vector: QPointF) -> QPointF:
     length = float(np.hypot(vector.x(), vector.y()))
-    return vector / length if length > 1e-9 else QPointF(0.0, -1.0)
+    return vector * (1.0 / length) if length > 1e-9 else QPointF(0.0, -1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPolygonF
+from PySide6.QtGui import QColor, QFont, QPainter, QPainterPath, QPaintEvent, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
@@ -50,7 +50,7 @@ class SimBanner(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        word_font = theme.bold(18)
+        word_font = QFont(theme.bold(18))
         word_font.setLetterSpacing(word_font.SpacingType.AbsoluteSpacing, 2.0)
         painter.setFont(word_font)
         word_width = painter.fontMetrics().horizontalAdvance(self._text.word) + 20

@@ -114,7 +114,7 @@ class ThetaGauge(QWidget):
     @staticmethod
     def _paint_needle(painter: QPainter, hub: QPointF, radius: float, theta_deg: float) -> None:
         tip = _on_dial(hub, radius - 2, theta_deg)
-        direction = (tip - hub) / max(radius - 2, 1.0)
+        direction = (tip - hub) * (1.0 / max(radius - 2, 1.0))
         across = QPointF(-direction.y(), direction.x())
         painter.setPen(QPen(QColor(palette.PANEL), 1.5))
         painter.setBrush(QColor(palette.THETA))

@@ -15,6 +15,7 @@ class Toast(QLabel):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
+        self._parent = parent
         self.setWordWrap(True)
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
@@ -44,7 +45,7 @@ class Toast(QLabel):
         return False
 
     def _place(self) -> None:
-        room = self.parentWidget().rect()
+        room = self._parent.rect()
         widest = max(200, room.width() - 40)
         self.setFixedWidth(min(widest, self.fontMetrics().horizontalAdvance(self.text()) + 60))
         self.setFixedHeight(self.heightForWidth(self.width()))

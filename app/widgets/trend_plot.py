@@ -44,7 +44,8 @@ class TrendPlot(QWidget):
         view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         view.viewport().setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         view.ci.layout.setContentsMargins(0, 4, 14, 0)
-        view.ci.layout.setVerticalSpacing(8)
+        view.ci.layout.setVerticalSpacing(6)
+        view.ci.layout.setHorizontalSpacing(0)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(view)
@@ -92,8 +93,27 @@ class TrendPlot(QWidget):
         self._band.show(ago_s, self._states[first:])
 
 
+def _add_box(view: pg.GraphicsLayoutWidget, row: int) -> pg.ViewBox:
+    """A view of the last 30 s. A ``PlotItem`` would bring menus and buttons that nobody needs here."""
+    box = pg.ViewBox(enableMenu=False, enableMouse=False, defaultPadding=0.0)
+    box.setXRange(-SPAN_S, 0.0, padding=0)
+    view.addItem(box, row, 1)
+    return box
+
+
+def _add_axis(view: pg.GraphicsLayoutWidget, row: int, side: str, box: pg.ViewBox) -> pg.AxisItem:
+    axis = pg.AxisItem(side)
+    axis.linkToView(box)
+    axis.setPen(QPen(QColor(palette.LINE)))
+    axis.setTextPen(QPen(QColor(palette.TEXT_DIM)))
+    axis.setStyle(tickFont=theme.font(theme.Size.LABEL), tickLength=-3, hideOverlappingLabels=False)
+    axis.setStyle(autoExpandTextSpace=False, autoReduceTextSpace=False)
+    view.addItem(axis, row, 0 if side == "left" else 1)
+    return axis
+
+
 class _Chart:
-    """One plot with a fixed time axis and a value axis that steps through a few ranges."""
+    """Curves over a fixed time axis, with a value axis that steps through a few ranges."""
 
     def __init__(
         self, view: pg.GraphicsLayoutWidget, row: int, ranges: tuple[float, ...], *, is_signed: bool, allowed: float
@@ -102,13 +122,9 @@ class _Chart:
         self._is_signed = is_signed
         self._range = 0.0
         self._ticks: tuple[float, ...] = ()
-        self._plot = view.addPlot(row=row, col=0)
-        self._plot.setMenuEnabled(False)
-        self._plot.hideButtons()
-        self._plot.setMouseEnabled(False, False)
-        self._plot.hideAxis("bottom")
-        self._plot.setXRange(-SPAN_S, 0.0, padding=0)
-        _style_axis(self._plot.getAxis("left"))
+        self._box = _add_box(view, row)
+        self._axis = _add_axis(view, row, "left", self._box)
+        self._axis.setWidth(40)
         band = pg.LinearRegionItem(
             (-allowed if is_signed else 0.0, allowed),
             orientation="horizontal",
@@ -117,14 +133,14 @@ class _Chart:
             pen=QPen(theme.colour(palette.ALLOWED, 0.0)),
         )
         band.setZValue(-10)
-        self._plot.addItem(band, ignoreBounds=True)
+        self._box.addItem(band, ignoreBounds=True)
         self.fit(np.full((1, 1), np.nan))
 
     def add_curve(self, colour_name: str, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> pg.PlotCurveItem:
         pen = QPen(QColor(colour_name), 1.5, style)
         pen.setCosmetic(True)
         curve = pg.PlotCurveItem(pen=pen, connect="finite")
-        self._plot.addItem(curve, ignoreBounds=True)
+        self._box.addItem(curve, ignoreBounds=True)
         return curve
 
     def fit(self, values: np.ndarray) -> None:
@@ -137,35 +153,28 @@ class _Chart:
         low = -wanted if self._is_signed else 0.0
         if wanted != self._range:
             self._range = wanted
-            self._plot.setYRange(low, wanted, padding=0.04)
-        ticks = (low, (low + wanted) / 2, wanted) if self._plot.vb.height() > _ROOM_FOR_TICKS else (0.0, wanted)
+            self._box.setYRange(low, wanted, padding=0.04)
+        ticks = (low, (low + wanted) / 2, wanted) if self._box.height() > _ROOM_FOR_TICKS else (0.0, wanted)
         if ticks != self._ticks:
             self._ticks = ticks
-            self._plot.getAxis("left").setTicks([[(tick, f"{tick:g}".replace("-", "\N{MINUS SIGN}")) for tick in ticks]])
+            self._axis.setTicks([[(tick, f"{tick:g}".replace("-", "\N{MINUS SIGN}")) for tick in ticks]])
 
 
 class _StateBand:
     """A narrow strip whose colour is the state, with the time axis below it."""
 
     def __init__(self, view: pg.GraphicsLayoutWidget, row: int) -> None:
-        self._plot = view.addPlot(row=row, col=0)
-        self._plot.setMenuEnabled(False)
-        self._plot.hideButtons()
-        self._plot.setMouseEnabled(False, False)
-        self._plot.setXRange(-SPAN_S, 0.0, padding=0)
-        self._plot.setYRange(0.0, 1.0, padding=0)
-        _style_axis(self._plot.getAxis("left"))
-        self._plot.getAxis("left").setTicks([[]])
-        bottom = self._plot.getAxis("bottom")
-        _style_axis(bottom)
+        box = _add_box(view, row)
+        box.setYRange(0.0, 1.0, padding=0)
+        box.setFixedHeight(8)
+        bottom = _add_axis(view, row + 1, "bottom", box)
         bottom.setHeight(18)
-        bottom.setTicks([[(-30.0, "\N{MINUS SIGN}30"), (-20.0, "\N{MINUS SIGN}20"), (-10.0, "\N{MINUS SIGN}10"), (0.0, "0 s")]])
-        self._plot.setFixedHeight(27)
+        bottom.setTicks([[(float(s), f"\N{MINUS SIGN}{-s}" if s else "0 s") for s in (-30, -20, -10, 0)]])
         colours = [theme.colour(palette.LINE, 0.6)] + [QColor(palette.STATE_COLOUR[state]) for state in PoseState]
         self._table = np.array([[c.red(), c.green(), c.blue(), c.alpha()] for c in colours], np.uint8)
         self._cells_s = np.arange(-SPAN_S + _CELL_S / 2, 0.0, _CELL_S)
         self._image = pg.ImageItem(axisOrder="row-major")
-        self._plot.addItem(self._image, ignoreBounds=True)
+        box.addItem(self._image, ignoreBounds=True)
         self.show(np.zeros(0), np.zeros(0, np.uint8))
 
     def show(self, ago_s: np.ndarray, states: np.ndarray) -> None:
@@ -176,12 +185,3 @@ class _StateBand:
             cells[fresh] = states[newest[fresh]]
         self._image.setImage(self._table[cells][None], autoLevels=False)
         self._image.setRect(QRectF(-SPAN_S, 0.0, SPAN_S, 1.0))
-
-
-def _style_axis(axis: pg.AxisItem) -> None:
-    axis.setPen(QPen(QColor(palette.LINE)))
-    axis.setTextPen(QPen(QColor(palette.TEXT_DIM)))
-    axis.setStyle(tickFont=theme.font(theme.Size.LABEL), tickLength=-3, hideOverlappingLabels=False)
-    axis.setStyle(autoExpandTextSpace=False, autoReduceTextSpace=False)
-    if axis.orientation == "left":
-        axis.setWidth(40)

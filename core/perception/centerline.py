@@ -100,7 +100,9 @@ def centerline_at(
     """
     feet = _feet(graph, head, half_length_px)
     incidence = incidence_of(graph)
-    ahead = _route_ahead(route, head, half_length_px, max((radius for _, _, radius in feet), default=0.0))
+    # One scale for all candidates: a narrow branch must not count the same distance for more than its wide trunk does.
+    scale = max((radius for _, _, radius in feet), default=1.0)
+    ahead = _route_ahead(route, head, half_length_px, scale)
     direction = np.asarray(robot_direction, np.float64)
     candidates = []
     for edge, position, radius in feet:
@@ -111,7 +113,7 @@ def centerline_at(
                 if used_behind & used_ahead:
                     continue
                 line = np.concatenate([back[:0:-1], onward])
-                candidate = _candidate(line, radius, head, direction, half_length_px, ahead)
+                candidate = _candidate(line, radius, scale, head, direction, half_length_px, ahead)
                 if candidate is not None:
                     candidates.append(candidate)
     if not candidates:
@@ -178,7 +180,7 @@ def _route_ahead(route: Route | None, head: Point, half_length: float, radius: f
 
 
 def _candidate(
-    line: Points, radius: float, head: Point, direction: NDArray[np.float64], half_length: float, ahead: Points | None
+    line: Points, radius: float, scale: float, head: Point, direction: NDArray[np.float64], half_length: float, ahead: Points | None
 ) -> _Candidate | None:
     _, position, nearest = polyline.nearest(line, head)
     piece = polyline.cut(line, position - half_length, position + half_length)
@@ -198,10 +200,10 @@ def _candidate(
     turn_cost = 1.0 - float(chord @ direction) / length
     places = np.array([piece[0], nearest, piece[-1]])
     robot_line = np.asarray(head) + np.outer([-before, 0.0, after], direction)
-    place_cost = float(np.mean(np.sum((places - robot_line) ** 2, axis=1))) / radius**2
+    place_cost = float(np.mean(np.sum((places - robot_line) ** 2, axis=1))) / scale**2
     cost = turn_cost + PLACE_WEIGHT * place_cost + SHORTNESS_WEIGHT * (1.0 - length / (2.0 * half_length))
     if ahead is not None:
-        cost += ROUTE_WEIGHT * _off_route(polyline.cut(piece, before, length), ahead, radius)
+        cost += ROUTE_WEIGHT * _off_route(polyline.cut(piece, before, length), ahead, scale)
     return _Candidate(piece, nearest, radius, cost)
 
 

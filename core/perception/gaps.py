@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -10,10 +12,12 @@ import numpy as np
 
 from core.config import GapConfig
 from core.perception.skeleton import end_direction, end_pixels
-from core.types import Mask, Point, Skeletons
+from core.types import Mask, Point, Points, Skeletons
 
-TOUCHING_PX = 4.0
-"""Two ends this near need no direction check: the step between them is too short to have a direction."""
+TOUCHING_PX = 3.0
+"""Two ends this near are joined however they look."""
+NEAR_PX = 10.0
+"""The step between two ends this near is too short to have a direction: there only the ends' own directions must agree."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +34,10 @@ def repair(skeletons: Skeletons, config: GapConfig) -> Skeletons:
     more than ``max_turn_deg``; each end is used once. With ``rule = "every_pair"`` every two ends nearer than the threshold are
     joined, as the paper's pseudocode says: also the two ends of one short piece.
     """
-    ends = _ends(skeletons.robot)
+    places = end_pixels(skeletons.robot)
+    if not any(math.dist(a, b) < config.gap_threshold_px for a, b in combinations(places, 2)):
+        return skeletons
+    ends = _described(places, skeletons.robot)
     if config.rule == "every_pair":
         pairs = [(a, b) for a, b in combinations(ends, 2) if _distance(a, b) < config.gap_threshold_px]
     else:
@@ -44,10 +51,7 @@ def repair(skeletons: Skeletons, config: GapConfig) -> Skeletons:
     return Skeletons(skeletons.vessel, robot.view(np.bool_), bridges)
 
 
-def _ends(skeleton: Mask) -> list[_End]:
-    places = end_pixels(skeleton)
-    if len(places) < 2:
-        return []
+def _described(places: list[tuple[int, int]], skeleton: Mask) -> list[_End]:
     x, y, width, height = cv2.boundingRect(skeleton.view(np.uint8))
     window = np.ascontiguousarray(skeleton[y : y + height, x : x + width])
     _, labels = cv2.connectedComponents(window.view(np.uint8), connectivity=8)
@@ -55,7 +59,7 @@ def _ends(skeleton: Mask) -> list[_End]:
 
 
 def _distance(a: _End, b: _End) -> float:
-    return float(np.hypot(a.place[0] - b.place[0], a.place[1] - b.place[1]))
+    return math.dist(a.place, b.place)
 
 
 def _plausible_pairs(ends: list[_End], config: GapConfig) -> list[tuple[_End, _End]]:
@@ -68,7 +72,7 @@ def _plausible_pairs(ends: list[_End], config: GapConfig) -> list[tuple[_End, _E
         a, b = ends[i], ends[j]
         if i in used or j in used or merged[a.component] == merged[b.component]:
             continue
-        if distance > TOUCHING_PX and max(turns_deg(a.place, a.direction, b.place, b.direction)) > config.max_turn_deg:
+        if distance > TOUCHING_PX and _turn_deg(a, b, distance) > config.max_turn_deg:
             continue
         old, new = merged[b.component], merged[a.component]
         merged = {component: new if group == old else group for component, group in merged.items()}
@@ -77,12 +81,21 @@ def _plausible_pairs(ends: list[_End], config: GapConfig) -> list[tuple[_End, _E
     return chosen
 
 
-def turns_deg(a: Point, leaving: Point | None, b: Point, arriving: Point | None) -> tuple[float, float]:
+def _turn_deg(a: _End, b: _End, distance: float) -> float:
+    if distance <= NEAR_PX and a.direction is not None and b.direction is not None:
+        cosine = -a.direction[0] * b.direction[0] - a.direction[1] * b.direction[1]
+        return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    return max(turns_deg(a.place, a.direction, b.place, b.direction))
+
+
+def turns_deg(
+    a: Sequence[float] | Points, leaving: Point | Points | None, b: Sequence[float] | Points, arriving: Point | Points | None
+) -> tuple[float, float]:
     """How far a path turns, leaving through end `a` towards end `b`, and entering there: degrees, 0 for an end without direction.
 
-    Both directions point out of their own piece.
+    Both directions are unit vectors that point out of their own piece.
     """
-    step = np.array([b[0] - a[0], b[1] - a[1]], np.float64)
+    step = np.asarray(b, np.float64) - np.asarray(a, np.float64)
     step /= max(float(np.hypot(step[0], step[1])), 1e-9)
     first = 1.0 if leaving is None else float(step @ np.asarray(leaving))
     second = 1.0 if arriving is None else float(-step @ np.asarray(arriving))

@@ -11,8 +11,10 @@ from core.types import Mask, Masks, Points
 STEP_PX = 2.0
 TRIM_RADII = 1.2
 """Thinning bends the skeleton's last radius towards a corner of a blunt end."""
-END_HEADING_PX = 14.0
-"""The end's tangent is taken over this length."""
+END_HEADING_PX = 16.0
+"""The end's direction and bend are taken over this length."""
+BEND_SHARE = 0.5
+"""So much of the bend is continued beyond it: noise bends too."""
 
 
 def refine(points: Points, masks: Masks, radius_px: float, smoothing_px: float, extend: bool) -> tuple[Points, float]:
@@ -61,23 +63,29 @@ def _to_edge(line: Points, masks: Masks, radius_px: float) -> Points:
     """The last point replaced by where the path's own direction leaves the mask."""
     along = polyline.arc_length(line)
     trimmed = polyline.cut(line, 0.0, along[-1] - min(TRIM_RADII * radius_px, 0.3 * along[-1]))
-    heading = polyline.cut(trimmed, polyline.arc_length(trimmed)[-1] - END_HEADING_PX, np.inf)
-    chord = heading[-1] - heading[0]
-    length = float(np.hypot(chord[0], chord[1]))
-    if length < 1e-6:
-        return line
-    direction = chord / length
-    reach = edge_distance(trimmed[-1], direction, masks.robot, masks.robot_probability, 6.0 * radius_px + 10.0)
+    onward = _continued(trimmed, 6.0 * radius_px + 10.0)
+    reach = edge_distance(onward, masks.robot, masks.robot_probability)
     if reach <= 0.0:
         return line
-    steps = np.append(np.arange(STEP_PX, reach, STEP_PX), reach)
-    return np.concatenate([trimmed, trimmed[-1] + steps[:, None] * direction])
+    return np.concatenate([trimmed[:-1], polyline.resample(polyline.cut(onward, 0.0, reach), STEP_PX)])
 
 
-def edge_distance(origin: Points, direction: Points, mask: Mask, probability: NDArray[np.float32], limit_px: float) -> float:
-    """How far it is from `origin` in a mask to its edge: to a fraction of a pixel, where the probability falls through 0.5."""
-    steps = np.arange(0.0, limit_px)
-    places = origin + steps[:, None] * direction
+def _continued(line: Points, length_px: float) -> Points:
+    """How the path would go on from its last point, bending as it did before: a point every px, the last point first."""
+    along = polyline.arc_length(line)
+    marks = along[-1] - np.array([0.0, 0.5, 1.0]) * min(END_HEADING_PX, along[-1])
+    last, middle, first = polyline.point_at(line, along, marks)
+    before, after = np.arctan2(*(middle - first)[::-1]), np.arctan2(*(last - middle)[::-1])
+    turn = float((after - before + np.pi) % (2.0 * np.pi) - np.pi)
+    per_px = BEND_SHARE * turn / max(0.5 * END_HEADING_PX, 1.0)
+    # From the middle of the last half, where its chord has the path's direction, to each further step.
+    headings = after + per_px * (0.25 * END_HEADING_PX + 0.5 + np.arange(int(length_px)))
+    steps = np.column_stack([np.cos(headings), np.sin(headings)])
+    return np.concatenate([last[None], last + np.cumsum(steps, axis=0)])
+
+
+def edge_distance(places: Points, mask: Mask, probability: NDArray[np.float32]) -> float:
+    """How far a line of points, 1 px apart, runs in a mask: to a fraction of a pixel, where the probability falls through 0.5."""
     height, width = mask.shape
     columns, rows = np.rint(places[:, 0]).astype(int), np.rint(places[:, 1]).astype(int)
     on_image = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)

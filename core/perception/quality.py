@@ -6,12 +6,15 @@ confidence is a product of shares, each 1 when nothing speaks against the answer
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from core.config import PerceptionConfig, QualityConfig
 from core.perception import polyline
-from core.types import Centerline, Image, Mask, Masks, Reason, Refusal, RobotPath
+from core.types import Centerline, Image, Mask, Masks, Points, Reason, Refusal, RobotPath
 
 SAMPLE_STEP = 4
 """Brightness is judged on every fourth pixel."""
@@ -98,7 +101,7 @@ def check_confidence(confidence: float, config: QualityConfig) -> Refusal | None
 def inside_share(path: RobotPath, vessel: Mask, length_px: float) -> float:
     """Share of the robot's last `length_px` that lies in the vessel's mask."""
     total = float(polyline.arc_length(path.points)[-1])
-    return _mean_at(vessel, polyline.resample(polyline.cut(path.points, total - length_px, total), 1.0))
+    return float(_at(vessel, polyline.resample(polyline.cut(path.points, total - length_px, total), 1.0)).mean())
 
 
 def confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> float:
@@ -112,7 +115,9 @@ def confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: Pe
     """
     total = float(polyline.arc_length(path.points)[-1])
     tip = polyline.resample(polyline.cut(path.points, total - config.vectors.robot_length_px, total), 1.0)
-    seen = _clearness(_mean_at(masks.robot_probability, tip)) * _clearness(_mean_at(masks.vessel_probability, centerline.piece))
+    in_mask = tip[_at(masks.robot, tip)]  # what is bridged there is counted below
+    robot_seen = _clearness(float(_at(masks.robot_probability, in_mask).mean())) if len(in_mask) else 0.0
+    seen = robot_seen * _clearness(float(_at(masks.vessel_probability, centerline.piece).mean()))
     inside = min(1.0, inside_share(path, masks.vessel, config.vectors.robot_length_px) / 0.9)
     unbridged = 1.0 - min(1.0, path.bridged_px / max(total, 1.0))
     lead = 1.0 if path.runner_up is None else float(np.clip(0.6 + (path.score - path.runner_up) / 0.5, 0.4, 1.0))
@@ -124,8 +129,8 @@ def _clearness(probability: float) -> float:
     return float(np.clip((probability - 0.5) / 0.4, 0.0, 1.0))
 
 
-def _mean_at(values: np.ndarray, points: np.ndarray) -> float:
-    """Mean of a map (h, w) at the pixels nearest to `points`; places beyond the image count as its border."""
+def _at(values: NDArray[Any], points: Points) -> NDArray[Any]:
+    """A map (h, w) at the pixels nearest to `points`; places beyond the image count as its border."""
     columns = np.clip(np.rint(points[:, 0]).astype(int), 0, values.shape[1] - 1)
     rows = np.clip(np.rint(points[:, 1]).astype(int), 0, values.shape[0] - 1)
-    return float(values[rows, columns].mean())
+    return np.asarray(values[rows, columns])

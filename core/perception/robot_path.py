@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 
 from core.config import PathConfig, PerceptionConfig
-from core.perception import gaps, path_shape, polyline, trails
+from core.perception import path_shape, polyline, trails
 from core.perception.entry import Surroundings, is_entry, tail_first
+from core.perception.pieces import check_pieces, find_pieces
 from core.perception.pixel_graph import Chain, PixelGraph, trace
 from core.perception.trails import Trail
 from core.types import Masks, Point, Points, Reason, Refusal, RobotPath, Skeletons, VesselGraph
@@ -21,8 +22,6 @@ RIVAL_SHARE = 0.8
 CONTINUITY_WEIGHT = 0.3
 CONTINUITY_PX = 30.0
 """In a stream a candidate that ends where the last one did gets this much more score, falling off over this distance."""
-BROKEN_GAP_FACTOR = 3.0
-"""Two pieces that face each other across up to this many gap thresholds are one broken robot, not two robots."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,16 +64,20 @@ def find(
     total_px = sum(_length(chain.points) for chain in traced.chains)
     radius_px = float(np.clip(0.5 * cv2.countNonZero(masks.robot.view(np.uint8)) / max(total_px, 1.0), 0.5, 30.0))
     graph = _without_short_links(traced, 3.0 * radius_px)
-    pieces = _pieces(graph, masks)
-    refusal = _several(graph, pieces, config)
+    pieces = find_pieces(graph, masks.vessel)
+    if not pieces:
+        return Refusal(Reason.TOO_SHORT, f"{total_px:.0f} px long (at least {config.path.min_length_px:.0f} px)")
+    refusal = check_pieces(graph, pieces, config)
     if refusal is not None:
         return refusal
     around = Surroundings(masks, previous, vessel, port, config.path)
-    chosen = [node for nodes, size in pieces if size >= config.path.outlier_share * pieces[0][1] for node in nodes]
+    chosen = [node for piece in pieces if piece.size_px >= config.path.outlier_share * pieces[0].size_px for node in piece.nodes]
     candidates, rivals = _candidates(graph, chosen, around, previous, config.path)
     if not candidates:
         return _why_no_candidate(graph, config.path)
     best = max(candidates, key=lambda candidate: candidate.score + candidate.continuity)
+    if previous is None and all(is_entry(place, around) for place in best.trail.points[[0, -1]]):
+        return Refusal(Reason.AMBIGUOUS_PATH, "both of its ends lie at the image border, so its head may be out of view")
     points = tail_first(best.trail.points, around)
     line, radius_px = path_shape.refine(points, masks, radius_px, config.path.smoothing_px, config.cleaning.extend_ends)
     return RobotPath(
@@ -116,83 +119,40 @@ def _without_short_links(graph: PixelGraph, limit_px: float) -> PixelGraph:
     return PixelGraph(graph.nodes, chains)
 
 
-def _pieces(graph: PixelGraph, masks: Masks) -> list[tuple[list[int], float]]:
-    """Connected pieces as (their nodes, their size in px), largest first. What lies in the vessel counts, if anything does."""
-    group = np.arange(len(graph.nodes))
-    for chain in graph.chains:
-        group[group == group[chain.end]] = group[chain.start]
-    inside = np.zeros(len(graph.nodes))
-    length = np.zeros(len(graph.nodes))
-    for chain in graph.chains:
-        length[group[chain.start]] += _length(chain.points)
-        inside[group[chain.start]] += _length(chain.points) * _share_inside(chain.points, masks)
-    size = inside if inside.any() else length
-    names = sorted({int(group[chain.start]) for chain in graph.chains}, key=lambda name: -size[name])
-    return [(np.flatnonzero(group == name).tolist(), float(size[name])) for name in names]
-
-
-def _share_inside(points: Points, masks: Masks) -> float:
-    places = np.rint(points).astype(int)
-    return float(masks.vessel[places[:, 1], places[:, 0]].mean())
-
-
-def _several(graph: PixelGraph, pieces: list[tuple[list[int], float]], config: PerceptionConfig) -> Refusal | None:
-    """Refuse when a second piece is too large to be an outlier, or when the robot goes on beyond a gap that was not repaired."""
-    share = config.quality.several_robots_share
-    for nodes, size in pieces[1:] if share < 1.0 else []:
-        if size < config.path.min_length_px:
-            continue
-        gap_px = _facing_gap(graph, pieces[0][0], nodes, config)
-        if gap_px is not None and size >= min(share * pieces[0][1], config.quality.min_robot_length_px):
-            detail = f"two pieces of the robot are {gap_px:.0f} px apart (repaired up to {config.gaps.gap_threshold_px:.0f} px)"
-            return Refusal(Reason.GAP_TOO_LONG, detail)
-        if size >= share * pieces[0][1]:
-            detail = f"a second one of {size:.0f} px beside one of {pieces[0][1]:.0f} px (allowed: {100 * share:.0f} %)"
-            return Refusal(Reason.SEVERAL_ROBOTS, detail)
-    return None
-
-
-def _facing_gap(graph: PixelGraph, first: list[int], second: list[int], config: PerceptionConfig) -> float | None:
-    """The gap between two pieces if an end of one looks at an end of the other, else None."""
-    degrees = graph.degrees()
-    headings = {}
-    for chain in graph.chains:
-        for node, outward in ((chain.start, chain.points[::-1]), (chain.end, chain.points)):
-            if degrees[node] == 1:
-                chord = outward[-1] - outward[max(len(outward) - 12, 0)]
-                headings[node] = chord / max(float(np.hypot(chord[0], chord[1])), 1e-9)
-    found = []
-    for a in first:
-        for b in second:
-            if a in headings and b in headings:
-                distance = float(np.hypot(*(graph.nodes[a] - graph.nodes[b])))
-                turns = gaps.turns_deg(tuple(graph.nodes[a]), tuple(headings[a]), tuple(graph.nodes[b]), tuple(headings[b]))
-                if distance < BROKEN_GAP_FACTOR * config.gaps.gap_threshold_px and max(turns) < 0.6 * config.gaps.max_turn_deg:
-                    found.append(distance)
-    return min(found, default=None)
-
-
 def _candidates(
     graph: PixelGraph, nodes: list[int], around: Surroundings, previous: RobotPath | None, config: PathConfig
 ) -> tuple[list[_Candidate], list[_Candidate]]:
     """The best branch of each start, scored, and those other branches of the same starts that are nearly as long."""
     degrees = graph.degrees()
     ends = [node for node in nodes if degrees[node] == 1]
-    starts = [node for node in ends if is_entry(graph.nodes[node], around)] or ends
+    entries = [node for node in ends if is_entry(graph.nodes[node], around)]
     winners, others = [], []
-    for start in starts:
+    for start in entries or ends:
         valid = [trail for trail in trails.explore(graph, start, config) if trail.length_px >= config.min_length_px]
-        if valid:
-            winners.append(valid[0])
-            others += [trail for trail in valid[1:] if trail.effective_px >= RIVAL_SHARE * valid[0].effective_px]
-    longest = max((trail.length_px for trail in winners), default=1.0)
+        if not valid:
+            continue
+        worth = [trail.effective_px - config.outside_cost * _outside_end(trail.points, around.masks) for trail in valid]
+        best = int(np.argmax(worth))
+        winners.append((worth[best], valid[best]))
+        others += [(w, trail) for w, trail in zip(worth, valid, strict=True) if trail is not valid[best]]
+    most = max((worth for worth, _ in winners), default=0.0)
+    rivals = [trail for worth, trail in others if worth >= RIVAL_SHARE * most]
+    # Where no end is known to be the entry, the tips of side branches are starts too: only the longest ways are the robot.
+    chosen = [trail for worth, trail in winners if entries or worth >= RIVAL_SHARE * most]
+    longest = max((trail.length_px for trail in chosen), default=1.0)
 
     def scored(trail: Trail) -> _Candidate:
         gap = 0.0 if previous is None else float(np.hypot(*(trail.points[-1] - previous.points[-1])))
         continuity = 0.0 if previous is None else CONTINUITY_WEIGHT * float(np.exp(-gap / CONTINUITY_PX))
         return _Candidate(trail, trails.score(trail.points, trail.length_px / longest, config), continuity)
 
-    return [scored(trail) for trail in winners], [scored(trail) for trail in others]
+    return [scored(trail) for trail in chosen], [scored(trail) for trail in rivals]
+
+
+def _outside_end(points: Points, masks: Masks) -> float:
+    """How long the path's last part outside the vessel is; 0 where all of it is outside."""
+    inside = masks.vessel[np.rint(points[:, 1]).astype(int), np.rint(points[:, 0]).astype(int)]
+    return float(np.argmax(inside[::-1])) if inside.any() else 0.0
 
 
 def _runner_up(best: _Candidate, all_candidates: list[_Candidate]) -> float | None:

@@ -45,7 +45,7 @@ def plan_route(graph: VesselGraph, start: Point, target: Point) -> Route | None:
         node = graph.edges[via].start if graph.edges[via].end == node else graph.edges[via].end
     first = graph.edges[edge]
     leaves_by_end = node == first.end and (node != first.start or 2.0 * position > lengths[edge])
-    pieces.append(polyline.cut(first.points, *((position, np.inf) if leaves_by_end else (0.0, position)))[:: 1 if leaves_by_end else -1])
+    pieces.append(polyline.cut(first.points, position, np.inf) if leaves_by_end else polyline.cut(first.points, 0, position)[::-1])
     points = np.concatenate(pieces[::-1])
     distinct = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])
     return Route(points[distinct], length, target)

@@ -13,8 +13,8 @@ from hardware.twin.walls import Port, Wall
 
 _log = logging.getLogger(__name__)
 _FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
-_GUIDE_EI = 1e6
-_GUIDE_DAMPING_S = 0.05
+_GUIDE_EI = 1e8
+_GUIDE_DAMPING_S = 0.004
 _GUIDE_MM = 3.0
 _SHEATH_EI = 6e4
 
@@ -52,6 +52,7 @@ class Chain:
         self._joint_link, self._joint_length = link, lengths[link]
         ei = np.where(link >= shaft_links, specimen.tip_ei, specimen.shaft_ei)
         self._own_stiffness = ei / self._joint_length
+        self._set_rad = self.model.qpos_spring[1:].copy()
         self._shaped_for: tuple[float, float] | None = None
         self.shape(0.0)
         mujoco.mj_forward(self.model, self.data)
@@ -115,6 +116,8 @@ class Chain:
         held = guided * _GUIDE_EI / self._joint_length
         self.model.jnt_stiffness[1:] = own + held
         self.model.dof_damping[1:] = own * self._specimen.damping_s + held * _GUIDE_DAMPING_S
+        # Guide and sheath are straight, so they pull against the robot's own set.
+        self.model.qpos_spring[1:] = self._set_rad * self._own_stiffness / (own + held)
 
     def corners_mm(self, outside_mm: float) -> Points:
         """Link starts on the board, from at most `outside_mm` behind the port to the last; then its end and the nose (N, 2)."""

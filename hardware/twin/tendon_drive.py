@@ -13,8 +13,8 @@ class DriveProperties:
     """``backlash_mm`` is the play between motor and tendon, ``dead_zone_mm`` the slack that must be taken up before it pulls."""
 
     slew_mm_s: float = 10.0
-    backlash_mm: float = 0.06
-    dead_zone_mm: float = 0.03
+    backlash_mm: float = 0.08
+    dead_zone_mm: float = 0.02
 
 
 class TendonDrive:

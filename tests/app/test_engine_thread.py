@@ -141,8 +141,13 @@ def test_of_several_orders_the_last_one_runs(
     assert last.commands == [Command(bend=0.5)]
 
 
-@pytest.mark.parametrize("moment", ["before the start", "while opening", "while running", "while the camera is silent", "after a fault"])
-def test_stop_ends_the_thread(qtbot: QtBot, thread: EngineThread, statuses: list[EngineStatus], bench: FakeBench, moment: str) -> None:
+MOMENTS = ["before the start", "while opening", "while running", "while the camera is silent", "after a fault"]
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_stop_ends_the_thread(
+    qtbot: QtBot, thread: EngineThread, statuses: list[EngineStatus], bench: FakeBench, moment: str
+) -> None:
     engine = FakeEngine(bench)
 
     def open_slowly() -> FakeEngine:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import combinations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -43,17 +44,16 @@ def test_state_colours_differ_for_a_deuteranope() -> None:
 
 
 def test_states_differ_in_shape_too() -> None:
-    """Areas in units of the box of side 2: circle 2.8, square 3.0 but with far corners, triangle 2.0, diamond 2.1."""
+    """At least a tenth of the larger of two shapes lies outside the other one."""
 
-    def profile(state: PoseState) -> np.ndarray:
-        outline = state_outline(state)
-        angle = np.arctan2(outline[:, 1], outline[:, 0])
-        order = np.argsort(angle)
-        grid = np.linspace(-np.pi, np.pi, 90)
-        return np.interp(grid, angle[order], np.linalg.norm(outline, axis=1)[order], period=2 * np.pi)
+    def filled(state: PoseState) -> np.ndarray:
+        canvas = np.zeros((220, 220), np.uint8)
+        cv2.fillPoly(canvas, [np.round(110 + 100 * state_outline(state)).astype(np.int32)], 1)
+        return canvas.astype(bool)
 
     for first, second in combinations(PoseState, 2):
-        assert np.abs(profile(first) - profile(second)).max() > 0.15, (first, second)
+        one, other = filled(first), filled(second)
+        assert (one ^ other).sum() > 0.1 * max(one.sum(), other.sum()), (first, second)
 
 
 def test_text_is_fitted_to_its_place(themed: None) -> None:

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from app.wording import QUANTITY_MEANING, REASON_TEXT, SPEED_WORD, STATE_MEANING, STATE_TITLE, advice_headline, refusal_line, why_line
+from app.wording import (
+    QUANTITY_MEANING,
+    REASON_TEXT,
+    SPEED_WORD,
+    STATE_MEANING,
+    STATE_TITLE,
+    advice_headline,
+    refusal_line,
+    why_line,
+)
 from core.config import PoseConfig
 from core.types import Advice, PoseState, Reason, Refusal, Speed
 from tests.app.fakes import make_pose

@@ -1,0 +1,100 @@
+"""``benchmark --window``: the operator window as it runs, with a robot that is being driven: pace, blocking, memory."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+from PySide6.QtCore import QObject, QTimer
+
+from app.benchmark_command import quantiles
+from app.operator_window import OperatorWindow
+from core.types import Command
+
+_WARM_UP_S = 10.0
+_DRIVE_EVERY_MS = 1500
+_LOOK_EVERY_MS = 5
+
+
+@dataclass(slots=True)
+class _Readings:
+    shown: int = 0
+    last_index: int = -1
+    first_shown_s: float | None = None
+    dropped: int = 0
+    block_ms: list[float] = field(default_factory=list)
+    latency_ms: list[float] = field(default_factory=list)
+    memory_mb: list[tuple[float, float]] = field(default_factory=list)
+
+
+class WindowWatch(QObject):
+    """Drives the robot to and fro and takes readings until `seconds` have passed, then closes the window."""
+
+    def __init__(self, window: OperatorWindow, seconds: float) -> None:
+        super().__init__(window)
+        self._window = window
+        self._seconds = seconds
+        self._started_s = time.monotonic()
+        self._process = psutil.Process()
+        self._moves = itertools.cycle((Command(0.4, 0.0, 8.0), Command(-0.5, 0.0, 6.0), Command(0.2, 0.0, -10.0), Command()))
+        self.readings = _Readings()
+        for interval_ms, slot in ((_LOOK_EVERY_MS, self._look), (_DRIVE_EVERY_MS, self._drive), (1000, self._weigh)):
+            timer = QTimer(self)
+            timer.timeout.connect(slot)
+            timer.start(interval_ms)
+
+    def _look(self) -> None:
+        tick, now = self._window.shown_tick, time.monotonic()
+        if tick is not None and tick.frame.index != self.readings.last_index:
+            self.readings.last_index = tick.frame.index
+            self.readings.shown += 1
+            self.readings.dropped = tick.dropped_frames
+            self.readings.latency_ms.append((now - tick.frame.captured_s) * 1e3)
+            if self.readings.first_shown_s is None:
+                self.readings.first_shown_s = now
+        if now - self._started_s >= self._seconds:
+            self._window.close()
+
+    def _drive(self) -> None:
+        self._window.drive(next(self._moves))
+
+    def _weigh(self) -> None:
+        self.readings.block_ms.append(self._window.max_block_ms)
+        self.readings.memory_mb.append((time.monotonic() - self._started_s, self._process.memory_info().rss / 2**20))
+
+    def result(self) -> dict[str, Any]:
+        """Pace since the first shown frame; memory at the end of the warm-up, at the end, and its growth per minute in between."""
+        seen = self.readings
+        if seen.first_shown_s is None:
+            return {"shown_fps": 0.0}
+        lasted_s = max(self._started_s + self._seconds - seen.first_shown_s, 1e-9)
+        steady = [(at, mb) for at, mb in seen.memory_mb if at >= _WARM_UP_S] or seen.memory_mb[-1:]
+        span_min = max((steady[-1][0] - steady[0][0]) / 60.0, 1e-9)
+        return {
+            "seconds": round(lasted_s, 1),
+            "shown_fps": round(seen.shown / lasted_s, 2),
+            "frames_dropped": seen.dropped,
+            "capture_to_screen_ms": quantiles(seen.latency_ms),
+            "gui_max_block_ms": round(max(seen.block_ms, default=0.0), 1),
+            "memory_mb": {"after_10_s": round(steady[0][1], 1), "end": round(steady[-1][1], 1)},
+            "memory_growth_mb_per_min": round((steady[-1][1] - steady[0][1]) / span_min, 2) if len(steady) > 1 else None,
+        }
+
+
+def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
+    """Run the window on the twin for some seconds and tell how it went."""
+    from app.window_command import make_application, make_window, window_config
+
+    config, kind = window_config("twin", config_path, None)
+    application = make_application()
+    window = make_window(config, kind)
+    application.aboutToQuit.connect(window.shut_down)
+    window.show()
+    window.start()
+    watch = WindowWatch(window, seconds)
+    application.exec()
+    return watch.result()

@@ -1,0 +1,106 @@
+"""A magnifying glass over the robot's head, in a corner of the live view: 40-px vectors are too small for two metres."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPaintEvent, QPen, QTransform
+from PySide6.QtWidgets import QWidget
+
+from app import palette, theme
+from app.widgets.overlays import OverlayItem
+from core.types import Image, Point, Scene
+
+_SPAN_PX = 110.0
+_SHARE_OF_VIEW = 0.36
+_ASPECT = 0.75
+_LABEL_PX = 16
+_CORNERS = ((1, 0), (0, 0), (1, 1), (0, 1))
+
+
+class HeadLoupe(QWidget):
+    """Shows about 110 working pixels around the head with the same marks as the live view.
+
+    It stays in its corner as long as the head is elsewhere, and moves to the opposite side when the head comes near.
+    """
+
+    def __init__(self, parent: QWidget, marks: OverlayItem) -> None:
+        super().__init__(parent)
+        self._parent = parent
+        self._marks = marks
+        self._image: QImage | None = None
+        self._pixels: Image | None = None
+        self._to_widget = QTransform()
+        self._corner = 0
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.setAccessibleName("Magnified head")
+        self.hide()
+
+    def show_head(self, image: Image, scene: Scene, head_in_view: QPointF) -> None:
+        """Magnify the surroundings of the head; `head_in_view` is where it is on the parent widget."""
+        middle = _middle(scene)
+        if middle is None:
+            self.hide()
+            return
+        self._place(head_in_view)
+        span = _SPAN_PX / scene.scale
+        zoom = self.width() / span
+        left, top = middle[0] + 0.5 - span / 2, middle[1] + 0.5 - self.height() / zoom / 2
+        self._cut(image, left, top, span, self.height() / zoom)
+        self._to_widget = QTransform(zoom, 0.0, 0.0, zoom, -left * zoom, -top * zoom)
+        self.show()
+        self.update()
+
+    def _cut(self, image: Image, left: float, top: float, width: float, height: float) -> None:
+        """Keep a copy of the part that is visible, with its place in the source."""
+        x0, y0 = max(0, int(left) - 1), max(0, int(top) - 1)
+        x1, y1 = min(image.shape[1], int(left + width) + 2), min(image.shape[0], int(top + height) + 2)
+        self._pixels = np.ascontiguousarray(image[y0 : max(y1, y0 + 1), x0 : max(x1, x0 + 1)])
+        rows, columns = self._pixels.shape[:2]
+        self._image = QImage(self._pixels.data, columns, rows, 3 * columns, QImage.Format.Format_RGB888)
+        self._image.setOffset(QPointF(x0, y0).toPoint())
+
+    def _place(self, head: QPointF) -> None:
+        room = self._parent.rect()
+        width = int(_SHARE_OF_VIEW * min(room.width(), room.height() / _ASPECT))
+        size = (width, int(width * _ASPECT))
+        if self._rect(self._corner, size).adjusted(-20, -20, 20, 20).contains(head):
+            far = [k for k in range(len(_CORNERS)) if not self._rect(k, size).adjusted(-60, -60, 60, 60).contains(head)]
+            self._corner = far[0] if far else self._corner
+        self.setGeometry(self._rect(self._corner, size).toRect())
+
+    def _rect(self, corner: int, size: tuple[int, int]) -> QRectF:
+        right, bottom = _CORNERS[corner]
+        room = self._parent.rect()
+        return QRectF(
+            room.width() - size[0] - 10 if right else 10, room.height() - size[1] - 10 if bottom else 10, size[0], size[1]
+        )
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        if self._image is None:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+        glass = QPainterPath()
+        glass.addRoundedRect(frame, theme.RADIUS, theme.RADIUS)
+        painter.fillPath(glass, QColor(palette.INK))
+        painter.save()
+        painter.setClipPath(glass)
+        painter.setWorldTransform(self._to_widget)
+        painter.drawImage(self._image.offset(), self._image)
+        self._marks.draw(painter, _LABEL_PX)
+        painter.restore()
+        painter.setPen(QPen(QColor(palette.TEXT), 2))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawRoundedRect(frame, theme.RADIUS, theme.RADIUS)
+        painter.end()
+
+
+def _middle(scene: Scene) -> Point | None:
+    """Between both vectors, or the head when there is no pose; source pixels."""
+    if scene.robot_vector is not None and scene.vessel_vector is not None:
+        (ax, ay), (bx, by) = scene.robot_vector.center, scene.vessel_vector.center
+        return scene.to_source(((ax + bx) / 2, (ay + by) / 2))
+    return scene.to_source(scene.path.head) if scene.path is not None else None

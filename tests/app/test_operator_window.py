@@ -1,0 +1,379 @@
+"""The whole window over fake engines: what it says, what keys do, and that it can be closed at any moment."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.engine_thread import Phase
+from app.operator_window import OperatorWindow
+from app.widgets.overlays import Layer
+from core.config import Config
+from core.devices import DeviceError, EndOfStream
+from core.types import Command, Reason, Refusal
+from hardware.rig import RigKind
+from tests.app.conftest import MakeWindow
+from tests.app.fakes import FakeBench, FakeEngine
+
+Key = Qt.Key
+
+
+@pytest.fixture
+def engine(bench: FakeBench) -> FakeEngine:
+    return FakeEngine(bench)
+
+
+@pytest.fixture
+def running(make_window: MakeWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path) -> OperatorWindow:
+    """A window that shows pictures of `engine`; its snapshots go to the test's folder."""
+    config = Config.model_validate({"window": {"pictures_folder": str(tmp_path / "shots")}})
+    window = make_window(lambda _config: engine, config)
+    window.start()
+    qtbot.waitUntil(lambda: window.shown_tick is not None)
+    return window
+
+
+def until(qtbot: QtBot, condition: Callable[[], bool]) -> None:
+    qtbot.waitUntil(condition, timeout=5000)
+
+
+# ---- starting and failing
+
+
+def test_window_is_there_at_once_and_says_what_it_waits_for(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    gate = threading.Event()
+
+    def open_engine(_config: Config) -> FakeEngine:
+        gate.wait(5)
+        return FakeEngine(bench)
+
+    window = make_window(open_engine)
+    before = time.monotonic()
+    window.start()
+    assert time.monotonic() - before < 0.5
+    assert window._notice.isVisible()
+    assert window._notice.text.startswith("Starting: S-curve")
+    assert window._badge.letter == "-"
+    gate.set()
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert not window._notice.isVisible()
+
+
+def test_everything_is_shown(running: OperatorWindow, qtbot: QtBot) -> None:
+    tick = running.shown_tick
+    assert tick is not None
+    pose = tick.scene.pose
+    assert pose is not None
+    assert running._badge.letter == pose.state.value
+    assert running._gauge.text.endswith("°")
+    assert running._bars.texts[0].endswith("px")
+    assert running._advice.text.startswith(("Fast", "Slow", "Slowest", "Moderate"))
+    until(qtbot, lambda: "total 27.5" in running._performance.text)
+    assert "SIM" in running.windowTitle()
+    assert running._banner.word == "SIM"
+
+
+def test_texts_follow_within_a_fraction_of_a_second(running: OperatorWindow, qtbot: QtBot) -> None:
+    before = running._gauge.text
+    until(qtbot, lambda: running._gauge.text != before)
+
+
+def test_fault_is_one_visible_line_and_f5_starts_again(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    working: list[bool] = []
+
+    def open_engine(_config: Config) -> FakeEngine:
+        if not working:
+            raise DeviceError("bench twin: physics went out of bounds; start again")
+        return FakeEngine(bench)
+
+    window = make_window(open_engine)
+    window.start()
+    until(qtbot, lambda: "physics went out of bounds" in window._notice.text)
+    assert window._badge.title == "Fault"
+    assert window._advice.text.startswith("No advice")
+    working.append(True)
+    qtbot.keyClick(window, Key.Key_F5)
+    until(qtbot, lambda: window.shown_tick is not None)
+
+
+def test_fault_while_running_blanks_everything(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    engine.fail_with = DeviceError("camera lost: plug it in")
+    until(qtbot, lambda: "camera lost" in running._notice.text)
+    assert running.shown_tick is None
+    assert running._live.scene is None
+    assert running._gauge.text == "–"
+    assert running._bars.texts == ("–", "–")
+
+
+def test_end_of_a_recording(make_window: MakeWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    window = make_window(lambda _config: engine, kind=RigKind.PLAYBACK)
+    window.start()
+    until(qtbot, lambda: window.shown_tick is not None)
+    engine.fail_with = EndOfStream("clip.mp4: 240 frames")
+    until(qtbot, lambda: window._notice.text == "Recording is over. clip.mp4: 240 frames")
+    assert window._banner.word == "PLAYBACK"
+    assert window._picker is None
+
+
+def test_silent_camera_leaves_no_stale_overlay(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    engine.silent = True
+    until(qtbot, lambda: running._badge.title == "No new picture")
+    assert running._live.scene is None
+    assert running._advice.text == "No advice: no new picture"
+    assert running._notice.isVisible()
+    engine.silent = False
+    until(qtbot, lambda: running._live.scene is not None)
+    assert not running._notice.isVisible()
+
+
+def test_refusal_is_named_and_the_picture_goes_on(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    engine.refusal = Refusal(Reason.OUTSIDE_VESSEL, "41 % inside, 60 % needed")
+    until(qtbot, lambda: running._badge.title == "Robot is outside the vessel")
+    assert running._badge.letter == "-"
+    assert running._advice.text == "No advice: robot is outside the vessel"
+    assert running._gauge.text == "–"
+    tick = running.shown_tick
+    until(qtbot, lambda: running.shown_tick is not tick)
+
+
+def test_missing_model_says_what_to_do_while_the_picture_goes_on(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    engine.refusal = Refusal(Reason.NO_MODEL, "default/network.onnx: hash differs")
+    until(qtbot, lambda: running._badge.title == "No model")
+    assert "Put back resources/models/default" in running._badge.why
+    assert "hash differs" in running._badge.why
+    tick = running.shown_tick
+    until(qtbot, lambda: running.shown_tick is not tick)
+
+
+# ---- the operator
+
+
+def test_keys_move_the_robot_while_held(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    qtbot.keyPress(running, Key.Key_W)
+    assert engine.commands[-1].advance_mm_s == pytest.approx(10.0)
+    lit = [motion.value for motion, cap in running._jog_panel._caps.items() if cap.is_lit]
+    assert lit == ["advance"]
+    qtbot.keyRelease(running, Key.Key_W)
+    assert engine.commands[-1] == Command()
+    assert not any(cap.is_lit for cap in running._jog_panel._caps.values())
+
+
+def test_losing_the_focus_stops_the_robot(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    qtbot.keyPress(running, Key.Key_W)
+    QApplication.sendEvent(running, QEvent(QEvent.Type.WindowDeactivate))
+    assert engine.commands[-1].advance_mm_s == 0.0
+
+
+def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    chip = running._overlay_bar._chips[Layer.MASKS]
+    chip.setFocus()
+    qtbot.keyPress(running, Key.Key_W)
+    qtbot.keyClick(chip, Key.Key_Space)
+    assert engine.commands[-1] == Command()
+    assert chip.isChecked(), "space is no click here"
+
+
+def test_digits_switch_overlays(running: OperatorWindow, qtbot: QtBot) -> None:
+    for layer in Layer:
+        qtbot.keyClick(running, layer.value.key)
+        assert not running._overlay_bar.is_on(layer)
+        assert not running._layer_actions[layer].isChecked()
+    qtbot.keyClick(running, Key.Key_0)
+    assert all(running._overlay_bar.is_on(layer) for layer in Layer)
+    assert all(action.isChecked() for action in running._layer_actions.values())
+
+
+def test_digits_typed_into_the_seed_switch_nothing(running: OperatorWindow, qtbot: QtBot) -> None:
+    assert running._picker is not None
+    seed = running._picker._seed
+    seed.setEnabled(True)
+    seed.setFocus()
+    qtbot.keyClicks(seed, "12")
+    assert running._overlay_bar.is_on(Layer.MASKS)
+
+
+def test_click_sets_the_target_and_escape_clears_it(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running._live.clicked.emit(500.0, 280.0)
+    assert engine.targets[-1] == (500.0, 280.0)
+    until(qtbot, lambda: running.shown_tick is not None and running.shown_tick.scene.route is not None)
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert engine.targets[-1] is None
+    running._live.clicked.emit(500.0, 280.0)
+    running._live.cleared.emit()
+    assert engine.targets[-1] is None
+
+
+def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    opened: list[str] = []
+    engines: list[FakeEngine] = []
+
+    def open_engine(config: Config) -> FakeEngine:
+        opened.append(config.twin.phantom)
+        engines.append(FakeEngine(bench))
+        return engines[-1]
+
+    window = make_window(open_engine)
+    window.start()
+    until(qtbot, lambda: window.shown_tick is not None)
+    window._live.clicked.emit(500.0, 280.0)
+    qtbot.keyPress(window, Key.Key_D)
+    assert window._picker is not None
+    window._picker.chosen.emit("tree")
+    assert window._phase is Phase.STARTING
+    assert window._target is None
+    assert window._jog.command == Command()
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert opened == ["s_curve", "tree"]
+    assert engines[0].closed.is_set()
+    qtbot.keyRelease(window, Key.Key_D)
+    qtbot.keyClick(window, Key.Key_R)
+    until(qtbot, lambda: len(opened) == 3)
+    assert opened[-1] == "random:1"
+
+
+def test_window_stays_alive_while_a_phantom_is_opened(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    def open_slowly(_config: Config) -> FakeEngine:
+        time.sleep(0.4)
+        return FakeEngine(bench)
+
+    window = make_window(open_slowly)
+    window.start()
+    turns = 0
+    while window.shown_tick is None:
+        before = time.monotonic()
+        QApplication.processEvents()
+        assert time.monotonic() - before < 0.3
+        turns += 1
+        time.sleep(0.005)
+    assert turns > 20
+
+
+def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    qtbot.keyClick(running, Key.Key_P)
+    until(qtbot, running._toast.isVisible)
+    assert str(tmp_path / "shots") in running._toast.text()
+    names = sorted(path.name for path in (tmp_path / "shots").iterdir())
+    assert [name.partition("_")[2][-12:] for name in names if name.endswith("overlay.png")]
+    record = json.loads(next((tmp_path / "shots").glob("*.json")).read_text())
+    assert record["state"] in ("A", "B", "C", "D")
+
+
+def test_snapshot_into_an_unwritable_folder_is_one_line(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "shots").write_text("a file where the folder should be")
+    qtbot.keyClick(running, Key.Key_S, Qt.KeyboardModifier.ControlModifier)
+    until(qtbot, running._toast.isVisible)
+    assert running._toast.text().startswith("Snapshot not saved: ")
+
+
+def test_no_snapshot_before_the_first_picture(make_window: MakeWindow, qtbot: QtBot) -> None:
+    window = make_window()
+    until(qtbot, window.isActiveWindow)
+    qtbot.keyClick(window, Key.Key_P)
+    assert window._toast.text() == "No snapshot: there is no picture yet"
+
+
+def test_help_and_full_screen_and_what_escape_leaves_first(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running._live.clicked.emit(500.0, 280.0)
+    qtbot.keyClick(running, Key.Key_F11)
+    assert running.isFullScreen()
+    assert not running.menuBar().isVisible()
+    assert running._banner.isVisible(), "the banner is permanent"
+    qtbot.keyClick(running, Key.Key_F1)
+    assert running._help.isVisible()
+    assert running._help.mapTo(running, running._help.rect().topLeft()).y() > running._banner.geometry().bottom()
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert not running._help.isVisible()
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert not running.isFullScreen()
+    assert running.menuBar().isVisible()
+    assert engine.targets[-1] is not None, "the target is cleared last"
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert engine.targets[-1] is None
+
+
+@pytest.mark.parametrize("size", [(1100, 700), (1280, 720), (1600, 900), (1920, 1080)])
+def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[int, int]) -> None:
+    running.resize(*size)
+    qtbot.wait(30)
+    assert (running.width(), running.height()) == size
+    panels = (running._badge, running._gauge, running._bars, running._trends, running._jog_panel, running._performance)
+    for widget in (running._live, *panels):
+        assert widget.height() >= widget.minimumSizeHint().height(), widget
+        assert widget.height() >= widget.minimumHeight(), widget
+        assert widget.width() >= widget.minimumWidth(), widget
+    assert running._live.width() >= 0.5 * size[0]
+
+
+# ---- closing
+
+
+MOMENTS = [
+    "before the start",
+    "while starting",
+    "before the first picture",
+    "while running",
+    "while switching",
+    "while a key is held",
+    "after a fault",
+    "while a snapshot is written",
+    "in full screen",
+]
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_it_can_be_closed_at_any_moment(
+    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot, tmp_path: Path, moment: str
+) -> None:
+    engines: list[FakeEngine] = []
+
+    def open_engine(_config: Config) -> FakeEngine:
+        if moment == "after a fault":
+            raise DeviceError("nothing there")
+        if moment == "while starting" or engines:
+            time.sleep(0.2)
+        engine = FakeEngine(bench)
+        engine.silent = moment == "before the first picture"
+        engines.append(engine)
+        return engine
+
+    config = Config.model_validate({"window": {"pictures_folder": str(tmp_path)}})
+    window = make_window(open_engine, config)
+    if moment != "before the start":
+        window.start()
+    if moment in ("while running", "while switching", "while a key is held", "while a snapshot is written", "in full screen"):
+        until(qtbot, lambda: window.shown_tick is not None)
+    if moment == "before the first picture":
+        until(qtbot, lambda: window._phase is Phase.RUNNING)
+    if moment == "after a fault":
+        until(qtbot, lambda: window._phase is Phase.FAULT)
+    if moment == "while switching":
+        assert window._picker is not None
+        window._picker.roll()
+    if moment == "while a key is held":
+        qtbot.keyPress(window, Key.Key_W)
+    if moment == "while a snapshot is written":
+        qtbot.keyClick(window, Key.Key_P)
+    if moment == "in full screen":
+        qtbot.keyClick(window, Key.Key_F11)
+    assert window.close()
+    assert not window._thread.isRunning()
+    assert not window.isVisible()
+    assert all(engine.closed.is_set() for engine in engines)
+    if moment == "while a key is held":
+        assert engines[0].commands[-1] == Command(), "the robot was stopped before the rig was closed"
+    if moment == "while a snapshot is written":
+        assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_closing_twice_is_nothing_special(running: OperatorWindow) -> None:
+    running.close()
+    running.shut_down()
+    assert running.close()

@@ -1,0 +1,331 @@
+"""Each widget shows one value; what it shows can be read back as text."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+from pytestqt.qtbot import QtBot
+
+from app import palette
+from app.jog_keys import Motion
+from app.widgets.advice_line import AdviceLine
+from app.widgets.distance_bars import DistanceBars
+from app.widgets.jog_panel import JogPanel
+from app.widgets.mode_badge import ModeBadge
+from app.widgets.notice import Notice, NoticeKind
+from app.widgets.overlay_bar import OverlayBar
+from app.widgets.overlays import Layer
+from app.widgets.performance_panel import PerformancePanel
+from app.widgets.phantom_picker import PhantomPicker
+from app.widgets.sim_banner import SimBanner
+from app.widgets.state_badge import StateBadge
+from app.widgets.theta_gauge import ThetaGauge
+from app.widgets.trend_plot import SPAN_S, TrendPlot
+from core.config import PoseConfig
+from core.types import Advice, Command, PoseState, Reason, Refusal, RobotStatus, Speed
+from hardware.rig import RigKind
+from tests.app.fakes import make_pose, make_scene, make_tick
+
+LIMITS = PoseConfig()
+
+
+def colours_in(widget: QWidget) -> set[str]:
+    image = widget.grab().toImage()
+    return {image.pixelColor(x, y).name().upper() for x in range(0, image.width(), 2) for y in range(0, image.height(), 2)}
+
+
+# ---- state badge
+
+
+@pytest.mark.parametrize("state", list(PoseState))
+def test_badge_shows_letter_title_and_colour_of_the_state(qtbot: QtBot, state: PoseState) -> None:
+    badge = StateBadge(LIMITS)
+    qtbot.addWidget(badge)
+    badge.resize(480, badge.height())
+    badge.show_scene(make_scene(make_pose(state)))
+    assert badge.letter == state.value
+    assert badge.accessibleDescription().startswith(f"{state.value}: {badge.title}")
+    assert palette.STATE_COLOUR[state].upper() in colours_in(badge)
+
+
+def test_badge_shows_a_dash_and_the_reason_without_a_pose(qtbot: QtBot) -> None:
+    badge = StateBadge(LIMITS)
+    qtbot.addWidget(badge)
+    badge.show_scene(make_scene(make_pose()))
+    badge.show_scene(make_scene(refusal=Refusal(Reason.OUTSIDE_VESSEL, "41 % inside, 60 % needed")), renew_text=False)
+    assert (badge.letter, badge.title) == ("-", "Robot is outside the vessel")
+    assert badge.why.endswith("41 % inside, 60 % needed")
+
+
+def test_badge_keeps_its_sentence_until_texts_are_renewed_but_never_a_wrong_letter(qtbot: QtBot) -> None:
+    badge = StateBadge(LIMITS)
+    qtbot.addWidget(badge)
+    badge.show_scene(make_scene(make_pose(PoseState.C, head=14.0)))
+    before = badge.why
+    badge.show_scene(make_scene(make_pose(PoseState.C, head=19.0)), renew_text=False)
+    assert badge.why == before
+    badge.show_scene(make_scene(make_pose(PoseState.B, head=6.5, tail=12.0)), renew_text=False)
+    assert badge.letter == "B"
+    assert badge.why != before
+
+
+# ---- gauge and bars
+
+
+def test_gauge_shows_sign_number_and_side(qtbot: QtBot) -> None:
+    gauge = ThetaGauge(10.0)
+    qtbot.addWidget(gauge)
+    assert (gauge.text, gauge.direction) == ("–", "")
+    gauge.show_pose(make_pose(theta=18.44))
+    assert (gauge.text, gauge.direction) == ("+18.4°", "right")
+    gauge.show_pose(make_pose(theta=-132.0))
+    assert (gauge.text, gauge.direction) == ("-132.0°", "left")
+    gauge.show_pose(None)
+    assert gauge.text == "–"
+
+
+@pytest.mark.parametrize(("theta", "side"), [(60.0, 1), (-60.0, -1), (170.0, 1), (-170.0, -1)])
+def test_needle_points_to_the_side_of_the_sign(qtbot: QtBot, theta: float, side: int) -> None:
+    gauge = ThetaGauge(10.0)
+    qtbot.addWidget(gauge)
+    gauge.resize(300, 200)
+    gauge.show_pose(make_pose(theta=theta))
+    image = gauge.grab().toImage()
+    needle = [
+        x for x in range(image.width()) for y in range(image.height()) if image.pixelColor(x, y).name().upper() == palette.THETA
+    ]
+    assert needle
+    assert (np.mean(needle) - image.width() / 2) * side > 5
+
+
+def test_needle_follows_at_once_the_number_when_texts_are_renewed(qtbot: QtBot) -> None:
+    gauge = ThetaGauge(10.0)
+    qtbot.addWidget(gauge)
+    gauge.show_pose(make_pose(theta=10.0))
+    gauge.show_pose(make_pose(theta=20.0), renew_text=False)
+    assert gauge.text == "+10.0°"
+    gauge.show_pose(make_pose(theta=20.0))
+    assert gauge.text == "+20.0°"
+
+
+def test_bars_show_unsigned_numbers_and_grow_to_their_side(qtbot: QtBot) -> None:
+    bars = DistanceBars(6.0)
+    qtbot.addWidget(bars)
+    bars.resize(300, 160)
+    assert bars.texts == ("–", "–")
+    bars.show_pose(make_pose(head=-14.2, tail=6.1))
+    assert bars.texts == ("14.2 px", "6.1 px")
+    image = bars.grab().toImage()
+    track = [x for x in range(300) if any(image.pixelColor(x, y).name().upper() == palette.D_HEAD for y in range(52, 70))]
+    assert track
+    assert max(track) <= 150, "left of the middle"
+    bars.show_pose(make_pose(head=500.0, tail=1.0))
+    bars.grab()
+    bars.show_pose(None)
+    assert bars.texts == ("–", "–")
+
+
+# ---- advice
+
+
+def test_advice_is_blank_with_a_reason_when_there_is_none(qtbot: QtBot) -> None:
+    line = AdviceLine()
+    qtbot.addWidget(line)
+    line.show_advice(Advice(Speed.SLOWEST, 1.0, -18.4, "moving away"), PoseState.C, "")
+    assert line.text == "Slowest, 18° left: moving away"
+    line.show_advice(None, None, "no robot in view", renew_text=False)
+    assert line.text == "No advice: no robot in view"
+
+
+@pytest.mark.parametrize("speed", list(Speed))
+def test_advice_paints_every_speed(qtbot: QtBot, speed: Speed) -> None:
+    line = AdviceLine()
+    qtbot.addWidget(line)
+    line.resize(700, 68)
+    line.show_advice(Advice(speed, 1.0, 200.0, "a reason " * 40), PoseState.D, "")
+    assert not line.grab().isNull()
+
+
+# ---- trends
+
+
+def test_frames_without_a_pose_are_gaps(qtbot: QtBot) -> None:
+    plot = TrendPlot(LIMITS)
+    qtbot.addWidget(plot)
+    for k in range(5):
+        plot.add(make_scene(None if k == 2 else make_pose(theta=float(k)), captured_s=k * 0.1))
+    plot._draw()
+    ago, theta = plot.curves[0].getData()
+    np.testing.assert_allclose(ago, [-0.4, -0.3, -0.2, -0.1, 0.0], atol=1e-9)
+    np.testing.assert_array_equal(theta, [0.0, 1.0, np.nan, 3.0, 4.0])
+
+
+def test_trends_hold_thirty_seconds_and_restart_when_the_clock_jumps_back(qtbot: QtBot) -> None:
+    plot = TrendPlot(LIMITS)
+    qtbot.addWidget(plot)
+    for k in range(1200):
+        plot.add(make_scene(make_pose(), captured_s=k / 30))
+    plot._draw()
+    ago, _ = plot.curves[0].getData()
+    assert ago[0] == pytest.approx(-SPAN_S, abs=0.04)
+    plot.add(make_scene(make_pose(), captured_s=0.0))
+    plot._draw()
+    assert len(plot.curves[0].getData()[0]) == 1
+
+
+# ---- performance
+
+
+def test_performance_shows_percentiles_and_marks_a_long_block(qtbot: QtBot) -> None:
+    panel = PerformancePanel()
+    qtbot.addWidget(panel)
+    panel.resize(260, 180)
+    panel.add(make_tick(), 12.4)
+    assert "network" not in panel.text
+    assert "total 30.0 30.0" in panel.text
+    assert "segmentation 21.0 21.0" in panel.text
+    assert "block ms 12" in panel.text
+    panel.clear()
+    assert "total" not in panel.text
+    panel.add(make_tick(), 80.0)
+    assert palette.FAULT.upper() in colours_in(panel)
+
+
+# ---- switches, picker, panels
+
+
+def test_chips_switch_their_layer(qtbot: QtBot) -> None:
+    bar = OverlayBar()
+    qtbot.addWidget(bar)
+    seen: list[tuple[Layer, bool]] = []
+    bar.toggled.connect(lambda layer, on: seen.append((layer, on)))
+    bar.toggle(Layer.VECTORS)
+    assert seen == [(Layer.VECTORS, False)]
+    assert not bar.is_on(Layer.VECTORS)
+    bar.set_all(True)
+    assert seen[-1] == (Layer.VECTORS, True)
+
+
+def test_layers_have_keys_of_their_own() -> None:
+    assert [layer.value.key for layer in Layer] == list("123456789")
+
+
+@pytest.mark.parametrize("kind", list(RigKind))
+def test_banner_says_what_the_picture_is(qtbot: QtBot, kind: RigKind) -> None:
+    banner = SimBanner(kind)
+    qtbot.addWidget(banner)
+    banner.resize(500, 34)
+    banner.grab()
+    assert banner.word == kind.value
+    assert banner.accessibleName().startswith(kind.value)
+
+
+def test_mode_badge_says_advisory(qtbot: QtBot) -> None:
+    badge = ModeBadge()
+    qtbot.addWidget(badge)
+    badge.grab()
+    assert "ADVISORY" in badge.accessibleName()
+
+
+def test_picker_gives_names_as_the_configuration_writes_them(qtbot: QtBot) -> None:
+    picker = PhantomPicker([("s_curve", "S-curve"), ("tree", "Tree")], "tree")
+    qtbot.addWidget(picker)
+    chosen: list[str] = []
+    picker.chosen.connect(chosen.append)
+    assert (picker.name, picker.title) == ("tree", "Tree")
+    picker._combo.setCurrentIndex(0)
+    picker._combo.activated.emit(0)
+    picker.roll()
+    picker.roll()
+    assert chosen == ["s_curve", "random:1", "random:2"]
+    assert picker.title == "random 2"
+
+
+def test_picker_shows_a_random_phantom_of_the_configuration(qtbot: QtBot) -> None:
+    picker = PhantomPicker([("tree", "Tree")], "random:77")
+    qtbot.addWidget(picker)
+    assert picker.name == "random:77"
+
+
+def test_seed_counts_when_confirmed_not_at_each_digit(qtbot: QtBot) -> None:
+    holder = QWidget()
+    qtbot.addWidget(holder)
+    picker = PhantomPicker([("tree", "Tree")], "random:1")
+    QVBoxLayout(holder).addWidget(picker)
+    holder.show()
+    chosen: list[str] = []
+    picker.chosen.connect(chosen.append)
+    picker._seed.setFocus()
+    picker._seed.selectAll()
+    QTest.keyClicks(picker._seed, "42")
+    assert chosen == []
+    QTest.keyClick(picker._seed, Qt.Key.Key_Return)
+    assert chosen == ["random:42"]
+
+
+def test_key_caps_light_up_and_can_be_held_with_the_mouse(qtbot: QtBot) -> None:
+    panel = JogPanel()
+    qtbot.addWidget(panel)
+    panel.resize(280, 140)
+    panel.show()
+    events: list[tuple[str, Motion]] = []
+    panel.pressed.connect(lambda motion: events.append(("down", motion)))
+    panel.released.connect(lambda motion: events.append(("up", motion)))
+    panel.show_held(frozenset({Motion.ADVANCE}))
+    lit = [motion for motion, cap in panel._caps.items() if cap.is_lit]
+    assert lit == [Motion.ADVANCE]
+    cap = panel._caps[Motion.STEER_LEFT]
+    qtbot.mousePress(cap, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
+    qtbot.mouseRelease(cap, Qt.MouseButton.LeftButton, pos=QPoint(500, 5))
+    assert events == [("down", Motion.STEER_LEFT), ("up", Motion.STEER_LEFT)]
+    qtbot.mousePress(cap, Qt.MouseButton.LeftButton)
+    panel.hide()
+    assert events[-1] == ("up", Motion.STEER_LEFT), "a hidden cap holds nothing"
+
+
+def test_readout_shows_how_far_the_robot_is_in(qtbot: QtBot) -> None:
+    panel = JogPanel()
+    qtbot.addWidget(panel)
+    panel.show_command(Command(bend=-0.5), RobotStatus(0.0, 84.2, 0.0, (0, 0, 0, 0), (0, 0, 0, 0)))
+    assert panel.readout == "bend -0.50, pitch 0.00, in 84 mm"
+    panel.show_command(Command(), None)
+    assert panel.readout.endswith("in – mm")
+
+
+def test_notice_shows_title_detail_and_a_way_out(qtbot: QtBot) -> None:
+    room = QWidget()
+    qtbot.addWidget(room)
+    room.resize(700, 500)
+    room.show()
+    notice = Notice(room)
+    notice.show_notice(NoticeKind.FAULT, "The rig stopped", "camera lost", restartable=True)
+    assert notice.text == "The rig stopped. camera lost"
+    with qtbot.waitSignal(notice.restart):
+        qtbot.mouseClick(notice._button, Qt.MouseButton.LeftButton)
+    assert room.rect().contains(notice.geometry())
+    notice.clear()
+    assert not notice.isVisible()
+
+
+def test_every_widget_has_an_accessible_name_and_a_tool_tip(qtbot: QtBot) -> None:
+    widgets = (StateBadge(LIMITS), ThetaGauge(10), DistanceBars(6), AdviceLine(), TrendPlot(LIMITS), PerformancePanel())
+    for widget in (*widgets, ModeBadge()):
+        qtbot.addWidget(widget)
+        assert widget.accessibleName(), widget
+        assert widget.toolTip(), widget
+
+
+def test_sizes_do_not_depend_on_values(qtbot: QtBot) -> None:
+    """No layout jumps when numbers change."""
+    gauge, bars, badge = ThetaGauge(10.0), DistanceBars(6.0), StateBadge(LIMITS)
+    for widget in (gauge, bars, badge):
+        qtbot.addWidget(widget)
+    before = [widget.sizeHint() for widget in (gauge, bars, badge)]
+    pose = make_pose(theta=-179.9, head=-333.3, tail=222.2)
+    gauge.show_pose(pose)
+    bars.show_pose(pose)
+    badge.show_scene(make_scene(pose))
+    assert [widget.sizeHint() for widget in (gauge, bars, badge)] == before

@@ -1,0 +1,60 @@
+"""Masks for the tests: drawn with characters where the answer is counted by hand, as tubes where it is known by construction."""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+
+from core.perception import polyline
+from core.types import Mask, Masks, Points
+
+SIZE = (640, 480)
+
+
+def art(picture: str) -> Mask:
+    """'#' is set, everything else is not; the first and last line break are dropped."""
+    return np.array([[character == "#" for character in line] for line in picture.strip("\n").split("\n")])
+
+
+def picture(mask: Mask) -> str:
+    return "\n".join("".join(".#"[int(value)] for value in row) for row in mask)
+
+
+def depth(line: Points, radius: float, size: tuple[int, int] = SIZE) -> np.ndarray:
+    """How deep each pixel lies in a tube with flat ends around a polyline, in px; negative outside. Shape (h, w)."""
+    points = polyline.resample(np.asarray(line, np.float64), 0.5)
+    x, y = np.meshgrid(np.arange(size[0], dtype=np.float64), np.arange(size[1], dtype=np.float64))
+    nearest = np.full((size[1], size[0]), np.inf)
+    left, top = np.maximum(np.floor(points.min(axis=0) - 2 * radius - 2), 0).astype(int)
+    right, bottom = np.minimum(np.ceil(points.max(axis=0) + 2 * radius + 3), size).astype(int)
+    window = np.s_[top:bottom, left:right]
+    places = np.column_stack([x[window].ravel(), y[window].ravel()])
+    nearest[window] = cKDTree(points).query(places)[0].reshape(x[window].shape)
+    deep = radius - nearest
+    for end, inner in ((points[-1], points[-7]), (points[0], points[6])):
+        out = (end - inner) / np.hypot(*(end - inner))
+        beyond = (x - end[0]) * out[0] + (y - end[1]) * out[1]
+        close = np.hypot(x - end[0], y - end[1]) < 3 * radius + 2
+        deep = np.where(close, np.minimum(deep, -beyond), deep)
+    return deep
+
+
+def probability(*depths: np.ndarray) -> np.ndarray:
+    """What a network would give for the union of some tubes: 0.5 on the edge, soft over a pixel or two."""
+    return (1.0 / (1.0 + np.exp(-2.0 * np.maximum.reduce(depths)))).astype(np.float32)
+
+
+def masks_of(vessel: np.ndarray, robot: np.ndarray) -> Masks:
+    """Masks of two probability maps, thresholded at 0.5 and not cleaned."""
+    return Masks(vessel >= 0.5, robot >= 0.5, vessel, robot)
+
+
+def everywhere(size: tuple[int, int] = SIZE) -> np.ndarray:
+    """A vessel that fills the image."""
+    return np.ones((size[1], size[0]), np.float32)
+
+
+def curve(*points: tuple[float, float]) -> Points:
+    """A smooth line through some points, a point every px."""
+    corners = np.asarray(points, np.float64)
+    along = polyline.arc_length(corners)
+    return polyline.resample(CubicSpline(along, corners)(np.linspace(0.0, along[-1], 400)), 1.0)

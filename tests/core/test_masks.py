@@ -1,0 +1,102 @@
+import numpy as np
+import pytest
+
+from core.config import CleaningConfig, PerceptionConfig, SegmentationConfig
+from core.perception.masks import clean, clean_mask
+from tests.core.drawing import art, picture
+
+CLUTTERED = art("""
+##............
+##..########..
+....########..
+....##.##.##..
+....########..
+.#..########..
+""")
+
+
+def test_specks_go_and_pinholes_are_filled() -> None:
+    assert picture(clean_mask(CLUTTERED, min_area_px=5, max_hole_area_px=1)) == (
+        "..............\n"
+        "....########..\n"
+        "....########..\n"
+        "....########..\n"
+        "....########..\n"
+        "....########.."
+    )
+
+
+def test_the_limits_are_exact() -> None:
+    assert clean_mask(CLUTTERED, 4, 0)[:2, :2].all()  # the speck has four pixels
+    assert not clean_mask(CLUTTERED, 5, 0)[:2, :2].any()
+    assert not clean_mask(CLUTTERED, 0, 0)[3, 6]
+    assert clean_mask(CLUTTERED, 0, 1)[3, 6]
+
+
+RING = art("""
+.........
+.#######.
+.#.....#.
+.#.###.#.
+.#.....#.
+.#######.
+.........
+""")
+
+
+def test_a_loop_that_encloses_more_than_a_hole_stays_open() -> None:
+    assert not clean_mask(RING, 0, 11)[2, 3]  # the hole has 15 pixels, or 12 without the island in it
+    assert clean_mask(RING, 0, 15)[1:6, 1:8].all()
+
+
+def test_holes_do_not_count_as_area() -> None:
+    assert clean_mask(RING, 20, 0)[1, 1]  # the ring has 20 pixels
+    assert not clean_mask(RING, 21, 0)[1, 1]
+
+
+def test_background_at_the_image_border_is_no_hole() -> None:
+    bay = art("""
+##.##
+##.##
+#####
+""")
+    assert picture(clean_mask(bay, 0, 100)) == picture(bay)
+
+
+def test_diagonal_pixels_belong_together() -> None:
+    stairs = art("""
+#....
+.#...
+..#..
+...#.
+....#
+""")
+    assert clean_mask(stairs, 5, 0).sum() == 5
+    assert clean_mask(stairs, 6, 0).sum() == 0
+
+
+def test_the_input_is_not_written_to() -> None:
+    before = CLUTTERED.copy()
+    clean_mask(CLUTTERED, 100, 100)
+    assert (before == CLUTTERED).all()
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_empty_and_full_images(value: float) -> None:
+    probability = np.full((48, 64), value, np.float32)
+    masks = clean(probability, probability, PerceptionConfig())
+    assert masks.vessel.all() == masks.robot.all() == bool(value)
+    assert masks.vessel.dtype == masks.robot.dtype == np.bool_
+
+
+def test_each_mask_has_its_own_threshold_and_limit() -> None:
+    probability = np.zeros((60, 80), np.float32)
+    probability[10:40, 10:40] = 0.6
+    config = PerceptionConfig(
+        segmentation=SegmentationConfig(vessel_threshold=0.5, robot_threshold=0.7),
+        cleaning=CleaningConfig(min_vessel_area_px=900, min_robot_area_px=900),
+    )
+    masks = clean(probability, probability, config)
+    assert masks.vessel.sum() == 900
+    assert masks.robot.sum() == 0
+    assert masks.vessel_probability is probability

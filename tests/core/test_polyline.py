@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from core.perception import polyline
+
+CORNER = np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 40.0]])
+
+
+def test_arc_length_is_the_distance_walked() -> None:
+    assert polyline.arc_length(CORNER).tolist() == [0.0, 30.0, 70.0]
+
+
+def test_resampling_keeps_both_ends_and_spaces_evenly() -> None:
+    even = polyline.resample(CORNER, 10.0)
+    assert even.tolist() == [[0, 0], [10, 0], [20, 0], [30, 0], [30, 10], [30, 20], [30, 30], [30, 40]]
+
+
+def test_a_cut_keeps_inner_corners_and_is_clamped_to_the_ends() -> None:
+    assert polyline.cut(CORNER, 20.0, 35.0).tolist() == [[20, 0], [30, 0], [30, 5]]
+    assert polyline.cut(CORNER, -5.0, 500.0).tolist() == CORNER.tolist()
+
+
+@pytest.mark.parametrize(
+    ("point", "distance", "position", "foot"),
+    [((10.0, 5.0), 5.0, 10.0, (10.0, 0.0)), ((33.0, 44.0), 5.0, 70.0, (30.0, 40.0)), ((-3.0, -4.0), 5.0, 0.0, (0.0, 0.0))],
+)
+def test_the_nearest_place_lies_on_a_segment_not_on_a_vertex(
+    point: tuple[float, float], distance: float, position: float, foot: tuple[float, float]
+) -> None:
+    assert polyline.nearest(CORNER, point) == (pytest.approx(distance), pytest.approx(position), pytest.approx(foot))
+
+
+def test_smoothing_keeps_the_ends_and_leaves_a_straight_line_alone() -> None:
+    line = np.column_stack([np.linspace(0, 50, 26), np.linspace(10, 35, 26)])
+    np.testing.assert_allclose(polyline.smooth(line, 3.0), line, atol=1e-9)
+    staircase = line + np.tile([[0.0, 0.5], [0.0, -0.5]], (13, 1))
+    smoothed = polyline.smooth(staircase, 3.0)
+    np.testing.assert_allclose(smoothed[[0, -1]], staircase[[0, -1]], atol=1e-9)
+    assert np.abs(smoothed[3:-3] - line[3:-3]).max() < 0.1
+
+
+def test_a_map_is_sampled_between_pixels_and_beyond_its_border() -> None:
+    ramp = np.tile(np.arange(8, dtype=np.float32), (6, 1))
+    assert polyline.sample(ramp, np.array([[2.5, 3.0], [-4.0, 1.0], [20.0, 1.0]])).tolist() == [2.5, 0.0, 7.0]
