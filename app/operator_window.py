@@ -36,7 +36,7 @@ from app.widgets.toast import Toast
 from app.widgets.trend_plot import TrendPlot
 from app.wording import REASON_TEXT
 from core.config import Config
-from core.types import Command, Point, Tick
+from core.types import Command, Point, PoseState, Tick
 from hardware.rig import RigKind
 
 OpenEngineFor = Callable[[Config], EngineLike]
@@ -73,6 +73,7 @@ class OperatorWindow(QMainWindow):
         self._due_s = 0.0
         self._is_shut = False
         self._text_pace = Pace(TEXT_EVERY_S)
+        self._shown_state: PoseState | None = None
         self._thread = EngineThread(self)
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
         self._heartbeat = Heartbeat(parent=self)
@@ -160,7 +161,7 @@ class OperatorWindow(QMainWindow):
         column.addWidget(Card("", self._badge))
         column.addLayout(measures, 3)
         column.addWidget(Card("Last 30 seconds", self._trends, _trend_legend()), 3)
-        column.addLayout(hands, 2)
+        column.addLayout(hands, 3)
         return column
 
     def _make_menus(self) -> None:
@@ -279,6 +280,7 @@ class OperatorWindow(QMainWindow):
         self._trends.clear()
         what = self._picker.title if self._picker is not None else self._config.rig.source or self._config.rig.name
         if phase is Phase.STARTING:
+            self._live.clear()
             self._blank("Starting", what)
             self._notice.show_notice(NoticeKind.PROGRESS, f"Starting: {what}", "Opening camera and robot, loading the network")
         elif phase is Phase.RUNNING:
@@ -327,13 +329,16 @@ class OperatorWindow(QMainWindow):
         first = self._tick is None
         self._tick = tick
         scene, pose = tick.scene, tick.scene.pose
-        renew_text = self._text_pace.due()
+        state = pose.state if pose is not None else None
+        # a new state renews all texts together: numbers beside it must be the ones that made it
+        renew_text = self._text_pace.due() or state is not self._shown_state
+        self._shown_state = state
         self._live.show_frame(tick.frame, scene)
         self._badge.show_scene(scene, renew_text=renew_text)
         self._gauge.show_pose(pose, renew_text=renew_text)
         self._bars.show_pose(pose, renew_text=renew_text)
         why_none = REASON_TEXT[scene.refusal.reason].title.lower() if scene.refusal is not None else "no pose"
-        self._advice.show_advice(tick.advice, pose.state if pose is not None else None, why_none, renew_text=renew_text)
+        self._advice.show_advice(tick.advice, state, why_none, renew_text=renew_text)
         self._trends.add(scene)
         self._performance.add(tick, self._heartbeat.max_block_ms)
         self._jog_panel.show_command(self._jog.command, tick.status)

@@ -10,7 +10,7 @@ import numpy as np
 from app import palette
 from app.scene_shapes import SceneShapes, scene_shapes
 from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
-from app.wording import REASON_TEXT, STATE_TITLE, advice_headline
+from app.wording import REASON_TEXT, STATE_TITLE, advice_headline, signed_degrees
 from core.config import RESOURCES
 from core.types import Advice, Image, Mask, Point, Points, Pose, PoseState, Scene, Vector
 
@@ -146,7 +146,7 @@ def _draw_measures(brush: _Brush, pose: Pose, shapes: SceneShapes, labels: bool)
         brush.angle(robot.start, shapes.angle_arc, palette.THETA)
         head_side = 1.0 if pose.c_head_px > 0 else -1.0
         # on the side of the vessel where the head is not: there is the least to cover
-        brush.label_beside(vessel.center, vessel, -head_side, f"θ {pose.theta_signed_deg:+.1f}°", palette.THETA)
+        brush.label_beside(vessel.center, vessel, -head_side, f"θ {signed_degrees(pose.theta_signed_deg, 1)}", palette.THETA)
         brush.label_beside(robot.end, vessel, head_side, f"d_head {pose.d_head_px:.1f} px", palette.D_HEAD)
         tail_side = 1.0 if pose.c_tail_px > 0 else -1.0
         brush.label_beside(robot.start, vessel, tail_side, f"d_tail {pose.d_tail_px:.1f} px", palette.D_TAIL)
@@ -160,6 +160,7 @@ class _Brush:
         self._zoom = zoom
         self._origin = np.array(origin)
         self._unit = unit
+        self._labels: list[Points] = []
 
     @property
     def unit(self) -> float:
@@ -227,7 +228,12 @@ class _Brush:
         width = _text_width(text, "SemiBold", round(20 * self._unit)) + 20 * self._unit
         reach = 22.0 * self._unit + abs(across[0]) * width / 2 + abs(across[1]) * 15.0 * self._unit
         (middle,) = self._at([point])
-        self._label(middle + across * reach, text, name)
+        middle = middle + across * reach
+        gap = np.array([width, 32.0 * self._unit])
+        if any((np.abs(middle - other) < gap).all() for other in self._labels):
+            middle = middle + across * 32.0 * self._unit
+        self._labels.append(middle)
+        self._label(middle, text, name)
 
     def frame(self, origin: Points, size: Point) -> None:
         """A thin rectangle from `origin`, source pixels."""
@@ -267,7 +273,10 @@ def _caption(scene: Scene, advice: Advice | None, width: int) -> Image:
     if scene.pose is not None:
         pose = scene.pose
         title = STATE_TITLE[pose.state]
-        parts = [(f"θ {pose.theta_signed_deg:+.1f}°", palette.THETA), (f"d_head {pose.d_head_px:.1f} px", palette.D_HEAD)]
+        parts = [
+            (f"θ {signed_degrees(pose.theta_signed_deg, 1)}", palette.THETA),
+            (f"d_head {pose.d_head_px:.1f} px", palette.D_HEAD),
+        ]
         parts += [(f"d_tail {pose.d_tail_px:.1f} px", palette.D_TAIL), (f"confidence {pose.confidence:.2f}", palette.TEXT_DIM)]
     else:
         title = REASON_TEXT[scene.refusal.reason].title if scene.refusal else "No pose"

@@ -23,13 +23,11 @@ class Size(StrEnum):
 
     LABEL = "label"
     BODY = "body"
-    WHY = "why"
     TITLE = "title"
     NUMBER = "number"
-    HUGE = "huge"
 
 
-_PIXELS = {Size.LABEL: 12, Size.BODY: 14, Size.WHY: 17, Size.TITLE: 27, Size.NUMBER: 32, Size.HUGE: 76}
+_PIXELS = {Size.LABEL: 12, Size.BODY: 14, Size.TITLE: 27, Size.NUMBER: 32}
 _FAMILIES = ["Inter", "Segoe UI", "Noto Sans", "DejaVu Sans", "sans-serif"]
 
 

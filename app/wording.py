@@ -77,6 +77,13 @@ def side(signed: float) -> str:
     return "right" if signed > 0 else "left"
 
 
+def signed_degrees(angle_deg: float, digits: int) -> str:
+    """For example "+18.4°"; zero has no sign."""
+    if round(angle_deg, digits) == 0:
+        return f"{0:.{digits}f}°"
+    return f"{angle_deg:+.{digits}f}°".replace("-", "\N{MINUS SIGN}")
+
+
 def literal_state(pose: Pose, limits: PoseConfig) -> PoseState:
     """The state by METHOD section 6 without hysteresis."""
     if pose.d_head_px < limits.d_allow_px and pose.d_tail_px < limits.d_allow_px and pose.theta_deg < limits.theta_allow_deg:

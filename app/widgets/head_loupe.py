@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPaintEvent, QPen, QTransform
@@ -55,9 +56,10 @@ class HeadLoupe(QWidget):
         """Keep a copy of the part that is visible, with its place in the source."""
         x0, y0 = max(0, int(left) - 1), max(0, int(top) - 1)
         x1, y1 = min(image.shape[1], int(left + width) + 2), min(image.shape[0], int(top + height) + 2)
-        self._pixels = np.ascontiguousarray(image[y0 : max(y1, y0 + 1), x0 : max(x1, x0 + 1)])
-        rows, columns = self._pixels.shape[:2]
-        self._image = QImage(self._pixels.data, columns, rows, 3 * columns, QImage.Format.Format_RGB888)
+        part = np.ascontiguousarray(image[y0 : max(y1, y0 + 1), x0 : max(x1, x0 + 1)])
+        self._pixels = np.asarray(cv2.cvtColor(part, cv2.COLOR_RGB2BGRA), np.uint8)
+        rows, columns = part.shape[:2]
+        self._image = QImage(self._pixels.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32)
         self._image.setOffset(QPointF(x0, y0).toPoint())
 
     def _place(self, head: QPointF) -> None:

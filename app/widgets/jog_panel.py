@@ -50,9 +50,8 @@ class JogPanel(QWidget):
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
         rows.setSpacing(4)
-        rows.addLayout(grid)
+        rows.addLayout(grid, 1)
         rows.addWidget(self._readout)
-        rows.addStretch(1)
         self.setAccessibleName("Keys that move the robot")
 
     @property
@@ -91,7 +90,8 @@ class _Cap(QWidget):
         self._lit = False
         self._held_by_mouse = False
         self.setMinimumSize(46, self.sizeHint().height())
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setMaximumHeight(28 if wide else 44)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def sizeHint(self) -> QSize:
         return QSize(62, 24 if self._wide else 34)
@@ -140,14 +140,14 @@ class _Cap(QWidget):
             painter.setFont(theme.semi_bold(12))
             painter.drawText(frame, Qt.AlignmentFlag.AlignCenter, f"{self._key}:  {self._text}")
             return
-        top = QRectF(frame.left(), frame.top() + 2, frame.width(), 16)
+        top = QRectF(frame.left(), frame.center().y() - 15, frame.width(), 16)
         painter.setFont(theme.semi_bold(13))
         painter.drawText(top.translated(8 if self._arrow is not None else 0, 0), Qt.AlignmentFlag.AlignCenter, self._key)
         if self._arrow is not None:
             self._paint_arrow(painter, QPointF(top.center().x() - 9, top.center().y()), self._arrow, text)
         painter.setPen(QColor(label))
         painter.setFont(theme.font(11))
-        painter.drawText(QRectF(frame.left(), frame.top() + 18, frame.width(), 14), Qt.AlignmentFlag.AlignCenter, self._text)
+        painter.drawText(QRectF(frame.left(), frame.center().y() + 1, frame.width(), 14), Qt.AlignmentFlag.AlignCenter, self._text)
         painter.end()
 
     @staticmethod

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
 
 from app import palette, theme
 from app.scene_shapes import SceneShapes
+from app.wording import signed_degrees
 from core.types import Point, Points, Pose, Vector
 
 _ARC_RADIUS = 44.0
@@ -129,7 +130,7 @@ def _draw_vectors(pencil: _Pencil, shapes: SceneShapes, pose: Pose | None, angle
     pencil.angle(shapes.robot_vector.start, shapes.angle_arc, palette.THETA)
     # on the side of the vessel where the head is not: there is the least to cover
     vessel = shapes.vessel_vector
-    pencil.label_beside(vessel.center, vessel, angle_side, f"θ {pose.theta_signed_deg:+.0f}°", palette.THETA)
+    pencil.label_beside(vessel.center, vessel, angle_side, f"θ {signed_degrees(pose.theta_signed_deg, 0)}", palette.THETA)
 
 
 def _draw_distances(pencil: _Pencil, shapes: SceneShapes, pose: Pose, sides: tuple[float, float]) -> None:
@@ -155,6 +156,7 @@ class _Pencil:
         self._to_screen = to_screen
         self._label_px = label_px
         self._room = QRectF(painter.window())
+        self._labels: list[QRectF] = []
         painter.resetTransform()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
 
@@ -237,8 +239,11 @@ class _Pencil:
         reach = _LABEL_GAP + (abs(across.x()) * width + abs(across.y()) * height) / 2
         middle = self._at(point) + across * reach
         box = QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height)
+        if any(box.intersects(other) for other in self._labels):
+            box.translate(across * (height + 2.0))
         box.moveLeft(max(self._room.left() + 4, min(box.left(), self._room.right() - width - 4)))
         box.moveTop(max(self._room.top() + 4, min(box.top(), self._room.bottom() - height - 4)))
+        self._labels.append(box)
         self._painter.setPen(Qt.PenStyle.NoPen)
         self._painter.setBrush(theme.colour(palette.INK, 0.72))
         self._painter.drawRoundedRect(box, 4.0, 4.0)

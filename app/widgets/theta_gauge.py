@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygon
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.wording import QUANTITY_MEANING, side
+from app.wording import QUANTITY_MEANING, side, signed_degrees
 from core.types import Pose
 
 _OVERFLOW_DEG = 22.0
@@ -36,7 +36,7 @@ class ThetaGauge(QWidget):
     @property
     def text(self) -> str:
         """The number on the dial."""
-        return "\N{EN DASH}" if self._number is None else f"{self._number:+.1f}°"
+        return "\N{EN DASH}" if self._number is None else signed_degrees(self._number, 1)
 
     @property
     def direction(self) -> str:

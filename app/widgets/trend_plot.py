@@ -17,6 +17,7 @@ SPAN_S = 30.0
 _CAPACITY = 1024
 _DRAW_EVERY_S = 0.1
 _CELL_S = 0.1
+_HOLD_S = 0.6  # a slow camera leaves no holes in the band, a silent one does
 _ROOM_FOR_TICKS = 44.0
 _STATES: tuple[PoseState | None, ...] = (None, *PoseState)
 _ANGLE_RANGES = (20.0, 45.0, 90.0, 180.0)
@@ -181,7 +182,7 @@ class _StateBand:
         cells = np.zeros(len(self._cells_s), np.uint8)
         if len(ago_s):
             newest = np.searchsorted(ago_s, self._cells_s + _CELL_S, side="right") - 1
-            fresh = (newest >= 0) & (self._cells_s - ago_s[np.maximum(newest, 0)] < 3 * _CELL_S)
+            fresh = (newest >= 0) & (self._cells_s - ago_s[np.maximum(newest, 0)] < _HOLD_S)
             cells[fresh] = states[newest[fresh]]
         self._image.setImage(self._table[cells][None], autoLevels=False)
         self._image.setRect(QRectF(-SPAN_S, 0.0, SPAN_S, 1.0))

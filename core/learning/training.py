@@ -16,6 +16,11 @@ from torch.utils.data import DataLoader, Dataset
 from core.learning.augment import random_clutter, random_crop, random_look
 from core.learning.dataset import Sample
 from core.perception.unet import DualUNet
+from core.types import Image, Mask
+
+
+_MAX_KEPT = 4000
+"""Frames of 640x480 kept in memory: some 1.5 MB each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,11 +28,11 @@ class TrainingPlan:
     """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours."""
 
     steps: int = 6000
-    batch: int = 6
-    learning_rate: float = 2e-3
+    batch: int = 12
+    learning_rate: float = 3e-3
     weight_decay: float = 1e-4
-    warmup_steps: int = 200
-    crop: tuple[int, int] = (384, 384)
+    warmup_steps: int = 100
+    crop: tuple[int, int] = (256, 256)
     clutter_share: float = 0.03
     average_decay: float = 0.998
     robot_weight: float = 1.5
@@ -57,6 +62,7 @@ class _Crops(Dataset[tuple[Tensor, Tensor]]):
     def __init__(self, samples: list[Sample], plan: TrainingPlan) -> None:
         self._samples = samples
         self._plan = plan
+        self._kept: dict[int, tuple[Image, Mask, Mask]] = {}
 
     def __len__(self) -> int:
         return self._plan.steps * self._plan.batch
@@ -70,11 +76,20 @@ class _Crops(Dataset[tuple[Tensor, Tensor]]):
             # Epochs without repetition: position in a permutation that is drawn anew for every pass.
             epoch, place = divmod(index, len(self._samples))
             order = np.random.default_rng((self._plan.seed, 7919, epoch)).permutation(len(self._samples))
-            image, vessel, robot = self._samples[order[place]].load()
-            image, vessel, robot = random_crop(image, vessel, robot, size, rng)
+            image, vessel, robot = random_crop(*self._frame(int(order[place])), size, rng)
         image = random_look(image, rng)
         target = np.stack([vessel, robot]).astype(np.uint8)
         return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(target)
+
+
+    def _frame(self, place: int) -> tuple[Image, Mask, Mask]:
+        """Decoding costs as much as cropping: frames are kept, as far as they fit."""
+        frame = self._kept.get(place)
+        if frame is None:
+            frame = self._samples[place].load()
+            if len(self._kept) < _MAX_KEPT:
+                self._kept[place] = frame
+        return frame
 
 
 def loss_of(logits: Tensor, target: Tensor, robot_weight: float) -> tuple[Tensor, Tensor]:

@@ -23,6 +23,9 @@ MIN_PIECE_SHARE = 0.2
 PLACE_WEIGHT = 0.5
 SHORTNESS_WEIGHT = 0.5
 ROUTE_WEIGHT = 1.0
+WALL_WEIGHT = 4.0
+REACH_RADII = 1.5
+"""Vessels farther from the head than this many of their radii are not looked at."""
 TIE_COST = 0.2
 """A path whose cost is this much above the best one's no longer counts as nearly as good."""
 TIE_ANGLE_DEG = 20.0
@@ -138,7 +141,7 @@ def _feet(graph: VesselGraph, head: Point, half_length: float) -> list[tuple[int
     return [
         (index, position, radius)
         for distance, index, position, radius in found
-        if distance <= max(least + 0.25 * radius_there, 1.1 * radius)
+        if distance <= max(least + 0.25 * radius_there, REACH_RADII * radius)
     ]
 
 
@@ -182,7 +185,7 @@ def _route_ahead(route: Route | None, head: Point, half_length: float, radius: f
 def _candidate(
     line: Points, radius: float, scale: float, head: Point, direction: NDArray[np.float64], half_length: float, ahead: Points | None
 ) -> _Candidate | None:
-    _, position, nearest = polyline.nearest(line, head)
+    distance, position, nearest = polyline.nearest(line, head)
     piece = polyline.cut(line, position - half_length, position + half_length)
     before, after = min(position, half_length), float(polyline.arc_length(piece)[-1]) - min(position, half_length)
     length = before + after
@@ -202,6 +205,8 @@ def _candidate(
     robot_line = np.asarray(head) + np.outer([-before, 0.0, after], direction)
     place_cost = float(np.mean(np.sum((places - robot_line) ** 2, axis=1))) / scale**2
     cost = turn_cost + PLACE_WEIGHT * place_cost + SHORTNESS_WEIGHT * (1.0 - length / (2.0 * half_length))
+    # A path whose lumen the head is outside of is another vessel, however well it would fit.
+    cost += WALL_WEIGHT * max(0.0, distance / radius - 1.0)
     if ahead is not None:
         cost += ROUTE_WEIGHT * _off_route(polyline.cut(piece, before, length), ahead, scale)
     return _Candidate(piece, nearest, radius, cost)

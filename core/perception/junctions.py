@@ -22,7 +22,13 @@ OPENING_MAX_RADII = 2.5
 """An opening ends where the lumen is as narrow as the branch itself: looked for between these multiples of its junction's
 radius."""
 SETTLED = 1.1
+"""As narrow as the branch itself: at most this factor of its own radius (and a third of a pixel)."""
+BEYOND_RADII = 0.4
+"""The skeleton comes back to the middle a little later than the radius does."""
+HEADING_RADII = 1.0
+"""A branch's direction is taken over this many of its radii, and at least 12 px."""
 CLEAR_RADII = 1.0
+"""The opening reaches at least so many of the branch's radii beyond the junction's new place."""
 ROUNDS = 3
 TRUNK_MAX_TURN_DEG = 50.0
 TRUNK_LEAD_DEG = 10.0
@@ -103,7 +109,8 @@ def _gate(arm: Arm, along: NDArray[np.float64], radius_px: float, at_least_px: f
     own = float(plain[int(0.4 * len(plain))]) if len(plain) else float(arm.radius[first:last].min())
     settled = arm.radius[first:last] <= SETTLED * own + 0.3
     index = int(first + np.argmax(settled)) if settled.any() else int(last - 1)
-    chord = arm.points[min(index + round(max(12.0, radius_px) / STEP_PX), len(along) - 1)] - arm.points[index]
+    index = min(index + round(BEYOND_RADII * own / STEP_PX), len(along) - 1 - round(8.0 / STEP_PX))
+    chord = arm.points[min(index + round(max(12.0, HEADING_RADII * own) / STEP_PX), len(along) - 1)] - arm.points[index]
     return _Gate(arm.points[index], chord / max(float(np.hypot(chord[0], chord[1])), 1e-9), float(along[index]), own)
 
 

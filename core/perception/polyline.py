@@ -76,6 +76,8 @@ def smooth(points: Points, sigma: float) -> Points:
 
 def sample(values: NDArray[np.float32], points: Points) -> NDArray[np.float64]:
     """A map (h, w) at sub-pixel places (..., 2), bilinear; places beyond its border get the border's value. Shape (...)."""
+    if points.size == 0:
+        return np.zeros(points.shape[:-1])
     x, y = (np.ascontiguousarray(points[..., axis], np.float32).reshape(-1, 1) for axis in (0, 1))
     found = cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(found, np.float64).reshape(points.shape[:-1])

@@ -75,7 +75,8 @@ def find(
     candidates, rivals = _candidates(graph, chosen, around, previous, config.path)
     if not candidates:
         return _why_no_candidate(graph, config.path)
-    best = max(candidates, key=lambda candidate: candidate.score + candidate.continuity)
+    eligible = candidates if previous is None else [*candidates, *rivals]
+    best = max(eligible, key=lambda candidate: candidate.score + candidate.continuity)
     if previous is None and all(is_entry(place, around) for place in best.trail.points[[0, -1]]):
         return Refusal(Reason.AMBIGUOUS_PATH, "both of its ends lie at the image border, so its head may be out of view")
     points = tail_first(best.trail.points, around)

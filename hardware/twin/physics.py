@@ -162,8 +162,10 @@ class TwinPhysics:
         """
         with self._lock:
             corners = self._chain.corners_mm(OUTSIDE_MM)
-        if (corners[0] - self._port.point) @ self._port.inward > -OUTSIDE_MM:
-            corners = np.vstack([self._port.point - OUTSIDE_MM * self._port.inward, corners])
+        outside = -float((corners[0] - self._port.point) @ self._port.inward)
+        lead_in = np.arange(OUTSIDE_MM, outside + SHAFT_LINK_MM / 2, -SHAFT_LINK_MM)
+        if len(lead_in):
+            corners = np.vstack([self._port.point - lead_in[:, None] * self._port.inward, corners])
         return _smooth(corners)
 
     @property

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -164,7 +166,8 @@ def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int],
             on_progress(_write_episode(plan, episode))
     elif missing:
         # Spawned, not forked: physics and OpenCV own threads that a fork would cut off.
-        with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent) as pool:
             jobs = [pool.submit(_write_episode, plan, episode) for episode in missing]
             try:
                 for job in as_completed(jobs):
@@ -175,6 +178,18 @@ def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int],
     rows = [_episode_file(plan, episode).read_text(encoding="utf-8") for episode in range(plan.episodes)]
     (plan.out / "truth.jsonl").write_text("".join(rows), encoding="utf-8")
     return plan.count
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent was killed would wait for work for ever."""
+
+    def watch() -> None:
+        parent = multiprocessing.parent_process()
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _prepare(plan: SynthPlan) -> None:

@@ -228,6 +228,7 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     assert window._picker is not None
     window._picker.chosen.emit("tree")
     assert window._phase is Phase.STARTING
+    assert not window._live._picture.isVisible(), "the old world is not shown as the new one"
     assert window._target is None
     assert window._jog.command == Command()
     until(qtbot, lambda: window.shown_tick is not None)

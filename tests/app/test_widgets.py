@@ -82,7 +82,7 @@ def test_gauge_shows_sign_number_and_side(qtbot: QtBot) -> None:
     gauge.show_pose(make_pose(theta=18.44))
     assert (gauge.text, gauge.direction) == ("+18.4°", "right")
     gauge.show_pose(make_pose(theta=-132.0))
-    assert (gauge.text, gauge.direction) == ("-132.0°", "left")
+    assert (gauge.text, gauge.direction) == ("−132.0°", "left")
     gauge.show_pose(None)
     assert gauge.text == "–"
 

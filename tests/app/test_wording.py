@@ -12,6 +12,7 @@ from app.wording import (
     STATE_TITLE,
     advice_headline,
     refusal_line,
+    signed_degrees,
     why_line,
 )
 from core.config import PoseConfig
@@ -46,6 +47,11 @@ def test_why_line_owns_up_to_hysteresis() -> None:
 
 def test_values_and_units_stay_together_when_the_line_wraps() -> None:
     assert "14\N{NO-BREAK SPACE}px" in why_line(make_pose(PoseState.C), LIMITS)
+
+
+@pytest.mark.parametrize(("angle", "expected"), [(18.44, "+18.4°"), (-132.0, "−132.0°"), (-0.04, "0.0°"), (0.06, "+0.1°")])
+def test_signed_degrees(angle: float, expected: str) -> None:
+    assert signed_degrees(angle, 1) == expected
 
 
 def test_every_case_has_a_text() -> None:

@@ -36,7 +36,7 @@ def test_smoothing_keeps_the_ends_and_leaves_a_straight_line_alone() -> None:
     staircase = line + np.tile([[0.0, 0.5], [0.0, -0.5]], (13, 1))
     smoothed = polyline.smooth(staircase, 3.0)
     np.testing.assert_allclose(smoothed[[0, -1]], staircase[[0, -1]], atol=1e-9)
-    assert np.abs(smoothed[3:-3] - line[3:-3]).max() < 0.1
+    assert np.abs(smoothed[9:-9] - line[9:-9]).max() < 0.1
 
 
 def test_a_map_is_sampled_between_pixels_and_beyond_its_border() -> None:

@@ -38,6 +38,7 @@ def wide() -> TwinPhysics:
 def inserted(wide: TwinPhysics) -> TwinPhysics:
     wide.reset()
     wide.step(Command(advance_mm_s=40.0), 1.5)
+    wide.step(Command(), 0.1)
     return wide
 
 

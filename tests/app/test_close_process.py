@@ -1,0 +1,54 @@
+"""A process with the window ends with exit code 0 and says nothing, whenever it is closed and however."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+PROGRAM = """
+import os, signal, sys, time
+from PySide6.QtCore import QTimer
+from app.operator_window import OperatorWindow
+from app.window_command import _quit_on_signal, make_application
+from core.config import Config
+from hardware.rig import RigKind
+from tests.app.fakes import FakeBench, FakeEngine
+
+how, after_ms = sys.argv[1], int(sys.argv[2])
+
+def open_engine(config):
+    time.sleep(0.3)
+    return FakeEngine(FakeBench())
+
+application = make_application()
+window = OperatorWindow(Config(), open_engine, RigKind.SIM, [("tree", "Tree")])
+application.aboutToQuit.connect(window.shut_down)
+window.show()
+window.start()
+_quit_on_signal(application)
+end = {
+    "close": window.close,
+    "quit": application.quit,
+    "SIGINT": lambda: os.kill(os.getpid(), signal.SIGINT),
+    "SIGTERM": lambda: os.kill(os.getpid(), signal.SIGTERM),
+}
+QTimer.singleShot(after_ms, end[how])
+sys.exit(application.exec())
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "after_ms"),
+    [("close", 0), ("close", 150), ("close", 900), ("quit", 150), ("quit", 900), ("SIGINT", 900), ("SIGTERM", 150)],
+)
+def test_exit_code_0_and_not_a_word(how: str, after_ms: int) -> None:
+    """At 0 and 150 ms the rig is being opened, at 900 ms pictures run (or not yet, on a slow machine: no less a moment)."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, how, str(after_ms)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", "")

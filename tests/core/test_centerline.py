@@ -1,0 +1,306 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from core.config import CleaningConfig, PerceptionConfig, VectorConfig, load_config
+from core.perception import centerline, polyline, skeleton
+from core.perception.centerline import build_graph, centerline_at, window_at
+from core.perception.vectors import fit_vessel_vector
+from core.types import GraphEdge, Masks, Point, Points, Route, VesselGraph
+from tests.core.drawing import SIZE, curve, depth, probability
+
+EAST, WEST = (1.0, 0.0), (-1.0, 0.0)
+HALF = 20.0
+
+
+def direction(angle_deg: float) -> Point:
+    return float(np.cos(np.radians(angle_deg))), float(np.sin(np.radians(angle_deg)))
+
+
+def graph_of(nodes: list[Point], edges: list[tuple[int, int]], radius: float = 15.0) -> VesselGraph:
+    """Straight vessels between nodes."""
+    places = np.array(nodes, np.float64)
+    lines = [np.linspace(places[a], places[b], 81) for a, b in edges]
+    return VesselGraph(places, tuple(GraphEdge(a, b, line, np.full(81, radius)) for (a, b), line in zip(edges, lines, strict=True)))
+
+
+STRAIGHT = graph_of([(0, 100), (200, 100)], [(0, 1)])
+TEE = graph_of([(0, 100), (100, 100), (200, 100), (100, 0)], [(0, 1), (1, 2), (1, 3)])
+FORK = graph_of([(0, 100), (100, 100), (200, 150), (200, 50)], [(0, 1), (1, 2), (1, 3)])
+
+
+def ends(graph: VesselGraph, head: Point, pointing: Point, route: Route | None = None) -> list[list[float]]:
+    found = centerline_at(graph, head, pointing, HALF, route)
+    assert found is not None
+    return found.piece[[0, -1]].round(3).tolist()
+
+
+def test_twenty_px_to_each_side_of_the_nearest_point() -> None:
+    found = centerline_at(STRAIGHT, (80.25, 93.0), EAST, HALF)
+    assert found is not None
+    assert found.nearest == pytest.approx((80.25, 100.0))  # between the line's points
+    assert found.piece[[0, -1]].tolist() == [pytest.approx([60.25, 100]), pytest.approx([100.25, 100])]
+    assert found.radius_px == 15.0
+    assert found.ambiguity == 0.0
+
+
+def test_the_piece_runs_the_way_the_robot_travels() -> None:
+    assert ends(STRAIGHT, (80, 93), EAST) == [[60, 100], [100, 100]]
+    assert ends(STRAIGHT, (80, 93), WEST) == [[100, 100], [60, 100]]
+    assert ends(STRAIGHT, (80, 93), direction(70)) == [[60, 100], [100, 100]]
+    assert ends(STRAIGHT, (80, 93), direction(110)) == [[100, 100], [60, 100]]
+
+
+@pytest.mark.parametrize(
+    ("head_x", "piece"), [(5.0, [[0, 100], [25, 100]]), (193.0, [[173, 100], [200, 100]]), (-8.0, [[0, 100], [20, 100]])]
+)
+def test_a_vessels_end_cuts_the_piece_short(head_x: float, piece: list[list[float]]) -> None:
+    assert ends(STRAIGHT, (head_x, 95.0), EAST) == piece
+
+
+def test_a_vessel_of_less_than_eight_px_gives_nothing() -> None:
+    assert centerline_at(graph_of([(0, 0), (7.9, 0)], [(0, 1)]), (3, 0), EAST, HALF) is None
+    assert centerline_at(graph_of([(0, 0), (8.1, 0)], [(0, 1)]), (3, 0), EAST, HALF) is not None
+    assert centerline_at(VesselGraph(np.empty((0, 2)), ()), (3, 0), EAST, HALF) is None
+
+
+def test_a_side_branch_that_the_robot_passes_is_not_taken() -> None:
+    for head_x in (80, 90, 95, 100, 105, 110, 120):
+        piece = centerline_at(TEE, (head_x, 92.0), EAST, HALF)
+        assert piece is not None
+        assert np.abs(piece.piece[:, 1] - 100).max() < 1e-6  # although (100, 92) lies on the side branch
+
+
+def test_at_a_fork_the_branch_that_the_robot_points_into() -> None:
+    assert ends(FORK, (90, 100), direction(20))[1][1] > 103
+    assert ends(FORK, (90, 100), direction(-20))[1][1] < 97
+
+
+def test_at_a_fork_with_the_robot_pointing_between_the_nearer_branch() -> None:
+    assert ends(FORK, (95, 106), EAST)[1][1] > 103
+    assert ends(FORK, (95, 94), EAST)[1][1] < 97
+
+
+def test_never_both_branches() -> None:
+    for angle in (-30, -10, 0, 10, 30):
+        piece = centerline_at(FORK, (100, 100), direction(angle), HALF)
+        assert piece is not None
+        forward = piece.piece[piece.piece[:, 0] > 100.5]
+        assert (forward[:, 1] > 100).all() or (forward[:, 1] < 100).all()
+        assert polyline.arc_length(piece.piece)[-1] == pytest.approx(2 * HALF)
+
+
+def test_backward_the_branch_that_the_robot_came_from() -> None:
+    leaving = ends(FORK, (90, 100), direction(180 - 26.57))  # out of the branch that runs up on the screen, down into the stem
+    assert leaving[1][0] < 75
+    assert leaving[0][1] < 97
+    turning = ends(TEE, (103, 88), direction(-80))  # it has just turned into the side branch
+    assert turning[1] == [100, pytest.approx(68, abs=0.5)]
+
+
+def test_ambiguity_is_one_in_the_fork_and_zero_away_from_it() -> None:
+    def ambiguity(head: Point, pointing: Point) -> float:
+        found = centerline_at(FORK, head, pointing, HALF)
+        assert found is not None
+        return found.ambiguity
+
+    assert ambiguity((98, 100), EAST) == pytest.approx(1.0, abs=1e-6)
+    assert ambiguity((40, 100), EAST) == 0.0
+    assert ambiguity((160, 130), direction(26.57)) == 0.0
+    assert ambiguity((98, 100), direction(10)) < 0.8
+    assert ambiguity((98, 100), direction(26)) < 0.2
+
+
+def test_the_route_decides_between_branches() -> None:
+    for target, sign in (((200, 150), 1), ((200, 50), -1)):
+        route = centerline.plan_route(FORK, (20, 100), target)
+        for angle in (0, -12, 12):
+            assert sign * (ends(FORK, (95, 100), direction(angle), route)[1][1] - 100) > 3
+        found = centerline_at(FORK, (95, 100), EAST, HALF, route)
+        assert found is not None
+        assert found.ambiguity < 0.1
+
+
+def test_a_route_that_does_not_pass_by_is_ignored() -> None:
+    far = Route(np.array([[0.0, 400.0], [200.0, 400.0]]), 200.0, (200, 400))
+    assert ends(FORK, (90, 100), direction(-20), far)[1][1] < 97
+
+
+def test_the_route_tells_the_direction_of_travel_beyond_a_right_angle() -> None:
+    route = centerline.plan_route(STRAIGHT, (20, 100), (190, 100))
+    assert ends(STRAIGHT, (80, 95), direction(100), route)[1][0] > 80
+    assert ends(STRAIGHT, (80, 95), direction(170), route)[1][0] < 80  # but not of a robot that has turned around
+
+
+def test_a_loop_is_walked_one_way_round() -> None:
+    corners: list[Point] = [(0, 100), (60, 100), (100, 60), (140, 100), (100, 140), (200, 100)]
+    loop = graph_of(corners, [(0, 1), (1, 2), (2, 3), (3, 4), (4, 1), (3, 5)])
+    piece = ends(loop, (62, 97), direction(-30))
+    assert piece[0][0] < 50
+    assert piece[1][1] < 90
+
+
+@settings(max_examples=60)
+@given(
+    x=st.floats(20, 180), offset=st.floats(-10, 10), angle=st.floats(-35, 35), turn=st.floats(-180, 180), shift=st.floats(-300, 300)
+)
+def test_the_piece_turns_and_moves_with_the_picture(x: float, offset: float, angle: float, turn: float, shift: float) -> None:
+    plain = centerline_at(FORK, (x, 100 + offset), direction(angle), HALF)
+    a = np.radians(turn)
+    rotation = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+
+    def moved(points: Points) -> Points:
+        return np.asarray(points) @ rotation.T + shift
+
+    edges = tuple(GraphEdge(e.start, e.end, moved(e.points), e.radius) for e in FORK.edges)
+    turned = centerline_at(
+        VesselGraph(moved(FORK.nodes), edges), tuple(moved(np.array([x, 100 + offset]))), direction(angle + turn), HALF
+    )
+    assert plain is not None
+    assert turned is not None
+    assert turned.ambiguity == pytest.approx(plain.ambiguity, abs=1e-3)
+    if abs(offset) + abs(angle) > 0.1:  # an exact tie may fall either way
+        np.testing.assert_allclose(turned.piece[[0, -1]], moved(plain.piece[[0, -1]]), atol=1e-3)
+
+
+@settings(max_examples=60)
+@given(
+    x=st.floats(20, 180),
+    offset=st.floats(-8, 8),
+    angle=st.floats(-30, 30),
+    dx=st.floats(-0.5, 0.5),
+    dy=st.floats(-0.5, 0.5),
+    da=st.floats(-1, 1),
+)
+def test_a_small_disturbance_matters_only_where_two_branches_fit_alike(
+    x: float, offset: float, angle: float, dx: float, dy: float, da: float
+) -> None:
+    before = centerline_at(FORK, (x, 100 + offset), direction(angle), HALF)
+    after = centerline_at(FORK, (x + dx, 100 + offset + dy), direction(angle + da), HALF)
+    assert before is not None
+    assert after is not None
+    if before.ambiguity < 0.1:
+        assert np.abs(before.piece[-1] - after.piece[-1]).max() < 6.0
+
+
+def test_the_papers_window_takes_every_pixel_near_the_nearest_one() -> None:
+    pixels = np.zeros((200, 220), bool)
+    pixels[100, 10:200] = True
+    pixels[100:180, 100] = True
+    straight = window_at(pixels, (50, 90), WEST, HALF)
+    assert straight is not None
+    assert straight.piece.round(6).tolist() == [[70, 100], [30, 100]]
+    assert straight.nearest == (50.0, 100.0)
+    both = window_at(pixels, (95, 104), EAST, HALF)
+    assert both is not None
+    vector = fit_vessel_vector(both)
+    assert vector is not None
+    assert vector.direction[1] > 0.05  # the side branch pulls the line: why the graph rule is the default
+    assert window_at(np.zeros((200, 220), bool), (50, 90), EAST, HALF) is None
+
+
+def test_the_rule_is_chosen_by_configuration() -> None:
+    pixels = np.zeros((200, 220), bool)
+    pixels[100, 10:200] = True
+    paper = load_config(preset="paper").perception.vectors
+    literal = centerline.find(STRAIGHT, pixels, (50, 90), EAST, paper)
+    ours = centerline.find(STRAIGHT, pixels, (50.5, 90), EAST, VectorConfig())
+    assert literal is not None
+    assert ours is not None
+    assert literal.radius_px == 0.0
+    assert ours.nearest == (50.5, 100.0)
+
+
+# ---- the graph of a skeleton ----
+
+
+def perceived(*tubes: tuple[Points, float], config: CleaningConfig = CleaningConfig()) -> VesselGraph:  # noqa: B008
+    vessel = probability(*(depth(line, radius) for line, radius in tubes))
+    found = Masks(vessel >= 0.5, np.zeros_like(vessel, bool), vessel, np.zeros_like(vessel))
+    skeletons = skeleton.thin_masks(found, PerceptionConfig(cleaning=config))
+    return build_graph(skeletons.vessel, found.vessel, config)
+
+
+def degrees(graph: VesselGraph) -> list[int]:
+    return sorted(np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)]).tolist())
+
+
+BENT = curve((-30, 240), (160, 200), (330, 270), (670, 220))
+
+
+def test_one_vessel_is_one_edge_to_a_fraction_of_a_pixel() -> None:
+    graph = perceived((BENT, 17.0))
+    assert degrees(graph) == [1, 1]
+    edge = graph.edges[0]
+    gaps = [polyline.nearest(BENT, (float(x), float(y)))[0] for x, y in edge.points]
+    assert max(gaps) < 2.0
+    assert np.median(gaps) < 0.5
+    assert np.median(edge.radius) == pytest.approx(17.0, abs=0.7)
+    assert {round(x) for x in (edge.points[0, 0], edge.points[-1, 0])} == {0, SIZE[0] - 1}  # to the image border
+
+
+def test_edges_end_in_their_nodes() -> None:
+    graph = perceived((BENT, 17.0), (curve((200, 210), (260, 330), (280, 420)), 11.0))
+    assert degrees(graph) == [1, 1, 1, 3]
+    for edge in graph.edges:
+        np.testing.assert_allclose(edge.points[0], graph.nodes[edge.start])
+        np.testing.assert_allclose(edge.points[-1], graph.nodes[edge.end])
+        assert len(edge.points) == len(edge.radius)
+
+
+def test_bumps_of_the_wall_are_no_branches() -> None:
+    bumps = [(np.array([[x, 240.0], [x + 4.0, 266.0]]), 4.0) for x in (150.0, 300.0, 450.0)]
+    line = np.array([[-20.0, 240.0], [660.0, 240.0]])
+    assert degrees(perceived((line, 18.0), *bumps)) == [1, 1]
+    literal = CleaningConfig(prune_spurs=False, extend_ends=False, rebuild_junctions=False)
+    assert len(perceived((line, 18.0), *bumps, config=literal).edges) > 1
+
+
+@pytest.mark.parametrize("angle_deg", [50, 70, 90, 120])
+def test_a_trunk_runs_straight_through_a_junction_and_the_branch_straight_into_it(angle_deg: float) -> None:
+    trunk = np.array([[-20.0, 200.0], [660.0, 200.0]])
+    along = np.array(direction(angle_deg))
+    branch = np.array([[300.0, 200.0], [300.0, 200.0] + 200 * along])
+    graph = perceived((trunk, 18.0), (branch, 12.0))
+    assert degrees(graph) == [1, 1, 1, 3]
+    node = graph.nodes[int(np.argmax(np.bincount([n for e in graph.edges for n in (e.start, e.end)])))]
+    assert node == pytest.approx((300, 200), abs=8)
+    for edge in graph.edges:
+        line = branch if edge.points[:, 1].max() > 300 else trunk
+        assert max(polyline.nearest(line, (float(x), float(y)))[0] for x, y in edge.points) < 5.0
+
+
+def arc(first_deg: float, last_deg: float) -> Points:
+    angle = np.radians(np.linspace(first_deg, last_deg, 200))
+    return np.column_stack([320 + 110 * np.cos(angle), 240 + 110 * np.sin(angle)])
+
+
+def test_a_loop_stays_a_loop() -> None:
+    way_in, way_out = np.array([[-20.0, 240.0], [215.0, 240.0]]), np.array([[425.0, 240.0], [660.0, 240.0]])
+    graph = perceived((arc(-10, 190), 14.0), (arc(170, 370), 14.0), (way_in, 14.0), (way_out, 14.0))
+    assert degrees(graph) == [1, 1, 3, 3]
+    assert len(graph.edges) == 4
+
+
+def test_a_ring_alone_and_an_empty_mask() -> None:
+    graph = perceived((arc(-10, 190), 14.0), (arc(170, 370), 14.0))
+    assert len(graph.edges) == 1
+    assert graph.edges[0].start == graph.edges[0].end
+    nothing = np.zeros((480, 640), bool)
+    assert build_graph(nothing, nothing, CleaningConfig()).edges == ()
+
+
+def test_a_blob_keeps_one_edge_or_none() -> None:
+    assert len(perceived((np.array([[300.0, 240.0], [330.0, 240.0]]), 25.0)).edges) <= 1
+
+
+def test_the_vessels_direction_beside_the_head_to_a_degree() -> None:
+    graph = perceived((BENT, 17.0))
+    truth = VesselGraph(BENT[[0, -1]], (GraphEdge(0, 1, BENT, np.full(len(BENT), 17.0)),))
+    for x in range(40, 600, 40):
+        head = (float(x), float(np.interp(x, BENT[:, 0], BENT[:, 1])) + 5.0)
+        vectors = [fit_vessel_vector(found) for one in (graph, truth) if (found := centerline_at(one, head, EAST, HALF))]
+        assert len(vectors) == 2
+        angles = [np.degrees(np.arctan2(v.direction[1], v.direction[0])) for v in vectors if v is not None]
+        assert abs(angles[0] - angles[1]) < 1.0

@@ -1,0 +1,158 @@
+import cv2
+import numpy as np
+import pytest
+
+from core.config import PerceptionConfig, QualityConfig
+from core.perception import quality
+from core.perception.tracking import Memory, check_jump, recall
+from core.types import Centerline, Masks, Points, Reason, Refusal, RobotPath
+
+CONFIG = PerceptionConfig()
+LIMITS = CONFIG.quality
+SHAPE = (120, 200)
+LINE: Points = np.column_stack([np.arange(20.0, 121.0), np.full(101, 60.0)])
+PIECE = Centerline(np.array([[100.0, 62.0], [140.0, 62.0]]), (120.0, 62.0), 20.0)
+
+
+def path(line: Points = LINE, **more: float | None) -> RobotPath:
+    values: dict[str, float | None] = {"score": 1.3, "runner_up": None, "bridged_px": 0.0, "radius_px": 4.0} | more
+    return RobotPath(points=line, entry_on_border=True, **values)  # type: ignore[arg-type]
+
+
+def masks(vessel_from: int = 0, vessel_probability: float = 1.0, robot_probability: float = 1.0) -> Masks:
+    """A vessel band from a column on, and the robot along ``LINE``."""
+    vessel, robot = np.zeros(SHAPE, bool), np.zeros(SHAPE, bool)
+    vessel[40:81, vessel_from:] = True
+    robot[56:65, 20:121] = True
+    return Masks(vessel, robot, (vessel * vessel_probability).astype(np.float32), (robot * robot_probability).astype(np.float32))
+
+
+def picture(kind: str) -> np.ndarray:
+    image = np.full((480, 640, 3), 170, np.uint8)
+    for x in range(60, 600, 90):
+        cv2.line(image, (x, 40), (x + 40, 440), (70, 60, 60), 9, cv2.LINE_AA)
+    match kind:
+        case "black":
+            return (image // 30).astype(np.uint8)
+        case "white":
+            return np.full_like(image, 254)
+        case "blurred":
+            return cv2.GaussianBlur(image, (0, 0), 25)
+        case _:
+            return image
+
+
+@pytest.mark.parametrize(
+    ("kind", "reason"), [("black", Reason.BLACK), ("white", Reason.WHITE), ("sharp", None), ("blurred", Reason.BLURRED)]
+)
+def test_images_that_show_nothing(kind: str, reason: Reason | None) -> None:
+    refusal = quality.check_image(picture(kind), QualityConfig(min_sharpness=0.03))
+    assert (refusal.reason if refusal else None) is reason
+
+
+def test_sharpness_is_only_asked_where_a_limit_is_set() -> None:
+    assert quality.check_image(picture("blurred"), QualityConfig(min_sharpness=0.0)) is None
+
+
+def test_sharpness_depends_on_blur_and_not_on_exposure_or_noise() -> None:
+    sharp = picture("sharp")
+    values = [quality.sharpness(cv2.GaussianBlur(sharp, (0, 0), sigma)) for sigma in (0.5, 2.0, 5.0, 12.0)]
+    assert values == sorted(values, reverse=True)
+    assert values[0] > 2 * values[2] > 4 * values[3]
+    assert quality.sharpness((sharp // 3).astype(np.uint8)) == pytest.approx(quality.sharpness(sharp), rel=0.1)
+    noise = np.random.default_rng(0).normal(0, 6, sharp.shape)
+    noisy = np.clip(cv2.GaussianBlur(sharp, (0, 0), 12.0) + noise, 0, 255).astype(np.uint8)
+    assert quality.sharpness(noisy) < 2 * values[3] + 0.02
+
+
+def test_an_image_without_pixels() -> None:
+    refusal = quality.check_image(np.zeros((0, 0, 3), np.uint8), LIMITS)
+    assert refusal is not None
+    assert refusal.reason is Reason.UNREADABLE
+
+
+def test_empty_masks_say_which() -> None:
+    found, nothing = masks(), np.zeros(SHAPE, bool)
+    assert quality.check_masks(found) is None
+    no_vessel = quality.check_masks(Masks(nothing, found.robot, found.vessel_probability * 0.4, found.robot_probability))
+    no_robot = quality.check_masks(Masks(found.vessel, nothing, found.vessel_probability, found.robot_probability * 0.3))
+    assert str(no_vessel) == "no vessel: highest vessel probability 0.40"
+    assert str(no_robot) == "no robot: highest robot probability 0.30"
+
+
+@pytest.mark.parametrize(
+    ("found", "where", "text"),
+    [
+        (path(), masks(), None),
+        (path(LINE[:20]), masks(), "robot too short: 19 px long (at least 20 px)"),
+        (path(bridged_px=50.0), masks(), "repaired gap too long: 50 % of the robot is bridged (at most 40 %)"),
+        (path(), masks(vessel_from=101), "robot outside vessel: 49 % of its last 40 px lie in the vessel (at least 60 %)"),
+        (path(), masks(vessel_from=95), None),  # 26 of 41
+    ],
+)
+def test_paths_that_are_refused_say_the_value_and_its_limit(found: RobotPath, where: Masks, text: str | None) -> None:
+    refusal = quality.check_path(found, where, CONFIG)
+    assert (None if refusal is None else str(refusal)) == text
+
+
+def test_no_centerline_and_two_that_fit_alike() -> None:
+    assert quality.check_centerline(PIECE, LIMITS) is None
+    missing = quality.check_centerline(None, LIMITS)
+    tied = quality.check_centerline(Centerline(PIECE.piece, PIECE.nearest, 20.0, ambiguity=0.99), LIMITS)
+    assert isinstance(missing, Refusal)
+    assert missing.reason is Reason.NO_VESSEL
+    assert isinstance(tied, Refusal)
+    assert tied.reason is Reason.AMBIGUOUS_BRANCH
+    assert "99 %" in tied.detail
+    assert "95 %" in tied.detail
+
+
+def test_confidence_is_one_when_nothing_speaks_against() -> None:
+    assert quality.confidence(path(), PIECE, masks(), CONFIG) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "piece", "where"),
+    [
+        (path(), PIECE, masks(robot_probability=0.7)),
+        (path(), PIECE, masks(vessel_probability=0.7)),
+        (path(), PIECE, masks(vessel_from=95)),
+        (path(bridged_px=30.0), PIECE, masks()),
+        (path(runner_up=1.25), PIECE, masks()),
+        (path(), Centerline(PIECE.piece, PIECE.nearest, 20.0, ambiguity=0.8), masks()),
+    ],
+)
+def test_each_doubt_lowers_the_confidence(found: RobotPath, piece: Centerline, where: Masks) -> None:
+    assert 0.0 <= quality.confidence(found, piece, where, CONFIG) < 0.9
+
+
+def test_low_confidence_is_refused_with_both_numbers() -> None:
+    assert quality.check_confidence(0.3, LIMITS) is None
+    assert str(quality.check_confidence(0.21, LIMITS)) == "low confidence: 21 % (at least 30 %)"
+
+
+# ---- memory of a stream ----
+
+TRACKING = CONFIG.tracking
+MEMORY = Memory(path(), captured_s=10.0)
+
+
+@pytest.mark.parametrize(("now_s", "kept"), [(10.0, True), (10.03, True), (10.5, True), (10.51, False), (9.9, False)])
+def test_the_memory_fades_and_does_not_look_into_the_future(now_s: float, kept: bool) -> None:
+    assert (recall(MEMORY, now_s, TRACKING) is MEMORY.path) is kept
+
+
+def test_no_memory_and_tracking_switched_off() -> None:
+    assert recall(None, 10.0, TRACKING) is None
+    assert recall(MEMORY, 10.0, TRACKING.model_copy(update={"enabled": False})) is None
+
+
+def test_a_head_cannot_jump_farther_than_the_robot_moves() -> None:
+    limit_px = TRACKING.max_head_speed_px_s / 30 + 12
+    for shift, refused in ((0.0, False), (limit_px - 1, False), (limit_px + 1, True)):
+        jump = check_jump(path(LINE + [shift, 0.0]), MEMORY, 10.0 + 1 / 30, TRACKING)
+        assert (jump is not None) is refused
+        assert jump is None or jump.reason is Reason.HEAD_JUMP
+    far = path(LINE + [70.0, 0.0])
+    assert check_jump(far, MEMORY, 11.0, TRACKING) is None  # the memory has faded: the new place is accepted
+    assert check_jump(far, None, 10.0, TRACKING) is None
