@@ -103,9 +103,9 @@ def train(
     synthetic: Annotated[int, typer.Option(min=0, help="also make this many frames with the twin")] = 0,
     init: Annotated[str | None, typer.Option(help="start from this model instead of from nothing")] = None,
     steps: Annotated[int, typer.Option(min=1)] = 6000,
-    batch: Annotated[int, typer.Option(min=1, max=512)] = 6,
-    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 2e-3,
-    crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 384,
+    batch: Annotated[int, typer.Option(min=1, max=512)] = 12,
+    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 3e-3,
+    crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 256,
     base: Annotated[
         int | None, typer.Option(min=4, max=128, help="plain U-Net of this base width instead of the folded one")
     ] = None,

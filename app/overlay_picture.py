@@ -14,7 +14,7 @@ from app.wording import REASON_TEXT, STATE_TITLE, advice_headline, signed_degree
 from core.config import RESOURCES
 from core.types import Advice, Image, Mask, Point, Points, Pose, PoseState, Scene, Vector
 
-_SHIFT = 4  # OpenCV draws at 1/16 px
+SHIFT = 4  # OpenCV draws at 1/16 px
 _INSET_SPAN_PX = 112.0
 _INSET_MAX_COVERED = 0.35
 
@@ -40,7 +40,7 @@ def draw_overlay(image: Image, scene: Scene, advice: Advice | None = None, *, lo
     unit = max(1.0, max(canvas.shape[:2]) / 1280)
     shapes = scene_shapes(scene)
     corner = _free_corner(canvas, scene, zoom)
-    brush = _Brush(canvas, zoom, (0.0, 0.0), unit)
+    brush = Brush(canvas, zoom, (0.0, 0.0), unit)
     _draw_shapes(brush, scene, shapes, labels=corner is None)
     if corner is not None:
         _draw_inset(brush, corner, image, scene, shapes)
@@ -96,7 +96,7 @@ def _free_corner(canvas: Image, scene: Scene, zoom: float) -> tuple[int, int, in
     return best
 
 
-def _draw_inset(brush: _Brush, corner: tuple[int, int, int, int], image: Image, scene: Scene, shapes: SceneShapes) -> None:
+def _draw_inset(brush: Brush, corner: tuple[int, int, int, int], image: Image, scene: Scene, shapes: SceneShapes) -> None:
     """The surroundings of the head, magnified, with the labels; a frame shows where they are."""
     left, top, width, height = corner
     if shapes.robot_vector is None or shapes.vessel_vector is None:
@@ -109,12 +109,12 @@ def _draw_inset(brush: _Brush, corner: tuple[int, int, int, int], image: Image, 
     place = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
     warped = cv2.warpAffine(image, place, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     inset = np.asarray(warped, np.uint8)
-    _draw_shapes(_Brush(inset, zoom, (float(origin[0]), float(origin[1])), brush.unit), scene, shapes, labels=True)
+    _draw_shapes(Brush(inset, zoom, (float(origin[0]), float(origin[1])), brush.unit), scene, shapes, labels=True)
     brush.frame(origin, (span, height / zoom))
     brush.paste(inset, left, top)
 
 
-def _draw_shapes(brush: _Brush, scene: Scene, shapes: SceneShapes, *, labels: bool) -> None:
+def _draw_shapes(brush: Brush, scene: Scene, shapes: SceneShapes, *, labels: bool) -> None:
     brush.polylines(shapes.vessel_lines, palette.VESSEL, 2.5)
     if shapes.route is not None:
         brush.polylines((shapes.route,), palette.ROUTE, 4.0)
@@ -136,7 +136,7 @@ def _draw_shapes(brush: _Brush, scene: Scene, shapes: SceneShapes, *, labels: bo
         _draw_measures(brush, scene.pose, shapes, labels)
 
 
-def _draw_measures(brush: _Brush, pose: Pose, shapes: SceneShapes, labels: bool) -> None:
+def _draw_measures(brush: Brush, pose: Pose, shapes: SceneShapes, labels: bool) -> None:
     robot, vessel = shapes.robot_vector, shapes.vessel_vector
     if robot is None or vessel is None or shapes.head_foot is None or shapes.tail_foot is None or shapes.angle_arc is None:
         return
@@ -150,117 +150,6 @@ def _draw_measures(brush: _Brush, pose: Pose, shapes: SceneShapes, labels: bool)
         brush.label_beside(robot.end, vessel, head_side, f"d_head {pose.d_head_px:.1f} px", palette.D_HEAD)
         tail_side = 1.0 if pose.c_tail_px > 0 else -1.0
         brush.label_beside(robot.start, vessel, tail_side, f"d_tail {pose.d_tail_px:.1f} px", palette.D_TAIL)
-
-
-class _Brush:
-    """Draws marks at source-pixel places on the enlarged picture; widths are pixels of a picture 1280 px wide."""
-
-    def __init__(self, canvas: Image, zoom: float, origin: Point, unit: float) -> None:
-        self._canvas = canvas
-        self._zoom = zoom
-        self._origin = np.array(origin)
-        self._unit = unit
-        self._labels: list[Points] = []
-
-    @property
-    def unit(self) -> float:
-        return self._unit
-
-    def _at(self, points: Points | list[Point]) -> Points:
-        return np.asarray((np.asarray(points, np.float64) + 0.5 - self._origin) * self._zoom - 0.5)
-
-    def _width(self, width: float) -> int:
-        return max(1, round(width * self._unit))
-
-    def _lines(self, lines: list[Points], name: str, width: float, *, closed: bool = False) -> None:
-        """Polylines given in canvas pixels, first a dark edge, then the colour."""
-        fixed = [np.round(line * (1 << _SHIFT)).astype(np.int32).reshape(-1, 1, 2) for line in lines]
-        for colour, extra in ((palette.rgb(palette.INK), 2.0), (palette.rgb(name), 0.0)):
-            cv2.polylines(self._canvas, fixed, closed, colour, self._width(width + extra), cv2.LINE_AA, _SHIFT)
-
-    def _fill(self, outline: Points, name: str) -> None:
-        fixed = np.round(outline * (1 << _SHIFT)).astype(np.int32).reshape(-1, 1, 2)
-        cv2.fillPoly(self._canvas, [fixed], palette.rgb(name), cv2.LINE_AA, _SHIFT)
-        cv2.polylines(self._canvas, [fixed], True, palette.rgb(palette.INK), self._width(1.0), cv2.LINE_AA, _SHIFT)
-
-    def polylines(self, lines: tuple[Points, ...], name: str, width: float) -> None:
-        drawn = [self._at(line) for line in lines if len(line) > 1]
-        if drawn:
-            self._lines(drawn, name, width)
-
-    def dashes(self, first: Point, second: Point, name: str, width: float) -> None:
-        start, end = self._at([first, second])
-        count = max(1, int(np.linalg.norm(end - start) / (8.0 * self._unit)))
-        stops = np.linspace(start, end, 2 * count + 1)
-        self._lines([stops[k : k + 2] for k in range(0, 2 * count, 2)], name, width)
-
-    def arrow(self, vector: Vector, name: str, width: float) -> None:
-        start, end = self._at([vector.start, vector.end])
-        along = np.asarray(vector.direction) * self._unit
-        across = np.array([-along[1], along[0]])
-        self._lines([np.array([start, end])], name, width)
-        self._fill(np.array([end + along * 14, end - along * 6 + across * 10, end - along * 6 - across * 10]), name)
-
-    def ring(self, point: Point, name: str, radius: float) -> None:
-        turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-        (middle,) = self._at([point])
-        circle = np.column_stack([np.cos(turn), np.sin(turn)])
-        self._lines([middle + circle * radius * self._unit], name, 3.0, closed=True)
-        self._fill(middle + circle * 2.5 * self._unit, name)
-
-    def diamond(self, point: Point, name: str, radius: float) -> None:
-        (middle,) = self._at([point])
-        self._fill(middle + np.array([(0, -1), (1, 0), (0, 1), (-1, 0)]) * radius * self._unit, name)
-
-    def line(self, first: Point, second: Point, name: str, width: float) -> None:
-        self._lines([self._at([first, second])], name, width)
-
-    def angle(self, corner: Point, unit_arc: Points, name: str) -> None:
-        """The arc from the vessel's direction to the robot's, with the vessel's direction as a thin line through the corner."""
-        (middle,) = self._at([corner])
-        arc = middle + unit_arc * 70.0 * self._unit
-        self._lines([np.array([middle, middle + (arc[0] - middle) * 1.3])], palette.VESSEL_VECTOR, 1.5)
-        self._lines([arc], name, 2.5)
-
-    def label_beside(self, point: Point, line: Vector, side: float, text: str, name: str) -> None:
-        """A text beside `point`, on one side of `line` (+1: to the right of its direction)."""
-        across = np.array([-line.direction[1], line.direction[0]]) * side
-        width = _text_width(text, "SemiBold", round(20 * self._unit)) + 20 * self._unit
-        reach = 22.0 * self._unit + abs(across[0]) * width / 2 + abs(across[1]) * 15.0 * self._unit
-        (middle,) = self._at([point])
-        middle = middle + across * reach
-        gap = np.array([width, 32.0 * self._unit])
-        if any((np.abs(middle - other) < gap).all() for other in self._labels):
-            middle = middle + across * 32.0 * self._unit
-        self._labels.append(middle)
-        self._label(middle, text, name)
-
-    def frame(self, origin: Points, size: Point) -> None:
-        """A thin rectangle from `origin`, source pixels."""
-        corners = origin + np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * np.array(size)
-        self._lines([self._at(corners)], palette.TEXT, 1.5, closed=True)
-
-    def paste(self, inset: Image, left: int, top: int) -> None:
-        """Put a picture into a corner, with a frame."""
-        height, width = inset.shape[:2]
-        edge = self._width(3.0)
-        cv2.rectangle(inset, (0, 0), (width - 1, height - 1), palette.rgb(palette.INK), edge + 2)
-        cv2.rectangle(inset, (1, 1), (width - 2, height - 2), palette.rgb(palette.TEXT), edge - 1)
-        self._canvas[top : top + height, left : left + width] = inset
-
-    def stamp(self, text: str) -> None:
-        self._label(np.array([44.0, self._canvas.shape[0] / self._unit - 30.0]) * self._unit, text, palette.SIM)
-
-    def _label(self, middle: Points, text: str, name: str) -> None:
-        """A text on a dark plate around `middle`, moved inside the picture."""
-        size = round(20 * self._unit)
-        width, height = _text_width(text, "SemiBold", size) + size, round(1.5 * size)
-        x = float(np.clip(middle[0] - width / 2, 2, max(2, self._canvas.shape[1] - width - 2)))
-        y = float(np.clip(middle[1] - height / 2, 2, max(2, self._canvas.shape[0] - height - 2)))
-        left, top = round(x), round(y)
-        plate = self._canvas[top : top + height, left : left + width]
-        plate[:] = (plate * 0.25 + np.array(palette.rgb(palette.INK)) * 0.75).astype(np.uint8)
-        _put_text(self._canvas, text, (left + size // 2, top + round(1.1 * size)), name, "SemiBold", size)
 
 
 def _caption(scene: Scene, advice: Advice | None, width: int) -> Image:
@@ -281,56 +170,30 @@ def _caption(scene: Scene, advice: Advice | None, width: int) -> Image:
     else:
         title = REASON_TEXT[scene.refusal.reason].title if scene.refusal else "No pose"
         parts = [(f"no pose: {scene.refusal}" if scene.refusal else "no pose", palette.TEXT_DIM)]
-    _put_text(strip, title, (left, round(46 * unit)), palette.TEXT, "Bold", round(34 * unit))
+    put_text(strip, title, (left, round(46 * unit)), palette.TEXT, "Bold", round(34 * unit))
     x = left
     for text, name in parts:
-        size = _fitting(text, "SemiBold", round(24 * unit), width - x)
-        _put_text(strip, text, (x, round(84 * unit)), name, "SemiBold", size)
-        x += _text_width(text, "SemiBold", size) + round(34 * unit)
+        size = fitting_size(text, "SemiBold", round(24 * unit), width - x)
+        put_text(strip, text, (x, round(84 * unit)), name, "SemiBold", size)
+        x += text_width(text, "SemiBold", size) + round(34 * unit)
     if advice is not None:
         text = advice_headline(advice)
         size = round(30 * unit)
-        x = width - _text_width(text, "Bold", size) - round(26 * unit)
-        _put_text(strip, text, (x, round(46 * unit)), palette.TEXT, "Bold", size)
+        x = width - text_width(text, "Bold", size) - round(26 * unit)
+        put_text(strip, text, (x, round(46 * unit)), palette.TEXT, "Bold", size)
     return strip
 
 
 def _draw_state(strip: Image, middle: Point, side: float, state: PoseState | None) -> None:
     outline = np.asarray(middle) + state_outline(state) * side / 2
-    fixed = np.round(outline * (1 << _SHIFT)).astype(np.int32).reshape(-1, 1, 2)
+    fixed = to_fixed(outline)
     colour = palette.rgb(palette.STATE_COLOUR[state])
     if state is None:
-        cv2.polylines(strip, [fixed], True, colour, max(1, round(side / 24)), cv2.LINE_AA, _SHIFT)
+        cv2.polylines(strip, [fixed], True, colour, max(1, round(side / 24)), cv2.LINE_AA, SHIFT)
     else:
-        cv2.fillPoly(strip, [fixed], colour, cv2.LINE_AA, _SHIFT)
+        cv2.fillPoly(strip, [fixed], colour, cv2.LINE_AA, SHIFT)
     size = round(side * LETTER_HEIGHT[state])
     letter, name = (state.value, palette.INK) if state is not None else ("\N{EN DASH}", palette.TEXT_DIM)
-    x = round(middle[0] - _text_width(letter, "Bold", size) / 2)
+    x = round(middle[0] - text_width(letter, "Bold", size) / 2)
     y = round(middle[1] + 0.36 * size + side * LETTER_DROP.get(state, 0.0))
-    _put_text(strip, letter, (x, y), name, "Bold", size)
-
-
-@cache
-def _face(weight: str) -> cv2.FontFace:
-    """The program's font, or OpenCV's own when the file is missing."""
-    face = cv2.FontFace("sans")
-    path = RESOURCES / "fonts" / f"Inter-{weight}.otf"
-    if path.is_file():
-        face.set(str(path))
-    return face
-
-
-def _put_text(canvas: Image, text: str, left_baseline: tuple[int, int], name: str, weight: str, size: int) -> None:
-    cv2.putText(canvas, text, left_baseline, palette.rgb(name), _face(weight), max(size, 6), 0)
-
-
-def _text_width(text: str, weight: str, size: int) -> int:
-    _, _, width, _ = cv2.getTextSize((8192, 512), text, (0, 256), _face(weight), max(size, 6))
-    return int(width)
-
-
-def _fitting(text: str, weight: str, size: int, width: int) -> int:
-    """The largest size up to `size` at which `text` fits."""
-    while size > 8 and _text_width(text, weight, size) > width:
-        size -= 1
-    return size
+    put_text(strip, letter, (x, y), name, "Bold", size)

@@ -71,7 +71,7 @@ class PathConfig(_Section):
     junction_turn_px: float = Field(
         40.0, ge=0.0, le=500.0, description="a right-angled turn at a junction costs a branch this length"
     )
-    outside_cost: float = Field(2.0, ge=0.0, le=10.0, description="a px that a branch ends outside the vessel costs it this many px")
+    outside_cost: float = Field(2.0, ge=0.0, le=10.0, description="px a branch loses per px outside the vessel at its end")
     outlier_share: Share = Field(
         0.5, description="pieces shorter than this share of the longest are outliers; 0 = only the score decides"
     )

@@ -18,7 +18,6 @@ from core.learning.dataset import Sample
 from core.perception.unet import DualUNet
 from core.types import Image, Mask
 
-
 _MAX_KEPT = 4000
 """Frames of 640x480 kept in memory: some 1.5 MB each."""
 

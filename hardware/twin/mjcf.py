@@ -1,5 +1,6 @@
 """The MuJoCo model of robot and walls. Units mm, kg, s, so forces are millinewtons; board plane z = 0, x right, y down, z away
-from the camera. Numbers come from measurements of stability and bending; they are not calibrated to a real rig.
+from the camera. Numbers come from measurements of stability and bending; they are not calibrated to a real rig. Sparse Jacobian and elliptic cones:
+with 25 contacts on 127 degrees of freedom a step took 1.4 ms, against 1.8 with pyramidal cones and 5.8 with a dense Jacobian too.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ _TENDON_KP_MN_MM, _TENDON_KV, _TENDON_MAX_MN = 2000.0, 40.0, 4000.0
 class Specimen:
     """One robot's mechanical properties; no two are alike.
 
-    ``shaft_ei`` and ``tip_ei`` are bending stiffnesses (mN mm2), ``damping_s`` is damping over stiffness, ``tip_set_deg`` the bend that
-    the steerable part keeps with slack tendons (positive: right), ``friction`` that against the wall.
+    ``shaft_ei`` and ``tip_ei`` are bending stiffnesses (mN mm2), ``damping_s`` is damping over stiffness, ``tip_set_deg`` the bend
+    that the steerable part keeps with slack tendons (positive: right), ``friction`` that against the wall.
     """
 
     shaft_ei: float = 2e4
@@ -64,8 +65,8 @@ def link_lengths_mm(shaft_links: int) -> NDArray[np.float64]:
 def build_model(walls: list[Wall], port: Port, shaft_links: int, specimen: Specimen) -> mujoco.MjModel:
     """Compile the model: a chain of capsules on a slide along the port's axis, with its tip at the port for slide position 0.
 
-    Joint order: slide, then one planar hinge per link, followed by the pitch hinge where the link is steerable. Actuator order: right,
-    left, up, down, feed.
+    Joint order: slide, then one planar hinge per link, followed by the pitch hinge where the link is steerable. Actuator order:
+    right, left, up, down, feed.
     """
     x, y = port.point
     wall_geoms = "".join(
@@ -85,7 +86,8 @@ def build_model(walls: list[Wall], port: Port, shaft_links: int, specimen: Speci
     return mujoco.MjModel.from_xml_string(f"""
 <mujoco>
   <compiler angle="radian" autolimits="true"/>
-  <option timestep="{TIMESTEP_S}" gravity="0 0 0" integrator="discrete" solver="Newton" jacobian="sparse" cone="elliptic" iterations="20" tolerance="1e-8"/>
+  <option timestep="{TIMESTEP_S}" gravity="0 0 0" integrator="discrete"
+          solver="Newton" jacobian="sparse" cone="elliptic" iterations="20" tolerance="1e-8"/>
   <default>
     <joint armature="0.05"/>
     <geom condim="3" friction="{specimen.friction} 0.001 0.0001" solref=".004 1" solimp=".9 .95 .05"/>

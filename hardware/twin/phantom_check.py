@@ -19,8 +19,8 @@ _SAME_CHANNEL, _OTHER_CHANNEL = 1.6, 3.6
 def faults(phantom: Phantom) -> list[str]:
     """What is wrong with `phantom`, one line each; empty when it is fit.
 
-    A bend as tight as the lumen allows brings points 2 * (radius + gap) apart within half a turn, pi/2 times that along the way; two
-    branches that leave a junction at 35 degrees keep their gap after 3.5 times that. Points farther apart than these along the
+    A bend as tight as the lumen allows brings points 2 * (radius + gap) apart within half a turn, pi/2 times that along the way;
+    two branches that leave a junction at 35 degrees keep their gap after 3.5 times that. Points farther apart than these along the
     graph must have a wall between them.
     """
     return [*_off_board(phantom), *_too_tight(phantom), *_sharp_turns(phantom), *_overlaps(phantom)]

@@ -157,8 +157,8 @@ class TwinPhysics:
     def robot_points_mm(self) -> Points:
         """The robot's centerline on the board (N, 2) in mm, tail -> head.
 
-        It starts up to ``OUTSIDE_MM`` behind the port, where the robot is straight, and ends in the true tip: the foremost point of the
-        round nose, one robot radius beyond the end of the last link's axis.
+        It starts ``OUTSIDE_MM`` behind the port, where the robot is straight, and ends in the true tip: the foremost point of
+        the round nose, one robot radius beyond the end of the last link's axis.
         """
         with self._lock:
             corners = self._chain.corners_mm(OUTSIDE_MM)
@@ -223,7 +223,6 @@ def _smooth(corners: Points) -> Points:
     t = np.arange(_POINTS_PER_LINK)[None, :, None] / _POINTS_PER_LINK
     start_slope, end_slope = (end - before)[:, None] / 2, (after - start)[:, None] / 2
     start, end = start[:, None], end[:, None]
-    curve = (
-        (2 * t**3 - 3 * t**2 + 1) * start + (t**3 - 2 * t**2 + t) * start_slope + (3 * t**2 - 2 * t**3) * end + (t**3 - t**2) * end_slope
-    )
+    rise = 3 * t**2 - 2 * t**3
+    curve = (1 - rise) * start + rise * end + (t**3 - 2 * t**2 + t) * start_slope + (t**3 - t**2) * end_slope
     return np.vstack([curve.reshape(-1, 2), corners[-1]])

@@ -1,4 +1,4 @@
-"""Between a bend command and the tendon: slew limit, backlash and dead zone. Friction inside the contact solver gave no hysteresis."""
+"""Between a bend command and the tendon: slew limit, backlash and dead zone. Tendon friction in the solver gave no hysteresis."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
 import os, signal, sys, time
 from PySide6.QtCore import QTimer
+from app import operator_window
 from app.operator_window import OperatorWindow
 from app.window_command import _quit_on_signal, make_application
 from core.config import Config
@@ -20,10 +21,17 @@ from hardware.rig import RigKind
 from tests.app.fakes import FakeBench, FakeEngine
 
 how, after_ms = sys.argv[1], int(sys.argv[2])
+if len(sys.argv) > 3:
+    operator_window._STOP_WITHIN_MS = 300
+
+class StuckEngine(FakeEngine):
+    def step(self, timeout_s):
+        time.sleep(30.0 if len(sys.argv) > 3 else 0.0)
+        return super().step(timeout_s)
 
 def open_engine(config):
     time.sleep(0.3)
-    return FakeEngine(FakeBench())
+    return StuckEngine(FakeBench())
 
 application = make_application()
 window = OperatorWindow(Config(), open_engine, RigKind.SIM, [("tree", "Tree")])
@@ -52,3 +60,10 @@ def test_exit_code_0_and_not_a_word(how: str, after_ms: int) -> None:
         [sys.executable, "-c", PROGRAM, how, str(after_ms)], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr, done.stdout) == (0, "", "")
+
+
+def test_a_driver_that_never_returns_does_not_keep_the_window() -> None:
+    command = [sys.executable, "-c", PROGRAM, "close", "600", "stuck"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "the rig's driver did not return within 0.3 s; leaving without it\n"

@@ -59,12 +59,12 @@ def test_window_is_there_at_once_and_says_what_it_waits_for(make_window: MakeWin
     before = time.monotonic()
     window.start()
     assert time.monotonic() - before < 0.5
-    assert window._notice.isVisible()
-    assert window._notice.text.startswith("Starting: S-curve")
-    assert window._badge.letter == "-"
+    assert window.panels.notice.isVisible()
+    assert window.panels.notice.text.startswith("Starting: S-curve")
+    assert window.panels.badge.letter == "-"
     gate.set()
     until(qtbot, lambda: window.shown_tick is not None)
-    assert not window._notice.isVisible()
+    assert not window.panels.notice.isVisible()
 
 
 def test_everything_is_shown(running: OperatorWindow, qtbot: QtBot) -> None:
@@ -72,18 +72,18 @@ def test_everything_is_shown(running: OperatorWindow, qtbot: QtBot) -> None:
     assert tick is not None
     pose = tick.scene.pose
     assert pose is not None
-    assert running._badge.letter == pose.state.value
-    assert running._gauge.text.endswith("°")
-    assert running._bars.texts[0].endswith("px")
-    assert running._advice.text.startswith(("Fast", "Slow", "Slowest", "Moderate"))
-    until(qtbot, lambda: "total 27.5" in running._performance.text)
+    assert running.panels.badge.letter == pose.state.value
+    assert running.panels.gauge.text.endswith("°")
+    assert running.panels.bars.texts[0].endswith("px")
+    assert running.panels.advice.text.startswith(("Fast", "Slow", "Slowest", "Moderate"))
+    until(qtbot, lambda: "total 27.5" in running.panels.performance.text)
     assert "SIM" in running.windowTitle()
-    assert running._banner.word == "SIM"
+    assert running.panels.banner.word == "SIM"
 
 
 def test_texts_follow_within_a_fraction_of_a_second(running: OperatorWindow, qtbot: QtBot) -> None:
-    before = running._gauge.text
-    until(qtbot, lambda: running._gauge.text != before)
+    before = running.panels.gauge.text
+    until(qtbot, lambda: running.panels.gauge.text != before)
 
 
 def test_fault_is_one_visible_line_and_f5_starts_again(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
@@ -96,9 +96,9 @@ def test_fault_is_one_visible_line_and_f5_starts_again(make_window: MakeWindow, 
 
     window = make_window(open_engine)
     window.start()
-    until(qtbot, lambda: "physics went out of bounds" in window._notice.text)
-    assert window._badge.title == "Fault"
-    assert window._advice.text.startswith("No advice")
+    until(qtbot, lambda: "physics went out of bounds" in window.panels.notice.text)
+    assert window.panels.badge.title == "Fault"
+    assert window.panels.advice.text.startswith("No advice")
     working.append(True)
     qtbot.keyClick(window, Key.Key_F5)
     until(qtbot, lambda: window.shown_tick is not None)
@@ -106,11 +106,11 @@ def test_fault_is_one_visible_line_and_f5_starts_again(make_window: MakeWindow, 
 
 def test_fault_while_running_blanks_everything(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     engine.fail_with = DeviceError("camera lost: plug it in")
-    until(qtbot, lambda: "camera lost" in running._notice.text)
+    until(qtbot, lambda: "camera lost" in running.panels.notice.text)
     assert running.shown_tick is None
-    assert running._live.scene is None
-    assert running._gauge.text == "–"
-    assert running._bars.texts == ("–", "–")
+    assert running.panels.live.scene is None
+    assert running.panels.gauge.text == "–"
+    assert running.panels.bars.texts == ("–", "–")
 
 
 def test_end_of_a_recording(make_window: MakeWindow, engine: FakeEngine, qtbot: QtBot) -> None:
@@ -118,37 +118,37 @@ def test_end_of_a_recording(make_window: MakeWindow, engine: FakeEngine, qtbot: 
     window.start()
     until(qtbot, lambda: window.shown_tick is not None)
     engine.fail_with = EndOfStream("clip.mp4: 240 frames")
-    until(qtbot, lambda: window._notice.text == "Recording is over. clip.mp4: 240 frames")
-    assert window._banner.word == "PLAYBACK"
-    assert window._picker is None
+    until(qtbot, lambda: window.panels.notice.text == "Recording is over. clip.mp4: 240 frames")
+    assert window.panels.banner.word == "PLAYBACK"
+    assert window.panels.picker is None
 
 
 def test_silent_camera_leaves_no_stale_overlay(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     engine.silent = True
-    until(qtbot, lambda: running._badge.title == "No new picture")
-    assert running._live.scene is None
-    assert running._advice.text == "No advice: no new picture"
-    assert running._notice.isVisible()
+    until(qtbot, lambda: running.panels.badge.title == "No new picture")
+    assert running.panels.live.scene is None
+    assert running.panels.advice.text == "No advice: no new picture"
+    assert running.panels.notice.isVisible()
     engine.silent = False
-    until(qtbot, lambda: running._live.scene is not None)
-    assert not running._notice.isVisible()
+    until(qtbot, lambda: running.panels.live.scene is not None)
+    assert not running.panels.notice.isVisible()
 
 
 def test_refusal_is_named_and_the_picture_goes_on(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     engine.refusal = Refusal(Reason.OUTSIDE_VESSEL, "41 % inside, 60 % needed")
-    until(qtbot, lambda: running._badge.title == "Robot is outside the vessel")
-    assert running._badge.letter == "-"
-    assert running._advice.text == "No advice: robot is outside the vessel"
-    assert running._gauge.text == "–"
+    until(qtbot, lambda: running.panels.badge.title == "Robot is outside the vessel")
+    assert running.panels.badge.letter == "-"
+    assert running.panels.advice.text == "No advice: robot is outside the vessel"
+    assert running.panels.gauge.text == "–"
     tick = running.shown_tick
     until(qtbot, lambda: running.shown_tick is not tick)
 
 
 def test_missing_model_says_what_to_do_while_the_picture_goes_on(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     engine.refusal = Refusal(Reason.NO_MODEL, "default/network.onnx: hash differs")
-    until(qtbot, lambda: running._badge.title == "No model")
-    assert "Put back resources/models/default" in running._badge.why
-    assert "hash differs" in running._badge.why
+    until(qtbot, lambda: running.panels.badge.title == "No model")
+    assert "Put back resources/models/default" in running.panels.badge.why
+    assert "hash differs" in running.panels.badge.why
     tick = running.shown_tick
     until(qtbot, lambda: running.shown_tick is not tick)
 
@@ -159,11 +159,11 @@ def test_missing_model_says_what_to_do_while_the_picture_goes_on(running: Operat
 def test_keys_move_the_robot_while_held(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     qtbot.keyPress(running, Key.Key_W)
     assert engine.commands[-1].advance_mm_s == pytest.approx(10.0)
-    lit = [motion.value for motion, cap in running._jog_panel._caps.items() if cap.is_lit]
+    lit = [motion.value for motion, cap in running.panels.jog._caps.items() if cap.is_lit]
     assert lit == ["advance"]
     qtbot.keyRelease(running, Key.Key_W)
     assert engine.commands[-1] == Command()
-    assert not any(cap.is_lit for cap in running._jog_panel._caps.values())
+    assert not any(cap.is_lit for cap in running.panels.jog._caps.values())
 
 
 def test_losing_the_focus_stops_the_robot(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
@@ -173,7 +173,7 @@ def test_losing_the_focus_stops_the_robot(running: OperatorWindow, engine: FakeE
 
 
 def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
-    chip = running._overlay_bar._chips[Layer.MASKS]
+    chip = running.panels.overlay_bar._chips[Layer.MASKS]
     chip.setFocus()
     qtbot.keyPress(running, Key.Key_W)
     qtbot.keyClick(chip, Key.Key_Space)
@@ -184,30 +184,30 @@ def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine
 def test_digits_switch_overlays(running: OperatorWindow, qtbot: QtBot) -> None:
     for layer in Layer:
         qtbot.keyClick(running, layer.value.key)
-        assert not running._overlay_bar.is_on(layer)
+        assert not running.panels.overlay_bar.is_on(layer)
         assert not running._layer_actions[layer].isChecked()
     qtbot.keyClick(running, Key.Key_0)
-    assert all(running._overlay_bar.is_on(layer) for layer in Layer)
+    assert all(running.panels.overlay_bar.is_on(layer) for layer in Layer)
     assert all(action.isChecked() for action in running._layer_actions.values())
 
 
 def test_digits_typed_into_the_seed_switch_nothing(running: OperatorWindow, qtbot: QtBot) -> None:
-    assert running._picker is not None
-    seed = running._picker._seed
+    assert running.panels.picker is not None
+    seed = running.panels.picker._seed
     seed.setEnabled(True)
     seed.setFocus()
     qtbot.keyClicks(seed, "12")
-    assert running._overlay_bar.is_on(Layer.MASKS)
+    assert running.panels.overlay_bar.is_on(Layer.MASKS)
 
 
 def test_click_sets_the_target_and_escape_clears_it(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
-    running._live.clicked.emit(500.0, 280.0)
+    running.panels.live.clicked.emit(500.0, 280.0)
     assert engine.targets[-1] == (500.0, 280.0)
     until(qtbot, lambda: running.shown_tick is not None and running.shown_tick.scene.route is not None)
     qtbot.keyClick(running, Key.Key_Escape)
     assert engine.targets[-1] is None
-    running._live.clicked.emit(500.0, 280.0)
-    running._live.cleared.emit()
+    running.panels.live.clicked.emit(500.0, 280.0)
+    running.panels.live.cleared.emit()
     assert engine.targets[-1] is None
 
 
@@ -223,12 +223,12 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     window = make_window(open_engine)
     window.start()
     until(qtbot, lambda: window.shown_tick is not None)
-    window._live.clicked.emit(500.0, 280.0)
+    window.panels.live.clicked.emit(500.0, 280.0)
     qtbot.keyPress(window, Key.Key_D)
-    assert window._picker is not None
-    window._picker.chosen.emit("tree")
+    assert window.panels.picker is not None
+    window.panels.picker.chosen.emit("tree")
     assert window._phase is Phase.STARTING
-    assert not window._live._picture.isVisible(), "the old world is not shown as the new one"
+    assert not window.panels.live._picture.isVisible(), "the old world is not shown as the new one"
     assert window._target is None
     assert window._jog.command == Command()
     until(qtbot, lambda: window.shown_tick is not None)
@@ -259,8 +259,8 @@ def test_window_stays_alive_while_a_phantom_is_opened(make_window: MakeWindow, b
 
 def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
     qtbot.keyClick(running, Key.Key_P)
-    until(qtbot, running._toast.isVisible)
-    assert str(tmp_path / "shots") in running._toast.text()
+    until(qtbot, running.panels.toast.isVisible)
+    assert str(tmp_path / "shots") in running.panels.toast.text()
     names = sorted(path.name for path in (tmp_path / "shots").iterdir())
     assert [name.partition("_")[2][-12:] for name in names if name.endswith("overlay.png")]
     record = json.loads(next((tmp_path / "shots").glob("*.json")).read_text())
@@ -270,28 +270,28 @@ def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow,
 def test_snapshot_into_an_unwritable_folder_is_one_line(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
     (tmp_path / "shots").write_text("a file where the folder should be")
     qtbot.keyClick(running, Key.Key_S, Qt.KeyboardModifier.ControlModifier)
-    until(qtbot, running._toast.isVisible)
-    assert running._toast.text().startswith("Snapshot not saved: ")
+    until(qtbot, running.panels.toast.isVisible)
+    assert running.panels.toast.text().startswith("Snapshot not saved: ")
 
 
 def test_no_snapshot_before_the_first_picture(make_window: MakeWindow, qtbot: QtBot) -> None:
     window = make_window()
     until(qtbot, window.isActiveWindow)
     qtbot.keyClick(window, Key.Key_P)
-    assert window._toast.text() == "No snapshot: there is no picture yet"
+    assert window.panels.toast.text() == "No snapshot: there is no picture yet"
 
 
 def test_help_and_full_screen_and_what_escape_leaves_first(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
-    running._live.clicked.emit(500.0, 280.0)
+    running.panels.live.clicked.emit(500.0, 280.0)
     qtbot.keyClick(running, Key.Key_F11)
     assert running.isFullScreen()
     assert not running.menuBar().isVisible()
-    assert running._banner.isVisible(), "the banner is permanent"
+    assert running.panels.banner.isVisible(), "the banner is permanent"
     qtbot.keyClick(running, Key.Key_F1)
-    assert running._help.isVisible()
-    assert running._help.mapTo(running, running._help.rect().topLeft()).y() > running._banner.geometry().bottom()
+    assert running.panels.help.isVisible()
+    assert running.panels.help.mapTo(running, running.panels.help.rect().topLeft()).y() > running.panels.banner.geometry().bottom()
     qtbot.keyClick(running, Key.Key_Escape)
-    assert not running._help.isVisible()
+    assert not running.panels.help.isVisible()
     qtbot.keyClick(running, Key.Key_Escape)
     assert not running.isFullScreen()
     assert running.menuBar().isVisible()
@@ -305,12 +305,12 @@ def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[
     running.resize(*size)
     qtbot.wait(30)
     assert (running.width(), running.height()) == size
-    panels = (running._badge, running._gauge, running._bars, running._trends, running._jog_panel, running._performance)
-    for widget in (running._live, *panels):
+    shown = running.panels
+    for widget in (shown.live, shown.badge, shown.gauge, shown.bars, shown.trends, shown.jog, shown.performance):
         assert widget.height() >= widget.minimumSizeHint().height(), widget
         assert widget.height() >= widget.minimumHeight(), widget
         assert widget.width() >= widget.minimumWidth(), widget
-    assert running._live.width() >= 0.5 * size[0]
+    assert running.panels.live.width() >= 0.5 * size[0]
 
 
 # ---- closing
@@ -356,8 +356,8 @@ def test_it_can_be_closed_at_any_moment(
     if moment == "after a fault":
         until(qtbot, lambda: window._phase is Phase.FAULT)
     if moment == "while switching":
-        assert window._picker is not None
-        window._picker.roll()
+        assert window.panels.picker is not None
+        window.panels.picker.roll()
     if moment == "while a key is held":
         qtbot.keyPress(window, Key.Key_W)
     if moment == "while a snapshot is written":

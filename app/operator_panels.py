@@ -1,0 +1,154 @@
+"""All that the operator sees below the menus: the panels of the operator window and their places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from app import palette, theme
+from app.pace import Pace
+from app.widgets.advice_line import AdviceLine
+from app.widgets.card import Card
+from app.widgets.distance_bars import DistanceBars
+from app.widgets.help_overlay import HelpOverlay
+from app.widgets.jog_panel import JogPanel
+from app.widgets.live_view import LiveView
+from app.widgets.mode_badge import ModeBadge
+from app.widgets.notice import Notice
+from app.widgets.overlay_bar import OverlayBar
+from app.widgets.performance_panel import PerformancePanel
+from app.widgets.phantom_picker import PhantomPicker
+from app.widgets.sim_banner import SimBanner
+from app.widgets.state_badge import StateBadge
+from app.widgets.theta_gauge import ThetaGauge
+from app.widgets.toast import Toast
+from app.widgets.trend_plot import TrendPlot
+from app.wording import REASON_TEXT
+from core.config import PoseConfig
+from core.types import Command, PoseState, Tick
+from hardware.rig import RigKind
+
+TEXT_EVERY_S = 0.2
+_RIGHT_WIDTH = (470, 660)
+
+
+class OperatorPanels(QWidget):
+    """Makes the widgets and lays them out; shows a tick on all of them, or nothing and why.
+
+    ``picker`` is None when there is no phantom to choose.
+    """
+
+    def __init__(self, limits: PoseConfig, kind: RigKind, phantoms: Sequence[tuple[str, str]], phantom: str) -> None:
+        super().__init__()
+        self.banner = SimBanner(kind)
+        self.mode = ModeBadge()
+        self.picker = PhantomPicker(phantoms, phantom) if phantoms else None
+        self.live = LiveView()
+        self.notice = Notice(self.live)
+        self.toast = Toast(self.live)
+        self.overlay_bar = OverlayBar()
+        self.advice = AdviceLine()
+        self.badge = StateBadge(limits)
+        self.gauge = ThetaGauge(limits.theta_allow_deg)
+        self.bars = DistanceBars(limits.d_allow_px)
+        self.trends = TrendPlot(limits)
+        self.performance = PerformancePanel()
+        self.jog = JogPanel()
+        self._limits = limits
+        self._text_pace = Pace(TEXT_EVERY_S)
+        self._state: PoseState | None = None
+        stage = QWidget()
+        self._lay_out(stage)
+        self.help = HelpOverlay(stage)  # the banner stays in sight
+
+    def show_tick(self, tick: Tick, command: Command, max_block_ms: float) -> None:
+        """Show one turn of the engine on all panels."""
+        scene, pose = tick.scene, tick.scene.pose
+        state = pose.state if pose is not None else None
+        # a new state renews all texts together: the numbers beside it must be the ones that made it
+        renew_text = self._text_pace.due() or state is not self._state
+        self._state = state
+        self.live.show_frame(tick.frame, scene)
+        self.badge.show_scene(scene, renew_text=renew_text)
+        self.gauge.show_pose(pose, renew_text=renew_text)
+        self.bars.show_pose(pose, renew_text=renew_text)
+        why_none = REASON_TEXT[scene.refusal.reason].title.lower() if scene.refusal is not None else "no pose"
+        self.advice.show_advice(tick.advice, state, why_none, renew_text=renew_text)
+        self.trends.add(scene)
+        self.performance.add(tick, max_block_ms)
+        self.jog.show_command(command, tick.status)
+
+    def blank(self, title: str, why: str) -> None:
+        """Show nothing that was understood of an older picture, and say why."""
+        self.live.blank_overlays()
+        self.badge.show_nothing(title, why)
+        self.gauge.show_pose(None)
+        self.bars.show_pose(None)
+        self.advice.show_advice(None, None, title[0].lower() + title[1:])
+
+    def forget(self) -> None:
+        """Empty trends and performance: what comes next has nothing to do with them."""
+        self.performance.clear()
+        self.trends.clear()
+
+    def _lay_out(self, stage: QWidget) -> None:
+        header = QHBoxLayout()
+        header.setSpacing(16)
+        header.addWidget(self.banner, 1)
+        if self.picker is not None:
+            header.addWidget(self.picker)
+        header.addWidget(self.mode)
+        columns = QHBoxLayout(stage)
+        columns.setContentsMargins(0, 0, 0, 0)
+        columns.setSpacing(theme.GAP)
+        columns.addLayout(_column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0)), 62)
+        columns.addWidget(self._right_side(), 38)
+        rows = QVBoxLayout(self)
+        rows.setContentsMargins(theme.GAP, 4, theme.GAP, theme.GAP)
+        rows.setSpacing(theme.GAP)
+        rows.addLayout(header)
+        rows.addWidget(stage, 1)
+
+    def _right_side(self) -> QWidget:
+        limits = self._limits
+        angle = Card("Angle to the vessel", self.gauge, f"allowed {limits.theta_allow_deg:g}°")
+        distances = Card("Distances", self.bars, f"allowed {limits.d_allow_px:g} px")
+        trends = Card("Last 30 seconds", self.trends, _trend_legend())
+        hands = _row(Card("Move the robot", self.jog, "hold"), Card("Performance", self.performance))
+        side = QWidget()
+        side.setLayout(_column((Card("", self.badge), 0), (_row(angle, distances), 3), (trends, 3), (hands, 3)))
+        side.setMinimumWidth(_RIGHT_WIDTH[0])
+        side.setMaximumWidth(_RIGHT_WIDTH[1])
+        return side
+
+
+def _column(*parts: tuple[QWidget, int]) -> QVBoxLayout:
+    """Widgets below each other, with their stretch."""
+    column = QVBoxLayout()
+    column.setContentsMargins(0, 0, 0, 0)
+    column.setSpacing(theme.GAP)
+    for widget, stretch in parts:
+        column.addWidget(widget, stretch)
+    return column
+
+
+def _row(first: QWidget, second: QWidget) -> QWidget:
+    """Two widgets side by side, equally wide."""
+    holder = QWidget()
+    row = QHBoxLayout(holder)
+    row.setContentsMargins(0, 0, 0, 0)
+    row.setSpacing(theme.GAP)
+    row.addWidget(first, 1)
+    row.addWidget(second, 1)
+    return holder
+
+
+def _trend_legend() -> QLabel:
+    label = QLabel(
+        f'<span style="color:{palette.THETA}">\N{HORIZONTAL BAR} \N{GREEK SMALL LETTER THETA} °</span>&nbsp;&nbsp;&nbsp;'
+        f'<span style="color:{palette.D_HEAD}">\N{HORIZONTAL BAR} d_head px</span>&nbsp;&nbsp;&nbsp;'
+        f'<span style="color:{palette.D_TAIL}">\N{MIDDLE DOT}\N{MIDDLE DOT}\N{MIDDLE DOT} d_tail px</span>'
+    )
+    label.setObjectName("card_note")
+    return label
