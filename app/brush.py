@@ -6,6 +6,7 @@ from functools import cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from app import palette
 from core.config import RESOURCES
@@ -15,7 +16,7 @@ SHIFT = 4
 """Bits of sub-pixel places that OpenCV draws at: 1/16 px."""
 
 
-def to_fixed(outline: Points) -> Points:
+def to_fixed(outline: Points) -> NDArray[np.int32]:
     """A polyline (N, 2) as OpenCV takes it for sub-pixel drawing."""
     return np.round(outline * (1 << SHIFT)).astype(np.int32).reshape(-1, 1, 2)
 

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import cv2
 import numpy as np
 
 from app import palette
+from app.brush import SHIFT, Brush, fitting_size, put_text, text_width, to_fixed
 from app.scene_shapes import SceneShapes, scene_shapes
 from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
 from app.wording import REASON_TEXT, STATE_TITLE, advice_headline, signed_degrees
-from core.config import RESOURCES
-from core.types import Advice, Image, Mask, Point, Points, Pose, PoseState, Scene, Vector
+from core.types import Advice, Image, Mask, Point, Pose, PoseState, Scene
 
-SHIFT = 4  # OpenCV draws at 1/16 px
 _INSET_SPAN_PX = 112.0
 _INSET_MAX_COVERED = 0.35
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import sys
 import time
 from pathlib import Path
@@ -14,6 +15,7 @@ from core.config import Config, PerceptionConfig, load_config
 from core.control.engine import Engine, Perceive
 from core.control.policy import table_policy
 from core.devices import DeviceError
+from core.errors import UserError
 from core.learning.model_file import ModelError
 from core.types import Advice, Scene
 from hardware.rig import RigKind, open_rig
@@ -96,6 +98,7 @@ def make_application() -> QApplication:
 
 def run_window(rig: str, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False) -> int:
     """Show the window until it is closed; returns the exit code. Raises ConfigError, DeviceError for what is wrong before it opens."""
+    _check_display()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     config, kind = window_config(rig, config_path, source)
     application = make_application()
@@ -107,6 +110,13 @@ def run_window(rig: str, config_path: Path | None, source: Path | None, *, until
     if until_first_frame:
         timers.append(_leave_after_first_frame(window))
     return application.exec()
+
+
+def _check_display() -> None:
+    """Qt would end the process with a core dump; better one line."""
+    named = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
+    if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in named):
+        raise UserError("no display: start it in a desktop session, or give it a virtual one (xvfb-run -a make run)")
 
 
 def _quit_on_signal(application: QApplication) -> Any:

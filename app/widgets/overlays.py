@@ -7,15 +7,15 @@ from enum import Enum
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF, QTransform
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
 
-from app import palette, theme
+from app import palette
 from app.scene_shapes import SceneShapes
 from app.widgets.pencil import Pencil
 from app.wording import signed_degrees
-from core.types import Point, Points, Pose, Vector
+from core.types import Point, Pose
 
 _CLEAR_OFFSET_PX = 3.0
 

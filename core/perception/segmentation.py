@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 from typing import Protocol
 
@@ -55,6 +56,8 @@ class OpenVinoSegmenter:
     _MAX_SIZES = 4
 
     def __init__(self, folder: Path, threads: int = 0) -> None:
+        # Importing openvino reports itself over the network; with its telemetry package blocked it takes a silent stub instead.
+        sys.modules["openvino_telemetry"] = None  # type: ignore[assignment]
         import openvino
 
         self.info = read_model_info(folder, verify=(ONNX,))

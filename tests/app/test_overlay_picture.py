@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app import overlay_picture, palette
+from app import brush, overlay_picture, palette
 from app.overlay_picture import draw_overlay
 from core.types import PoseState, Reason, Refusal, Scene
 from tests.app.fakes import FakeBench, advise, make_pose, make_scene
@@ -87,8 +87,8 @@ def test_any_shape(shape: tuple[int, int]) -> None:
 
 
 def test_missing_font_files_are_no_error(monkeypatch: pytest.MonkeyPatch, tmp_path: object) -> None:
-    monkeypatch.setattr(overlay_picture, "RESOURCES", tmp_path)
-    overlay_picture._face.cache_clear()
+    monkeypatch.setattr(brush, "RESOURCES", tmp_path)
+    brush._face.cache_clear()
     image = np.full((120, 160, 3), 128, np.uint8)
     assert draw_overlay(image, make_scene(make_pose())).shape[1] == 1280
-    overlay_picture._face.cache_clear()
+    brush._face.cache_clear()
