@@ -36,7 +36,7 @@ class EngineMaker:
         self._loaded: PerceptionConfig | None = None
 
     def __call__(self, config: Config) -> Engine:
-        """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame with the reason."""
+        """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame, with why."""
         perceive = self._perception(config.perception)
         rig = open_rig(config)
 
@@ -97,7 +97,7 @@ def make_application() -> QApplication:
 
 
 def run_window(rig: str, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False) -> int:
-    """Show the window until it is closed; returns the exit code. Raises ConfigError, DeviceError for what is wrong before it opens."""
+    """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
     _check_display()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     config, kind = window_config(rig, config_path, source)

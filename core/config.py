@@ -168,7 +168,7 @@ class RigConfig(_Section):
 class WindowConfig(_Section):
     """The operator window."""
 
-    pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; default: LumenPilot in the user's pictures")
+    pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; None: LumenPilot in Pictures")
 
 
 class Config(_Section):

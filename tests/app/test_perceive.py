@@ -16,10 +16,10 @@ from core.images import read_image
 from hardware.twin.world import TwinWorld
 
 MAIN = Path(__file__).resolve().parents[2] / "main.py"
-KEYS = {
-    "image", "width", "height", "head_xy", "tail_xy", "robot_path_xy", "robot_vector", "vessel_vector", "theta_deg", "theta_signed_deg",
-    "d_head_px", "d_tail_px", "crossed", "state", "confidence", "reason", "latency_ms",
-}  # fmt: skip
+KEYS = set(
+    "image width height head_xy tail_xy robot_path_xy robot_vector vessel_vector theta_deg theta_signed_deg d_head_px d_tail_px "
+    "crossed state confidence reason latency_ms".split()
+)
 
 
 def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
