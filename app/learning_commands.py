@@ -49,7 +49,7 @@ def run_synth(
     with progress_bar() as bar:
         task = bar.add_task(f"frames -> {out}", total=count)
         write_set(plan, workers=workers, on_progress=lambda frames: bar.advance(task, frames))
-    _console.print(f"{count} labelled frames of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}")
+    _console.print(f"{count} labelled frames of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}", soft_wrap=True)
 
 
 class _Interrupt:
@@ -119,7 +119,7 @@ def run_train(out: Path, data: list[Path], synthetic: int, init: str | None, bas
         )
     save_model(network, out, training=notes | {"steps_done": done}, figures={})
     ending = "" if done == plan.steps else f" (interrupted after {done} of {plan.steps} steps; go on with --init {out})"
-    _console.print(f"model written to {out}{ending}")
+    _console.print(f"model written to {out}{ending}", soft_wrap=True)
 
 
 def default_shape() -> Any:

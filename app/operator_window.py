@@ -29,6 +29,7 @@ OpenEngineFor = Callable[[Config], EngineLike]
 
 SHOW_EVERY_S = 1.0 / 30.0
 STALE_AFTER_S = 0.5
+PLAYBACK_STALE_AFTER_S = 3.0
 _CHECK_EVERY_MS = 100
 _STOP_WITHIN_MS = 20_000
 
@@ -56,6 +57,7 @@ class OperatorWindow(QMainWindow):
         self._target: Point | None = None
         self._shown_s = 0.0
         self._due_s = 0.0
+        self._stale_after_s = PLAYBACK_STALE_AFTER_S if kind is RigKind.PLAYBACK else STALE_AFTER_S
         self._is_shut = False
         self._thread = EngineThread(self)
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
@@ -73,7 +75,7 @@ class OperatorWindow(QMainWindow):
         self._wire()
         self.setWindowTitle(f"LumenPilot \N{EM DASH} {kind.value}")
         self.setMinimumSize(*theme.MIN_WINDOW)
-        self.resize(*theme.START_WINDOW)
+        self.resize(theme.start_size(self.screen()))
 
     @property
     def panels(self) -> OperatorPanels:
@@ -240,7 +242,7 @@ class OperatorWindow(QMainWindow):
     def _check_age(self) -> None:
         """A picture that does not change is not live: after half a second nothing of it is shown as true."""
         age_s = time.monotonic() - self._shown_s
-        if self._phase is Phase.RUNNING and self._tick is not None and age_s > STALE_AFTER_S:
+        if self._phase is Phase.RUNNING and self._tick is not None and age_s > self._stale_after_s:
             self._panels.blank("No new picture", "Check the camera; F5 starts the rig again")
             notice = f"No new picture for {age_s:.0f} s"
             self._panels.notice.show_notice(NoticeKind.WARNING, notice, "The camera or the program is behind")

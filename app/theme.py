@@ -5,8 +5,8 @@ from __future__ import annotations
 from enum import StrEnum
 from functools import cache
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QFont, QFontDatabase, QFontMetrics, QPalette
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QColor, QFont, QFontDatabase, QFontMetrics, QPalette, QScreen
 from PySide6.QtWidgets import QApplication
 
 from app.palette import INK, LINE, PANEL, RAISED, SKY, TEXT, TEXT_DIM, TEXT_FAINT, WINDOW
@@ -14,6 +14,7 @@ from core.config import RESOURCES
 
 MIN_WINDOW = (1100, 700)
 START_WINDOW = (1600, 900)
+_FRAME = (8, 40)  # room for the title bar and borders that the desktop adds
 GAP = 10
 RADIUS = 8
 
@@ -63,6 +64,12 @@ def fitted(text_font: QFont, text: str, width_px: int, smallest_px: int = 11) ->
     while result.pixelSize() > smallest_px and QFontMetrics(result).horizontalAdvance(text) > width_px:
         result.setPixelSize(result.pixelSize() - 1)
     return result
+
+
+def start_size(screen: QScreen) -> QSize:
+    """The size of a window that opens on `screen`: the usual one, or what there is room for."""
+    room = screen.availableGeometry().size() - QSize(*_FRAME)
+    return QSize(*START_WINDOW).boundedTo(room).expandedTo(QSize(*MIN_WINDOW))
 
 
 def apply_theme(application: QApplication) -> None:

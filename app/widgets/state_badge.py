@@ -15,6 +15,7 @@ from core.config import PoseConfig
 from core.types import PoseState, Scene
 
 _HEIGHT = 104
+_MEANINGS = "\n".join(STATE_MEANING.values())
 _WRAPPED = int(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap)
 
 
@@ -31,7 +32,7 @@ class StateBadge(QWidget):
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Pose state")
-        self.setToolTip("\n".join(STATE_MEANING.values()))
+        self.setToolTip(_MEANINGS)
 
     @property
     def letter(self) -> str:
@@ -72,6 +73,8 @@ class StateBadge(QWidget):
             return
         self._state, self._title, self._why = state, title, text
         self.setAccessibleDescription(f"{self.letter}: {title}. {text}")
+        # a long reason may not fit; the tool tip has all of it
+        self.setToolTip(text if state is None and text else _MEANINGS)
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -95,7 +98,7 @@ class StateBadge(QWidget):
 
 def _wrapped_font(text: str, place: QRectF) -> QFont:
     """The largest of a few sizes at which `text` fits into `place` when wrapped."""
-    for size in (17, 15, 13):
+    for size in (17, 15, 13, 12):
         result = theme.font(size)
         if QFontMetricsF(result).boundingRect(place, _WRAPPED, text).height() <= place.height():
             break

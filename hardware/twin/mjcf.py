@@ -1,6 +1,7 @@
 """The MuJoCo model of robot and walls. Units mm, kg, s, so forces are millinewtons; board plane z = 0, x right, y down, z away
 from the camera. Numbers come from measurements of stability and bending; they are not calibrated to a real rig. Sparse Jacobian and
-elliptic cones: with 25 contacts on 127 degrees of freedom a step took 1.4 ms, against 1.8 with pyramidal cones and 5.8 with a dense Jacobian too.
+elliptic cones: with 25 contacts on 127 degrees of freedom a step took 1.4 ms, 1.8 with pyramidal cones, 5.8 with a
+dense Jacobian too.
 """
 
 from __future__ import annotations

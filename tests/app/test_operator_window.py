@@ -9,10 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, QRect, Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app import theme
 from app.engine_thread import Phase
 from app.operator_window import OperatorWindow
 from app.widgets.overlays import Layer
@@ -298,6 +299,24 @@ def test_help_and_full_screen_and_what_escape_leaves_first(running: OperatorWind
     assert engine.targets[-1] is not None, "the target is cleared last"
     qtbot.keyClick(running, Key.Key_Escape)
     assert engine.targets[-1] is None
+
+
+class Screen:
+    """A screen of a given size, as far as it is asked."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self._room = QRect(0, 0, width, height)
+
+    def availableGeometry(self) -> QRect:
+        return self._room
+
+
+SCREENS = [((1920, 1080), (1600, 900)), ((1366, 768), (1358, 728)), ((1280, 720), (1272, 700)), ((800, 600), (1100, 700))]
+
+
+@pytest.mark.parametrize(("screen", "expected"), SCREENS)
+def test_window_opens_no_larger_than_the_screen(screen: tuple[int, int], expected: tuple[int, int]) -> None:
+    assert theme.start_size(Screen(*screen)).toTuple() == expected  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("size", [(1100, 700), (1280, 720), (1600, 900), (1920, 1080)])

@@ -249,7 +249,9 @@ def test_a_controller_on_the_true_centerline_reaches_the_tree() -> None:
     way = np.concatenate(route)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
     physics, beside_mm = TwinPhysics(phantom), 0.0
-    while beside_mm < along[-1] - 4.0 and physics.time_s < 15.0:
+    goal = phantom.graph.nodes[target]
+    # Not by progress along the route: a head in a sibling branch lies beside its end, too.
+    while np.linalg.norm(goal - physics.head_mm) > 5.0 and physics.time_s < 12.0:
         points = physics.robot_points_mm()
         near = np.flatnonzero(np.abs(along - beside_mm) < 20.0)
         beside_mm = float(along[near[np.argmin(np.linalg.norm(way[near] - points[-1], axis=1))]])
@@ -257,5 +259,5 @@ def test_a_controller_on_the_true_centerline_reaches_the_tree() -> None:
         heading = points[-1] - points[-10]
         turn = np.arctan2(heading[0] * wanted[1] - heading[1] * wanted[0], heading @ wanted)
         physics.step(Command(bend=float(np.clip(1.6 * turn, -1, 1)), advance_mm_s=20.0), TICK_S)
-    np.testing.assert_allclose(physics.head_mm, phantom.graph.nodes[target], atol=8.0)
+    assert np.linalg.norm(goal - physics.head_mm) <= 5.0
     assert (physics.status().wall_contact_n or 0.0) < 1.0

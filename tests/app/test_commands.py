@@ -1,0 +1,113 @@
+"""``synth``, ``train`` and ``benchmark`` as a user calls them, small."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from core.learning.model_file import read_model_info
+
+MAIN = Path(__file__).resolve().parents[2] / "main.py"
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, str(MAIN), *map(str, arguments)], capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("synth") / "set"
+    done = run("synth", "--out", out, "--count", 6, "--seed", 77, "--width", 320, "--height", 240)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    return out
+
+
+@pytest.fixture(scope="module")
+def model(frames: Path) -> Path:
+    out = frames.parent / "tiny"
+    done = run("train", "--data", frames, "--out", out, "--steps", 3, "--batch", 2, "--crop", 64, "--base", 4, "--threads", 1)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+def test_training_writes_a_verified_model_and_a_log(model: Path, frames: Path) -> None:
+    info = read_model_info(model)
+    assert info.training["frames"] == 6
+    assert info.training["steps_done"] == 3
+    assert info.training["sets"][0]["seed"] == 77
+    assert "step 3 loss" in model.with_name("tiny.log").read_text()
+
+
+def test_fine_tuning_starts_from_a_model(model: Path, frames: Path, tmp_path: Path) -> None:
+    done = run("train", "--data", frames, "--init", model, "--out", tmp_path / "tuned", "--steps", 1, "--batch", 1, "--crop", 64)
+    assert done.returncode == 0, done.stderr
+    assert read_model_info(tmp_path / "tuned").shape == read_model_info(model).shape
+
+
+def test_an_interrupted_training_keeps_what_was_learnt(frames: Path, tmp_path: Path) -> None:
+    out = tmp_path / "long"
+    command = ["train", "--data", frames, "--out", out, "--steps", 100_000, "--batch", 1, "--crop", 64, "--base", 4, "--threads", 1]
+    process = subprocess.Popen([sys.executable, str(MAIN), *map(str, command)], stderr=subprocess.PIPE, text=True)
+    log = out.with_name("long.log")
+    while process.poll() is None and not (log.exists() and "step 50 " in log.read_text()):
+        time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate()
+    assert process.returncode == 0, errors
+    assert "interrupted after" in errors.replace("\n", " ")
+    assert 50 <= read_model_info(out).training["steps_done"] < 100_000
+
+
+def test_accuracy_is_one_json_object(model: Path, frames: Path) -> None:
+    done = run("benchmark", "--accuracy", frames, "--model", model, "--json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["frames"] == 6
+    assert 0 <= result["vessel_dice"] <= 1
+
+
+def test_an_unknown_look_is_named(tmp_path: Path) -> None:
+    done = run("synth", "--out", tmp_path / "x", "--count", 1, "--family", "velvet")
+    assert done.returncode == 2
+    assert "unknown look family 'velvet'" in done.stderr
+
+
+@pytest.mark.slow
+def test_speed_is_the_contracts_json_object() -> None:
+    done = run("benchmark", "--json", "--frames", 8)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    for key in ("total_ms", "after_network_ms", "baseline_total_ms"):
+        assert 0 < result[key]["p50"] <= result[key]["p95"]
+    assert {"network", "masks", "skeletons", "path", "pose"} <= set(result["stages_ms"])
+    assert result["speedup"] > 0
+    assert result["fps"] > 0
+    assert result["peak_memory_mb"] > 0
+    assert result["first_frame_s"] > 0
+
+
+@pytest.mark.slow
+def test_the_window_opens_shows_and_closes_with_exit_code_0() -> None:
+    environment = {name: value for name, value in os.environ.items() if name not in {"DISPLAY", "WAYLAND_DISPLAY"}}
+    environment["QT_QPA_PLATFORM"] = "offscreen"
+    done = subprocess.run(
+        [sys.executable, str(MAIN), "gui", "--until-first-frame"], capture_output=True, text=True, check=False, env=environment
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert json.loads(done.stdout)["first_frame_monotonic_s"] > 0
+
+
+def test_without_a_display_the_window_says_so() -> None:
+    environment = {name: v for name, v in os.environ.items() if name not in {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"}}
+    done = subprocess.run([sys.executable, str(MAIN)], capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: no display")
