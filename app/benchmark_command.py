@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -20,6 +20,10 @@ from rich.table import Table
 from app.learning_commands import progress_bar
 from core.config import Config, TwinConfig, load_config
 from core.types import Frame, Image, Scene
+
+if TYPE_CHECKING:
+    from core.perception.pipeline import Pipeline
+    from core.study.paper_baseline import PaperBaseline
 
 _BASELINE_EVERY = 8
 _WARM_UP = 3
@@ -37,12 +41,11 @@ def quantiles(values: Sequence[float]) -> dict[str, float]:
 def run_speed(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
     """Time perception frame by frame on twin pictures, with a baseline frame in between every eighth."""
     from core.perception.pipeline import open_pipeline
-    from core.study.paper_baseline import PaperBaseline
 
     config = _config(model, preset, config_path)
-    first_frame_s = _first_frame_s()
     pipeline = open_pipeline(config.perception)
-    baseline = PaperBaseline()
+    first_frame_s = _first_frame_s()
+    peak_memory_mb, baseline = _warm_up(pipeline)
     scenes: list[Scene] = []
     baseline_ms: list[float] = []
     started, spent = time.perf_counter(), 0.0
@@ -55,12 +58,13 @@ def run_speed(frames: int, *, model: str | None, preset: str | None, config_path
                 continue
             spent += time.perf_counter() - before
             scenes.append(scene)
-            if index % _BASELINE_EVERY == 0 and scene.masks is not None:
+            if (index - _WARM_UP) % _BASELINE_EVERY == 0 and scene.masks is not None:
                 baseline_ms.append(baseline.time(image, scene.masks.vessel, scene.masks.robot).total_ms)
             bar.advance(task)
     stages = sorted({stage for scene in scenes for stage in scene.latency_ms} - {"total"})
     totals = [scene.latency_ms["total"] for scene in scenes]
-    after = [scene.latency_ms["total"] - scene.latency_ms.get("prepare", 0) - scene.latency_ms["network"] for scene in scenes]
+    before = [scene.latency_ms.get("prepare", 0.0) + scene.latency_ms.get("network", 0.0) for scene in scenes]
+    after = [total - network for total, network in zip(totals, before, strict=True)]
     result = {
         "total_ms": quantiles(totals),
         "after_network_ms": quantiles(after),
@@ -68,7 +72,7 @@ def run_speed(frames: int, *, model: str | None, preset: str | None, config_path
         "baseline_total_ms": quantiles(baseline_ms),
         "speedup": round(float(np.median(baseline_ms) / np.median(totals)), 2),
         "fps": round(len(scenes) / spent, 2),
-        "peak_memory_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+        "peak_memory_mb": peak_memory_mb,
         "first_frame_s": first_frame_s,
         "engine": pipeline.engine,
         "cores": os.cpu_count(),
@@ -77,6 +81,19 @@ def run_speed(frames: int, *, model: str | None, preset: str | None, config_path
         "seconds": round(time.perf_counter() - started, 1),
     }
     _print(result, as_json, "speed")
+
+
+def _warm_up(pipeline: Pipeline) -> tuple[float, PaperBaseline]:
+    """Perceive some frames, weigh the process before torch is in it, then load the baseline and run it once cold."""
+    for index, image in enumerate(_pictures(_WARM_UP)):
+        scene = pipeline.perceive_single(Frame(index, index / 30, image))
+    peak_memory_mb = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1)
+    from core.study.paper_baseline import PaperBaseline
+
+    baseline = PaperBaseline()
+    if scene.masks is not None:
+        baseline.time(image, scene.masks.vessel, scene.masks.robot)
+    return peak_memory_mb, baseline
 
 
 def _pictures(count: int) -> Iterator[Image]:
@@ -102,7 +119,11 @@ def _first_frame_s() -> float | None:
         environment.setdefault("QT_QPA_PLATFORM", "offscreen")
     started = time.monotonic()
     command = [sys.executable, str(main), "gui", "--until-first-frame"]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    except subprocess.TimeoutExpired:
+        sys.stderr.write("the window showed no understood frame within 120 s\n")
+        return None
     try:
         return round(float(json.loads(done.stdout)["first_frame_monotonic_s"]) - started, 2)
     except (ValueError, KeyError):
@@ -119,14 +140,20 @@ def run_window_pace(seconds: float, *, config_path: Path | None, as_json: bool) 
     _print(measure_window(seconds, config_path), as_json, "window")
 
 
-def run_accuracy(folder: Path, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
-    """Perceive every frame of a synth set as a single image and compare with its truth."""
-    from core.learning.dataset import find_samples, read_truth
+def run_accuracy(
+    folder: Path, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool, store: bool = False
+) -> None:
+    """Perceive every frame of a synth set as a single image and compare with its truth; `store` keeps the result in model.json."""
+    from core.learning.dataset import DatasetError, find_samples, read_truth
+    from core.learning.model_file import model_folder, sha256_of, write_figures
     from core.perception.pipeline import open_pipeline
     from core.study.accuracy import score_frame, summarise
 
     config = _config(model, preset, config_path)
     samples, truth = find_samples([folder]), read_truth(folder)
+    untold = [sample.stem for sample in samples if sample.stem not in truth]
+    if untold:
+        raise DatasetError(f"{folder}: {len(untold)} frames lack a truth (the first: {untold[0]}); write the set again with synth")
     pipeline = open_pipeline(config.perception)
     scores = []
     with progress_bar() as bar:
@@ -135,8 +162,12 @@ def run_accuracy(folder: Path, *, model: str | None, preset: str | None, config_
             scene = pipeline.perceive_single(Frame(0, 0.0, image))
             size = _working_size(scene)
             masks = [_at_size(mask, size) for mask in (vessel, robot)]
-            scores.append(score_frame(sample.stem, scene, masks[0], masks[1], truth.get(sample.stem, {})))
-    _print(summarise(scores), as_json, f"accuracy on {folder}")
+            scores.append(score_frame(sample.stem, scene, masks[0], masks[1], truth[sample.stem]))
+    figures = summarise(scores)
+    if store:
+        described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
+        write_figures(model_folder(config.perception.segmentation.model), described | figures)
+    _print(figures, as_json, f"accuracy on {folder}")
 
 
 def _working_size(scene: Scene) -> tuple[int, int]:

@@ -125,6 +125,7 @@ def benchmark(
     json: JsonOption = False,
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
     window: Annotated[float | None, typer.Option(min=5.0, help="run the window for so many seconds and measure its pace")] = None,
+    store: Annotated[bool, typer.Option("--store", help="keep the accuracy in the model's model.json")] = False,
     frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
     model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
     preset: PresetOption = None,
@@ -136,6 +137,6 @@ def benchmark(
     if window is not None:
         run_window_pace(window, config_path=config, as_json=json)
     elif accuracy is not None:
-        run_accuracy(accuracy, model=model, preset=preset, config_path=config, as_json=json)
+        run_accuracy(accuracy, model=model, preset=preset, config_path=config, as_json=json, store=store)
     else:
         run_speed(frames, model=model, preset=preset, config_path=config, as_json=json)

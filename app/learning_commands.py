@@ -77,15 +77,16 @@ def run_train(out: Path, data: list[Path], synthetic: int, init: str | None, bas
     import torch
 
     from core.learning.dataset import DatasetError, find_samples
-    from core.learning.model_file import load_network, model_folder, save_model
+    from core.learning.model_file import check_can_write, load_network, model_folder, save_model
     from core.learning.training import Progress as Report
     from core.learning.training import train
     from core.perception.unet import DualUNet, UNetShape
 
     if not data and not synthetic:
         raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
+    check_can_write(out)
+    out = out.resolve()
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
         log = out.with_name(out.name + ".log").open("a", encoding="utf-8", buffering=1)
     except OSError as error:
         raise DatasetError(f"{out.parent}: cannot be written ({error.strerror}); choose another --out") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
@@ -46,7 +46,7 @@ def run_perceive(
 
     overrides: dict[str, Any] = {"perception": {"segmentation": {"model": model}}} if model else {}
     config = load_config(config_path, preset, overrides)
-    targets = _read_targets(targets_path)
+    targets = _Targets(_read_targets(targets_path))
     files = expand(paths)
     if not files:
         raise UserError(f"{', '.join(map(str, paths))}: no pictures or videos there")
@@ -54,36 +54,82 @@ def run_perceive(
         if folder is not None:
             _make_folder(folder)
     pipeline = open_pipeline(config.perception)
-    done = failed = 0
+    tally = _Tally()
     with _open_lines(outputs.jsonl) as lines, progress_bar() as bar:
-        task = bar.add_task("pictures", total=None if any(_is_long(f) for f in files) else len(files))
+        task = bar.add_task("pictures", total=None if any(_is_video(f) for f in files) else len(files))
         for picture in pictures(files):
             if picture.image is None:
+                tally.problem(picture.problem or f"{picture.name}: cannot be read")
                 record = unread_to_json(picture.name, picture.problem or "")
-                failed += 1
             else:
-                scene = _perceive_one(pipeline, picture, picture.image, done, targets)
+                scene = _perceive_one(pipeline, picture, picture.image, tally.done, targets)
                 record = scene_to_json(picture.name, scene)
+                tally.done += 1
+            _write_line(lines, json.dumps(record, allow_nan=False), outputs.jsonl)
+            if picture.image is not None:
                 try:
                     _write_pictures(outputs, picture.stem, picture.image, scene, config.advice)
                 except OSError as error:
-                    raise UserError(f"{error.filename or outputs.masks}: cannot be written ({error.strerror or error})") from None
-                done += 1
-            lines.write(json.dumps(record, allow_nan=False) + "\n")
+                    tally.unwritten += 1
+                    tally.problem(f"{error.filename or picture.stem}: cannot be written ({error.strerror or error})")
             bar.advance(task)
-    if not done:
-        raise UserError(f"none of {failed} pictures could be read; the first: {next(iter(files))}")
+    tally.close([stem for stem in targets if stem not in targets.used])
 
 
-def _perceive_one(pipeline: Any, picture: SourcePicture, image: Any, index: int, targets: dict[str, Point]) -> Scene:
+@dataclass(slots=True)
+class _Tally:
+    """What was done and what was not; the rest of a batch always goes on."""
+
+    done: int = 0
+    unwritten: int = 0
+    problems: list[str] = field(default_factory=list)
+
+    def problem(self, line: str) -> None:
+        self.problems.append(line)
+
+    def close(self, unused_targets: list[str]) -> None:
+        """Say what went wrong, once; raises UserError where nothing could be done or something was not written."""
+        if unused_targets:
+            sys.stderr.write(f"note: targets of no picture: {', '.join(unused_targets)}\n")
+        if self.unwritten:
+            raise UserError(f"{self.unwritten} pictures could not be written; the first: {self.problems[0]}")
+        if self.problems and not self.done:
+            raise UserError(f"none of {len(self.problems)} pictures could be read; the first: {self.problems[0]}")
+        if self.problems:
+            sys.stderr.write(f"note: {len(self.problems)} pictures could not be read; the first: {self.problems[0]}\n")
+
+
+class _Targets(dict[str, Point]):
+    """Destinations by stem; a video's holds for all its frames. Remembers which were asked for."""
+
+    def __init__(self, points: dict[str, Point]) -> None:
+        super().__init__(points)
+        self.used: set[str] = set()
+
+    def of(self, picture: SourcePicture) -> Point | None:
+        for stem in (picture.stem, Path(picture.name.rpartition("#")[0] or picture.name).stem):
+            if stem in self:
+                self.used.add(stem)
+                return self[stem]
+        return None
+
+
+def _write_line(lines: IO[str], text: str, path: Path | None) -> None:
+    try:
+        lines.write(text + "\n")
+    except OSError as error:
+        raise UserError(f"{path or 'standard output'}: cannot be written ({error.strerror})") from None
+
+
+def _perceive_one(pipeline: Any, picture: SourcePicture, image: Any, index: int, targets: _Targets) -> Scene:
     if picture.time_s is None:
-        return pipeline.perceive_single(Frame(index, 0.0, image), targets.get(picture.stem))  # type: ignore[no-any-return]
+        return pipeline.perceive_single(Frame(index, 0.0, image), targets.of(picture))  # type: ignore[no-any-return]
     if picture.first_of_stream:
         pipeline.reset()
-    return pipeline(Frame(index, picture.time_s, image), targets.get(picture.stem))  # type: ignore[no-any-return]
+    return pipeline(Frame(index, picture.time_s, image), targets.of(picture))  # type: ignore[no-any-return]
 
 
-def _is_long(path: Path) -> bool:
+def _is_video(path: Path) -> bool:
     from app.sources import VIDEO_ENDINGS
 
     return path.suffix.lower() in VIDEO_ENDINGS

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.devices import DeviceError, EndOfStream
+from core.errors import UserError
 from core.images import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS
 from core.types import Image
@@ -30,19 +31,25 @@ def expand(paths: Sequence[Path]) -> list[Path]:
     """Folders become their pictures and videos in name order (other files in them are left out); files stay as they are."""
     files: list[Path] = []
     for path in paths:
-        if path.is_dir():
-            files += sorted(p for p in path.iterdir() if p.suffix.lower() in IMAGE_ENDINGS + VIDEO_ENDINGS and p.is_file())
-        else:
-            files.append(path)
+        try:
+            if path.is_dir():
+                files += sorted(p for p in path.iterdir() if p.suffix.lower() in IMAGE_ENDINGS + VIDEO_ENDINGS and p.is_file())
+                continue
+        except OSError as error:
+            raise UserError(f"{path}: cannot be read ({error.strerror})") from None
+        files.append(path)
     return files
 
 
 def pictures(files: Sequence[Path]) -> Iterator[SourcePicture]:
     """The pictures of all files, one after another; stems are made unique by a number where two files share one."""
-    seen: dict[str, int] = {}
+    used: set[str] = set()
     for path in files:
-        count = seen[path.stem] = seen.get(path.stem, 0) + 1
-        stem = path.stem if count == 1 else f"{path.stem}_{count}"
+        stem, count = path.stem, 1
+        while stem in used:
+            count += 1
+            stem = f"{path.stem}_{count}"
+        used.add(stem)
         if path.suffix.lower() in VIDEO_ENDINGS:
             yield from _video(path, stem)
         else:

@@ -17,6 +17,7 @@ from core.control.policy import table_policy
 from core.devices import DeviceError
 from core.errors import UserError
 from core.learning.model_file import ModelError
+from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
 from core.types import Advice, Scene
 from hardware.rig import RigKind, open_rig
 
@@ -38,6 +39,9 @@ class EngineMaker:
     def __call__(self, config: Config) -> Engine:
         """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame, with why."""
         perceive = self._perception(config.perception)
+        if config.rig.camera == "image_folder" and isinstance(perceive, Pipeline):
+            # Pictures that have nothing to do with each other have no past.
+            perceive = perceive.perceive_single
         rig = open_rig(config)
 
         def advise(scene: Scene) -> Advice | None:
@@ -46,8 +50,6 @@ class EngineMaker:
         return Engine(rig.camera, rig.robot, perceive, advise, rig.close)
 
     def _perception(self, config: PerceptionConfig) -> Perceive:
-        from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
-
         if self._perceive is None or self._loaded != config:
             try:
                 self._perceive = open_pipeline(config)
@@ -67,7 +69,11 @@ def window_config(rig: str, config_path: Path | None, source: Path | None) -> tu
             raise DeviceError(f"unknown rig {rig!r}; known: {', '.join(RIGS)}")
         config = load_config(config_path)
     else:
-        if not source.exists():
+        try:
+            found = source.exists()
+        except OSError as error:
+            raise DeviceError(f"{source}: cannot be read ({error.strerror})") from None
+        if not found:
             raise DeviceError(f"{source}: no such file or folder")
         camera = "video_file" if source.suffix.lower() in VIDEO_ENDINGS else "image_folder"
         config = load_config(config_path, overrides={"rig": {"camera": camera, "robot": "none", "source": str(source)}})

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -290,7 +289,7 @@ class RobotStatus:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tick:
-    """One turn of the engine: what the window shows. ``dropped_frames`` counts since start; ``robot_truth`` exists in the twin."""
+    """One turn of the engine: what the window shows. ``dropped_frames`` counts since start."""
 
     frame: Frame
     scene: Scene
@@ -299,4 +298,3 @@ class Tick:
     status: RobotStatus | None
     dropped_frames: int
     frames_per_second: float
-    extras: dict[str, Any] = field(default_factory=dict)

@@ -37,9 +37,11 @@ class Rig:
         return self.kind is RigKind.LIVE
 
     def close(self) -> None:
-        if self.robot is not None:
-            self.robot.close()
-        self.camera.close()
+        try:
+            if self.robot is not None:
+                self.robot.close()
+        finally:
+            self.camera.close()
 
 
 _START_INSERTION_MM = 70.0
@@ -77,6 +79,8 @@ def _open_twin(config: Config) -> Rig:
     # A robot that already lies in the vessel: the first picture shows all that the program can tell.
     world.insert(_START_INSERTION_MM)
     camera = TwinCamera(world)
-    world.robot.connect()
+    robot = world.robot if config.rig.robot == "twin" else None
+    if robot is not None:
+        robot.connect()
     camera.open()
-    return Rig(config.rig.name, RigKind.SIM, camera, world.robot, world)
+    return Rig(config.rig.name, RigKind.SIM, camera, robot, world)

@@ -11,4 +11,4 @@ OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames" --count 2352 --seed 
 OMP_WAIT_POLICY=passive $python main.py train --data "$out/frames" --steps 4000 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/test" --count 320 --seed 900000 --workers 2
-$python main.py benchmark --accuracy "$out/test" --model "$out/default"
+$python main.py benchmark --accuracy "$out/test" --model "$out/default" --store

@@ -74,9 +74,11 @@ class Engine:
 
     def close(self) -> None:
         """Hold the robot and close the rig."""
-        if self._robot is not None:
-            self._robot.hold()
-        self._on_close()
+        try:
+            if self._robot is not None:
+                self._robot.hold()
+        finally:
+            self._on_close()
 
     def _count(self, frame: Frame) -> None:
         if self._last_index is not None:

@@ -18,6 +18,8 @@ from core.errors import UserError
 from core.images import ImageError, read_image
 from core.types import Image, Mask
 
+WORKING_SIZE_PX = 640
+"""Longer side at which networks are trained: the default of ``perception.working_size_px``."""
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 
@@ -34,8 +36,8 @@ class Sample:
     vessel: Path
     robot: Path
 
-    def load(self) -> tuple[Image, Mask, Mask]:
-        """Image (H, W, 3) and both masks (H, W); raises DatasetError."""
+    def load(self, longer_side_px: int | None = None) -> tuple[Image, Mask, Mask]:
+        """Image (H, W, 3) and both masks (H, W), scaled to `longer_side_px` if given; raises DatasetError."""
         try:
             image = read_image(self.image)
             masks = [read_image(path)[:, :, 0] > 127 for path in (self.vessel, self.robot)]
@@ -44,7 +46,17 @@ class Sample:
         for path, mask in zip((self.vessel, self.robot), masks, strict=True):
             if mask.shape != image.shape[:2]:
                 raise DatasetError(f"{path}: {mask.shape[1]}x{mask.shape[0]}, but its image is {image.shape[1]}x{image.shape[0]}")
-        return image, masks[0], masks[1]
+        if longer_side_px is None or max(image.shape[:2]) == longer_side_px:
+            return image, masks[0], masks[1]
+        scale = longer_side_px / max(image.shape[:2])
+        size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
+        vessel, robot = (_resized(mask.astype(np.uint8) * 255, size) > 127 for mask in masks)
+        return _resized(image, size), vessel, robot
+
+
+def _resized(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    shrinks = size[0] < pixels.shape[1]
+    return np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR))
 
 
 def find_samples(folders: Sequence[Path]) -> list[Sample]:

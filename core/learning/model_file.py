@@ -54,8 +54,11 @@ def sha256_of(path: Path) -> str:
 def model_folder(name: str) -> Path:
     """The folder of a model: a name in resources/models, or a path. Raises ModelError with the known names."""
     for folder in (MODELS / name, Path(name)):
-        if (folder / INFO).is_file():
-            return folder
+        try:
+            if (folder / INFO).is_file():
+                return folder
+        except OSError as error:
+            raise ModelError(f"{folder}: cannot be read ({error.strerror})") from None
     known = ", ".join(sorted(p.parent.name for p in MODELS.glob(f"*/{INFO}"))) or "none"
     raise ModelError(f"no model {name!r} (looked for {INFO} in {MODELS / name} and {Path(name)}); installed models: {known}")
 
@@ -101,11 +104,19 @@ def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
 
 
 def save_model(network: DualUNet, folder: Path, *, training: dict[str, Any], figures: dict[str, Any]) -> ModelInfo:
-    """Write weights, ONNX and manifest. The folder appears whole or not at all; an older one of that name is replaced last."""
+    """Write weights, ONNX and manifest. The folder appears whole or not at all; an older model of that name is replaced last.
+
+    Raises
+    ------
+    ModelError
+        The folder is something else than a model, or cannot be written.
+    """
     from safetensors.torch import save_file
 
-    folder.parent.mkdir(parents=True, exist_ok=True)
+    check_can_write(folder)
+    folder = folder.resolve()
     scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    aside = scratch.with_name(scratch.name + ".old")
     try:
         state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
         save_file(state, scratch / WEIGHTS)
@@ -123,11 +134,26 @@ def save_model(network: DualUNet, folder: Path, *, training: dict[str, Any], fig
         (scratch / INFO).write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
         scratch.chmod(0o755)
         if folder.exists():
-            shutil.rmtree(folder)
+            # Aside first, deleted last: whenever this is interrupted, one of the two is whole.
+            os.replace(folder, aside)
         os.replace(scratch, folder)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
+        shutil.rmtree(aside, ignore_errors=True)
     return info
+
+
+def check_can_write(folder: Path) -> None:
+    """Raise ModelError when `folder` is anything but a model, an empty folder, or not there: nothing else is ever replaced."""
+    try:
+        folder = folder.resolve()
+        if folder.exists() and not (folder / INFO).is_file() and (not folder.is_dir() or any(folder.iterdir())):
+            raise ModelError(f"{folder}: exists and is not a model; choose another folder")
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder.parent, os.W_OK):
+            raise ModelError(f"{folder.parent}: cannot be written; choose another folder")
+    except OSError as error:
+        raise ModelError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 
 
 def write_figures(folder: Path, figures: dict[str, Any]) -> None:

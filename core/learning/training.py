@@ -10,21 +10,23 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
 from core.learning.augment import random_clutter, random_crop, random_look
-from core.learning.dataset import Sample
+from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.perception.unet import DualUNet
 from core.types import Image, Mask
 
-_MAX_KEPT = 4000
-"""Frames of 640x480 kept in memory: some 1.5 MB each."""
+_MAX_KEPT_BYTES = 4_000_000_000
+"""Frames kept in memory by the loader: 2600 of 640x480."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrainingPlan:
-    """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours."""
+    """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours, and
+    ``look_share`` of them are changed in exposure, colour, sharpness and noise."""
 
     steps: int = 6000
     batch: int = 12
@@ -35,6 +37,7 @@ class TrainingPlan:
     clutter_share: float = 0.03
     average_decay: float = 0.998
     robot_weight: float = 1.5
+    look_share: float = 1.0
     seed: int = 0
     workers: int = 1
     threads: int = 0
@@ -62,6 +65,8 @@ class _Crops(Dataset[tuple[Tensor, Tensor]]):
         self._samples = samples
         self._plan = plan
         self._kept: dict[int, tuple[Image, Mask, Mask]] = {}
+        self._kept_bytes = 0
+        self._order: tuple[int, NDArray[np.int64]] | None = None
 
     def __len__(self) -> int:
         return self._plan.steps * self._plan.batch
@@ -72,22 +77,29 @@ class _Crops(Dataset[tuple[Tensor, Tensor]]):
         if rng.random() < self._plan.clutter_share:
             image, vessel, robot = random_clutter(size, rng), np.zeros(size, bool), np.zeros(size, bool)
         else:
-            # Epochs without repetition: position in a permutation that is drawn anew for every pass.
-            epoch, place = divmod(index, len(self._samples))
-            order = np.random.default_rng((self._plan.seed, 7919, epoch)).permutation(len(self._samples))
-            image, vessel, robot = random_crop(*self._frame(int(order[place])), size, rng)
-        image = random_look(image, rng)
+            image, vessel, robot = random_crop(*self._frame(self._place(index)), size, rng)
+        if rng.random() < self._plan.look_share:
+            image = random_look(image, rng)
         target = np.stack([vessel, robot]).astype(np.uint8)
         return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(target)
 
 
+    def _place(self, index: int) -> int:
+        """Epochs without repetition: a place in a permutation that is drawn anew for every pass."""
+        epoch, place = divmod(index, len(self._samples))
+        if self._order is None or self._order[0] != epoch:
+            rng = np.random.default_rng((self._plan.seed, 7919, epoch))
+            self._order = (epoch, rng.permutation(len(self._samples)))
+        return int(self._order[1][place])
+
     def _frame(self, place: int) -> tuple[Image, Mask, Mask]:
-        """Decoding costs as much as cropping: frames are kept, as far as they fit."""
+        """A frame at working size. Decoding costs as much as cropping, so frames are kept as far as they fit."""
         frame = self._kept.get(place)
         if frame is None:
-            frame = self._samples[place].load()
-            if len(self._kept) < _MAX_KEPT:
+            frame = self._samples[place].load(WORKING_SIZE_PX)
+            if self._kept_bytes < _MAX_KEPT_BYTES:
                 self._kept[place] = frame
+                self._kept_bytes += sum(part.nbytes for part in frame)
         return frame
 
 

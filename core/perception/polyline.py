@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from core.types import Point, Points
 
+REMAP_ROWS = 32_000
+"""OpenCV's remap takes less than 32767 rows at a time."""
+
 
 def arc_length(points: Points) -> NDArray[np.float64]:
     """Distance walked from the first point to each point, shape (N,)."""
@@ -79,8 +82,9 @@ def sample(values: NDArray[np.float32], points: Points) -> NDArray[np.float64]:
     if points.size == 0:
         return np.zeros(points.shape[:-1])
     x, y = (np.ascontiguousarray(points[..., axis], np.float32).reshape(-1, 1) for axis in (0, 1))
-    found = cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(found, np.float64).reshape(points.shape[:-1])
+    parts = [slice(first, first + REMAP_ROWS) for first in range(0, len(x), REMAP_ROWS)]
+    found = [cv2.remap(values, x[part], y[part], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for part in parts]
+    return np.concatenate(found).astype(np.float64).reshape(points.shape[:-1])
 
 
 @lru_cache(maxsize=64)

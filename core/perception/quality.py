@@ -24,12 +24,11 @@ def check_image(image: Image, config: QualityConfig) -> Refusal | None:
     """BLACK, WHITE or BLURRED, from the RGB image (h, w, 3) alone."""
     if image.shape[0] == 0 or image.shape[1] == 0:
         return Refusal(Reason.UNREADABLE, "it has no pixels")
-    brightness = np.sort(image[::SAMPLE_STEP, ::SAMPLE_STEP].max(axis=2), axis=None)
-    brightest = float(brightness[int(0.99 * (len(brightness) - 1))])
+    red, green, blue = (image[::SAMPLE_STEP, ::SAMPLE_STEP, channel] for channel in range(3))
+    brightest = _level(np.maximum(np.maximum(red, green), blue), 0.99)
     if brightest < config.black_level:
         return Refusal(Reason.BLACK, f"99 % of it is darker than {brightest:.0f} (black below {config.black_level:.0f} of 255)")
-    darkest = np.sort(image[::SAMPLE_STEP, ::SAMPLE_STEP].min(axis=2), axis=None)
-    dimmest = float(darkest[int(0.01 * (len(darkest) - 1))])
+    dimmest = _level(np.minimum(np.minimum(red, green), blue), 0.01)
     if dimmest > config.white_level:
         detail = f"99 % of it is brighter than {dimmest:.0f} (overexposed above {config.white_level:.0f} of 255)"
         return Refusal(Reason.WHITE, detail)
@@ -38,6 +37,12 @@ def check_image(image: Image, config: QualityConfig) -> Refusal | None:
         if found < config.min_sharpness:
             return Refusal(Reason.BLURRED, f"sharpness {found:.3f} (at least {config.min_sharpness:.3f})")
     return None
+
+
+def _level(values: NDArray[np.uint8], share: float) -> float:
+    """The value that this share of all values does not exceed; counted, because sorting costs 2 ms in every frame."""
+    counts = np.bincount(values.ravel(), minlength=256)
+    return float(np.searchsorted(counts.cumsum(), int(share * (values.size - 1)), side="right"))
 
 
 def sharpness(image: Image) -> float:

@@ -62,7 +62,7 @@ class OpenVinoSegmenter:
 
         self.info = read_model_info(folder, verify=(ONNX,))
         self._core = openvino.Core()
-        self._threads = threads or os.cpu_count() or 1
+        self._threads = threads or _cores()
         try:
             self._model = self._core.read_model(folder / ONNX)
         except RuntimeError as error:
@@ -107,7 +107,7 @@ class TorchSegmenter:
         self._torch = torch
         self._device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         if self._device.type == "cpu":
-            torch.set_num_threads(threads or os.cpu_count() or 1)
+            torch.set_num_threads(threads or _cores())
         self._network = Probabilities(network).to(self._device, memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     @property
@@ -124,8 +124,17 @@ class TorchSegmenter:
 
 
 def cuda_present() -> bool:
-    """Whether an NVIDIA driver is loaded. Asked of the kernel, because importing torch to ask costs seconds."""
-    return Path("/proc/driver/nvidia/version").exists() or Path("/dev/nvidia0").exists()
+    """Whether torch can use a CUDA device. The kernel is asked first, because importing torch to ask costs seconds."""
+    if not Path("/proc/driver/nvidia/version").exists() and not Path("/dev/nvidia0").exists():
+        return False
+    import torch
+
+    return torch.cuda.is_available()
+
+
+def _cores() -> int:
+    """Cores that this process may use; in a container fewer than the machine has."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def open_segmenter(config: SegmentationConfig) -> Segmenter:

@@ -48,7 +48,8 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
         true_head: Point = (float(truth["head_xy"][0]), float(truth["head_xy"][1]))
         true_head = scene.to_working(true_head)
         head_error = float(np.hypot(scene.path.head[0] - true_head[0], scene.path.head[1] - true_head[1]))
-        theta_error = float(pose.theta_deg - theta)
+        # Signed and wrapped: a robot that points left by as much as it should point right is wrong, and would be steered wrongly.
+        theta_error = (pose.theta_signed_deg - float(truth["theta_signed_deg"]) + 180.0) % 360.0 - 180.0
     return FrameScore(
         stem=stem,
         vessel_dice=dice(found_vessel, vessel),

@@ -159,6 +159,14 @@ def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int],
         The folder holds a set of another plan, or cannot be written.
     """
     _prepare(plan)
+    try:
+        _write_missing(plan, workers, on_progress)
+    except OSError as error:
+        raise SynthError(f"{error.filename or plan.out}: cannot be written ({error.strerror}); free some space and go on") from None
+    return plan.count
+
+
+def _write_missing(plan: SynthPlan, workers: int, on_progress: Callable[[int], None]) -> None:
     missing = [episode for episode in range(plan.episodes) if not _is_complete(plan, episode)]
     on_progress(plan.count - sum(min(FRAMES_PER_EPISODE, plan.count - e * FRAMES_PER_EPISODE) for e in missing))
     if workers <= 1:
@@ -177,7 +185,6 @@ def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int],
                 raise
     rows = [_episode_file(plan, episode).read_text(encoding="utf-8") for episode in range(plan.episodes)]
     (plan.out / "truth.jsonl").write_text("".join(rows), encoding="utf-8")
-    return plan.count
 
 
 def _end_with_parent() -> None:
@@ -203,6 +210,8 @@ def _prepare(plan: SynthPlan) -> None:
     try:
         for name in ("images", "masks", "episodes"):
             (plan.out / name).mkdir(parents=True, exist_ok=True)
+        if (plan.out / "images" / f"{plan.count:06d}.png").exists():
+            raise SynthError(f"{plan.out}: holds more than {plan.count} frames; ask for as many, or choose another folder")
         if path.is_file():
             if json.loads(path.read_text(encoding="utf-8")) != described:
                 raise SynthError(f"{plan.out}: holds a set with other settings ({path.name}); choose another folder")

@@ -87,10 +87,10 @@ class TwinWorld:
         """Render the world as it is now; ``captured_s`` defaults to simulated time."""
         with self._lock:
             points, sheath_mm, now = self.physics.robot_points_mm(), self.physics.delivery_mm, self.physics.time_s
-        picture = self.picture(points, sheath_mm)
-        frame = Frame(self._frame_index, now if captured_s is None else captured_s, picture.image)
-        self._frame_index += 1
-        return frame
+            index = self._frame_index
+            self._frame_index += 1
+        picture = self._renderer.render(points, sheath_mm, noise_seed=index)
+        return Frame(index, now if captured_s is None else captured_s, picture.image)
 
     def picture(self, robot_points_mm: Points, sheath_mm: float = 0.0) -> Picture:
         """Image and exact masks for a robot shape."""
@@ -110,6 +110,7 @@ class TwinWorld:
     def start(self) -> None:
         """Let the world run by itself, in step with the wall clock as far as the machine can."""
         if self._thread is None:
+            self.failure = None
             self._stop.clear()
             self._thread = threading.Thread(target=self._run, name="twin-world", daemon=True)
             self._thread.start()

@@ -97,7 +97,8 @@ def test_bad_files_are_objects_with_a_reason_and_the_rest_goes_on(picture: Path,
     assert cut["confidence"] == 0
     assert "empty file" in empty["reason"]
     assert good["state"] is not None
-    assert grey["reason"] is None or grey["state"] is None
+    assert grey["state"] is not None
+    assert "2 pictures could not be read" in done.stderr
 
 
 def test_pictures_of_nothing_have_no_pose_and_a_named_reason(tmp_path: Path) -> None:
@@ -151,10 +152,32 @@ def test_a_video_is_perceived_frame_by_frame(picture: Path, tmp_path: Path) -> N
     assert all(row["state"] for row in found)
 
 
-def test_the_target_decides_at_the_fork(picture: Path, tmp_path: Path) -> None:
-    (tmp_path / "t.json").write_text(json.dumps({"photo": [320, 240]}))
+def test_a_target_of_no_picture_is_noted(picture: Path, tmp_path: Path) -> None:
+    (tmp_path / "t.json").write_text(json.dumps({"photo": [320, 240], "phoot": [1, 2]}))
     done = run("perceive", picture, "--targets", tmp_path / "t.json", "--jsonl", tmp_path / "o.jsonl")
     assert done.returncode == 0, done.stderr
+    assert "targets of no picture: phoot" in done.stderr
+
+
+def test_pictures_of_the_same_name_do_not_overwrite_each_other(picture: Path, tmp_path: Path) -> None:
+    for name in ("x/a.png", "y/a.png", "y/a_2.png"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(picture.read_bytes())
+    arguments = [tmp_path / name for name in ("x/a.png", "y/a.png", "y/a_2.png")]
+    assert run("perceive", *arguments, "--jsonl", tmp_path / "o.jsonl", "--masks", tmp_path / "m").returncode == 0
+    assert sorted(p.name for p in (tmp_path / "m").glob("*_robot.png")) == ["a_2_2_robot.png", "a_2_robot.png", "a_robot.png"]
+
+
+def test_what_cannot_be_written_is_told_and_the_rest_goes_on(picture: Path, tmp_path: Path) -> None:
+    (tmp_path / "m").mkdir()
+    (tmp_path / "m" / "photo_vessel.png").mkdir()
+    other = tmp_path / "other.png"
+    other.write_bytes(picture.read_bytes())
+    done = run("perceive", picture, other, "--jsonl", tmp_path / "o.jsonl", "--masks", tmp_path / "m")
+    assert done.returncode == 2
+    assert "1 pictures could not be written" in done.stderr
+    assert len(rows(tmp_path / "o.jsonl")) == 2
+    assert (tmp_path / "m" / "other_robot.png").is_file()
 
 
 @pytest.mark.parametrize(

@@ -133,3 +133,11 @@ def test_masks_are_readable_pictures(tmp_path: Path) -> None:
 def test_an_unwritable_place_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="none"):
         write_mask(tmp_path / "none" / "m.png", np.eye(4, dtype=bool))
+
+
+def test_frames_are_trained_on_at_working_size(tmp_path: Path) -> None:
+    sample = find_samples([_toy_set(tmp_path / "set", 1)])[0]
+    image, vessel, robot = sample.load(640)
+    assert image.shape == (480, 640, 3)
+    assert vessel.shape == robot.shape == (480, 640)
+    assert vessel.sum() == pytest.approx(96 * 24 * 25, rel=0.03)

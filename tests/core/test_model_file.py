@@ -118,3 +118,21 @@ def test_working_size_keeps_the_aspect(size: tuple[int, int], working: tuple[int
     image, scale = to_working(np.zeros((*size, 3), np.uint8), 640)
     assert image.shape[:2] == working
     assert scale == 640 / max(size)
+
+
+def test_nothing_but_a_model_is_ever_replaced(tmp_path: Path) -> None:
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter.txt").write_text("years of work")
+    with pytest.raises(ModelError, match="exists and is not a model"):
+        save_model(DualUNet(TINY), tmp_path / "thesis", training={}, figures={})
+    assert (tmp_path / "thesis" / "chapter.txt").read_text() == "years of work"
+
+
+def test_a_model_is_replaced_whole(model: Path) -> None:
+    before = read_model_info(model).weights_sha256
+    torch.manual_seed(2)
+    save_model(DualUNet(TINY), model, training={"steps": 9}, figures={})
+    after = read_model_info(model)
+    assert after.training == {"steps": 9}
+    assert after.weights_sha256 != before
+    assert [p.name for p in model.parent.iterdir()] == [model.name], "no scratch is left behind"

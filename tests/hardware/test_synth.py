@@ -67,3 +67,8 @@ def test_masks_fit_the_picture_of_a_clear_look() -> None:
     frame = next(synth.episode_frames(SynthPlan(Path("unused"), 1, 8, size=(320, 240), families=("silicone_white",)), 0))
     assert frame.picture.vessel.shape == (240, 320)
     assert 0.01 < np.mean(frame.picture.vessel) < 0.6
+
+
+def test_a_smaller_count_is_refused_not_mixed(small_set: SynthPlan) -> None:
+    with pytest.raises(SynthError, match="holds more than 2 frames"):
+        write_set(SynthPlan(small_set.out, 2, 3, size=(320, 240)))
