@@ -78,13 +78,13 @@ def _free_corner(canvas: Image, scene: Scene, zoom: float) -> tuple[int, int, in
     height, width = canvas.shape[:2]
     box_width, box_height = round(0.34 * width), round(0.38 * height)
     busy = scene.masks.vessel.astype(np.float32) + 4.0 * scene.masks.robot
-    scale = scene.scale / zoom
-    head = np.array(scene.path.head) / scale
+    down, across = busy.shape[0] / height, busy.shape[1] / width
+    head = (np.array(scene.to_source(scene.path.head)) + 0.5) * zoom
     best, best_share = None, _INSET_MAX_COVERED
     for left in (0, width - box_width):
         for top in (0, height - box_height):
-            rows = slice(round(top * scale), round((top + box_height) * scale))
-            columns = slice(round(left * scale), round((left + box_width) * scale))
+            rows = slice(round(top * down), round((top + box_height) * down))
+            columns = slice(round(left * across), round((left + box_width) * across))
             part = busy[rows, columns]
             away = np.abs(head - (left + box_width / 2, top + box_height / 2)) / (box_width, box_height)
             is_beside = bool(away.max() > 0.6)

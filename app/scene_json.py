@@ -49,7 +49,7 @@ def _point(scene: Scene, point: Point) -> list[float]:
 
 
 def _points(scene: Scene, points: Points) -> list[list[float]]:
-    return np.round((points + 0.5) / scene.scale - 0.5, 2).tolist()  # type: ignore[no-any-return]
+    return np.round(scene.points_to_source(points), 2).tolist()  # type: ignore[no-any-return]
 
 
 def _vector(scene: Scene, vector: Vector | None) -> dict[str, list[float]] | None:

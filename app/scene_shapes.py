@@ -72,7 +72,7 @@ def _line(scene: Scene, points: Points) -> Points:
         stride = max(1, int(_MIN_STEP_PX * (len(points) - 1) / max(length, 1e-9)))
         keep = np.unique(np.append(np.arange(0, len(points), stride), len(points) - 1))
         points = points[keep]
-    return np.asarray((points + 0.5) / scene.scale - 0.5)
+    return scene.points_to_source(points)
 
 
 def _arc(vessel: Vector, robot: Vector) -> Points:

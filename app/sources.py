@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.devices import DeviceError, EndOfStream
+from core.devices import DamagedStream, DeviceError, EndOfStream
 from core.errors import UserError
 from core.images import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS
@@ -72,7 +72,7 @@ def _video(path: Path, stem: str) -> Iterator[SourcePicture]:
                 yield SourcePicture(f"{path}#{index}", f"{stem}_{index:06d}", frame.image, None, frame.captured_s, index == 0)
                 index += 1
     except EndOfStream as end:
-        if index == 0 or "damaged" in str(end):
+        if index == 0 or isinstance(end, DamagedStream):
             yield SourcePicture(f"{path}#{index}", f"{stem}_{index:06d}", None, str(end))
     except DeviceError as error:
         yield SourcePicture(str(path), stem, None, str(error))

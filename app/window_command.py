@@ -18,8 +18,9 @@ from core.devices import DeviceError
 from core.errors import UserError
 from core.learning.model_file import ModelError
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
-from core.types import Advice, Scene
+from core.types import Advice, Reason, Scene
 from hardware.rig import RigKind, open_rig
+from hardware.twin.phantom import PHANTOM_TITLES
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -83,10 +84,8 @@ def window_config(rig: str, config_path: Path | None, source: Path | None) -> tu
 def make_window(config: Config, kind: RigKind) -> OperatorWindow:
     """The window, not shown yet. There must be an application."""
     from app.operator_window import OperatorWindow
-    from hardware.twin.phantoms import PHANTOM_NAMES, make_phantom
 
-    phantoms = [(name, make_phantom(name).title) for name in PHANTOM_NAMES] if kind is RigKind.SIM else []
-    return OperatorWindow(config, EngineMaker(), kind, phantoms)
+    return OperatorWindow(config, EngineMaker(), kind, list(PHANTOM_TITLES.items()) if kind is RigKind.SIM else [])
 
 
 def make_application() -> QApplication:
@@ -147,7 +146,11 @@ def _leave_after_first_frame(window: OperatorWindow) -> Any:
 
     def look() -> None:
         tick = window.shown_tick
-        if tick is not None and tick.scene.path is not None:
+        if tick is not None and tick.scene.refusal is not None and tick.scene.refusal.reason is Reason.NO_MODEL:
+            timer.stop()
+            sys.stderr.write(f"error: {tick.scene.refusal}\n")
+            window.close()
+        elif tick is not None and tick.scene.path is not None:
             timer.stop()
             window.repaint()
             sys.stdout.write(json.dumps({"first_frame_monotonic_s": time.monotonic()}) + "\n")

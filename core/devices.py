@@ -32,6 +32,10 @@ class EndOfStream(DeviceError):
     """A recorded source has no more frames."""
 
 
+class DamagedStream(EndOfStream):
+    """A recorded source ends too early, because its rest cannot be read."""
+
+
 class Robot(Protocol):
     """Takes commands and returns what was really sent after its own limits."""
 

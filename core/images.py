@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import struct
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -13,6 +16,15 @@ from core.types import Image
 
 MAX_PIXELS = 120_000_000
 """8k (33 million pixels) passes easily; far beyond it a file is rather damaged or hostile than a photograph."""
+_AS_SEEN = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR
+"""Grey stays grey and 16 bit stay 16 bit; alpha is dropped, and the picture is turned upright as its EXIF orientation says."""
+_FULL_SCALES = (1023, 4095, 65535)
+_PNG, _JPEG = b"\x89PNG", b"\xff\xd8"
+_JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+"""Segments that give the size; the three left out are tables."""
+
+# What OpenCV has to say about a damaged file is raised as an ``ImageError``; its own log lines would say it again, less clearly.
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 
 class ImageError(UserError):
@@ -33,51 +45,105 @@ def read_image(path: Path) -> Image:
         raise ImageError(f"{path}: cannot be read ({error.strerror})") from None
     if not data:
         raise ImageError(f"{path}: empty file")
+    if _is_cut(data):
+        raise ImageError(f"{path}: cut short (the end of the file is missing)")
+    _check_size(path, *(_header_size(data) or (0, 0)))
     try:
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), _AS_SEEN)
+        if pixels is None:  # some rare kinds, such as TIFF of floats with alpha, are only read as they are
+            pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
         raise ImageError(f"{path}: cannot be decoded ({error.err or 'damaged or too large'})") from None
     if pixels is None or pixels.size == 0:
         raise ImageError(f"{path}: not a picture that can be read, or cut short")
-    if pixels.shape[0] * pixels.shape[1] > MAX_PIXELS:
-        raise ImageError(f"{path}: {pixels.shape[1]}x{pixels.shape[0]} is larger than {MAX_PIXELS // 1_000_000} million pixels")
-    if _is_cut(data):
-        raise ImageError(f"{path}: cut short (the end of the file is missing)")
+    _check_size(path, pixels.shape[1], pixels.shape[0])
     return to_rgb8(pixels, blue_first=True)
 
 
+def _check_size(path: Path, width: int, height: int) -> None:
+    if width * height > MAX_PIXELS:
+        raise ImageError(f"{path}: {width}x{height} is larger than {MAX_PIXELS // 1_000_000} million pixels")
+
+
 def _is_cut(data: bytes) -> bool:
-    """Decoders fill the missing part of a cut PNG or JPEG with grey and say nothing; its end mark tells."""
-    if data.startswith(b"\x89PNG"):
-        return b"IEND" not in data[-64:]
-    if data.startswith(b"\xff\xd8"):
-        return b"\xff\xd9" not in data[-4096:]
+    """Decoders fill the missing part of a cut PNG or JPEG with grey and say nothing; its end mark tells.
+
+    Behind the end mark anything may follow: phones append a short video. In front of a JPEG's pixels its preview has an end mark of
+    its own; among the pixels the mark cannot occur, because 0xFF is escaped there.
+    """
+    if data.startswith(_PNG):
+        return b"IEND" not in data
+    if data.startswith(_JPEG):
+        *_, (_, pixels) = _jpeg_segments(data)
+        return data.find(b"\xff\xd9", pixels) < 0
     return False
+
+
+def _header_size(data: bytes) -> tuple[int, int] | None:
+    """Width and height as the file's header says, known before megabytes are decoded; None for kinds that are not looked into."""
+    try:
+        if data.startswith(_PNG):
+            return struct.unpack_from(">II", data, 16)
+        if data.startswith(_JPEG):
+            for marker, place in _jpeg_segments(data):
+                if marker in _JPEG_FRAMES:
+                    height, width = struct.unpack_from(">HH", data, place + 3)
+                    return width, height
+        if data.startswith(b"BM"):
+            old = struct.unpack_from("<I", data, 14)[0] == 12
+            width, height = struct.unpack_from("<HH" if old else "<ii", data, 18)
+            return abs(width), abs(height)
+    except struct.error:
+        pass
+    return None
+
+
+def _jpeg_segments(data: bytes) -> Iterator[tuple[int, int]]:
+    """Each segment's marker and where its length stands, up to the start of the pixels or to where the file ends or breaks off."""
+    place = 2
+    while place + 4 <= len(data) and data[place] == 0xFF:
+        marker = data[place + 1]
+        if marker == 0xFF:  # a fill byte
+            place += 1
+            continue
+        yield marker, place + 2
+        if marker == 0xDA:
+            return
+        alone = marker == 0x01 or 0xD0 <= marker <= 0xD8
+        place += 2 if alone else 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+    yield 0, min(place, len(data))
 
 
 def to_rgb8(pixels: NDArray[np.generic], *, blue_first: bool = False) -> Image:
     """Grey, grey + alpha, colour or colour + alpha of any depth -> RGB uint8 (H, W, 3).
 
-    16-bit images are scaled by their full range (65535 -> 255) unless they use less than 1/16 of it, as 10- and 12-bit sensors do;
-    then by the largest value. Floats are taken as 0..1. Raises ImageError for any other shape or kind.
+    16-bit images are scaled by the full range of the sensor that fits their brightest pixels: 10, 12 or 16 bit. Floats are taken as
+    0..1. Alpha is dropped. Raises ImageError for any other shape or kind.
     """
     array = np.asarray(pixels)
-    if array.ndim == 3 and array.shape[2] == 1:
-        array = array[:, :, 0]
-    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (2, 3, 4)):
+    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 2, 3, 4)):
         raise ImageError(f"an image has 1 to 4 channels, this array has the shape {array.shape}")
+    if array.ndim == 3:
+        array = array[:, :, 0] if array.shape[2] <= 2 else array[:, :, :3]
     if array.dtype == np.bool_:
         array = array.astype(np.uint8) * 255
     elif np.issubdtype(array.dtype, np.floating):
-        array = (np.clip(np.nan_to_num(array), 0.0, 1.0) * 255).astype(np.uint8)
+        array = np.rint(np.clip(np.nan_to_num(array), 0.0, 1.0) * 255).astype(np.uint8)
     elif array.dtype == np.uint16:
-        top = int(array.max(initial=0))
-        array = (array.astype(np.float32) * (255.0 / (65535 if top >= 4096 else max(top, 255)))).astype(np.uint8)
+        array = _from_16_bit(array)
     elif array.dtype != np.uint8:
         raise ImageError(f"images of type {array.dtype} are not supported; use 8 or 16 bit")
-    if array.ndim == 3 and array.shape[2] == 2:
-        array = array[:, :, 0]
     if array.ndim == 2:
         return np.ascontiguousarray(np.repeat(array[:, :, None], 3, axis=2))
-    colours = array[:, :, :3]
-    return np.ascontiguousarray(colours[:, :, ::-1] if blue_first else colours)
+    return np.ascontiguousarray(array[:, :, ::-1] if blue_first else array)
+
+
+def _from_16_bit(array: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """A fixed range and not the picture's own brightest value: a dark picture stays dark, and a video does not flicker."""
+    if array.size == 0:
+        return array.astype(np.uint8)
+    step = max(1, math.isqrt(array.shape[0] * array.shape[1] // 250_000))
+    brightest = float(np.percentile(array[::step, ::step], 99.9))  # a few hot pixels do not count
+    top = next(full for full in _FULL_SCALES if brightest <= full)
+    greys = np.rint(np.minimum(np.arange(65536) * (255.0 / top), 255.0)).astype(np.uint8)
+    return np.asarray(greys[array])

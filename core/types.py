@@ -204,8 +204,9 @@ class Pose:
 class Scene:
     """All that perception understood of one frame. Exactly one of ``pose`` and ``refusal`` is set.
 
-    ``scale`` is working pixels per source pixel; ``source_size`` is (width, height) of the frame. Stages that were not reached are
-    None. ``latency_ms`` maps stage name to milliseconds, with "total".
+    ``scale`` is working pixels per source pixel along the longer side, and ``scale_xy`` in x and y, which differ by the rounding to
+    whole pixels (None: both are ``scale``); ``source_size`` is (width, height) of the frame. Stages that were not reached are None.
+    ``latency_ms`` maps stage name to milliseconds, with "total".
     """
 
     frame_index: int
@@ -223,14 +224,21 @@ class Scene:
     pose: Pose | None = None
     refusal: Refusal | None = None
     latency_ms: dict[str, float] = field(default_factory=dict)
+    scale_xy: tuple[float, float] | None = None
+
+    def points_to_source(self, points: Points) -> Points:
+        """Working pixels (N, 2) -> source pixels (N, 2); pixel centres are at integers in both."""
+        return np.asarray((points + 0.5) / (self.scale_xy or (self.scale, self.scale)) - 0.5, np.float64)
 
     def to_source(self, point: Point) -> Point:
-        """Working pixels -> source pixels (pixel centres at integers in both)."""
-        return (point[0] + 0.5) / self.scale - 0.5, (point[1] + 0.5) / self.scale - 0.5
+        """A point in working pixels -> source pixels."""
+        x, y = self.points_to_source(np.array([point]))[0].tolist()
+        return x, y
 
     def to_working(self, point: Point) -> Point:
-        """Source pixels -> working pixels."""
-        return (point[0] + 0.5) * self.scale - 0.5, (point[1] + 0.5) * self.scale - 0.5
+        """A point in source pixels -> working pixels."""
+        across, down = self.scale_xy or (self.scale, self.scale)
+        return (point[0] + 0.5) * across - 0.5, (point[1] + 0.5) * down - 0.5
 
 
 class Speed(StrEnum):

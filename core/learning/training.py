@@ -26,7 +26,8 @@ _MAX_KEPT_BYTES = 4_000_000_000
 @dataclass(frozen=True, slots=True)
 class TrainingPlan:
     """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours, and
-    ``look_share`` of them are changed in exposure, colour, sharpness and noise."""
+    ``look_share`` of them are changed in exposure, colour, sharpness and noise. ``stop_after`` ends before the learning rate has
+    come down: for a run that another one goes on from."""
 
     steps: int = 6000
     batch: int = 12
@@ -38,6 +39,7 @@ class TrainingPlan:
     average_decay: float = 0.998
     robot_weight: float = 1.5
     look_share: float = 1.0
+    stop_after: int | None = None
     seed: int = 0
     workers: int = 1
     threads: int = 0
@@ -174,7 +176,7 @@ def train(
             mark, marked = now, done
         if done % checkpoint_every == 0 and done < plan.steps:
             on_checkpoint(average, done)
-        if should_stop():
+        if should_stop() or done == plan.stop_after:
             break
     return average.to("cpu"), done
 

@@ -35,21 +35,34 @@ def clean_mask(mask: Mask, min_area_px: int, max_hole_area_px: int) -> Mask:
     """
     # Areas come from the contours, which cost 0.1 ms at 640x480 where labelling foreground and background costs 1.4 ms.
     cleaned = np.array(mask, np.uint8, order="C")
-    contours, hierarchy = cv2.findContours(cleaned, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    contours, hierarchy = cv2.findContours(cleaned, cv2.RETR_TREE, cv2.CHAIN_APPROX_NONE)
     if not contours:
         return cleaned.view(np.bool_)
-    parents = hierarchy[0, :, 3].tolist()
-    areas = [_enclosed_pixels(contour, is_hole=parent >= 0) for contour, parent in zip(contours, parents, strict=True)]
-    components = [0.0 if parent >= 0 else area for area, parent in zip(areas, parents, strict=True)]
-    for area, parent in zip(areas, parents, strict=True):
-        if parent >= 0 and area > max_hole_area_px:
-            components[parent] -= area
-    small_holes = [c for c, area, parent in zip(contours, areas, parents, strict=True) if parent >= 0 and area <= max_hole_area_px]
-    cv2.drawContours(cleaned, small_holes, -1, 1, cv2.FILLED)
-    for contour, parent, area in zip(contours, parents, components, strict=True):
-        if parent < 0 and area < min_area_px:
-            cv2.drawContours(cleaned, [contour], -1, 0, cv2.FILLED)
+    parents: list[int] = hierarchy[0, :, 3].tolist()
+    is_hole = [_depth(parents, index) % 2 == 1 for index in range(len(parents))]
+    areas = [_enclosed_pixels(contour, hole) for contour, hole in zip(contours, is_hole, strict=True)]
+    is_filled = [hole and area <= max_hole_area_px for hole, area in zip(is_hole, areas, strict=True)]
+    cv2.drawContours(cleaned, [contours[index] for index in range(len(contours)) if is_filled[index]], -1, 1, cv2.FILLED)
+    open_holes: dict[int, list[int]] = {}
+    for index, parent in enumerate(parents):
+        if is_hole[index] and not is_filled[index]:
+            open_holes.setdefault(parent, []).append(index)
+    for index, parent in enumerate(parents):
+        if is_hole[index] or (parent >= 0 and is_filled[parent]):
+            continue
+        holes = open_holes.get(index, [])
+        if areas[index] - sum(areas[hole] for hole in holes) < min_area_px:
+            # Drawn together with its holes, a component goes and what lies in its holes stays.
+            cv2.drawContours(cleaned, [contours[part] for part in (index, *holes)], -1, 0, cv2.FILLED)
     return cleaned.view(np.bool_)
+
+
+def _depth(parents: list[int], index: int) -> int:
+    """How many contours lie around this one: an even number around a component's outline, an odd one around a hole's."""
+    depth = 0
+    while (index := parents[index]) >= 0:
+        depth += 1
+    return depth
 
 
 def _enclosed_pixels(contour: cv2.typing.MatLike, is_hole: bool) -> float:

@@ -86,9 +86,9 @@ class Pipeline:
         config = self._config
         height, width = frame.image.shape[:2]
         with watch.stage("prepare"):
-            image, scale = to_working(frame.image, config.working_size_px)
+            image, scale_xy = to_working(frame.image, config.working_size_px)
             refusal = quality.check_image(image, config.quality)
-        scene = Scene(frame.index, frame.captured_s, (width, height), scale)
+        scene = Scene(frame.index, frame.captured_s, (width, height), scale_xy[0 if width >= height else 1], scale_xy=scale_xy)
         if refusal is not None:
             return replace(scene, refusal=refusal)
         with watch.stage("network"):

@@ -15,6 +15,8 @@ from core.perception.pixel_graph import Chain, PixelGraph, trace
 from core.perception.trails import Trail
 from core.types import Masks, Point, Points, Reason, Refusal, RobotPath, Skeletons, VesselGraph
 
+MAX_CHAINS = 80
+"""A robot with all its false branches has some ten; a graph of more is a mesh, and any way through it is as good as another."""
 SAME_END_PX = 10.0
 """Paths whose heads are this near to each other are the same answer."""
 RIVAL_SHARE = 0.8
@@ -72,6 +74,10 @@ def find(
         return refusal
     around = Surroundings(masks, previous, vessel, port, config.path)
     chosen = [node for piece in pieces if piece.size_px >= config.path.outlier_share * pieces[0].size_px for node in piece.nodes]
+    taken = set(chosen)
+    chains = sum(chain.start in taken for chain in graph.chains)
+    if chains > MAX_CHAINS:
+        return Refusal(Reason.AMBIGUOUS_PATH, f"it is a mesh of {chains} branches (at most {MAX_CHAINS})")
     candidates, rivals = _candidates(graph, chosen, around, previous, config.path)
     if not candidates:
         return _why_no_candidate(graph, config.path)
@@ -128,8 +134,10 @@ def _candidates(
     ends = [node for node in nodes if degrees[node] == 1]
     entries = [node for node in ends if is_entry(graph.nodes[node], around)]
     winners, others = [], []
-    for start in entries or ends:
-        valid = [trail for trail in trails.explore(graph, start, config) if trail.length_px >= config.min_length_px]
+    starts = entries or ends
+    share = trails.max_steps(config) // max(len(starts), 1)
+    for start in starts:
+        valid = [trail for trail in trails.explore(graph, start, config, share) if trail.length_px >= config.min_length_px]
         if not valid:
             continue
         worth = [trail.effective_px - config.outside_cost * _outside_end(trail.points, around.masks) for trail in valid]

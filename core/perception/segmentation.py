@@ -28,16 +28,19 @@ class Segmenter(Protocol):
     def __call__(self, image: Image) -> tuple[Probability, Probability]: ...
 
 
-def to_working(image: Image, working_size_px: int) -> tuple[Image, float]:
-    """Scale an image so that its longer side is `working_size_px`; returns it and working pixels per source pixel."""
+def to_working(image: Image, working_size_px: int) -> tuple[Image, tuple[float, float]]:
+    """Scale an image so that its longer side is `working_size_px`; returns it and working pixels per source pixel in x and y.
+
+    The two differ a little, because the shorter side is rounded to whole pixels.
+    """
     height, width = image.shape[:2]
     scale = working_size_px / max(height, width)
     if scale == 1.0:
-        return image, 1.0
+        return image, (1.0, 1.0)
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
     # Area averaging keeps thin structures when shrinking; it would show blocks when enlarging.
     resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
-    return np.asarray(resized, np.uint8), scale
+    return np.asarray(resized, np.uint8), (size[0] / width, size[1] / height)
 
 
 def _padded(image: Image, stride: int) -> Image:

@@ -17,6 +17,7 @@ Steps = tuple[tuple[int, bool], ...]
 """Chains in walking order, each with whether it is walked from its start to its end."""
 HEADING_PX = 10.0
 """Directions at a junction are taken over this length of each chain."""
+STEPS_PER_CANDIDATE = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,21 +31,26 @@ class Trail:
     effective_px: float
 
 
-def explore(graph: PixelGraph, start: int, config: PathConfig) -> list[Trail]:
+def max_steps(config: PathConfig) -> int:
+    """How many chains may be walked in one frame, by all its starts together."""
+    return STEPS_PER_CANDIDATE * config.max_candidates
+
+
+def explore(graph: PixelGraph, start: int, config: PathConfig, budget: int | None = None) -> list[Trail]:
     """All ways from an end of the skeleton to its other ends, without using a chain twice; longest (effective) first.
 
-    A node may be passed twice: a robot that crosses itself does. Straight continuations are tried first, so that the limit of
-    ``max_candidates`` drops the unlikely ones. Where no other end can be reached (the robot's head lies against its own body) the
-    ways that stop at a junction are given instead.
+    A node may be passed twice: a robot that crosses itself does. Straight continuations are tried first, so that the limits drop
+    the unlikely ones: ``max_candidates``, and `budget`, the number of chains walked. Where no other end can be reached (the robot's
+    head lies against its own body) the ways that stop at a junction are given instead.
     """
     leaving = _chains_at(graph)
     degrees = graph.degrees()
     finished: list[tuple[Steps, float]] = []
     stopped: list[tuple[Steps, float]] = []
     pending: list[tuple[int, Steps, float]] = [(start, (), 0.0)]
-    budget = 20 * config.max_candidates
-    while pending and budget > 0 and len(finished) < config.max_candidates:
-        budget -= 1
+    left = max_steps(config) if budget is None else budget
+    while pending and left > 0 and len(finished) < config.max_candidates:
+        left -= 1
         node, steps, turning = pending.pop()
         if steps and degrees[node] == 1:
             finished.append((steps, turning))

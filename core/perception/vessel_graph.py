@@ -139,7 +139,20 @@ def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: _RadiusMap) ->
             continue
         nodes[node] = anew[0]
         for (line, outward), arm in zip(touching, anew[1], strict=True):
+            if line.start == line.end:
+                if outward:
+                    back = next(b for (other, away), b in zip(touching, anew[1], strict=True) if other is line and not away)
+                    _close_loop(line, arm, back)
+                continue
             line.points, line.radius = (arm.points, arm.radius) if outward else (arm.points[::-1], arm.radius[::-1])
+
+
+def _close_loop(line: _Line, out: Arm, back: Arm) -> None:
+    """A line from a junction to itself: its first half as seen from its start, its second half as seen from its end."""
+    count = len(line.points)
+    first, second = max(1, len(out.points) - (count - count // 2)), max(1, len(back.points) - count // 2)
+    line.points = np.concatenate([out.points[:first], back.points[:second][::-1]])
+    line.radius = np.concatenate([out.radius[:first], back.radius[:second][::-1]])
 
 
 def _packed(lines: list[_Line], nodes: Points) -> VesselGraph:

@@ -10,8 +10,11 @@ import av
 import av.error
 import numpy as np
 
-from core.devices import DeviceError, EndOfStream
+from core.devices import DamagedStream, DeviceError, EndOfStream
 from core.types import Frame, Image
+
+LATE_S = 0.1
+"""A paced frame that is this late is skipped."""
 
 
 def _rgb(frame: av.VideoFrame) -> Image:
@@ -22,7 +25,8 @@ class VideoFile:
     """A ``Camera`` over a video file.
 
     With `paced` the frames come at the speed of the recording and late ones are skipped, as from a camera; without, every frame is
-    given. ``captured_s`` is the presentation time from the first frame on, in the clock of the first read when paced.
+    given. A video that decodes slower than it was recorded is played slower. ``captured_s`` is the presentation time from the first
+    frame on, in the clock of the first read when paced.
     """
 
     def __init__(self, path: Path, *, paced: bool = True) -> None:
@@ -33,6 +37,7 @@ class VideoFile:
         self._index = -1
         self._start_s = 0.0
         self._first_s: float | None = None
+        self._pending: tuple[av.VideoFrame, float] | None = None
 
     @property
     def name(self) -> str:
@@ -43,46 +48,58 @@ class VideoFile:
         return False
 
     def open(self) -> None:
+        self._first_s, self._pending = None, None
         try:
-            self._container = av.open(str(self._path))
-            if not self._container.streams.video:
-                raise DeviceError(f"{self._path}: has no video in it")
-            stream = self._container.streams.video[0]
-            stream.thread_type = "AUTO"
-            self._frames = self._container.decode(stream)
+            container = av.open(str(self._path))
         except (av.error.FFmpegError, OSError) as error:
             raise DeviceError(f"{self._path}: cannot be read as a video ({error.strerror or error})") from None
+        if not container.streams.video:
+            container.close()
+            raise DeviceError(f"{self._path}: has no video in it")
+        stream = container.streams.video[0]
+        stream.thread_type = "AUTO"
+        self._container, self._frames = container, container.decode(stream)
 
     def read(self, timeout_s: float) -> Frame | None:
+        entered_s = time.monotonic()
         while True:
-            frame, at_s = self._decode()
-            self._index += 1
+            frame, at_s = self._pending or self._decode()
+            self._pending = None
             if not self._paced:
                 return Frame(self._index, at_s, _rgb(frame))
-            due = self._start_s + at_s
-            late = time.monotonic() - due
-            if late < 0.1:
-                if late < 0:
-                    time.sleep(-late)
-                return Frame(self._index, time.monotonic(), _rgb(frame))
+            now_s = time.monotonic()
+            late_s = now_s - (self._start_s + at_s)
+            left_s = entered_s + timeout_s - now_s
+            if -late_s > max(left_s, 0.0):
+                self._pending = frame, at_s
+                time.sleep(max(left_s, 0.0))
+                return None
+            if late_s >= LATE_S:
+                if left_s > 0.0:
+                    continue
+                # Decoding is slower than the recording: it is played as fast as it goes, instead of never.
+                self._start_s += late_s
+            time.sleep(max(-late_s, 0.0))
+            return Frame(self._index, time.monotonic(), _rgb(frame))
 
     def _decode(self) -> tuple[av.VideoFrame, float]:
         if self._frames is None:
             raise DeviceError(f"{self._path}: not open")
         try:
             frame = next(self._frames)
+            self._index += 1
         except StopIteration:
             raise EndOfStream(f"{self._path}: end of the video") from None
         except av.error.FFmpegError as error:
-            raise EndOfStream(f"{self._path}: damaged after frame {self._index} ({error.strerror or error})") from None
-        at = frame.time if frame.time is not None and np.isfinite(frame.time) else (self._index + 1) / 30.0
+            raise DamagedStream(f"{self._path}: damaged after frame {self._index} ({error.strerror or error})") from None
+        at = frame.time if frame.time is not None and np.isfinite(frame.time) else self._index / 30.0
         if self._first_s is None:
             self._first_s = at
             self._start_s = time.monotonic()
         return frame, at - self._first_s
 
     def close(self) -> None:
-        self._frames = None
+        self._frames, self._pending = None, None
         if self._container is not None:
             self._container.close()
             self._container = None

@@ -8,6 +8,19 @@ from core.types import VesselGraph
 
 BOARD_MM = (200.0, 150.0)
 
+PHANTOM_TITLES = {
+    "s_curve": "S-curve",
+    "y_branch": "Y-branch",
+    "tree": "Tree with five ends",
+    "aortic_arch": "Aortic arch with supra-aortic vessels",
+    "tortuous": "Tortuous vessel",
+    "cerebral_siphon": "Carotid siphon",
+    "parallel_channels": "Three parallel channels",
+    "loop": "Loop of two ways",
+    "coronary": "Coronary tree with stenosis",
+}
+"""The named phantoms and what people call them; apart from their drawing, which takes a second to load."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Phantom:

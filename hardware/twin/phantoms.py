@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hardware.twin.channels import Sketch
-from hardware.twin.phantom import Phantom
+from hardware.twin.phantom import PHANTOM_TITLES, Phantom
 from hardware.twin.random_phantom import random_phantom
 
 
@@ -105,19 +105,19 @@ def _coronary() -> Sketch:
     return sketch
 
 
-_NAMED: dict[str, tuple[str, Callable[[], Sketch]]] = {
-    "s_curve": ("S-curve", _s_curve),
-    "y_branch": ("Y-branch", _y_branch),
-    "tree": ("Tree with five ends", _tree),
-    "aortic_arch": ("Aortic arch with supra-aortic vessels", _aortic_arch),
-    "tortuous": ("Tortuous vessel", _tortuous),
-    "cerebral_siphon": ("Carotid siphon", _cerebral_siphon),
-    "parallel_channels": ("Three parallel channels", _parallel_channels),
-    "loop": ("Loop of two ways", _loop),
-    "coronary": ("Coronary tree with stenosis", _coronary),
+_DRAWN: dict[str, Callable[[], Sketch]] = {
+    "s_curve": _s_curve,
+    "y_branch": _y_branch,
+    "tree": _tree,
+    "aortic_arch": _aortic_arch,
+    "tortuous": _tortuous,
+    "cerebral_siphon": _cerebral_siphon,
+    "parallel_channels": _parallel_channels,
+    "loop": _loop,
+    "coronary": _coronary,
 }
 
-PHANTOM_NAMES: tuple[str, ...] = tuple(_NAMED)
+PHANTOM_NAMES: tuple[str, ...] = tuple(PHANTOM_TITLES)
 
 
 def make_phantom(name: str) -> Phantom:
@@ -131,7 +131,6 @@ def make_phantom(name: str) -> Phantom:
     kind, _, seed = name.partition(":")
     if kind == "random" and seed.isdecimal():
         return random_phantom(int(seed))
-    if name not in _NAMED:
+    if name not in _DRAWN:
         raise ValueError(f"unknown phantom {name!r}; known: {', '.join(PHANTOM_NAMES)}, random:<seed>")
-    title, draw = _NAMED[name]
-    return Phantom(name, title, draw().graph(), port=0)
+    return Phantom(name, PHANTOM_TITLES[name], _DRAWN[name]().graph(), port=0)

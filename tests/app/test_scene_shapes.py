@@ -40,6 +40,14 @@ def test_working_pixels_become_source_pixels() -> None:
     np.testing.assert_allclose(shapes.robot_line, [[0.5, 0.5], [20.5, 0.5]])
 
 
+def test_lines_and_points_are_mapped_alike_where_x_and_y_differ() -> None:
+    path = RobotPath(np.array([[0.0, 0.0], [9.5, 9.5]]), 1.0, None, True, 0.0, 3.0)
+    shapes = scene_shapes(scene(0.5, scale_xy=(0.5, 0.4), path=path))
+    assert shapes.head == pytest.approx((19.5, 24.5))
+    assert shapes.robot_line is not None
+    np.testing.assert_allclose(shapes.robot_line[-1], (19.5, 24.5))
+
+
 def test_arc_turns_from_the_vessel_to_the_robot_the_short_way() -> None:
     shapes = scene_shapes(scene(robot_vector=ROBOT, vessel_vector=VESSEL, pose=POSE))
     assert shapes.angle_arc is not None

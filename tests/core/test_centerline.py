@@ -249,6 +249,19 @@ def test_edges_end_in_their_nodes() -> None:
         assert len(edge.points) == len(edge.radius)
 
 
+def test_a_loop_with_one_junction_starts_and_ends_there() -> None:
+    arcs = [np.linspace(start, start + 1.2 * np.pi, 200) for start in (0.0, np.pi)]
+    ring = [np.column_stack([330 + 110 * np.cos(angle), 240 + 110 * np.sin(angle)]) for angle in arcs]
+    graph = perceived(*((arc, 12.0) for arc in ring), (np.array([[-20.0, 240.0], [225.0, 240.0]]), 12.0))
+    assert degrees(graph) == [1, 3]
+    loop = next(edge for edge in graph.edges if edge.start == edge.end)
+    for end in (loop.points[0], loop.points[-1]):
+        np.testing.assert_allclose(end, graph.nodes[loop.start])
+    assert np.hypot(*np.diff(loop.points, axis=0).T).max() < 6.0
+    assert len(loop.points) == len(loop.radius)
+    assert max(abs(np.hypot(x - 330, y - 240) - 110) for x, y in loop.points[15:-15]) < 2.0
+
+
 def test_bumps_of_the_wall_are_no_branches() -> None:
     bumps = [(np.array([[x, 240.0], [x + 4.0, 266.0]]), 4.0) for x in (150.0, 300.0, 450.0)]
     line = np.array([[-20.0, 240.0], [660.0, 240.0]])

@@ -1,3 +1,5 @@
+import struct
+import zlib
 from pathlib import Path
 
 import cv2
@@ -73,3 +75,95 @@ def test_empty_missing_and_foreign_files_are_named(tmp_path: Path) -> None:
 def test_an_8k_picture_is_read(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "8k.jpg"), np.full((4320, 7680, 3), 90, np.uint8))
     assert read_image(tmp_path / "8k.jpg").shape == (4320, 7680, 3)
+
+
+@pytest.mark.parametrize(("value", "grey"), [(300, 75), (1023, 255), (1100, 68), (4095, 255), (4200, 16), (65535, 255)])
+def test_16_bit_pictures_are_scaled_by_their_sensors_range(value: int, grey: int) -> None:
+    """10, 12 or 16 bit; never by their own brightest pixel, which would make a dark picture white."""
+    assert to_rgb8(np.full((40, 50), value, np.uint16))[0, 0].tolist() == [grey] * 3
+
+
+def test_a_hot_pixel_or_an_opaque_alpha_does_not_darken_a_16_bit_picture() -> None:
+    pixels = np.full((60, 80, 4), 512, np.uint16)
+    pixels[:, :, 3] = 65535
+    pixels[3, 4] = 65535
+    image = to_rgb8(pixels)
+    assert image[0, 0].tolist() == [128, 128, 128]
+    assert image[3, 4].tolist() == [255, 255, 255]
+
+
+def test_floats_are_rounded() -> None:
+    assert to_rgb8(np.full((2, 2), 0.999))[0, 0, 0] == 255
+
+
+@pytest.mark.parametrize(("ending", "more"), [("jpg", 20_000), ("png", 200)])
+def test_what_a_phone_appends_to_a_picture_is_no_damage(tmp_path: Path, ending: str, more: int) -> None:
+    data = _picture(tmp_path / f"plain.{ending}")
+    (tmp_path / f"motion.{ending}").write_bytes(data + bytes(more))
+    assert (read_image(tmp_path / f"motion.{ending}") == read_image(tmp_path / f"plain.{ending}")).all()
+
+
+def _segment(marker: int, content: bytes) -> bytes:
+    return bytes((0xFF, marker)) + struct.pack(">H", len(content) + 2) + content
+
+
+def test_the_end_mark_of_a_preview_does_not_hide_that_a_jpeg_is_cut(tmp_path: Path) -> None:
+    data = _picture(tmp_path / "plain.jpg")
+    cut = data[:2] + _segment(0xE1, b"Exif\0\0" + data[:300] + b"\xff\xd9") + data[2:-200]
+    (tmp_path / "cut.jpg").write_bytes(cut)
+    with pytest.raises(ImageError, match="cut short"):
+        read_image(tmp_path / "cut.jpg")
+
+
+def test_a_picture_is_turned_upright_as_its_exif_says(tmp_path: Path) -> None:
+    left_white = np.zeros((40, 80), np.uint8)
+    left_white[:, :40] = 255
+    cv2.imwrite(str(tmp_path / "plain.jpg"), left_white)
+    data = (tmp_path / "plain.jpg").read_bytes()
+    orientation_6 = struct.pack("<2sHI H HHIHH I", b"II", 42, 8, 1, 0x0112, 3, 1, 6, 0, 0)  # turn clockwise to see it upright
+    (tmp_path / "turned.jpg").write_bytes(data[:2] + _segment(0xE1, b"Exif\0\0" + orientation_6) + data[2:])
+    image = read_image(tmp_path / "turned.jpg")
+    assert image.shape == (80, 40, 3)
+    assert image[10, 20, 0] > 250
+    assert image[70, 20, 0] < 5
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+@pytest.mark.parametrize("depth", [np.uint8, np.uint16])
+def test_grey_colour_and_alpha_files_of_both_depths(tmp_path: Path, channels: int, depth: type) -> None:
+    pixels = np.full((6, 8, channels), np.iinfo(depth).max, depth)
+    pixels[:, :4, :3] = np.iinfo(depth).max // 5
+    if channels == 4:
+        pixels[:, :, 3] = 0  # alpha says nothing about what a camera saw
+    cv2.imwrite(str(tmp_path / "x.png"), pixels)
+    image = read_image(tmp_path / "x.png")
+    assert image.shape == (6, 8, 3)
+    assert image[0, [0, 7]].tolist() == [[51] * 3, [255] * 3]
+
+
+def _png_header(width: int, height: int) -> bytes:
+    header = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header)) + bytes(8) + b"IEND"
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        _png_header(22_000, 22_000),
+        b"\xff\xd8" + _segment(0xE0, bytes(14)) + _segment(0xC2, struct.pack(">BHHB", 8, 22_000, 22_000, 1)) + b"\xff\xda\xff\xd9",
+        b"BM" + bytes(12) + struct.pack("<Iii", 40, 22_000, -22_000) + bytes(40),
+    ],
+)
+def test_a_picture_far_too_large_is_refused_by_its_header(tmp_path: Path, data: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("decoded"))
+    (tmp_path / "huge").write_bytes(data)
+    with pytest.raises(ImageError, match="22000x22000 is larger than 120 million pixels"):
+        read_image(tmp_path / "huge")
+
+
+def test_a_damaged_file_leaves_no_log_lines_of_opencv(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    cv2.imwrite(str(tmp_path / "whole.tiff"), np.zeros((50, 50, 3), np.uint8))
+    (tmp_path / "cut.tiff").write_bytes((tmp_path / "whole.tiff").read_bytes()[:80])
+    with pytest.raises(ImageError):
+        read_image(tmp_path / "cut.tiff")
+    assert capfd.readouterr().err == ""

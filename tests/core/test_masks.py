@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 
@@ -52,6 +53,20 @@ def test_a_loop_that_encloses_more_than_a_hole_stays_open() -> None:
 def test_holes_do_not_count_as_area() -> None:
     assert clean_mask(RING, 20, 0)[1, 1]  # the ring has 20 pixels
     assert not clean_mask(RING, 21, 0)[1, 1]
+
+
+@pytest.mark.parametrize("thickness", [1, 2, 3])
+def test_what_lies_inside_a_ring_stays_when_the_ring_goes(thickness: int) -> None:
+    mask, disc = np.zeros((140, 140), np.uint8), np.zeros((140, 140), np.uint8)
+    cv2.circle(disc, (70, 70), 18, 1, cv2.FILLED)
+    cv2.circle(mask, (70, 70), 31, 1, thickness)
+    cv2.circle(mask, (70, 70), 23, 1, thickness)
+    cleaned = clean_mask((mask | disc) > 0, min_area_px=1000, max_hole_area_px=20)
+    assert (cleaned == (disc > 0)).all()
+
+
+def test_an_island_in_a_filled_hole_is_no_speck() -> None:
+    assert clean_mask(RING, 5, 15)[1:6, 1:8].all()
 
 
 def test_background_at_the_image_border_is_no_hole() -> None:

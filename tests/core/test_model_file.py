@@ -117,7 +117,7 @@ def test_figures_are_added_without_touching_the_rest(model: Path) -> None:
 def test_working_size_keeps_the_aspect(size: tuple[int, int], working: tuple[int, int]) -> None:
     image, scale = to_working(np.zeros((*size, 3), np.uint8), 640)
     assert image.shape[:2] == working
-    assert scale == 640 / max(size)
+    assert scale == (working[1] / size[1], working[0] / size[0])
 
 
 def test_nothing_but_a_model_is_ever_replaced(tmp_path: Path) -> None:

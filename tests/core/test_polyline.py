@@ -42,3 +42,10 @@ def test_smoothing_keeps_the_ends_and_leaves_a_straight_line_alone() -> None:
 def test_a_map_is_sampled_between_pixels_and_beyond_its_border() -> None:
     ramp = np.tile(np.arange(8, dtype=np.float32), (6, 1))
     assert polyline.sample(ramp, np.array([[2.5, 3.0], [-4.0, 1.0], [20.0, 1.0]])).tolist() == [2.5, 0.0, 7.0]
+
+
+def test_more_places_than_opencv_takes_at_once_are_sampled_too() -> None:
+    ramp = np.tile(np.arange(8, dtype=np.float32), (6, 1))
+    places = np.zeros((700, 100, 2))
+    places[..., 0] = np.linspace(0.0, 7.0, 70_000).reshape(700, 100)
+    np.testing.assert_allclose(polyline.sample(ramp, places), places[..., 0], atol=0.02)

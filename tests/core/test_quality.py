@@ -50,6 +50,16 @@ def test_images_that_show_nothing(kind: str, reason: Reason | None) -> None:
     assert (refusal.reason if refusal else None) is reason
 
 
+def test_brightness_is_the_sorted_values_percentile() -> None:
+    image = np.random.default_rng(0).integers(0, 9, (480, 640, 3), np.uint8)
+    image[:8] += 200
+    seen = image[::4, ::4]
+    for share, by_hand in ((0.99, np.sort(seen.max(axis=2), axis=None)), (0.01, np.sort(seen.min(axis=2), axis=None))):
+        values = seen.max(axis=2) if share > 0.5 else seen.min(axis=2)
+        assert quality._level(values, share) == by_hand[int(share * (by_hand.size - 1))]
+    assert quality._level(np.full((1, 1), 255, np.uint8), 0.99) == 255.0
+
+
 def test_sharpness_is_only_asked_where_a_limit_is_set() -> None:
     assert quality.check_image(picture("blurred"), QualityConfig(min_sharpness=0.0)) is None
 

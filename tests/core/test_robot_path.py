@@ -6,6 +6,8 @@ import pytest
 
 from core.config import PathConfig, PerceptionConfig, load_config
 from core.perception import gaps, masks, polyline, robot_path, skeleton
+from core.perception.pixel_graph import PixelGraph
+from core.perception.trails import Trail
 from core.perception.vectors import fit_robot_vector
 from core.perception.vessel_graph import build_graph
 from core.types import Masks, Point, Points, Reason, Refusal, RobotPath, VesselGraph
@@ -86,6 +88,14 @@ def test_head_and_direction_of_any_robot_in_any_direction(radius: float, angle_d
     assert true is not None
     cosine = float(np.dot(found.direction, true.direction))
     assert np.degrees(np.arccos(min(cosine, 1.0))) < 1.0
+
+
+def test_a_long_thick_robot_is_no_matter() -> None:
+    corners = [(-20, 60), (560, 60), (560, 180), (80, 180), (80, 300), (560, 300), (560, 420), (80, 420)]
+    serpentine = polyline.smooth(polyline.resample(np.array(corners, np.float64), 2.0), 12.0)
+    path = path_of(probability(depth(serpentine, 25.0)))
+    assert path.head == pytest.approx((80, 420), abs=3.0)
+    assert path.radius_px == pytest.approx(25, abs=1.5)
 
 
 def test_an_intermediate_break_is_bridged() -> None:
@@ -223,6 +233,37 @@ def test_a_closed_ring_shows_no_end() -> None:
     robot = np.zeros((SIZE[1], SIZE[0]), np.float32)
     cv2.circle(robot, (320, 240), 80, 1.0, 7)
     assert reason_of(robot) is Reason.AMBIGUOUS_PATH
+
+
+def mesh(pitch_px: int, until_px: int = 640) -> np.ndarray:
+    robot = np.zeros((SIZE[1], SIZE[0]), np.float32)
+    for x in range(pitch_px // 2, until_px, pitch_px):
+        cv2.line(robot, (x, 0), (x, SIZE[1]), 1.0, 5)
+    for y in range(pitch_px // 2, SIZE[1], pitch_px):
+        cv2.line(robot, (0, y), (until_px, y), 1.0, 5)
+    return robot
+
+
+def test_a_mesh_is_not_searched_for_a_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_path.trails, "explore", lambda *_: pytest.fail("searched"))
+    refusal = perceive(mesh(60))
+    assert isinstance(refusal, Refusal)
+    assert refusal.reason is Reason.AMBIGUOUS_PATH
+    assert "mesh" in refusal.detail
+
+
+def test_all_starts_of_a_frame_share_one_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = []
+    explore = robot_path.trails.explore
+
+    def counted(graph: PixelGraph, start: int, config: PathConfig, budget: int) -> list[Trail]:
+        given.append(budget)
+        return explore(graph, start, config, budget)
+
+    monkeypatch.setattr(robot_path.trails, "explore", counted)
+    perceive(mesh(100, until_px=400))
+    assert len(given) > 8
+    assert sum(given) <= 20 * CONFIG.path.max_candidates
 
 
 def test_an_empty_image() -> None:

@@ -89,3 +89,11 @@ def test_the_number_of_candidates_is_limited() -> None:
 def test_without_another_end_the_way_around_the_loop_is_given() -> None:
     lasso = skeleton((10, 60, 100, 60), (100, 60, 140, 20), (140, 20, 180, 60), (180, 60, 140, 100), (140, 100, 100, 60))
     assert len(trails_from(lasso, (10, 60), PathConfig())) == 2
+
+
+def test_the_number_of_chains_walked_is_limited() -> None:
+    ladder = skeleton((5, 40, 235, 40), (5, 80, 235, 80), *((x, 40, x, 80) for x in range(20, 230, 10)))
+    graph = trace(ladder)
+    start = int(np.flatnonzero(graph.degrees() == 1)[0])
+    assert explore(graph, start, PathConfig(), budget=3) == []
+    assert len(explore(graph, start, PathConfig(), budget=60)) < 20

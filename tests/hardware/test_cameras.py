@@ -1,6 +1,6 @@
 """One contract for every camera that needs no device, and what is special to each."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import av
@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from core.config import TwinConfig
-from core.devices import Camera, DeviceError, EndOfStream
+from core.devices import Camera, DamagedStream, DeviceError, EndOfStream
+from hardware.cameras import video_file
 from hardware.cameras.image_folder import ImageFolder
 from hardware.cameras.video_file import VideoFile
 from hardware.twin.camera import TwinCamera
@@ -97,6 +98,106 @@ def test_a_cut_video_gives_what_is_there(tmp_path: Path) -> None:
             count += 1
     video.close()
     assert 0 < count < 40
+
+
+class _Clock:
+    """Time that passes only when somebody sleeps or decodes."""
+
+    now_s = 100.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def sleep(self, wait_s: float) -> None:
+        assert wait_s >= 0.0
+        self.now_s += wait_s
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> _Clock:
+    clock = _Clock()
+    monkeypatch.setattr(video_file, "time", clock)
+    return clock
+
+
+def _decoding_takes(seconds: float, video: VideoFile, clock: _Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    decode = video._decode
+
+    def slowly() -> tuple[av.VideoFrame, float]:
+        clock.now_s += seconds
+        return decode()
+
+    monkeypatch.setattr(video, "_decode", slowly)
+
+
+def test_a_video_that_decodes_too_slowly_is_played_slower(tmp_path: Path, clock: _Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    video = VideoFile(_video(tmp_path / "v.mp4", 30))
+    video.open()
+    _decoding_takes(0.3, video, clock, monkeypatch)
+    seen = []
+    for _ in range(5):
+        before_s = clock.now_s
+        frame = video.read(0.5)
+        assert clock.now_s - before_s <= 0.5 + 0.3 + 1e-6  # the time asked for, and a frame that was begun in it
+        assert frame is not None
+        seen.append(frame.index)
+    video.close()
+    assert seen == sorted(set(seen))
+
+
+def test_late_frames_are_skipped_and_early_ones_waited_for(tmp_path: Path, clock: _Clock) -> None:
+    video = VideoFile(_video(tmp_path / "v.mp4", 30))
+    video.open()
+    first = video.read(1.0)
+    clock.now_s += 0.5
+    after = video.read(1.0)
+    following = video.read(1.0)
+    video.close()
+    assert first is not None
+    assert after is not None
+    assert following is not None
+    assert after.index == 12  # due 0.4 s after the first one: 0.1 s late, less a rounding error
+    assert following.captured_s - first.captured_s == pytest.approx(0.5)
+
+
+def test_a_frame_that_is_not_yet_due_is_kept(tmp_path: Path, clock: _Clock) -> None:
+    video = VideoFile(_video(tmp_path / "v.mp4", 3, rate=1))
+    video.open()
+    given = [video.read(0.4) for _ in range(6)]
+    video.close()
+    assert [None if frame is None else frame.index for frame in given] == [0, None, None, 1, None, None]
+    assert given[3] is not None
+    assert given[3].captured_s == pytest.approx(101.0)
+
+
+def test_a_file_without_pictures_in_it_is_closed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "sound.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("aac", rate=44100)
+        sound = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), format="fltp", layout="mono")
+        sound.sample_rate = 44100
+        container.mux(stream.encode(sound))
+        container.mux(stream.encode())
+    opened = []
+    really_open = av.open
+    monkeypatch.setattr(av, "open", lambda name: opened.append(really_open(name)) or opened[-1])
+    with pytest.raises(DeviceError, match="has no video in it"):
+        VideoFile(path).open()
+    with pytest.raises(AssertionError, match="not open"):
+        next(opened[0].demux())
+
+
+def test_damage_is_told_from_the_end_by_its_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken() -> Iterator[av.VideoFrame]:
+        yield from ()
+        raise av.error.InvalidDataError(1, "invalid data")
+
+    video = VideoFile(_video(tmp_path / "v.mp4", 3), paced=False)
+    video.open()
+    monkeypatch.setattr(video, "_frames", broken())
+    with pytest.raises(DamagedStream, match="damaged after frame"):
+        video.read(0.0)
+    video.close()
 
 
 @pytest.mark.parametrize("content", [b"", b"not a video at all"])
