@@ -51,6 +51,7 @@ class Pipeline:
         self._config = config
         self._states = StateFilter(config.pose)
         self._memory: Memory | None = None
+        self._shape: tuple[int, ...] | None = None
 
     @property
     def engine(self) -> str:
@@ -72,6 +73,9 @@ class Pipeline:
         tracking = self._config.tracking
         if not tracking.enabled:
             return self.perceive_single(frame, target)
+        if frame.image.shape != self._shape:  # another camera or another mode of it: what is remembered lies in other pixels
+            self.reset()
+            self._shape = frame.image.shape
         watch = _Stopwatch()
         scene = self._perceive(frame, target, recall(self._memory, frame.captured_s, tracking), watch)
         if scene.pose is not None and scene.path is not None:

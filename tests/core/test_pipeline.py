@@ -1,0 +1,199 @@
+"""The stages together, behind a network that returns what each test has drawn."""
+
+import cv2
+import numpy as np
+import pytest
+
+from core.config import PerceptionConfig, TrackingConfig
+from core.learning.model_file import ModelInfo
+from core.perception.pipeline import NoPerception, Pipeline
+from core.types import Frame, Image, Points, Reason, Scene
+from tests.core.drawing import SIZE, curve, depth, probability
+
+CONFIG = PerceptionConfig()
+STAGES = ["prepare", "network", "masks", "skeletons", "gaps", "graph", "path", "pose", "total"]
+VESSEL = curve((-30, 240), (200, 220), (420, 260), (680, 230))
+NOTHING = np.zeros((SIZE[1], SIZE[0]), np.float32)
+FRAME_S = 1 / 30
+
+
+class DrawnNetwork:
+    """Gives what was drawn last, in the size of the image, and counts how often it is asked."""
+
+    info = ModelInfo(name="drawn", shape={}, stride=1, weights_sha256="0" * 64, onnx_sha256="0" * 64)
+    engine = "drawn by hand"
+
+    def __init__(self) -> None:
+        self.vessel = probability(depth(VESSEL, 22.0))
+        self.robot = NOTHING
+        self.shapes: list[tuple[int, ...]] = []
+
+    def draw(self, *lines: Points) -> None:
+        self.robot = probability(*(depth(line, 4.0) for line in lines)) if lines else NOTHING
+
+    def draw_up_to(self, x: float) -> None:
+        """A robot along the vessel, its head at about this column."""
+        self.draw(VESSEL[VESSEL[:, 0] <= x] + [0.0, 3.0])
+
+    def __call__(self, image: Image) -> tuple[np.ndarray, np.ndarray]:
+        self.shapes.append(image.shape)
+        size = image.shape[1], image.shape[0]
+        return cv2.resize(self.vessel, size), cv2.resize(self.robot, size)
+
+
+@pytest.fixture
+def network() -> DrawnNetwork:
+    network = DrawnNetwork()
+    network.draw_up_to(300)
+    return network
+
+
+@pytest.fixture
+def pipeline(network: DrawnNetwork) -> Pipeline:
+    return Pipeline(network, CONFIG)
+
+
+def frame(captured_s: float = 0.0, size: tuple[int, int] = SIZE, grey: int = 120) -> Frame:
+    return Frame(round(captured_s * 30), captured_s, np.full((size[1], size[0], 3), grey, np.uint8))
+
+
+def reason(scene: Scene) -> Reason | None:
+    assert (scene.pose is None) is (scene.refusal is not None), "exactly one of the two"
+    return scene.refusal.reason if scene.refusal is not None else None
+
+
+def test_a_frame_goes_through_all_stages_in_order(pipeline: Pipeline) -> None:
+    scene = pipeline.perceive_single(frame(2.0))
+    assert reason(scene) is None
+    assert list(scene.latency_ms) == STAGES
+    assert sum(scene.latency_ms[stage] for stage in STAGES[:-1]) <= scene.latency_ms["total"]
+    assert (scene.frame_index, scene.captured_s, scene.source_size, scene.scale) == (60, 2.0, SIZE, 1.0)
+    assert scene.path is not None
+    assert scene.path.head[0] == pytest.approx(300, abs=1.5)
+    assert scene.pose is not None
+    assert scene.pose.d_head_px == pytest.approx(3, abs=1)
+    assert scene.pose.theta_deg < 5.0
+    assert pipeline.engine == "drawn by hand"
+
+
+@pytest.mark.parametrize(("grey", "expected"), [(0, Reason.BLACK), (255, Reason.WHITE)])
+def test_a_frame_that_shows_nothing_never_reaches_the_network(
+    pipeline: Pipeline, network: DrawnNetwork, grey: int, expected: Reason
+) -> None:
+    scene = pipeline(frame(grey=grey))
+    assert reason(scene) is expected
+    assert network.shapes == []
+    assert list(scene.latency_ms) == ["prepare", "total"]
+
+
+def test_a_refusal_keeps_what_was_found_before_it(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    network.draw()
+    scene = pipeline.perceive_single(frame())
+    assert reason(scene) is Reason.NO_ROBOT
+    assert scene.masks is not None
+    assert scene.skeletons is None
+    assert list(scene.latency_ms) == ["prepare", "network", "masks", "total"]
+
+
+# ---- single images and streams ----
+
+STEM = [(-20.0, 240.0), (120.0, 240.0), (200.0, 240.0)]
+UP, DOWN = curve(*STEM, (260, 215), (330, 180)), curve(*STEM, (260, 265), (330, 300))
+
+
+def test_the_last_frame_decides_in_a_stream_and_not_in_a_single_image(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    network.vessel = np.ones_like(NOTHING)
+    network.draw(UP, DOWN)
+    alone = pipeline.perceive_single(frame()).path
+    assert alone is not None
+    chosen_alone_is_up = alone.head[1] < 240
+    before, other = (DOWN, UP) if chosen_alone_is_up else (UP, DOWN)
+    network.draw(before)
+    pipeline(frame(0.0))
+    network.draw(UP, DOWN)
+    in_stream = pipeline(frame(FRAME_S)).path
+    assert in_stream is not None
+    assert in_stream.head == pytest.approx(tuple(before[-1]), abs=2.0)
+    again = pipeline.perceive_single(frame(FRAME_S)).path
+    assert again is not None
+    assert again.head == pytest.approx(tuple(other[-1]), abs=2.0)
+
+
+def test_a_jump_is_refused_until_the_memory_has_faded(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    assert reason(pipeline(frame(0.0))) is None
+    network.draw_up_to(450)
+    jumped = pipeline(frame(FRAME_S))
+    assert reason(jumped) is Reason.HEAD_JUMP
+    assert jumped.path is not None, "it is still drawn"
+    assert reason(pipeline.perceive_single(frame(FRAME_S))) is None
+    network.draw_up_to(305)
+    assert reason(pipeline(frame(2 * FRAME_S))) is None, "the refused place was not remembered"
+    network.draw_up_to(450)
+    assert reason(pipeline(frame(3 * FRAME_S))) is Reason.HEAD_JUMP
+    assert reason(pipeline(frame(2 * FRAME_S + CONFIG.tracking.memory_s + 0.01))) is None
+
+
+def test_a_single_image_leaves_the_streams_memory_alone(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    pipeline(frame(0.0))
+    network.draw_up_to(450)
+    pipeline.perceive_single(frame(FRAME_S))
+    assert reason(pipeline(frame(2 * FRAME_S))) is Reason.HEAD_JUMP
+
+
+def test_after_a_reset_any_place_is_accepted(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    pipeline(frame(0.0))
+    network.draw_up_to(450)
+    pipeline.reset()
+    assert reason(pipeline(frame(FRAME_S))) is None
+
+
+def test_without_tracking_each_frame_stands_alone(network: DrawnNetwork) -> None:
+    pipeline = Pipeline(network, CONFIG.model_copy(update={"tracking": TrackingConfig(enabled=False)}))
+    pipeline(frame(0.0))
+    network.draw_up_to(450)
+    assert reason(pipeline(frame(FRAME_S))) is None
+
+
+# ---- sizes ----
+
+
+def test_a_larger_frame_gives_the_same_answer_in_its_own_pixels(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    small, large = pipeline.perceive_single(frame()), pipeline.perceive_single(frame(size=(2560, 1920)))
+    assert network.shapes == [(480, 640, 3)] * 2
+    assert large.scale == 0.25
+    assert small.path is not None
+    assert large.path is not None
+    assert large.path.head == pytest.approx(small.path.head)
+    assert large.to_source(large.path.head) == pytest.approx([4 * value + 1.5 for value in small.path.head])
+
+
+def test_a_frame_of_another_size_in_the_stream_is_a_new_stream(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    assert reason(pipeline(frame(0.0))) is None
+    portrait = pipeline(frame(FRAME_S, size=(360, 640)))  # the head lies elsewhere in it, and that is no jump
+    assert portrait.source_size == (360, 640)
+    assert network.shapes[-1] == (640, 360, 3)
+    assert reason(portrait) is not Reason.HEAD_JUMP
+    assert reason(pipeline(frame(2 * FRAME_S))) is None
+
+
+@pytest.mark.parametrize("size", [SIZE, (1280, 960), (3000, 2251)])
+def test_a_target_in_source_pixels_becomes_a_route(pipeline: Pipeline, network: DrawnNetwork, size: tuple[int, int]) -> None:
+    branch = curve((380, 252), (450, 330), (520, 440))
+    network.vessel = probability(depth(VESSEL, 22.0), depth(branch, 18.0))
+    target = 500 * size[0] / 640, 408 * size[1] / 480
+    scene = pipeline(frame(size=size), target)
+    assert scene.route is not None
+    assert scene.to_source(scene.route.target) == pytest.approx(target, abs=8 * size[0] / 640)
+    assert scene.route.points[-1] == pytest.approx((500, 408), abs=8.0)
+    assert scene.route.points[0] == pytest.approx((300, 244), abs=12.0)
+    assert pipeline(frame(size=size)).route is None
+
+
+# ---- without a model ----
+
+
+def test_without_a_model_every_frame_is_refused_with_what_to_do() -> None:
+    scene = NoPerception("no model 'x'; known: default")(frame(1.0, size=(800, 600)), target=(1.0, 2.0))
+    assert str(scene.refusal) == "no model: no model 'x'; known: default"
+    assert reason(scene) is Reason.NO_MODEL
+    assert (scene.source_size, scene.captured_s, scene.latency_ms) == ((800, 600), 1.0, {"total": 0.0})
