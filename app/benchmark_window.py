@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,8 +15,10 @@ from app.operator_window import OperatorWindow
 from core.types import Command
 
 _WARM_UP_S = 10.0
-_DRIVE_EVERY_MS = 1500
+_DRIVE_EVERY_MS = 50
+_MOVE_S = 1.5
 _LOOK_EVERY_MS = 5
+_MOVES = (Command(0.4, 0.0, 8.0), Command(-0.5, 0.0, 6.0), Command(0.2, 0.0, -10.0), Command())
 
 
 @dataclass(slots=True)
@@ -40,7 +41,6 @@ class WindowWatch(QObject):
         self._seconds = seconds
         self._started_s = time.monotonic()
         self._process = psutil.Process()
-        self._moves = itertools.cycle((Command(0.4, 0.0, 8.0), Command(-0.5, 0.0, 6.0), Command(0.2, 0.0, -10.0), Command()))
         self.readings = _Readings()
         for interval_ms, slot in ((_LOOK_EVERY_MS, self._look), (_DRIVE_EVERY_MS, self._drive), (1000, self._weigh)):
             timer = QTimer(self)
@@ -60,7 +60,9 @@ class WindowWatch(QObject):
             self._window.close()
 
     def _drive(self) -> None:
-        self._window.drive(next(self._moves))
+        # As a held key does, the command is repeated: a robot whose driver falls silent is held.
+        place = int((time.monotonic() - self._started_s) / _MOVE_S)
+        self._window.drive(_MOVES[place % len(_MOVES)])
 
     def _weigh(self) -> None:
         self.readings.block_ms.append(self._window.max_block_ms)

@@ -8,7 +8,7 @@ from enum import Enum
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QGuiApplication, QKeyEvent
-from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLineEdit, QWidget
+from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QWidget
 
 from core.types import Command
 
@@ -162,7 +162,7 @@ class JogKeys(QObject):
             return True
         motion = _MOTION_OF_KEY.get(key)
         # A field keeps its letters and arrows, and what it does not use must not reach the robot by way of its parent.
-        if motion is None or isinstance(self._window.focusWidget(), QAbstractSpinBox | QLineEdit | QComboBox):
+        if motion is None or isinstance(self._window.focusWidget(), QAbstractSpinBox | QLineEdit):
             return False
         if not event.isAutoRepeat():
             self.press(key, motion)

@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from PySide6.QtCore import Qt, QTimer, QUrl, Slot
-from PySide6.QtGui import QAction, QCloseEvent, QDesktopServices, QKeySequence
-from PySide6.QtWidgets import QLabel, QMainWindow
+from PySide6.QtCore import QEvent, Qt, QTimer, QUrl, Slot
+from PySide6.QtGui import QAction, QCloseEvent, QDesktopServices, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QComboBox, QLabel, QLineEdit, QMainWindow
 
 from app import theme
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
@@ -18,7 +18,7 @@ from app.heartbeat import Heartbeat
 from app.jog_keys import JogKeys, Motion
 from app.menus import MenuEntry, add_menu
 from app.operator_panels import OperatorPanels
-from app.snapshot import SnapshotWriter, pictures_folder
+from app.snapshot import Origin, SnapshotWriter, pictures_folder
 from app.widgets.notice import NoticeKind
 from app.widgets.overlays import Layer
 from core.config import Config
@@ -54,6 +54,7 @@ class OperatorWindow(QMainWindow):
         self._kind = kind
         self._phase = Phase.IDLE
         self._tick: Tick | None = None
+        self._is_stale = False
         self._target: Point | None = None
         self._shown_s = 0.0
         self._due_s = 0.0
@@ -185,6 +186,8 @@ class OperatorWindow(QMainWindow):
 
     @Slot(object)
     def _on_status(self, status: EngineStatus) -> None:
+        if status.phase is Phase.ENDED:
+            self._show_newest()  # the last picture of a recording may still be waiting for its turn
         if not self._is_shut and status.phase is not Phase.IDLE:
             self._show_phase(status.phase, status.message)
 
@@ -192,6 +195,9 @@ class OperatorWindow(QMainWindow):
         panels = self._panels
         self._phase = phase
         self._tick = None
+        if phase in (Phase.ENDED, Phase.FAULT):
+            self._jog.reset()
+            panels.jog.show_command(self._jog.command, None)
         panels.forget()
         what = panels.picker.title if panels.picker is not None else self._config.rig.source or self._config.rig.name
         if phase is Phase.STARTING:
@@ -232,6 +238,7 @@ class OperatorWindow(QMainWindow):
         # on average, not at least, a thirtieth apart: a tick that comes early by a hair must not be shown a whole period later
         self._due_s = max(self._due_s, now - SHOW_EVERY_S) + SHOW_EVERY_S
         self._shown_s = now
+        self._is_stale = False
         if self._tick is None:
             self._panels.jog.set_enabled(tick.status is not None, "" if tick.status is not None else "This rig has no robot")
         self._tick = tick
@@ -243,6 +250,7 @@ class OperatorWindow(QMainWindow):
         """A picture that does not change is not live: after half a second nothing of it is shown as true."""
         age_s = time.monotonic() - self._shown_s
         if self._phase is Phase.RUNNING and self._tick is not None and age_s > self._stale_after_s:
+            self._is_stale = True
             self._panels.blank("No new picture", "Check the camera; F5 starts the rig again")
             notice = f"No new picture for {age_s:.0f} s"
             self._panels.notice.show_notice(NoticeKind.WARNING, notice, "The camera or the program is behind")
@@ -286,10 +294,13 @@ class OperatorWindow(QMainWindow):
         bar.set_all(not any(bar.is_on(layer) for layer in Layer))
 
     def _take_snapshot(self) -> None:
-        if self._tick is None:
-            self._panels.toast.show_message("No snapshot: there is no picture yet", is_fault=True)
+        if self._tick is None or self._is_stale:
+            has_old = self._is_stale or self._phase in (Phase.ENDED, Phase.FAULT)
+            why = "the picture is not live" if has_old else "there is no picture yet"
+            self._panels.toast.show_message(f"No snapshot: {why}", is_fault=True)
             return
-        self._snapshots.write(self._tick, self._kind.value)
+        phantom = self._panels.picker.name if self._panels.picker is not None else None
+        self._snapshots.write(self._tick, Origin(self._kind.value, phantom, MODEL_TBD))
 
     @Slot(str)
     def _on_snapshot_failed(self, message: str) -> None:
@@ -302,7 +313,13 @@ class OperatorWindow(QMainWindow):
 
     @Slot()
     def _on_escape(self) -> None:
-        if self._panels.help.isVisible():
+        field = self.focusWidget()
+        if isinstance(field, QAbstractSpinBox | QLineEdit | QComboBox):
+            if self._panels.picker is not None:
+                self._panels.picker.abandon()
+            field.clearFocus()
+            self._panels.live.setFocus()
+        elif self._panels.help.isVisible():
             self._panels.help.hide()
         elif self.isFullScreen():
             self._toggle_full_screen()
@@ -311,8 +328,21 @@ class OperatorWindow(QMainWindow):
 
     def _toggle_full_screen(self) -> None:
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
-        self.menuBar().setVisible(not self.isFullScreen())
-        self._full_screen.setChecked(self.isFullScreen())
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.WindowStateChange:  # the desktop can end full screen too
+            self.menuBar().setVisible(not self.isFullScreen())
+            self._full_screen.setChecked(self.isFullScreen())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Enter presses the button that has the focus: Space, which does it elsewhere, stops the robot here."""
+        button = self.focusWidget()
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and isinstance(button, QAbstractButton):
+            if not event.isAutoRepeat():
+                button.click()
+            return
+        super().keyPressEvent(event)
 
     # ---- the end
 
@@ -334,7 +364,9 @@ class OperatorWindow(QMainWindow):
         self.hide()
         self._thread.stop()
         has_ended = self._thread.wait(_STOP_WITHIN_MS)
-        self._snapshots.finish()
+        has_saved = self._snapshots.finish()
+        if not has_saved:
+            _log.error("a snapshot could not be finished: the disk does not answer; leaving without it")
         if not has_ended:
             # Qt would abort on a thread that still runs; the robot was told to stop above
             _log.error("the rig's driver did not return within %g s; leaving without it", _STOP_WITHIN_MS / 1000)

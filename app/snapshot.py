@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import logging
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
@@ -15,20 +17,44 @@ from app.scene_json import scene_to_json
 from core.types import Image, Tick
 
 
+_FINISH_WITHIN_MS = 5_000
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a picture comes from: what the banner says of the rig, the phantom if there is one, and the network."""
+
+    rig: str
+    phantom: str | None = None
+    model: str | None = None
+
+
 def pictures_folder(configured: str | None) -> Path:
     """Where snapshots go: the configured folder, else LumenPilot in the user's pictures."""
     return Path(configured).expanduser() if configured else Path(platformdirs.user_pictures_dir()) / "LumenPilot"
 
 
-def write_snapshot(folder: Path, tick: Tick, stamp: str, now: datetime) -> Path:
-    """Write ``<time>.png``, ``<time>_overlay.png`` and ``<time>.json``; returns the first path. Raises OSError."""
+def write_snapshot(folder: Path, tick: Tick, origin: Origin, now: datetime) -> Path:
+    """Write ``<time>.png``, ``<time>_overlay.png`` and ``<time>.json``; returns the first path. Raises OSError.
+
+    The JSON object is that of one image, with ``rig``, ``phantom``, ``model``, ``frame`` (index since the rig's start) and
+    ``captured_s`` (seconds of the camera's clock) added.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     name = f"{now:%Y-%m-%d_%H-%M-%S}_{now.microsecond // 1000:03d}"
     first = folder / f"{name}.png"
     first.write_bytes(_png(tick.frame.image))
-    overlay = draw_overlay(tick.frame.image, tick.scene, tick.advice, stamp=stamp)
+    overlay = draw_overlay(tick.frame.image, tick.scene, tick.advice, stamp=origin.rig)
     (folder / f"{name}_overlay.png").write_bytes(_png(overlay))
-    record = scene_to_json(first.name, tick.scene)
+    record = scene_to_json(first.name, tick.scene) | {
+        "rig": origin.rig,
+        "phantom": origin.phantom,
+        "model": origin.model,
+        "frame": tick.frame.index,
+        "captured_s": round(tick.frame.captured_s, 6),
+    }
     (folder / f"{name}.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return first
 
@@ -56,28 +82,31 @@ class SnapshotWriter(QObject):
     def folder(self) -> Path:
         return self._folder
 
-    def write(self, tick: Tick, stamp: str) -> None:
+    def write(self, tick: Tick, origin: Origin) -> None:
         """Start to write; returns at once."""
-        self._pool.start(_Job(self, tick, stamp, datetime.now()))
+        self._pool.start(_Job(self, tick, origin, datetime.now()))
 
-    def finish(self) -> None:
-        """Wait until everything is on the disk."""
-        self._pool.waitForDone()
+    def finish(self, within_ms: int = _FINISH_WITHIN_MS) -> bool:
+        """Wait until everything is on the disk; False when the disk has not answered in time."""
+        return self._pool.waitForDone(within_ms)
 
 
 class _Job(QRunnable):
-    def __init__(self, writer: SnapshotWriter, tick: Tick, stamp: str, now: datetime) -> None:
+    def __init__(self, writer: SnapshotWriter, tick: Tick, origin: Origin, now: datetime) -> None:
         super().__init__()
         self._writer = writer
         self._tick = tick
-        self._stamp = stamp
+        self._origin = origin
         self._now = now
 
     def run(self) -> None:
         folder = self._writer.folder
         try:
-            path = write_snapshot(folder, self._tick, self._stamp, self._now)
+            path = write_snapshot(folder, self._tick, self._origin, self._now)
         except OSError as error:
             self._writer.failed.emit(f"Snapshot not saved: {error.filename or folder}: {error.strerror or error}")
+        except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible line
+            _log.error("the snapshot was not written", exc_info=error)
+            self._writer.failed.emit(f"Snapshot not saved: unexpected {type(error).__name__}: {' '.join(str(error).split())}")
         else:
             self._writer.saved.emit(f"Snapshot saved: {path} (with _overlay.png and .json)")

@@ -38,6 +38,7 @@ KEY_TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("R", "another random phantom"),
             ("F5", "start the rig again"),
             ("Wheel, drag, F", "zoom, move, whole picture"),
+            ("Tab, Enter", "go to a button, press it"),
             ("F11", "full screen (Esc leaves)"),
             ("F1", "this page (Esc closes)"),
             ("Ctrl+Q", "quit"),

@@ -73,6 +73,7 @@ class JogPanel(QWidget):
             cap.setEnabled(enabled)
         self._readout.setEnabled(enabled)
         self.setToolTip(why)
+        self.setAccessibleDescription(why)
 
 
 class _Cap(QWidget):
@@ -167,6 +168,8 @@ class _Readout(QWidget):
         self._bend = self._pitch = 0.0
         self._insertion_mm: float | None = None
         self.setFixedHeight(18)
+        self.setAccessibleName("Bend and insertion")
+        self.setAccessibleDescription(self.text)
         self.setToolTip("Bend of the head that is asked for (share of the tendons' full pull) and how far the robot is in")
 
     @property
@@ -181,6 +184,7 @@ class _Readout(QWidget):
         values = (round(bend, 2), round(pitch, 2), None if insertion_mm is None else round(insertion_mm))
         if values != (self._bend, self._pitch, self._insertion_mm):
             self._bend, self._pitch, self._insertion_mm = values
+            self.setAccessibleDescription(self.text)
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:

@@ -135,7 +135,8 @@ class LiveView(QWidget):
             if self._robot_on and scene.path is None:
                 labels |= scene.skeletons.robot.view(np.uint8) * np.uint8(_ROBOT_SKELETON)
         self._labels.setImage(labels, autoLevels=False, levels=None)
-        self._labels.setTransform(QTransform.fromScale(1.0 / scene.scale, 1.0 / scene.scale))
+        across, down = scene.scale_xy or (scene.scale, scene.scale)
+        self._labels.setTransform(QTransform.fromScale(1.0 / across, 1.0 / down))
         self._labels.setVisible(True)
 
     def _show_marks(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
-from PySide6.QtGui import QFocusEvent, QKeyEvent
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSpinBox, QWidget
 
 _RANDOM = "random"
@@ -20,13 +20,12 @@ class PhantomPicker(QWidget):
     def __init__(self, phantoms: Sequence[tuple[str, str]], current: str) -> None:
         """`phantoms` are (name, title) pairs; `current` is a name or "random:<seed>"."""
         super().__init__()
-        self._combo = QComboBox()
+        self._combo = _PhantomBox()
         for name, title in phantoms:
             self._combo.addItem(title, name)
         self._combo.addItem("Random \N{HORIZONTAL ELLIPSIS}", _RANDOM)
         self._combo.setMinimumWidth(190)
         self._combo.setMaxVisibleItems(16)
-        self._combo.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._combo.setToolTip("The phantom that the bench twin shows")
         self._combo.setAccessibleName("Phantom")
         self._seed = _SeedBox()
@@ -66,6 +65,10 @@ class PhantomPicker(QWidget):
                 self._seed.setValue(int(seed))
         self._show_seed()
 
+    def abandon(self) -> None:
+        """Forget a seed that was typed and not confirmed."""
+        self._seed.abandon()
+
     @Slot()
     def roll(self) -> None:
         """The random phantom of the next seed."""
@@ -85,8 +88,26 @@ class PhantomPicker(QWidget):
         self._seed.setEnabled(self._combo.currentData() == _RANDOM)
 
 
+class _PhantomBox(QComboBox):
+    """A list that only a click opens: a turn of the wheel must not restart the world, and the keys belong to the robot."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        event.ignore()
+
+    def hidePopup(self) -> None:
+        super().hidePopup()
+        self.clearFocus()
+
+
 class _SeedBox(QSpinBox):
-    """A seed that counts when it is confirmed, not at each digit. Enter and Escape give the keys back to the robot."""
+    """A seed that counts when it is confirmed, not at each digit.
+
+    Enter confirms, Escape takes back what was typed; both give the keys back to the robot.
+    """
 
     committed = Signal()
 
@@ -105,9 +126,20 @@ class _SeedBox(QSpinBox):
         self.valueChanged.connect(self._on_value)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        super().keyPressEvent(event)
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape):
+        if event.key() == Qt.Key.Key_Escape:
+            self.abandon()
             self.clearFocus()
+            return
+        super().keyPressEvent(event)
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.clearFocus()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        event.ignore()
+
+    def abandon(self) -> None:
+        """Show the value again instead of what was typed; leaving the field would count it otherwise."""
+        self.lineEdit().setText(self.prefix() + self.textFromValue(self.value()))
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)

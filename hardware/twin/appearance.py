@@ -97,7 +97,6 @@ class Appearance:
     # where the camera stands
     pixels_per_mm: float = 3.1
     rotation_deg: float = 0.0
-    mirror: bool = False
     tilt: tuple[float, float] = (0.0, 0.0)
     offset_mm: tuple[float, float] = (0.0, 0.0)
     distortion: float = 0.0
@@ -170,7 +169,7 @@ def _view(appearance: Appearance, size: tuple[int, int], middle_mm: np.ndarray, 
     scale = pixels_per_mm * max(size) / _SIDE_PX
     angle = np.deg2rad(appearance.rotation_deg)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    linear = scale * turn @ np.diag([-1.0 if appearance.mirror else 1.0, 1.0])
+    linear = scale * turn
     shift = np.eye(3)
     shift[:2, 2] = -middle_mm
     place = np.eye(3)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from core.types import Points
-from hardware.twin.mjcf import ROBOT_RADIUS_MM, Specimen, build_model, link_lengths_mm
+from hardware.twin.mjcf import Specimen, build_model, link_lengths_mm
 from hardware.twin.walls import Port, Wall
 
 _log = logging.getLogger(__name__)
@@ -120,12 +120,11 @@ class Chain:
         self.model.qpos_spring[1:] = self._set_rad * self._own_stiffness / (own + held)
 
     def corners_mm(self, outside_mm: float) -> Points:
-        """Link starts on the board, from at most `outside_mm` behind the port to the last; then its end and the nose (N, 2)."""
+        """The axis on the board (N, 2): link starts from at most `outside_mm` behind the port on, then the last link's end."""
         joints = self.data.xpos[self._bodies][:, :2]
         direction = self.data.xmat[self._bodies[-1]].reshape(3, 3)[:2, 0]
         first = max(0, int(np.searchsorted(self._starts_mm + self.insertion_mm, -outside_mm)) - 1)
-        end = joints[-1] + direction * self._tip_length_mm
-        return np.vstack([joints[first:], end, end + direction * ROBOT_RADIUS_MM])
+        return np.vstack([joints[first:], joints[-1] + direction * self._tip_length_mm])
 
     def wall_force_mn(self) -> float:
         """Sum of the normal forces of all contacts."""

@@ -93,12 +93,14 @@ class TwinPhysics:
     def _fit_chain(self) -> None:
         """Swap to a longer or shorter chain when the insertion asks for it."""
         insertion_mm, now = self._chain.insertion_mm, self._chain
+        chosen = now
         if now.length_mm < self.chain_mm and insertion_mm > now.length_mm - _SWAP_MM:
-            self._chain = self._chain_of(self._size + 1)
+            chosen = self._chain_of(self._size + 1)
         elif self._size > 0 and insertion_mm < self._size * _CHAIN_STEP_LINKS * SHAFT_LINK_MM + STEERABLE_MM - _SWAP_BACK_MM:
-            self._chain = self._chain_of(self._size - 1)
-        if self._chain is not now:
-            self._chain.take_over(now)
+            chosen = self._chain_of(self._size - 1)
+        if chosen is not now:
+            chosen.take_over(now)
+            self._chain = chosen  # last, so that nobody reads a chain that is not in its place yet
 
     @property
     def time_s(self) -> float:
@@ -157,8 +159,8 @@ class TwinPhysics:
     def robot_points_mm(self) -> Points:
         """The robot's centerline on the board (N, 2) in mm, tail -> head.
 
-        It starts ``OUTSIDE_MM`` behind the port, where the robot is straight, and ends in the true tip: the foremost point of
-        the round nose, one robot radius beyond the end of the last link's axis.
+        It starts ``OUTSIDE_MM`` behind the port, where the robot is straight, and ends where the last link's axis does: the round
+        nose reaches one robot radius beyond it (``head_mm``).
         """
         with self._lock:
             corners = self._chain.corners_mm(OUTSIDE_MM)
@@ -170,8 +172,9 @@ class TwinPhysics:
 
     @property
     def head_mm(self) -> Point:
-        """The true tip on the board."""
-        x, y = self.robot_points_mm()[-1]
+        """The true tip on the board: the foremost point of the round nose."""
+        before, end = self.robot_points_mm()[-2:]
+        x, y = end + ROBOT_RADIUS_MM * (end - before) / np.linalg.norm(end - before)
         return float(x), float(y)
 
     def status(self) -> RobotStatus:
@@ -202,7 +205,7 @@ class TwinPhysics:
 
     def clearance_mm(self) -> float:
         """Least distance between the robot's surface and the lumen's wall, from the phantom's graph; negative: pressed into it."""
-        points = self.robot_points_mm()[:-_POINTS_PER_LINK]  # without the nose, which is no part of the axis
+        points = self.robot_points_mm()
         inside = points[(points - self._port.point) @ self._port.inward > 0.0]
         if len(inside) == 0:
             return self._port.radius - ROBOT_RADIUS_MM

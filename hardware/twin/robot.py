@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from dataclasses import replace
 
 from core.devices import DeviceError
@@ -26,6 +27,7 @@ class TwinRobot:
         self._lock = threading.Lock()
         self._command = Command()
         self._connected = False
+        self._sent_s = time.monotonic()
 
     @property
     def name(self) -> str:
@@ -66,7 +68,13 @@ class TwinRobot:
             if not self._connected:
                 raise DeviceError("the bench twin's robot is not connected: call connect() first")
             self._command = sent
+            self._sent_s = time.monotonic()
         return sent
+
+    def command_age_s(self) -> float:
+        """Time since the last command came; the living world holds a robot whose driver has fallen silent."""
+        with self._lock:
+            return time.monotonic() - self._sent_s
 
     def hold(self) -> None:
         """Stop all motion and keep the bend."""

@@ -82,8 +82,9 @@ def robot_shapes(phantom: Phantom, seed: int, count: int) -> list[tuple[Points, 
             physics.step(type(command)(float(rng.uniform(-1, 1)), 0.0, 0.0, 0.0), float(rng.uniform(0.0, 0.15)))
         if len(shapes) == count:
             break
+    last = (physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm())
     while len(shapes) < count:  # it got stuck: its last shape, seen by other looks
-        shapes.append((physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm()))
+        shapes.append(last)
     return shapes
 
 
@@ -106,8 +107,10 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
         picture = renderer.render(robot, 0.0 if empty else sheath_mm, noise_seed=place)
         truth = truth_of(phantom, view, robot, appearance.robot_radius_mm, config).to_json()
         stem = f"{first + place:06d}"
-        row = {"stem": stem, "seed": seed, "phantom": phantom.name, "family": appearance.family, "clearance_mm": clearance_mm}
-        yield LabelledFrame(stem, picture, row | {"robot_visible": bool(picture.robot.any())} | truth)
+        stuck = place > 0 and shapes[place][0] is shapes[place - 1][0]
+        row = {"stem": stem, "seed": seed, "phantom": phantom.name, "family": appearance.family}
+        row |= {"clearance_mm": clearance_mm, "stuck": stuck, "robot_visible": bool(picture.robot.any())}
+        yield LabelledFrame(stem, picture, row | truth)
 
 
 def _look(plan: SynthPlan, look_seed: int, rng: np.random.Generator) -> Appearance:

@@ -42,11 +42,13 @@ class Truth:
     ambiguity : 0..1, how nearly another branch fits as well.
     head_clearance_mm, body_clearance_mm : least distance between the robot's visible surface and the lumen's wall, at the end of
         the robot's line and anywhere within the lumen; negative: it overlaps the wall.
+    head_visible : whether the head lies in the picture; a robot whose head does not has no pose, though its body may be seen.
     scale : working px per source px.
     """
 
     scale: float
     reason: Reason | None = None
+    head_visible: bool = False
     head_xy: Point | None = None
     tail_xy: Point | None = None
     robot_path: Points | None = None
@@ -83,6 +85,7 @@ class Truth:
             "crossed": pose.crossed if pose else None,
             "state": pose.state.value if pose else None,
             "reason": self.reason.value if self.reason else None,
+            "head_visible": self.head_visible,
             "nearest_xy": self._plain(self.nearest),
             "lumen_radius_px": self.lumen_radius_px,
             "offset_ratio": self.offset_ratio,
@@ -150,6 +153,7 @@ def truth_of(
     return Truth(
         scale=scale,
         reason=reason,
+        head_visible=True,
         head_xy=head,
         tail_xy=tail,
         robot_path=path,

@@ -65,11 +65,6 @@ class View:
         return np.asarray(self.unproject(np.column_stack([x.ravel(), y.ravel()])).reshape(height, width, 2))
 
     @property
-    def mirrored(self) -> bool:
-        """Whether the board is seen mirrored, so that a bend to the right on the board is one to the left on screen."""
-        return float(np.linalg.det(self.homography[:2, :2])) < 0
-
-    @property
     def _center(self) -> np.ndarray:
         return np.array([(self.size[0] - 1) / 2, (self.size[1] - 1) / 2])
 

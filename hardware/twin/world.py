@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from core.config import PerceptionConfig, TwinConfig
 from core.latest import Latest
+from core.perception.route import plan_route
 from core.types import Command, Frame, Point, Points
 from hardware.twin.appearance import Appearance, default_appearance, make_view, random_appearance
 from hardware.twin.autopilot import RouteFollower, nearest_target
@@ -17,9 +19,12 @@ from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import TwinPhysics
 from hardware.twin.renderer import Picture, Renderer
 from hardware.twin.robot import TwinRobot
-from hardware.twin.truth import Truth, truth_of
+from hardware.twin.truth import Truth, true_graph, truth_of
+
+_log = logging.getLogger(__name__)
 
 _CONTROL_S = 0.02
+_COMMAND_EXPIRES_S = 0.3
 _CATCH_UP_S = 0.2
 
 
@@ -96,11 +101,17 @@ class TwinWorld:
         """Image and exact masks for a robot shape."""
         return self._renderer.render(robot_points_mm, sheath_mm, noise_seed=self._frame_index)
 
-    def truth(self) -> Truth:
-        """The exact truth of the present moment, by the same 40-px rule as perception's."""
+    def truth(self, target_px: Point | None = None) -> Truth:
+        """The exact truth of the present moment, by perception's 40-px rule; with a target its route decides at forks."""
         with self._lock:
             points = self.physics.robot_points_mm()
-        return truth_of(self.phantom, self.view, points, self.appearance.robot_radius_mm, self._perception)
+        route = None
+        if target_px is not None:
+            scale = self._perception.working_size_px / max(self.view.size)
+            graph = true_graph(self.phantom, self.view, scale)
+            ends = (self.view.project(points[-1:])[0] + 0.5) * scale - 0.5, (np.array(target_px) + 0.5) * scale - 0.5
+            route = plan_route(graph, (float(ends[0][0]), float(ends[0][1])), (float(ends[1][0]), float(ends[1][1])))
+        return truth_of(self.phantom, self.view, points, self.appearance.robot_radius_mm, self._perception, route)
 
     def target_at(self, point_px: Point) -> int:
         """The phantom's target node nearest to an image point."""
@@ -126,7 +137,8 @@ class TwinWorld:
         try:
             self._follow_clock()
         except Exception as error:  # noqa: BLE001 - top of the thread: the camera reports it as its own loss
-            self.failure = f"the bench twin stopped: {error}"
+            _log.exception("the bench twin stopped")
+            self.failure = f"the bench twin stopped ({type(error).__name__}: {error}); start the rig again"
 
     def _follow_clock(self) -> None:
         period = 1.0 / self.config.frames_per_second
@@ -134,6 +146,9 @@ class TwinWorld:
         while not self._stop.is_set():
             now = time.monotonic()
             clock = max(clock, now - _CATCH_UP_S)
+            if self.robot.command_age_s() > _COMMAND_EXPIRES_S:
+                # Whoever drives repeats the command; a program that hangs does not.
+                self.robot.hold()
             if now - clock >= _CONTROL_S:
                 self.advance(_CONTROL_S)
                 clock += _CONTROL_S

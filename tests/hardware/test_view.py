@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.types import GraphEdge, VesselGraph
-from hardware.twin.appearance import Appearance, default_appearance, make_view, random_appearance
+from hardware.twin.appearance import default_appearance, make_view, random_appearance
 from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.view import View
 
@@ -39,12 +39,6 @@ def test_grid_holds_the_millimetres_under_each_pixel_centre() -> None:
     assert TILTED.project(grid[123, 456][None])[0] == pytest.approx([456, 123], abs=1e-6)
 
 
-def test_mirrored_board_is_told() -> None:
-    appearance = default_appearance()
-    assert not make_view(appearance, (640, 480)).mirrored
-    assert make_view(Appearance(mirror=True), (640, 480)).mirrored
-
-
 def test_default_view_shows_the_board_upright_in_the_middle() -> None:
     view = make_view(default_appearance(), (640, 480))
     assert view.project(np.array([BOARD_MM]) / 2)[0] == pytest.approx([319.5, 239.5])
@@ -71,4 +65,3 @@ def test_port_and_most_of_the_lumen_stay_in_the_picture(size: tuple[int, int]) -
         inside = np.all((pixels >= 0) & (pixels <= np.array(size) - 1), axis=1)
         assert inside[0], f"port out of the picture, seed {seed}"
         assert inside.mean() >= 0.75, f"most of the lumen out of the picture, seed {seed}"
-        assert not view.mirrored

@@ -94,3 +94,36 @@ def test_the_default_rig_is_simulated_and_says_so() -> None:
 def test_an_unknown_phantom_is_one_clear_line() -> None:
     with pytest.raises(DeviceError, match="s_curve"):
         open_rig(Config(twin=TwinConfig(phantom="nope")))
+
+
+def test_a_robot_whose_driver_falls_silent_is_held() -> None:
+    world = _world()
+    world.robot.connect()
+    world.robot.send(Command(bend=0.4, advance_mm_s=10.0))
+    world.start()
+    try:
+        while world.robot.command_age_s() < 1.0:
+            time.sleep(0.05)
+    finally:
+        world.stop()
+    assert world.robot.current_command == Command(bend=0.4)
+
+
+def test_the_seen_tip_is_the_physical_one() -> None:
+    world = _world()
+    world.insert(60.0)
+    truth = world.truth()
+    assert truth.head_xy is not None
+    seen = np.array(truth.head_xy)
+    scale = 640 / 320
+    physical = (world.view.project(np.array([world.physics.head_mm]))[0] + 0.5) * scale - 0.5
+    # The look draws the robot with its own radius, which may differ a little from the physical one.
+    assert np.hypot(*(seen - physical)) < 2.0
+
+
+def test_a_target_gives_the_truth_a_route() -> None:
+    world = TwinWorld(TwinConfig(phantom="y_branch"))
+    world.insert(40.0)
+    ends = [world.view.project(world.phantom.graph.nodes[node : node + 1])[0] for node in world.phantom.targets]
+    for end in ends:
+        assert world.truth((float(end[0]), float(end[1]))).pose is not None
