@@ -141,30 +141,42 @@ def run_window_pace(seconds: float, *, config_path: Path | None, as_json: bool) 
 
 
 def run_accuracy(
-    folder: Path, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool, store: bool = False
+    folder: Path,
+    *,
+    model: str | None,
+    preset: str | None,
+    config_path: Path | None,
+    as_json: bool,
+    store: bool = False,
+    true_masks: bool = False,
 ) -> None:
-    """Perceive every frame of a synth set as a single image and compare with its truth; `store` keeps the result in model.json."""
+    """Perceive every frame of a synth set as a single image and compare with its truth.
+
+    `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network.
+    """
     from core.learning.dataset import DatasetError, find_samples, read_truth
     from core.learning.model_file import model_folder, sha256_of, write_figures
-    from core.perception.pipeline import open_pipeline
-    from core.study.accuracy import score_frame, summarise
+    from core.perception.pipeline import Pipeline, open_pipeline
+    from core.study.accuracy import TrueMasks, score_frame, summarise
 
     config = _config(model, preset, config_path)
     samples, truth = find_samples([folder]), read_truth(folder)
     untold = [sample.stem for sample in samples if sample.stem not in truth]
     if untold:
         raise DatasetError(f"{folder}: {len(untold)} frames lack a truth (the first: {untold[0]}); write the set again with synth")
-    pipeline = open_pipeline(config.perception)
+    truth_teller = TrueMasks()
+    pipeline = Pipeline(truth_teller, config.perception) if true_masks else open_pipeline(config.perception)
     scores = []
     with progress_bar() as bar:
         for sample in bar.track(samples, description="frames"):
             image, vessel, robot = sample.load()
+            truth_teller.show(vessel, robot)
             scene = pipeline.perceive_single(Frame(0, 0.0, image))
             size = _working_size(scene)
             masks = [_at_size(mask, size) for mask in (vessel, robot)]
             scores.append(score_frame(sample.stem, scene, masks[0], masks[1], truth[sample.stem]))
     figures = summarise(scores)
-    if store:
+    if store and not true_masks:
         described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
         write_figures(model_folder(config.perception.segmentation.model), described | figures)
     _print(figures, as_json, f"accuracy on {folder}")

@@ -136,6 +136,7 @@ def benchmark(
     json: JsonOption = False,
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
     window: Annotated[float | None, typer.Option(min=5.0, help="run the window for so many seconds and measure its pace")] = None,
+    true_masks: Annotated[bool, typer.Option("--true-masks", help="accuracy of the geometry alone, without the network")] = False,
     store: Annotated[bool, typer.Option("--store", help="keep the accuracy in the model's model.json")] = False,
     frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
     model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
@@ -148,6 +149,6 @@ def benchmark(
     if window is not None:
         run_window_pace(window, config_path=config, as_json=json)
     elif accuracy is not None:
-        run_accuracy(accuracy, model=model, preset=preset, config_path=config, as_json=json, store=store)
+        run_accuracy(accuracy, model=model, preset=preset, config_path=config, as_json=json, store=store, true_masks=true_masks)
     else:
         run_speed(frames, model=model, preset=preset, config_path=config, as_json=json)

@@ -114,7 +114,10 @@ class OperatorPanels(QWidget):
         limits = self._limits
         angle = Card("Angle to the vessel", self.gauge, f"allowed {limits.theta_allow_deg:g}°")
         distances = Card("Distances", self.bars, f"allowed {limits.d_allow_px:g} px")
-        trends = Card("Last 30 seconds", self.trends, _trend_legend())
+        legend = QLabel(_trend_legend(True))
+        legend.setObjectName("card_note")
+        self.trends.distances_shown.connect(lambda on: legend.setText(_trend_legend(on)))
+        trends = Card("Last 30 seconds", self.trends, legend)
         hands = _row(Card("Move the robot", self.jog, "hold"), Card("Performance", self.performance))
         side = QWidget()
         side.setLayout(_column((Card("", self.badge), 0), (_row(angle, distances), 3), (trends, 3), (hands, 3)))
@@ -144,11 +147,11 @@ def _row(first: QWidget, second: QWidget) -> QWidget:
     return holder
 
 
-def _trend_legend() -> QLabel:
-    label = QLabel(
-        f'<span style="color:{palette.THETA}">\N{HORIZONTAL BAR} \N{GREEK SMALL LETTER THETA} °</span>&nbsp;&nbsp;&nbsp;'
-        f'<span style="color:{palette.D_HEAD}">\N{HORIZONTAL BAR} d_head px</span>&nbsp;&nbsp;&nbsp;'
+def _trend_legend(with_distances: bool) -> str:
+    """What the colours of the trends mean."""
+    theta = f'<span style="color:{palette.THETA}">\N{HORIZONTAL BAR} \N{GREEK SMALL LETTER THETA} °</span>'
+    distances = (
+        f'&nbsp;&nbsp;&nbsp;<span style="color:{palette.D_HEAD}">\N{HORIZONTAL BAR} d_head px</span>&nbsp;&nbsp;&nbsp;'
         f'<span style="color:{palette.D_TAIL}">\N{MIDDLE DOT}\N{MIDDLE DOT}\N{MIDDLE DOT} d_tail px</span>'
     )
-    label.setObjectName("card_note")
-    return label
+    return theta + distances if with_distances else theta

@@ -195,6 +195,7 @@ class OperatorWindow(QMainWindow):
         panels = self._panels
         self._phase = phase
         self._tick = None
+        self._is_stale = False
         if phase in (Phase.ENDED, Phase.FAULT):
             self._jog.reset()
             panels.jog.show_command(self._jog.command, None)
@@ -300,7 +301,7 @@ class OperatorWindow(QMainWindow):
             self._panels.toast.show_message(f"No snapshot: {why}", is_fault=True)
             return
         phantom = self._panels.picker.name if self._panels.picker is not None else None
-        self._snapshots.write(self._tick, Origin(self._kind.value, phantom, MODEL_TBD))
+        self._snapshots.write(self._tick, Origin(self._kind.value, phantom, self._config.perception.segmentation.model))
 
     @Slot(str)
     def _on_snapshot_failed(self, message: str) -> None:
@@ -366,8 +367,8 @@ class OperatorWindow(QMainWindow):
         has_ended = self._thread.wait(_STOP_WITHIN_MS)
         has_saved = self._snapshots.finish()
         if not has_saved:
-            _log.error("a snapshot could not be finished: the disk does not answer; leaving without it")
+            _log.error("the disk did not take a snapshot in time; leaving without it")
         if not has_ended:
-            # Qt would abort on a thread that still runs; the robot was told to stop above
             _log.error("the rig's driver did not return within %g s; leaving without it", _STOP_WITHIN_MS / 1000)
-            os._exit(1)
+        if not (has_ended and has_saved):
+            os._exit(1)  # Qt would abort on a thread that still runs, or wait for it for ever; the robot was told to stop above

@@ -16,7 +16,6 @@ from app.overlay_picture import draw_overlay
 from app.scene_json import scene_to_json
 from core.types import Image, Tick
 
-
 _FINISH_WITHIN_MS = 5_000
 
 _log = logging.getLogger(__name__)

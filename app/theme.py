@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication
 from app.palette import INK, LINE, PANEL, RAISED, SKY, TEXT, TEXT_DIM, TEXT_FAINT, WINDOW
 from core.config import RESOURCES
 
-MIN_WINDOW = (1100, 700)
+MIN_WINDOW = (1100, 660)  # fits a screen of 720 lines with title bar and task bar
 START_WINDOW = (1600, 900)
 _FRAME = (8, 40)  # room for the title bar and borders that the desktop adds
 GAP = 10

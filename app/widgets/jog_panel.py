@@ -95,7 +95,7 @@ class _Cap(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def sizeHint(self) -> QSize:
-        return QSize(62, 24 if self._wide else 34)
+        return QSize(62, 22 if self._wide else 30)
 
     @property
     def is_lit(self) -> bool:

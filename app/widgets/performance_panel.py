@@ -32,7 +32,7 @@ class PerformancePanel(QWidget):
         self._heads: tuple[tuple[str, str, bool], ...] = _heads(None, None, None, None)
         self._rows: tuple[tuple[str, str, str], ...] = ()
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setMinimumSize(210, 120)
+        self.setMinimumSize(210, 92)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Performance")
         self.setToolTip("\n".join(QUANTITY_MEANING[key] for key in ("shown", "engine", "dropped", "gui_block", "latency")))

@@ -13,6 +13,7 @@ from app.wording import QUANTITY_MEANING, side, signed_degrees
 from core.types import Pose
 
 _OVERFLOW_DEG = 22.0
+_SMALL_PX = 66.0  # below this radius the number needs the room of the outermost labels
 
 
 class ThetaGauge(QWidget):
@@ -28,7 +29,7 @@ class ThetaGauge(QWidget):
         self._number: float | None = None
         self._scale: QPixmap | None = None
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setMinimumSize(200, 146)
+        self.setMinimumSize(200, 114)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("theta")
         self.setToolTip(QUANTITY_MEANING["theta"])
@@ -95,7 +96,7 @@ class ThetaGauge(QWidget):
             painter.drawLine(inner, _on_dial(hub, radius - 4, degrees))
             if major:
                 self._paint_label(painter, _on_dial(hub, radius + 15, degrees), f"{abs(degrees)}")
-        for degrees in (-180, 180):
+        for degrees in (-180, 180) if radius >= _SMALL_PX else ():
             self._paint_label(painter, _on_dial(hub, radius + 17, degrees), "180")
 
     @staticmethod
@@ -125,7 +126,7 @@ class ThetaGauge(QWidget):
     def _paint_number(self, painter: QPainter, hub: QPointF, radius: float) -> None:
         shown = self._number is not None
         painter.setPen(QColor(palette.TEXT if shown else palette.TEXT_FAINT))
-        painter.setFont(theme.bold(theme.Size.NUMBER))
+        painter.setFont(theme.bold(theme.Size.NUMBER if radius >= _SMALL_PX else 26))
         painter.drawText(QRectF(hub.x() - 90, hub.y() + 10, 180, 34), Qt.AlignmentFlag.AlignCenter, self.text)
         painter.setFont(theme.semi_bold(13))
         for sign in (-1.0, 1.0):

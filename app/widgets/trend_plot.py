@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QPen
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPen, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette, theme
@@ -19,6 +19,8 @@ _DRAW_EVERY_S = 0.1
 _CELL_S = 0.1
 _HOLD_S = 0.6  # a slow camera leaves no holes in the band, a silent one does
 _ROOM_FOR_TICKS = 44.0
+_ROOM_FOR_BOTH_PX = 130  # below this height two charts would be too low to be read
+_UNLIMITED_PX = 16_777_215.0
 _STATES: tuple[PoseState | None, ...] = (None, *PoseState)
 _ANGLE_RANGES = (20.0, 45.0, 90.0, 180.0)
 _DISTANCE_RANGES = (15.0, 30.0, 60.0, 120.0, 640.0)
@@ -27,8 +29,11 @@ _DISTANCE_RANGES = (15.0, 30.0, 60.0, 120.0, 640.0)
 class TrendPlot(QWidget):
     """Curves over fixed buffers; frames without a pose are gaps. Drawn ten times a second, however fast ticks come.
 
-    The scales change in a few steps only, so that a curve can be compared with what it was a second ago.
+    The scales change in a few steps only, so that a curve can be compared with what it was a second ago. In a low window only theta
+    is drawn, and ``distances_shown`` says so.
     """
+
+    distances_shown = Signal(bool)
 
     def __init__(self, limits: PoseConfig) -> None:
         super().__init__()
@@ -36,7 +41,8 @@ class TrendPlot(QWidget):
         self._values = np.full((3, _CAPACITY), np.nan)
         self._states = np.zeros(_CAPACITY, np.uint8)
         self._pace = Pace(_DRAW_EVERY_S)
-        self.setMinimumHeight(96)
+        self.setMinimumHeight(78)
+        self._has_distances = True
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Trends of theta, d_head and d_tail over the last 30 seconds")
         self.setToolTip("theta (above), d_head and d_tail (below, dotted) and the state over the last 30 s; gaps: no pose")
@@ -58,6 +64,22 @@ class TrendPlot(QWidget):
             self._distance.add_curve(palette.D_TAIL, Qt.PenStyle.DotLine),
         )
         self._band = _StateBand(view, 2)
+
+    @property
+    def has_distances(self) -> bool:
+        """Whether there is room for the chart of both distances."""
+        return self._has_distances
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(200, 78)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        fits = self.height() >= _ROOM_FOR_BOTH_PX
+        if fits is not self._has_distances:
+            self._has_distances = fits
+            self._distance.set_visible(fits)
+            self.distances_shown.emit(fits)
 
     @property
     def curves(self) -> tuple[pg.PlotCurveItem, ...]:
@@ -143,6 +165,12 @@ class _Chart:
         curve = pg.PlotCurveItem(pen=pen, connect="finite")
         self._box.addItem(curve, ignoreBounds=True)
         return curve
+
+    def set_visible(self, on: bool) -> None:
+        """Show the chart, or give its room to the other one."""
+        for item in (self._box, self._axis):
+            item.setVisible(on)
+            item.setMaximumHeight(_UNLIMITED_PX if on else 0.0)
 
     def fit(self, values: np.ndarray) -> None:
         """The smallest range that holds all values; it shrinks again only when there is room to spare."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import SegmentationConfig
-from core.learning.model_file import ONNX, ModelError, ModelInfo, model_folder, read_model_info
+from core.learning.model_file import ONNX, ModelError, model_folder, read_model_info
 from core.types import Image
 
 Probability = NDArray[np.float32]
@@ -21,8 +21,6 @@ Probability = NDArray[np.float32]
 class Segmenter(Protocol):
     """Gives vessel and robot probabilities, float32 (h, w) each, of an RGB uint8 image (h, w, 3) of any size."""
 
-    @property
-    def info(self) -> ModelInfo: ...
     @property
     def engine(self) -> str: ...
     def __call__(self, image: Image) -> tuple[Probability, Probability]: ...

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QEvent, QRect, Qt
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from app import theme
@@ -19,7 +19,7 @@ from app.operator_window import OperatorWindow
 from app.widgets.overlays import Layer
 from core.config import Config
 from core.devices import DeviceError, EndOfStream
-from core.types import Command, Reason, Refusal
+from core.types import Command, Reason, Refusal, Tick
 from hardware.rig import RigKind
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine
@@ -201,6 +201,51 @@ def test_digits_typed_into_the_seed_switch_nothing(running: OperatorWindow, qtbo
     assert running.panels.overlay_bar.is_on(Layer.MASKS)
 
 
+def test_escape_in_the_seed_takes_back_what_was_typed_and_gives_the_keys_to_the_robot(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    picker = running.panels.picker
+    assert picker is not None
+    picker.show_name("random:5")
+    chosen: list[str] = []
+    picker.chosen.connect(chosen.append)
+    running.panels.live.clicked.emit(500.0, 280.0)
+    picker._seed.setFocus()
+    qtbot.keyClicks(picker._seed, "12")
+    qtbot.keyClick(picker._seed, Key.Key_Escape)
+    assert running.focusWidget() is running.panels.live
+    assert picker.name == "random:5"
+    assert picker._seed.text() == "seed 5"
+    assert chosen == []
+    assert engine.targets[-1] is not None, "the target is not what was meant"
+    qtbot.keyPress(running.panels.live, Key.Key_W)
+    assert engine.commands[-1].advance_mm_s > 0.0
+
+
+def test_the_list_of_phantoms_never_takes_the_keys(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    assert running.panels.picker is not None
+    combo = running.panels.picker._combo
+    combo.showPopup()
+    qtbot.keyClick(combo.view(), Key.Key_Escape)
+    combo.hidePopup()
+    assert not combo.hasFocus()
+    name = running.panels.picker.name
+    qtbot.keyPress(running.panels.live, Key.Key_Down)
+    assert running.panels.picker.name == name
+    assert engine.commands[-1].advance_mm_s < 0.0
+
+
+def test_enter_presses_the_button_that_has_the_focus(running: OperatorWindow, qtbot: QtBot) -> None:
+    bar = running.panels.overlay_bar
+    chip = bar._chips[Layer.MASKS]
+    chip.setFocus()
+    qtbot.keyClick(chip, Key.Key_Return)
+    assert not bar.is_on(Layer.MASKS)
+    running.panels.live.setFocus()
+    qtbot.keyClick(running.panels.live, Key.Key_Enter)
+    assert not bar.is_on(Layer.MASKS), "without a button Enter does nothing"
+
+
 def test_click_sets_the_target_and_escape_clears_it(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     running.panels.live.clicked.emit(500.0, 280.0)
     assert engine.targets[-1] == (500.0, 280.0)
@@ -266,6 +311,60 @@ def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow,
     assert [name.partition("_")[2][-12:] for name in names if name.endswith("overlay.png")]
     record = json.loads(next((tmp_path / "shots").glob("*.json")).read_text())
     assert record["state"] in ("A", "B", "C", "D")
+    assert (record["rig"], record["phantom"], record["model"]) == ("SIM", "s_curve", "default")
+
+
+def test_no_snapshot_of_a_picture_that_is_not_live(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path
+) -> None:
+    engine.silent = True
+    until(qtbot, lambda: running.panels.badge.title == "No new picture")
+    qtbot.keyClick(running, Key.Key_P)
+    assert running.panels.toast.text() == "No snapshot: the picture is not live"
+    engine.silent = False
+    until(qtbot, lambda: running.panels.badge.title != "No new picture")
+    engine.fail_with = EndOfStream("the end")
+    until(qtbot, lambda: running._phase is Phase.ENDED)
+    qtbot.keyClick(running, Key.Key_P)
+    assert running.panels.toast.text() == "No snapshot: the picture is not live"
+    assert not (tmp_path / "shots").exists()
+
+
+@pytest.mark.parametrize("error", [EndOfStream("the end"), DeviceError("unplugged")])
+def test_nothing_is_held_any_more_after_the_end(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, error: Exception
+) -> None:
+    qtbot.keyPress(running, Key.Key_D)
+    qtbot.keyPress(running, Key.Key_W)
+    engine.fail_with = error
+    until(qtbot, lambda: running._phase in (Phase.ENDED, Phase.FAULT))
+    assert running._jog.held == frozenset()
+    assert running._jog.command == Command()
+    assert running.panels.jog.readout.startswith("bend 0.00")
+
+
+def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    """Three pictures at once, then the end: the last ones have no time of their own on the screen, and yet the last one stays."""
+
+    class Short(FakeEngine):
+        def step(self, timeout_s: float) -> Tick | None:
+            if self._index == 3:
+                raise EndOfStream("the end")
+            return super().step(timeout_s)
+
+    window = make_window(lambda _config: Short(bench, frames_per_second=1000.0), kind=RigKind.PLAYBACK)
+    shown: list[int] = []
+    show_tick = window.panels.show_tick
+
+    def spy(tick: Tick, command: Command, max_block_ms: float) -> None:
+        shown.append(tick.frame.index)
+        show_tick(tick, command, max_block_ms)
+
+    window.panels.show_tick = spy  # type: ignore[method-assign]
+    window.start()
+    until(qtbot, lambda: window._phase is Phase.ENDED)
+    assert shown[-1] == 3
+    assert window.panels.live._picture.isVisible()
 
 
 def test_snapshot_into_an_unwritable_folder_is_one_line(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
@@ -296,6 +395,12 @@ def test_help_and_full_screen_and_what_escape_leaves_first(running: OperatorWind
     qtbot.keyClick(running, Key.Key_Escape)
     assert not running.isFullScreen()
     assert running.menuBar().isVisible()
+    running.showFullScreen()
+    assert not running.menuBar().isVisible()
+    assert running._full_screen.isChecked()
+    running.showNormal()  # as the desktop does it
+    assert running.menuBar().isVisible()
+    assert not running._full_screen.isChecked()
     assert engine.targets[-1] is not None, "the target is cleared last"
     qtbot.keyClick(running, Key.Key_Escape)
     assert engine.targets[-1] is None
@@ -311,7 +416,7 @@ class Screen:
         return self._room
 
 
-SCREENS = [((1920, 1080), (1600, 900)), ((1366, 768), (1358, 728)), ((1280, 720), (1272, 700)), ((800, 600), (1100, 700))]
+SCREENS = [((1920, 1080), (1600, 900)), ((1366, 768), (1358, 728)), ((1280, 720), (1272, 680)), ((800, 600), (1100, 660))]
 
 
 @pytest.mark.parametrize(("screen", "expected"), SCREENS)
@@ -319,7 +424,7 @@ def test_window_opens_no_larger_than_the_screen(screen: tuple[int, int], expecte
     assert theme.start_size(Screen(*screen)).toTuple() == expected  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("size", [(1100, 700), (1280, 720), (1600, 900), (1920, 1080)])
+@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900), (1920, 1080)])
 def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[int, int]) -> None:
     running.resize(*size)
     qtbot.wait(30)
@@ -330,6 +435,20 @@ def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[
         assert widget.height() >= widget.minimumHeight(), widget
         assert widget.width() >= widget.minimumWidth(), widget
     assert running.panels.live.width() >= 0.5 * size[0]
+
+
+def test_a_screen_of_720_lines_is_enough(running: OperatorWindow, qtbot: QtBot) -> None:
+    """Below 760 lines the chart of the distances gives its room to theta; the legend names only what is drawn."""
+    assert running.minimumSizeHint().height() <= 660
+    assert theme.MIN_WINDOW[1] <= 660
+    legends = [label for label in running.findChildren(QLabel) if "\N{GREEK SMALL LETTER THETA}" in label.text()]
+    for size, has_distances in (((1280, 680), False), ((1600, 900), True), ((1280, 720), False)):
+        running.resize(*size)
+        qtbot.wait(30)
+        trends = running.panels.trends
+        assert trends.has_distances is has_distances
+        assert trends._angle._box.height() >= 36
+        assert ("d_head" in legends[0].text()) is has_distances
 
 
 # ---- closing

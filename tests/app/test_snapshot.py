@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import logging
+import threading
 from datetime import datetime
 from pathlib import Path
 
@@ -12,7 +14,8 @@ import platformdirs
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.snapshot import SnapshotWriter, pictures_folder, write_snapshot
+from app import snapshot
+from app.snapshot import Origin, SnapshotWriter, pictures_folder, write_snapshot
 from tests.app.fakes import make_pose, make_scene, make_tick
 
 NOW = datetime(2025, 3, 4, 5, 6, 7, 89_000)
@@ -26,8 +29,8 @@ def test_folder_is_the_users_pictures_unless_configured(monkeypatch: pytest.Monk
 
 
 def test_three_files_are_written(tmp_path: Path) -> None:
-    tick = make_tick(make_scene(make_pose()))
-    first = write_snapshot(tmp_path / "new" / "folder", tick, "SIM", NOW)
+    tick = make_tick(make_scene(make_pose(), index=41, captured_s=12.5))
+    first = write_snapshot(tmp_path / "new" / "folder", tick, Origin("SIM", "tree", "default"), NOW)
     assert first.name == "2025-03-04_05-06-07_089.png"
     raw = cv2.imread(str(first))
     assert raw is not None
@@ -38,12 +41,14 @@ def test_three_files_are_written(tmp_path: Path) -> None:
     record = json.loads(first.with_suffix(".json").read_text())
     assert record["state"] == "C"
     assert record["theta_signed_deg"] == pytest.approx(18.4)
+    origin = {"rig": "SIM", "phantom": "tree", "model": "default", "frame": 41, "captured_s": 12.5}
+    assert {key: record[key] for key in origin} == origin
 
 
 def test_writer_says_where_it_wrote(qtbot: QtBot, tmp_path: Path) -> None:
     writer = SnapshotWriter(tmp_path)
     with qtbot.waitSignal(writer.saved) as signal:
-        writer.write(make_tick(), "SIM")
+        writer.write(make_tick(), Origin("SIM"))
     assert signal.args is not None
     assert str(tmp_path) in signal.args[0]
     assert len(list(tmp_path.iterdir())) == 3
@@ -58,7 +63,7 @@ def test_unwritable_folder_is_one_clear_line(qtbot: QtBot, tmp_path: Path, obsta
         folder = Path("/proc/nothing/pictures")
     writer = SnapshotWriter(folder)
     with qtbot.waitSignal(writer.failed) as signal:
-        writer.write(make_tick(), "SIM")
+        writer.write(make_tick(), Origin("SIM"))
     assert signal.args is not None
     message = signal.args[0]
     assert message.startswith("Snapshot not saved: ")
@@ -66,10 +71,36 @@ def test_unwritable_folder_is_one_clear_line(qtbot: QtBot, tmp_path: Path, obsta
     assert str(folder.parent) in message
 
 
+def test_an_unexpected_error_is_a_line_too_and_the_traceback_is_logged(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(*_args: object, **_more: object) -> None:
+        raise ValueError("out of\nrange")
+
+    monkeypatch.setattr(snapshot, "draw_overlay", fail)
+    writer = SnapshotWriter(tmp_path)
+    with caplog.at_level(logging.ERROR), qtbot.waitSignal(writer.failed) as signal:
+        writer.write(make_tick(), Origin("SIM"))
+    assert signal.args == ["Snapshot not saved: unexpected ValueError: out of range"]
+    assert "Traceback" in caplog.text
+
+
+def test_a_disk_that_does_not_answer_is_not_waited_for_for_ever(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gate = threading.Event()
+    monkeypatch.setattr(snapshot, "write_snapshot", lambda *_args: gate.wait(5) and tmp_path)
+    writer = SnapshotWriter(tmp_path)
+    writer.write(make_tick(), Origin("SIM"))
+    assert not writer.finish(within_ms=20)
+    gate.set()
+    assert writer.finish()
+
+
 def test_finish_waits_for_the_disk(tmp_path: Path, qtbot: QtBot) -> None:
     writer = SnapshotWriter(tmp_path)
     for _ in range(2):
-        writer.write(make_tick(), "SIM")
-    writer.finish()
+        writer.write(make_tick(), Origin("SIM"))
+    assert writer.finish()
     assert len([path for path in tmp_path.iterdir() if path.suffix == ".json"]) >= 1
     assert all(path.stat().st_size > 0 for path in tmp_path.iterdir())

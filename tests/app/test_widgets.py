@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
 from app import palette
@@ -242,6 +243,39 @@ def test_picker_gives_names_as_the_configuration_writes_them(qtbot: QtBot) -> No
     picker.roll()
     assert chosen == ["s_curve", "random:1", "random:2"]
     assert picker.title == "random 2"
+
+
+def test_the_wheel_chooses_nothing(qtbot: QtBot) -> None:
+    picker = PhantomPicker([("s_curve", "S-curve"), ("tree", "Tree")], "random:5")
+    qtbot.addWidget(picker)
+    chosen: list[str] = []
+    picker.chosen.connect(chosen.append)
+    for widget in (picker._combo, picker._seed):
+        for notch in (-120, 120):
+            middle = QPointF(widget.rect().center())
+            event = QWheelEvent(
+                middle,
+                widget.mapToGlobal(middle),
+                QPoint(),
+                QPoint(0, notch),
+                Qt.MouseButton.NoButton,
+                Qt.KeyboardModifier.NoModifier,
+                Qt.ScrollPhase.NoScrollPhase,
+                False,
+            )
+            QApplication.sendEvent(widget, event)
+    assert chosen == []
+    assert picker.name == "random:5"
+
+
+def test_jog_panel_says_aloud_what_it_shows(qtbot: QtBot) -> None:
+    panel = JogPanel()
+    qtbot.addWidget(panel)
+    panel.show_command(Command(bend=0.5), None)
+    assert panel._readout.accessibleName()
+    assert panel._readout.accessibleDescription() == panel.readout
+    panel.set_enabled(False, "Fault")
+    assert panel.accessibleDescription() == "Fault"
 
 
 def test_picker_shows_a_random_phantom_of_the_configuration(qtbot: QtBot) -> None:
