@@ -42,10 +42,12 @@ class WindowWatch(QObject):
         self._started_s = time.monotonic()
         self._process = psutil.Process()
         self.readings = _Readings()
+        self._timers: list[QTimer] = []
         for interval_ms, slot in ((_LOOK_EVERY_MS, self._look), (_DRIVE_EVERY_MS, self._drive), (1000, self._weigh)):
             timer = QTimer(self)
             timer.timeout.connect(slot)
             timer.start(interval_ms)
+            self._timers.append(timer)
 
     def _look(self) -> None:
         tick, now = self._window.shown_tick, time.monotonic()
@@ -57,6 +59,8 @@ class WindowWatch(QObject):
             if self.readings.first_shown_s is None:
                 self.readings.first_shown_s = now
         if now - self._started_s >= self._seconds:
+            for timer in self._timers:
+                timer.stop()
             self._window.close()
 
     def _drive(self) -> None:
