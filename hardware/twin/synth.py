@@ -183,9 +183,9 @@ def _write_missing(plan: SynthPlan, workers: int, on_progress: Callable[[int], N
             try:
                 for job in as_completed(jobs):
                     on_progress(job.result())
-            except BaseException:
+            finally:
+                # Nothing is left to cancel unless it was interrupted or an episode failed.
                 pool.shutdown(wait=False, cancel_futures=True)
-                raise
     rows = [_episode_file(plan, episode).read_text(encoding="utf-8") for episode in range(plan.episodes)]
     (plan.out / "truth.jsonl").write_text("".join(rows), encoding="utf-8")
 
