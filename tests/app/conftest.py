@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -69,3 +70,18 @@ def make_window(qtbot: QtBot, bench: FakeBench) -> Iterator[MakeWindow]:
     for window in windows:
         window.close()
         assert not window._thread.isRunning()
+
+
+@pytest.fixture
+def engine(bench: FakeBench) -> FakeEngine:
+    return FakeEngine(bench)
+
+
+@pytest.fixture
+def running(make_window: MakeWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path) -> OperatorWindow:
+    """A window that shows pictures of `engine`; its snapshots go to the test's folder."""
+    config = Config.model_validate({"window": {"pictures_folder": str(tmp_path / "shots")}})
+    window = make_window(lambda _config: engine, config)
+    window.start()
+    qtbot.waitUntil(lambda: window.shown_tick is not None)
+    return window

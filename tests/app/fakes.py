@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
+from pytestqt.qtbot import QtBot
 
 from core.config import PoseConfig
 from core.devices import DeviceError
@@ -258,3 +259,7 @@ class FakeEngine:
 
     def close(self) -> None:
         self.closed.set()
+
+
+def until(qtbot: QtBot, condition: Callable[[], bool]) -> None:
+    qtbot.waitUntil(condition, timeout=5000)

@@ -1,0 +1,321 @@
+"""The whole window over a fake engine: what keys, clicks and sizes do."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QEvent, QRect, Qt
+from PySide6.QtWidgets import QApplication, QLabel
+from pytestqt.qtbot import QtBot
+
+from app import theme
+from app.engine_thread import Phase
+from app.operator_window import OperatorWindow
+from app.widgets.overlays import Layer
+from core.config import Config
+from core.devices import DeviceError, EndOfStream
+from core.types import Command, Tick
+from hardware.rig import RigKind
+from tests.app.conftest import MakeWindow
+from tests.app.fakes import FakeBench, FakeEngine, until
+
+Key = Qt.Key
+
+
+def test_keys_move_the_robot_while_held(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    qtbot.keyPress(running, Key.Key_W)
+    assert engine.commands[-1].advance_mm_s == pytest.approx(10.0)
+    lit = [motion.value for motion, cap in running.panels.jog._caps.items() if cap.is_lit]
+    assert lit == ["advance"]
+    qtbot.keyRelease(running, Key.Key_W)
+    assert engine.commands[-1] == Command()
+    assert not any(cap.is_lit for cap in running.panels.jog._caps.values())
+
+
+def test_losing_the_focus_stops_the_robot(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    qtbot.keyPress(running, Key.Key_W)
+    QApplication.sendEvent(running, QEvent(QEvent.Type.WindowDeactivate))
+    assert engine.commands[-1].advance_mm_s == 0.0
+
+
+def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    chip = running.panels.overlay_bar._chips[Layer.MASKS]
+    chip.setFocus()
+    qtbot.keyPress(running, Key.Key_W)
+    qtbot.keyClick(chip, Key.Key_Space)
+    assert engine.commands[-1] == Command()
+    assert chip.isChecked(), "space is no click here"
+
+
+def test_digits_switch_overlays(running: OperatorWindow, qtbot: QtBot) -> None:
+    for layer in Layer:
+        qtbot.keyClick(running, layer.value.key)
+        assert not running.panels.overlay_bar.is_on(layer)
+        assert not running._layer_actions[layer].isChecked()
+    qtbot.keyClick(running, Key.Key_0)
+    assert all(running.panels.overlay_bar.is_on(layer) for layer in Layer)
+    assert all(action.isChecked() for action in running._layer_actions.values())
+
+
+def test_digits_typed_into_the_seed_switch_nothing(running: OperatorWindow, qtbot: QtBot) -> None:
+    assert running.panels.picker is not None
+    seed = running.panels.picker._seed
+    seed.setEnabled(True)
+    seed.setFocus()
+    qtbot.keyClicks(seed, "12")
+    assert running.panels.overlay_bar.is_on(Layer.MASKS)
+
+
+def test_escape_in_the_seed_takes_back_what_was_typed_and_gives_the_keys_to_the_robot(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    picker = running.panels.picker
+    assert picker is not None
+    picker.show_name("random:5")
+    chosen: list[str] = []
+    picker.chosen.connect(chosen.append)
+    running.panels.live.clicked.emit(500.0, 280.0)
+    picker._seed.setFocus()
+    qtbot.keyClicks(picker._seed, "12")
+    qtbot.keyClick(picker._seed, Key.Key_Escape)
+    assert running.focusWidget() is running.panels.live
+    assert picker.name == "random:5"
+    assert picker._seed.text() == "seed 5"
+    assert chosen == []
+    assert engine.targets[-1] is not None, "the target is not what was meant"
+    qtbot.keyPress(running.panels.live, Key.Key_W)
+    assert engine.commands[-1].advance_mm_s > 0.0
+
+
+def test_the_list_of_phantoms_never_takes_the_keys(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    assert running.panels.picker is not None
+    combo = running.panels.picker._combo
+    assert combo.focusPolicy() is Qt.FocusPolicy.NoFocus
+    combo.showPopup()
+    qtbot.keyClick(combo.view(), Key.Key_Escape)
+    combo.hidePopup()
+    assert not combo.hasFocus()
+    name = running.panels.picker.name
+    qtbot.keyPress(running.panels.live, Key.Key_Down)
+    assert running.panels.picker.name == name
+    assert engine.commands[-1].advance_mm_s < 0.0
+
+
+def test_enter_presses_the_button_that_has_the_focus(running: OperatorWindow, qtbot: QtBot) -> None:
+    bar = running.panels.overlay_bar
+    chip = bar._chips[Layer.MASKS]
+    chip.setFocus()
+    qtbot.keyClick(chip, Key.Key_Return)
+    assert not bar.is_on(Layer.MASKS)
+    running.panels.live.setFocus()
+    qtbot.keyClick(running.panels.live, Key.Key_Enter)
+    assert not bar.is_on(Layer.MASKS), "without a button Enter does nothing"
+
+
+def test_click_sets_the_target_and_escape_clears_it(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running.panels.live.clicked.emit(500.0, 280.0)
+    assert engine.targets[-1] == (500.0, 280.0)
+    until(qtbot, lambda: running.shown_tick is not None and running.shown_tick.scene.route is not None)
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert engine.targets[-1] is None
+    running.panels.live.clicked.emit(500.0, 280.0)
+    running.panels.live.cleared.emit()
+    assert engine.targets[-1] is None
+
+
+def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    opened: list[str] = []
+    engines: list[FakeEngine] = []
+
+    def open_engine(config: Config) -> FakeEngine:
+        opened.append(config.twin.phantom)
+        engines.append(FakeEngine(bench))
+        return engines[-1]
+
+    window = make_window(open_engine)
+    window.start()
+    until(qtbot, lambda: window.shown_tick is not None)
+    window.panels.live.clicked.emit(500.0, 280.0)
+    qtbot.keyPress(window, Key.Key_D)
+    assert window.panels.picker is not None
+    window.panels.picker.chosen.emit("tree")
+    assert window._phase is Phase.STARTING
+    assert not window.panels.live._picture.isVisible(), "the old world is not shown as the new one"
+    assert window._target is None
+    assert window._jog.command == Command()
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert opened == ["s_curve", "tree"]
+    assert engines[0].closed.is_set()
+    qtbot.keyRelease(window, Key.Key_D)
+    qtbot.keyClick(window, Key.Key_R)
+    until(qtbot, lambda: len(opened) == 3)
+    assert opened[-1] == "random:1"
+
+
+def test_window_stays_alive_while_a_phantom_is_opened(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    def open_slowly(_config: Config) -> FakeEngine:
+        time.sleep(0.4)
+        return FakeEngine(bench)
+
+    window = make_window(open_slowly)
+    window.start()
+    turns = 0
+    while window.shown_tick is None:
+        before = time.monotonic()
+        QApplication.processEvents()
+        assert time.monotonic() - before < 0.3
+        turns += 1
+        time.sleep(0.005)
+    assert turns > 20
+
+
+def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    qtbot.keyClick(running, Key.Key_P)
+    until(qtbot, running.panels.toast.isVisible)
+    assert str(tmp_path / "shots") in running.panels.toast.text()
+    names = sorted(path.name for path in (tmp_path / "shots").iterdir())
+    assert [name.partition("_")[2][-12:] for name in names if name.endswith("overlay.png")]
+    record = json.loads(next((tmp_path / "shots").glob("*.json")).read_text())
+    assert record["state"] in ("A", "B", "C", "D")
+    assert (record["rig"], record["phantom"], record["model"]) == ("SIM", "s_curve", "default")
+
+
+def test_no_snapshot_of_a_picture_that_is_not_live(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path
+) -> None:
+    engine.silent = True
+    until(qtbot, lambda: running.panels.badge.title == "No new picture")
+    qtbot.keyClick(running, Key.Key_P)
+    assert running.panels.toast.text() == "No snapshot: the picture is not live"
+    engine.silent = False
+    until(qtbot, lambda: running.panels.badge.title != "No new picture")
+    engine.fail_with = EndOfStream("the end")
+    until(qtbot, lambda: running._phase is Phase.ENDED)
+    qtbot.keyClick(running, Key.Key_P)
+    assert running.panels.toast.text() == "No snapshot: the picture is not live"
+    assert not (tmp_path / "shots").exists()
+
+
+@pytest.mark.parametrize("error", [EndOfStream("the end"), DeviceError("unplugged")])
+def test_nothing_is_held_any_more_after_the_end(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, error: Exception
+) -> None:
+    qtbot.keyPress(running, Key.Key_D)
+    qtbot.keyPress(running, Key.Key_W)
+    engine.fail_with = error
+    until(qtbot, lambda: running._phase in (Phase.ENDED, Phase.FAULT))
+    assert running._jog.held == frozenset()
+    assert running._jog.command == Command()
+    assert running.panels.jog.readout.startswith("bend 0.00")
+
+
+def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    """The end may come before the last picture's time on the screen; the picture is shown nevertheless."""
+
+    class Short(FakeEngine):
+        def step(self, timeout_s: float) -> Tick | None:
+            if self._index == 3:
+                raise EndOfStream("the end")
+            return super().step(timeout_s)
+
+    window = make_window(lambda _config: Short(bench), kind=RigKind.PLAYBACK)
+    shown: list[int] = []
+    show_tick = window.panels.show_tick
+
+    def spy(tick: Tick, command: Command, max_block_ms: float) -> None:
+        shown.append(tick.frame.index)
+        show_tick(tick, command, max_block_ms)
+
+    window.panels.show_tick = spy  # type: ignore[method-assign]
+    window._due_s = time.monotonic() + 60.0  # no picture's time comes before the end
+    window.start()
+    until(qtbot, lambda: window._phase is Phase.ENDED)
+    assert shown == [3]
+    assert window.panels.live._picture.isVisible()
+
+
+def test_snapshot_into_an_unwritable_folder_is_one_line(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "shots").write_text("a file where the folder should be")
+    qtbot.keyClick(running, Key.Key_S, Qt.KeyboardModifier.ControlModifier)
+    until(qtbot, running.panels.toast.isVisible)
+    assert running.panels.toast.text().startswith("Snapshot not saved: ")
+
+
+def test_no_snapshot_before_the_first_picture(make_window: MakeWindow, qtbot: QtBot) -> None:
+    window = make_window()
+    until(qtbot, window.isActiveWindow)
+    qtbot.keyClick(window, Key.Key_P)
+    assert window.panels.toast.text() == "No snapshot: there is no picture yet"
+
+
+def test_help_and_full_screen_and_what_escape_leaves_first(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running.panels.live.clicked.emit(500.0, 280.0)
+    qtbot.keyClick(running, Key.Key_F11)
+    assert running.isFullScreen()
+    assert not running.menuBar().isVisible()
+    assert running.panels.banner.isVisible(), "the banner is permanent"
+    qtbot.keyClick(running, Key.Key_F1)
+    assert running.panels.help.isVisible()
+    assert running.panels.help.mapTo(running, running.panels.help.rect().topLeft()).y() > running.panels.banner.geometry().bottom()
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert not running.panels.help.isVisible()
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert not running.isFullScreen()
+    assert running.menuBar().isVisible()
+    running.showFullScreen()
+    assert not running.menuBar().isVisible()
+    assert running._full_screen.isChecked()
+    running.showNormal()  # as the desktop does it
+    assert running.menuBar().isVisible()
+    assert not running._full_screen.isChecked()
+    assert engine.targets[-1] is not None, "the target is cleared last"
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert engine.targets[-1] is None
+
+
+class Screen:
+    """A screen of a given size, as far as it is asked."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self._room = QRect(0, 0, width, height)
+
+    def availableGeometry(self) -> QRect:
+        return self._room
+
+
+SCREENS = [((1920, 1080), (1600, 900)), ((1366, 768), (1358, 728)), ((1280, 720), (1272, 680)), ((800, 600), (1100, 660))]
+
+
+@pytest.mark.parametrize(("screen", "expected"), SCREENS)
+def test_window_opens_no_larger_than_the_screen(screen: tuple[int, int], expected: tuple[int, int]) -> None:
+    assert theme.start_size(Screen(*screen)).toTuple() == expected  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900), (1920, 1080)])
+def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[int, int]) -> None:
+    running.resize(*size)
+    qtbot.wait(30)
+    assert (running.width(), running.height()) == size
+    shown = running.panels
+    for widget in (shown.live, shown.badge, shown.gauge, shown.bars, shown.trends, shown.jog, shown.performance):
+        assert widget.height() >= widget.minimumSizeHint().height(), widget
+        assert widget.height() >= widget.minimumHeight(), widget
+        assert widget.width() >= widget.minimumWidth(), widget
+    assert running.panels.live.width() >= 0.5 * size[0]
+
+
+def test_a_screen_of_720_lines_is_enough(running: OperatorWindow, qtbot: QtBot) -> None:
+    """Below 760 lines the chart of the distances gives its room to theta; the legend names only what is drawn."""
+    assert running.minimumSizeHint().height() <= 660
+    assert theme.MIN_WINDOW[1] <= 660
+    legends = [label for label in running.findChildren(QLabel) if "\N{GREEK SMALL LETTER THETA}" in label.text()]
+    for size, has_distances in (((1280, 680), False), ((1600, 900), True), ((1280, 720), False)):
+        running.resize(*size)
+        qtbot.wait(30)
+        trends = running.panels.trends
+        assert trends.has_distances is has_distances
+        assert trends._angle._box.height() >= 36
+        assert ("d_head" in legends[0].text()) is has_distances
