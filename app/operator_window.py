@@ -362,6 +362,8 @@ class OperatorWindow(QMainWindow):
             timer.stop()
         self._heartbeat.stop()
         self._panels.notice.clear()
+        # A repaint that is still queued would find a window without a surface.
+        self.setUpdatesEnabled(False)
         self.hide()
         self._thread.stop()
         has_ended = self._thread.wait(_STOP_WITHIN_MS)
