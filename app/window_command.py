@@ -131,7 +131,8 @@ def _quit_on_signal(application: QApplication) -> Any:
     from PySide6.QtCore import QTimer
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: application.closeAllWindows())
+        # Not at once: a signal may come while a widget is painting, and its window must not go from under it.
+        signal.signal(number, lambda *_: QTimer.singleShot(0, application.closeAllWindows))
     timer = QTimer(application)
     timer.timeout.connect(lambda: None)
     timer.start(200)
