@@ -105,7 +105,7 @@ def train(
     steps: Annotated[int, typer.Option(min=1)] = 6000,
     stop_after: Annotated[int | None, typer.Option(min=1, help="end after so many of the steps, to go on with --init")] = None,
     batch: Annotated[int, typer.Option(min=1, max=512)] = 12,
-    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 3e-3,
+    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 1e-2,
     crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 256,
     look_share: Annotated[float, typer.Option(min=0, max=1, help="share of the crops whose look is changed at random")] = 1.0,
     base: Annotated[

@@ -127,7 +127,7 @@ def default_shape() -> Any:
     """The shipped network: chosen in docs/method.md for 27 ms a frame at 640x480 on two cores without bf16."""
     from core.perception.unet import UNetShape
 
-    return UNetShape((16, 32, 64, 96, 128), (16, 24, 32, 48), 1, 2)
+    return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2)
 
 
 def _described(folder: Path) -> dict[str, Any]:

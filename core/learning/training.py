@@ -1,4 +1,4 @@
-"""Training of the dual-decoder U-Net: cross entropy + Dice for both tasks, AdamW, one cosine cycle, averaged weights."""
+"""Training of the dual-decoder U-Net: cross entropy + Dice for both tasks, Muon and AdamW at a falling rate, averaged weights."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from core.learning.augment import random_clutter, random_crop, random_look
 from core.learning.dataset import WORKING_SIZE_PX, Sample
+from core.learning.optimizer import make_optimizers
 from core.perception.unet import DualUNet
 from core.types import Image, Mask
 
@@ -31,7 +32,7 @@ class TrainingPlan:
 
     steps: int = 6000
     batch: int = 12
-    learning_rate: float = 3e-3
+    learning_rate: float = 1e-2
     weight_decay: float = 1e-4
     warmup_steps: int = 100
     crop: tuple[int, int] = (256, 256)
@@ -85,7 +86,6 @@ class _Crops(Dataset[tuple[Tensor, Tensor]]):
         target = np.stack([vessel, robot]).astype(np.uint8)
         return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(target)
 
-
     def _place(self, index: int) -> int:
         """Epochs without repetition: a place in a permutation that is drawn anew for every pass."""
         epoch, place = divmod(index, len(self._samples))
@@ -121,7 +121,7 @@ def _learning_rate(plan: TrainingPlan, step: int) -> float:
     if step < plan.warmup_steps:
         return plan.learning_rate * (step + 1) / plan.warmup_steps
     share = (step - plan.warmup_steps) / max(1, plan.steps - plan.warmup_steps)
-    return plan.learning_rate * (0.01 + 0.99 * 0.5 * (1 + float(np.cos(np.pi * share))))
+    return plan.learning_rate * max(0.01, 1.0 - share)
 
 
 def _batches(samples: list[Sample], plan: TrainingPlan) -> Iterator[tuple[Tensor, Tensor]]:
@@ -150,20 +150,24 @@ def train(
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     network = network.to(device, memory_format=torch.channels_last).train()  # type: ignore[call-overload]
     average = copy.deepcopy(network).eval()
-    optimizer = torch.optim.AdamW(network.parameters(), lr=plan.learning_rate, weight_decay=plan.weight_decay)
+    optimizers = make_optimizers(network, plan.learning_rate, plan.weight_decay)
+    shares = [[group["lr"] / plan.learning_rate for group in optimizer.param_groups] for optimizer in optimizers]
     smooth_loss, smooth_dice = 0.0, np.zeros(2)
     done, mark, marked = 0, time.monotonic(), 0
     for image, target in _batches(samples, plan):
-        for group in optimizer.param_groups:
-            group["lr"] = _learning_rate(plan, done)
+        for optimizer, parts in zip(optimizers, shares, strict=True):
+            for group, part in zip(optimizer.param_groups, parts, strict=True):
+                group["lr"] = part * _learning_rate(plan, done)
         batch = (image.to(device).float() / 255).contiguous(memory_format=torch.channels_last)
         with torch.autocast(device.type, torch.bfloat16, enabled=device.type == "cuda"):
             logits = network(batch)
         loss, dice = loss_of(logits.float(), target.to(device).float(), plan.robot_weight)
-        optimizer.zero_grad(set_to_none=True)
+        for optimizer in optimizers:
+            optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-        optimizer.step()
+        for optimizer in optimizers:
+            optimizer.step()
         _average(average, network, min(plan.average_decay, (1 + done) / (10 + done)))
         blend = max(0.02, 1 / (done + 1))
         smooth_loss += blend * (float(loss.detach()) - smooth_loss)

@@ -8,6 +8,7 @@ import pytest
 from core.images import read_image
 from core.learning.augment import random_clutter, random_crop, random_look
 from core.learning.dataset import DatasetError, find_samples, read_truth, write_mask, write_png
+from core.learning.optimizer import make_optimizers, orthogonalised
 from core.learning.training import Progress, TrainingPlan, train
 from core.perception.unet import DualUNet, UNetShape
 
@@ -89,7 +90,7 @@ def _toy_training(folder: Path, steps: int, **kwargs: object) -> tuple[DualUNet,
     torch.manual_seed(0)
     network = DualUNet(UNetShape((4, 8, 8, 8, 8), (4, 8, 8, 8), 1, 2))
     plan = TrainingPlan(
-        steps=steps, batch=4, learning_rate=1e-2, warmup_steps=5, crop=(64, 64), workers=0, average_decay=0.9, threads=1
+        steps=steps, batch=4, learning_rate=4e-2, warmup_steps=5, crop=(64, 64), workers=0, average_decay=0.9, threads=1
     )
     return train(network, find_samples([folder]), plan, **kwargs)  # type: ignore[arg-type]
 
@@ -123,6 +124,26 @@ def test_training_repeats_bit_for_bit_and_can_be_stopped(tmp_path: Path) -> None
     stops = iter([False, False, True])
     _, done = _toy_training(folder, 6, should_stop=lambda: next(stops))
     assert done == 3
+
+
+def test_orthogonalised_directions_have_singular_values_near_one() -> None:
+    import torch
+
+    torch.manual_seed(0)
+    for shape in ((8, 40), (40, 8), (16, 16)):
+        # Far from orthogonal to begin with: the first singular value is a hundred times the last.
+        matrix = torch.randn(shape) * torch.logspace(0, -1, shape[1])
+        values = torch.linalg.svdvals(orthogonalised(matrix))
+        assert float(values.max()) < 1.3
+        assert float(values.max() / values.min()) < 2.5
+
+
+def test_the_kernels_go_to_muon_and_the_rest_to_adamw() -> None:
+    network = DualUNet(UNetShape((4, 8, 8, 8, 8), (4, 8, 8, 8), 1, 2))
+    muon, adamw = make_optimizers(network, 1e-2, 1e-4)
+    sizes = [sum(p.numel() for group in o.param_groups for p in group["params"]) for o in (muon, adamw)]
+    assert sum(sizes) == sum(p.numel() for p in network.parameters())
+    assert all(p.ndim == 4 and p.shape[2:] == (3, 3) for group in muon.param_groups for p in group["params"])
 
 
 def test_masks_are_readable_pictures(tmp_path: Path) -> None:
