@@ -21,6 +21,8 @@ from rich.progress import (
 )
 
 _console = Console(stderr=True)
+_EXAMPLES = 40
+"""Training frames from which the eight-bit network learns its ranges."""
 
 
 def progress_bar() -> Progress:
@@ -76,7 +78,7 @@ def run_train(out: Path, data: list[Path], synthetic: int, init: str | None, bas
     """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log."""
     import torch
 
-    from core.learning.dataset import DatasetError, find_samples
+    from core.learning.dataset import WORKING_SIZE_PX, DatasetError, find_samples
     from core.learning.model_file import check_can_write, load_network, model_folder, save_model
     from core.learning.training import Progress as Report
     from core.learning.training import train
@@ -118,7 +120,8 @@ def run_train(out: Path, data: list[Path], synthetic: int, init: str | None, bas
         network, done = train(
             network, samples, plan, on_progress=report, on_checkpoint=checkpoint, should_stop=lambda: interrupt.asked
         )
-    save_model(network, out, training=notes | {"steps_done": done}, figures={})
+    examples = [sample.load(WORKING_SIZE_PX)[0] for sample in samples[:: max(1, len(samples) // _EXAMPLES)]]
+    save_model(network, out, training=notes | {"steps_done": done}, figures={}, examples=examples)
     ending = "" if done == plan.steps else f" (interrupted after {done} of {plan.steps} steps; go on with --init {out})"
     _console.print(f"model written to {out}{ending}", soft_wrap=True)
 

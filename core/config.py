@@ -32,6 +32,7 @@ class SegmentationConfig(_Section):
 
     model: str = Field("default", min_length=1, description="model folder in resources/models, or a path")
     device: Literal["auto", "openvino", "torch"] = Field("auto", description="inference engine")
+    precision: Literal["auto", "int8", "fp32"] = Field("auto", description="of OpenVINO; auto = int8 where the model has it")
     threads: int = Field(0, ge=0, le=64, description="CPU threads; 0 = all cores")
     vessel_threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
     robot_threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5

@@ -1,4 +1,4 @@
-"""A model on disk: ``weights.safetensors``, ``network.onnx`` and ``model.json`` with the SHA-256 of both.
+"""A model on disk: ``weights.safetensors``, ``network.onnx``, perhaps ``network_int8.onnx``, and ``model.json`` with their SHA-256.
 
 Nothing is loaded before its hash agrees, and nothing is ever unpickled: a cut, bit-flipped or foreign file is one clear error.
 """
@@ -9,6 +9,7 @@ import hashlib
 import os
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +17,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.config import RESOURCES
 from core.errors import UserError
+from core.types import Image
 
 if TYPE_CHECKING:
+    from core.learning.quantise import EightBitUNet
     from core.perception.unet import DualUNet
 
-WEIGHTS, ONNX, INFO = "weights.safetensors", "network.onnx", "model.json"
+WEIGHTS, ONNX, ONNX_INT8, INFO = "weights.safetensors", "network.onnx", "network_int8.onnx", "model.json"
 MODELS = RESOURCES / "models"
 
 
@@ -41,6 +44,7 @@ class ModelInfo(BaseModel):
     output: str = "probabilities float32 (1, 2, H, W): vessel, robot"
     weights_sha256: str = Field(pattern="^[0-9a-f]{64}$")
     onnx_sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    onnx_int8_sha256: str | None = Field(None, pattern="^[0-9a-f]{64}$")
     training: dict[str, Any] = {}
     figures: dict[str, Any] = {}
 
@@ -74,9 +78,11 @@ def read_model_info(folder: Path, *, verify: tuple[str, ...] = (WEIGHTS, ONNX)) 
         first: Any = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         raise ModelError(f"{path}: damaged ({key + ': ' if key else ''}{first['msg']}); restore the model folder") from None
-    wanted = {WEIGHTS: info.weights_sha256, ONNX: info.onnx_sha256}
+    wanted = {WEIGHTS: info.weights_sha256, ONNX: info.onnx_sha256, ONNX_INT8: info.onnx_int8_sha256}
     for name in verify:
         file = folder / name
+        if wanted[name] is None:
+            raise ModelError(f"{path}: the model has no {name}; choose precision fp32, or train it again")
         try:
             found = sha256_of(file)
         except OSError as error:
@@ -103,8 +109,17 @@ def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
     return network.eval(), info
 
 
-def save_model(network: DualUNet, folder: Path, *, training: dict[str, Any], figures: dict[str, Any]) -> ModelInfo:
+def save_model(
+    network: DualUNet,
+    folder: Path,
+    *,
+    training: dict[str, Any],
+    figures: dict[str, Any],
+    examples: Sequence[Image] = (),
+) -> ModelInfo:
     """Write weights, ONNX and manifest. The folder appears whole or not at all; an older model of that name is replaced last.
+
+    From `examples`, typical RGB images at working size, the ranges of an eight-bit copy are learnt; without them there is none.
 
     Raises
     ------
@@ -120,7 +135,9 @@ def save_model(network: DualUNet, folder: Path, *, training: dict[str, Any], fig
     try:
         state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
         save_file(state, scratch / WEIGHTS)
-        export_onnx(network, scratch / ONNX)
+        export_onnx(network, network.shape.stride, scratch / ONNX)
+        if len(examples):
+            export_onnx(_eight_bit(network, examples), network.shape.stride, scratch / ONNX_INT8)
         info = ModelInfo(
             format=1,
             name=folder.name,
@@ -128,6 +145,7 @@ def save_model(network: DualUNet, folder: Path, *, training: dict[str, Any], fig
             stride=network.shape.stride,
             weights_sha256=sha256_of(scratch / WEIGHTS),
             onnx_sha256=sha256_of(scratch / ONNX),
+            onnx_int8_sha256=sha256_of(scratch / ONNX_INT8) if len(examples) else None,
             training=training,
             figures=figures,
         )
@@ -164,15 +182,27 @@ def write_figures(folder: Path, figures: dict[str, Any]) -> None:
     os.replace(scratch, folder / INFO)
 
 
-def export_onnx(network: DualUNet, path: Path) -> None:
-    """Export with free height and width (multiples of the stride); pre- and post-processing are inside the graph."""
+def _eight_bit(network: DualUNet, examples: Sequence[Image]) -> EightBitUNet:
+    import torch
+
+    from core.learning.quantise import EightBitUNet
+
+    stride = network.shape.stride
+    eight_bit = EightBitUNet(network.eval()).eval()
+    # Cropped to whole strides: padding would teach the ranges edges that no camera shows.
+    cuts = (image[: image.shape[0] // stride * stride, : image.shape[1] // stride * stride] for image in examples)
+    eight_bit.learn_ranges(torch.from_numpy(cut.transpose(2, 0, 1)[None].copy()).float() / 255 for cut in cuts if cut.size)
+    return eight_bit
+
+
+def export_onnx(network: DualUNet | EightBitUNet, stride: int, path: Path) -> None:
+    """Export with free height and width (multiples of `stride`); pre- and post-processing are inside the graph."""
     import warnings
 
     import torch
 
     from core.perception.unet import Probabilities
 
-    stride = network.shape.stride
     example = torch.zeros(1, stride * 2, stride * 2, 3, dtype=torch.uint8)
     was_training = network.training
     with warnings.catch_warnings():

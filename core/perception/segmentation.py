@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import SegmentationConfig
-from core.learning.model_file import ONNX, ModelError, model_folder, read_model_info
+from core.learning.model_file import ONNX, ONNX_INT8, ModelError, model_folder, read_model_info
 from core.types import Image
 
 Probability = NDArray[np.float32]
@@ -52,28 +52,31 @@ def _padded(image: Image, stride: int) -> Image:
 
 
 class OpenVinoSegmenter:
-    """The ONNX network on the CPU through OpenVINO; compiled once per image size."""
+    """The ONNX network on the CPU through OpenVINO, in int8 where the model has it; compiled once per image size."""
 
     _MAX_SIZES = 4
 
-    def __init__(self, folder: Path, threads: int = 0) -> None:
+    def __init__(self, folder: Path, threads: int = 0, precision: str = "auto") -> None:
         # Importing openvino reports itself over the network; with its telemetry package blocked it takes a silent stub instead.
         sys.modules["openvino_telemetry"] = None  # type: ignore[assignment]
         import openvino
 
-        self.info = read_model_info(folder, verify=(ONNX,))
+        self.info = read_model_info(folder, verify=())
+        self._int8 = precision == "int8" or (precision == "auto" and self.info.onnx_int8_sha256 is not None)
+        name = ONNX_INT8 if self._int8 else ONNX
+        read_model_info(folder, verify=(name,))
         self._core = openvino.Core()
         self._threads = threads or _cores()
         try:
-            self._model = self._core.read_model(folder / ONNX)
+            self._model = self._core.read_model(folder / name)
         except RuntimeError as error:
             reason = str(error).strip().splitlines()[-1]
-            raise ModelError(f"{folder / ONNX}: cannot be read ({reason}); restore the model folder") from None
+            raise ModelError(f"{folder / name}: cannot be read ({reason}); restore the model folder") from None
         self._requests: dict[tuple[int, int], openvino.InferRequest] = {}
 
     @property
     def engine(self) -> str:
-        return "OpenVINO CPU"
+        return f"OpenVINO CPU {'int8' if self._int8 else 'fp32'}"
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         height, width = image.shape[:2]
@@ -149,4 +152,4 @@ def open_segmenter(config: SegmentationConfig) -> Segmenter:
     folder = model_folder(config.model)
     if config.device == "torch" or (config.device == "auto" and cuda_present()):
         return TorchSegmenter(folder, config.threads)
-    return OpenVinoSegmenter(folder, config.threads)
+    return OpenVinoSegmenter(folder, config.threads, config.precision)

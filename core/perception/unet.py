@@ -120,7 +120,7 @@ class DualUNet(nn.Module):
 class Probabilities(nn.Module):
     """The network as it is exported: uint8 image (1, H, W, 3) -> probabilities (1, 2, H, W) in 0..1."""
 
-    def __init__(self, network: DualUNet) -> None:
+    def __init__(self, network: nn.Module) -> None:
         super().__init__()
         self.network = network
 
