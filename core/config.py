@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.errors import UserError
+from core.servo_config import ServosConfig
 
 RESOURCES = Path(__file__).resolve().parent.parent / "resources"
 
@@ -177,6 +178,7 @@ class Config(_Section):
     twin: TwinConfig = TwinConfig()
     perception: PerceptionConfig = PerceptionConfig()
     advice: AdviceConfig = AdviceConfig()
+    servos: ServosConfig = ServosConfig()
     window: WindowConfig = WindowConfig()
 
 
