@@ -1,7 +1,7 @@
 """The seven servos as configuration: who they are on the bus, how their turns become millimetres, and what each may do.
 
-Joint coordinates are millimetres: of tendon pull (positive tightens), of robot advance, of catheter delivery. Zero is where the joint
-was zeroed; a tendon's zero is its pretension.
+Joint coordinates are millimetres: of tendon pull (positive tightens), of robot advance, of catheter delivery. Zero is where the
+joint was zeroed; there, a tendon has no tension.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class JointConfig(_Section):
 
 def _tendon(name: JointName, number: int) -> JointConfig:
     return JointConfig(
-        name=name, id=number, low_mm=-2.4, high_mm=2.4, max_speed_mm_s=10.0, max_acceleration_mm_s2=200.0, max_step_mm=0.6
+        name=name, id=number, low_mm=-2.4, high_mm=2.8, max_speed_mm_s=10.0, max_acceleration_mm_s2=200.0, max_step_mm=0.6
     )
 
 
