@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 from rich.console import Console
 from rich.table import Table
@@ -154,44 +153,23 @@ def run_accuracy(
 
     `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network.
     """
-    from core.learning.dataset import DatasetError, find_samples, read_truth
+    from core.learning.dataset import find_labelled
     from core.learning.model_file import model_folder, sha256_of, write_figures
     from core.perception.pipeline import Pipeline, open_pipeline
-    from core.study.accuracy import TrueMasks, score_frame, summarise
+    from core.study.accuracy import TrueMasks, score_set, summarise
+    from core.study.calibration import describe_confidence
 
     config = _config(model, preset, config_path)
-    samples, truth = find_samples([folder]), read_truth(folder)
-    untold = [sample.stem for sample in samples if sample.stem not in truth]
-    if untold:
-        raise DatasetError(f"{folder}: {len(untold)} frames lack a truth (the first: {untold[0]}); write the set again with synth")
-    truth_teller = TrueMasks()
-    pipeline = Pipeline(truth_teller, config.perception) if true_masks else open_pipeline(config.perception)
-    scores = []
+    samples, truth = find_labelled(folder)
+    masks = TrueMasks()
+    pipeline = Pipeline(masks, config.perception) if true_masks else open_pipeline(config.perception)
     with progress_bar() as bar:
-        for sample in bar.track(samples, description="frames"):
-            image, vessel, robot = sample.load()
-            truth_teller.show(vessel, robot)
-            scene = pipeline.perceive_single(Frame(0, 0.0, image))
-            size = _working_size(scene)
-            masks = [_at_size(mask, size) for mask in (vessel, robot)]
-            scores.append(score_frame(sample.stem, scene, masks[0], masks[1], truth[sample.stem]))
-    figures = summarise(scores)
+        scores = list(bar.track(score_set(samples, truth, pipeline, masks), total=len(samples), description="frames"))
+    figures = summarise(scores) | describe_confidence(scores)
     if store and not true_masks:
         described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
         write_figures(model_folder(config.perception.segmentation.model), described | figures)
     _print(figures, as_json, f"accuracy on {folder}")
-
-
-def _working_size(scene: Scene) -> tuple[int, int]:
-    if scene.masks is not None:
-        return scene.masks.vessel.shape[1], scene.masks.vessel.shape[0]
-    return round(scene.source_size[0] * scene.scale), round(scene.source_size[1] * scene.scale)
-
-
-def _at_size(mask: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    if (mask.shape[1], mask.shape[0]) == size:
-        return mask
-    return np.asarray(cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_AREA) > 127)
 
 
 def _print(result: dict[str, Any], as_json: bool, title: str) -> None:

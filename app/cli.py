@@ -132,6 +132,18 @@ def train(
 
 
 @app.command()
+def calibrate(
+    folder: Annotated[Path, typer.Argument(help="labelled folder as synth writes it, which training has never seen")],
+    model: Annotated[str, typer.Option(help="model in resources/models, or a folder; its model.json is rewritten")] = "default",
+    config: ConfigOption = None,
+) -> None:
+    """Teach a model what its confidence means: the share of right answers among those that it is so sure of."""
+    from app.calibrate_command import run_calibrate
+
+    run_calibrate(folder, model=model, config_path=config)
+
+
+@app.command()
 def benchmark(
     json: JsonOption = False,
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,

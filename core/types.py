@@ -224,6 +224,7 @@ class Scene:
     pose: Pose | None = None
     refusal: Refusal | None = None
     latency_ms: dict[str, float] = field(default_factory=dict)
+    evidence: tuple[float, ...] | None = None
     scale_xy: tuple[float, float] | None = None
 
     def points_to_source(self, points: Points) -> Points:

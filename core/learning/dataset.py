@@ -93,6 +93,15 @@ def read_truth(folder: Path) -> dict[str, dict[str, Any]]:
     return truth
 
 
+def find_labelled(folder: Path) -> tuple[list[Sample], dict[str, dict[str, Any]]]:
+    """The frames of a set that ``synth`` wrote, and their truth by stem; raises DatasetError when a frame has no truth."""
+    samples, truth = find_samples([folder]), read_truth(folder)
+    untold = [sample.stem for sample in samples if sample.stem not in truth]
+    if untold:
+        raise DatasetError(f"{folder}: {len(untold)} frames lack a truth (the first: {untold[0]}); write the set again with synth")
+    return samples, truth
+
+
 def write_mask(path: Path, mask: Mask) -> None:
     """A mask as 0/255 PNG; raises OSError when it cannot be written (OpenCV alone would only return False)."""
     write_png(path, mask.astype(np.uint8) * 255)

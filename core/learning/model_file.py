@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.config import RESOURCES
 from core.errors import UserError
+from core.perception.evidence import Calibration
 from core.types import Image
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ class ModelInfo(BaseModel):
     onnx_sha256: str = Field(pattern="^[0-9a-f]{64}$")
     onnx_int8_sha256: str | None = Field(None, pattern="^[0-9a-f]{64}$")
     training: dict[str, Any] = {}
+    calibration: Calibration | None = None
     figures: dict[str, Any] = {}
 
 
@@ -176,7 +178,16 @@ def check_can_write(folder: Path) -> None:
 
 def write_figures(folder: Path, figures: dict[str, Any]) -> None:
     """Store measured figures in the manifest of a model, atomically."""
-    info = read_model_info(folder).model_copy(update={"figures": figures})
+    _update(folder, {"figures": figures})
+
+
+def write_calibration(folder: Path, calibration: Calibration) -> None:
+    """Store how evidence becomes confidence in the manifest of a model, atomically. Figures measured before are no longer true."""
+    _update(folder, {"calibration": calibration, "figures": {}})
+
+
+def _update(folder: Path, changes: dict[str, Any]) -> None:
+    info = read_model_info(folder).model_copy(update=changes)
     scratch = folder / f".{INFO}.new"
     scratch.write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
     os.replace(scratch, folder / INFO)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import astuple, replace
 from time import perf_counter
 
 from core.config import PerceptionConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton
 from core.perception.centerline import find as find_centerline
+from core.perception.evidence import Calibration, collect
 from core.perception.pose import StateFilter, measure
 from core.perception.route import plan_route
 from core.perception.segmentation import Segmenter, open_segmenter, to_working
@@ -46,8 +47,9 @@ class Pipeline:
     refused, and the state is steadied. ``perceive_single`` knows nothing of other frames and leaves the stream's memory alone.
     """
 
-    def __init__(self, segmenter: Segmenter, config: PerceptionConfig) -> None:
+    def __init__(self, segmenter: Segmenter, config: PerceptionConfig, calibration: Calibration | None = None) -> None:
         self._segment = segmenter
+        self._calibration = calibration
         self._config = config
         self._states = StateFilter(config.pose)
         self._memory: Memory | None = None
@@ -125,17 +127,22 @@ class Pipeline:
         assert skeletons is not None
         if target is not None:
             scene = replace(scene, route=plan_route(graph, path.head, scene.to_working(target)))
-        robot_vector = fit_robot_vector(path.points, config.vectors.robot_length_px)
+        robot_vector = fit_robot_vector(path.points, config.vectors.robot_length_px, config.vectors.line_fit)
         refusal = quality.check_path(path, found, config)
         if robot_vector is None or refusal is not None:
             return replace(scene, robot_vector=robot_vector, refusal=refusal or Refusal(Reason.TOO_SHORT, "it has no direction"))
         centerline = find_centerline(graph, skeletons.vessel, path.head, robot_vector.direction, config.vectors, scene.route)
-        vessel_vector = fit_vessel_vector(centerline) if centerline is not None else None
+        vessel_vector = fit_vessel_vector(centerline, config.vectors.line_fit) if centerline is not None else None
         scene = replace(scene, robot_vector=robot_vector, centerline=centerline, vessel_vector=vessel_vector)
         refusal = quality.check_centerline(centerline, config.quality)
         if centerline is None or vessel_vector is None or refusal is not None:
             return replace(scene, refusal=refusal or Refusal(Reason.NO_VESSEL, "the centerline beside the head has no direction"))
-        confidence = quality.confidence(path, centerline, found, config)
+        evidence = collect(path, robot_vector, centerline, found, config)
+        scene = replace(scene, evidence=astuple(evidence))
+        if self._calibration is not None:
+            confidence = self._calibration.confidence(evidence)
+        else:
+            confidence = quality.confidence(path, centerline, found, config)
         refusal = quality.check_confidence(confidence, config.quality)
         if refusal is not None:
             return replace(scene, refusal=refusal)
@@ -144,7 +151,8 @@ class Pipeline:
 
 def open_pipeline(config: PerceptionConfig) -> Pipeline:
     """Load the configured model and build the pipeline around it; raises ModelError."""
-    return Pipeline(open_segmenter(config.segmentation), config)
+    segmenter = open_segmenter(config.segmentation)
+    return Pipeline(segmenter, config, segmenter.info.calibration)
 
 
 class NoPerception:

@@ -1,12 +1,11 @@
 """When perception does not answer, and how sure it is when it does.
 
-Each check gives a ``Refusal`` that names the measured value and its limit in plain words, or None. The limits are settings; the
-confidence is a product of shares, each 1 when nothing speaks against the answer.
+Each check gives a ``Refusal`` that names the measured value and its limit in plain words, or None. The limits are settings. A
+model that was calibrated tells a probability (``evidence``); without calibration the confidence is a product of shares, each 1 when
+nothing speaks against the answer.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import cv2
 import numpy as np
@@ -14,7 +13,8 @@ from numpy.typing import NDArray
 
 from core.config import PerceptionConfig, QualityConfig
 from core.perception import polyline
-from core.types import Centerline, Image, Mask, Masks, Points, Reason, Refusal, RobotPath
+from core.perception.evidence import at
+from core.types import Centerline, Image, Mask, Masks, Reason, Refusal, RobotPath
 
 SAMPLE_STEP = 4
 """Brightness is judged on every fourth pixel."""
@@ -24,6 +24,8 @@ def check_image(image: Image, config: QualityConfig) -> Refusal | None:
     """BLACK, WHITE or BLURRED, from the RGB image (h, w, 3) alone."""
     if image.shape[0] == 0 or image.shape[1] == 0:
         return Refusal(Reason.UNREADABLE, "it has no pixels")
+    if not config.enabled:
+        return None
     red, green, blue = (image[::SAMPLE_STEP, ::SAMPLE_STEP, channel] for channel in range(3))
     brightest = _level(np.maximum(np.maximum(red, green), blue), 0.99)
     if brightest < config.black_level:
@@ -72,6 +74,8 @@ def check_masks(masks: Masks) -> Refusal | None:
 def check_path(path: RobotPath, masks: Masks, config: PerceptionConfig) -> Refusal | None:
     """TOO_SHORT, GAP_TOO_LONG or OUTSIDE_VESSEL."""
     limits = config.quality
+    if not limits.enabled:
+        return None
     length_px = float(polyline.arc_length(path.points)[-1])
     if length_px < limits.min_robot_length_px:
         return Refusal(Reason.TOO_SHORT, f"{length_px:.0f} px long (at least {limits.min_robot_length_px:.0f} px)")
@@ -90,7 +94,7 @@ def check_centerline(centerline: Centerline | None, config: QualityConfig) -> Re
     """NO_VESSEL when there is no centerline beside the head, AMBIGUOUS_BRANCH when two branches fit it equally well."""
     if centerline is None:
         return Refusal(Reason.NO_VESSEL, "no centerline beside the robot's head")
-    if centerline.ambiguity > config.max_ambiguity:
+    if config.enabled and centerline.ambiguity > config.max_ambiguity:
         detail = f"a second branch fits {100 * centerline.ambiguity:.0f} % as well (at most {100 * config.max_ambiguity:.0f} %)"
         return Refusal(Reason.AMBIGUOUS_BRANCH, detail)
     return None
@@ -98,7 +102,7 @@ def check_centerline(centerline: Centerline | None, config: QualityConfig) -> Re
 
 def check_confidence(confidence: float, config: QualityConfig) -> Refusal | None:
     """LOW_CONFIDENCE."""
-    if confidence < config.min_confidence:
+    if config.enabled and confidence < config.min_confidence:
         return Refusal(Reason.LOW_CONFIDENCE, f"{100 * confidence:.0f} % (at least {100 * config.min_confidence:.0f} %)")
     return None
 
@@ -106,11 +110,11 @@ def check_confidence(confidence: float, config: QualityConfig) -> Refusal | None
 def inside_share(path: RobotPath, vessel: Mask, length_px: float) -> float:
     """Share of the robot's last `length_px` that lies in the vessel's mask."""
     total = float(polyline.arc_length(path.points)[-1])
-    return float(_at(vessel, polyline.resample(polyline.cut(path.points, total - length_px, total), 1.0)).mean())
+    return float(at(vessel, polyline.resample(polyline.cut(path.points, total - length_px, total), 1.0)).mean())
 
 
 def confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> float:
-    """How far the answer can be trusted, 0..1: the product of
+    """How far the answer of a model without calibration can be trusted, 0..1: the product of
 
     - how clearly the network saw the robot's last 40 px, and the vessel beside them,
     - how much of them lies in the vessel,
@@ -120,9 +124,9 @@ def confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: Pe
     """
     total = float(polyline.arc_length(path.points)[-1])
     tip = polyline.resample(polyline.cut(path.points, total - config.vectors.robot_length_px, total), 1.0)
-    in_mask = tip[_at(masks.robot, tip)]  # what is bridged there is counted below
-    robot_seen = _clearness(float(_at(masks.robot_probability, in_mask).mean())) if len(in_mask) else 0.0
-    seen = robot_seen * _clearness(float(_at(masks.vessel_probability, centerline.piece).mean()))
+    in_mask = tip[at(masks.robot, tip)]  # what is bridged there is counted below
+    robot_seen = _clearness(float(at(masks.robot_probability, in_mask).mean())) if len(in_mask) else 0.0
+    seen = robot_seen * _clearness(float(at(masks.vessel_probability, centerline.piece).mean()))
     inside = min(1.0, inside_share(path, masks.vessel, config.vectors.robot_length_px) / 0.9)
     unbridged = 1.0 - min(1.0, path.bridged_px / max(total, 1.0))
     lead = 1.0 if path.runner_up is None else float(np.clip(0.6 + (path.score - path.runner_up) / 0.5, 0.4, 1.0))
@@ -132,10 +136,3 @@ def confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: Pe
 def _clearness(probability: float) -> float:
     """0.5 says nothing, 0.9 is as clear as it gets."""
     return float(np.clip((probability - 0.5) / 0.4, 0.0, 1.0))
-
-
-def _at(values: NDArray[Any], points: Points) -> NDArray[Any]:
-    """A map (h, w) at the pixels nearest to `points`; places beyond the image count as its border."""
-    columns = np.clip(np.rint(points[:, 0]).astype(int), 0, values.shape[1] - 1)
-    rows = np.clip(np.rint(points[:, 1]).astype(int), 0, values.shape[0] - 1)
-    return np.asarray(values[rows, columns])

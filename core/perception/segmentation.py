@@ -141,7 +141,7 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def open_segmenter(config: SegmentationConfig) -> Segmenter:
+def open_segmenter(config: SegmentationConfig) -> OpenVinoSegmenter | TorchSegmenter:
     """Load the configured model into the configured engine ("auto": torch where a CUDA device is present, else OpenVINO).
 
     Raises

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.types import Image, Mask, Point, Reason, Scene
+from core.learning.dataset import Sample
+from core.perception.pipeline import Pipeline
+from core.types import Frame, Image, Mask, Point, Reason, Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,7 @@ class FrameScore:
     state: str | None
     true_state: str | None
     confidence: float
+    evidence: tuple[float, ...] | None = None
 
 
 class TrueMasks:
@@ -86,7 +89,32 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
         state=pose.state.value if pose is not None else None,
         true_state=state,
         confidence=pose.confidence if pose is not None else 0.0,
+        evidence=scene.evidence,
     )
+
+
+def score_set(
+    samples: Sequence[Sample], truth: dict[str, dict[str, Any]], pipeline: Pipeline, masks: TrueMasks
+) -> Iterator[FrameScore]:
+    """Perceive every frame by itself and score it; `masks` is told the true masks first, for a pipeline that runs on them."""
+    for sample in samples:
+        image, vessel, robot = sample.load()
+        masks.show(vessel, robot)
+        scene = pipeline.perceive_single(Frame(0, 0.0, image))
+        size = _working_size(scene)
+        yield score_frame(sample.stem, scene, _at_size(vessel, size), _at_size(robot, size), truth[sample.stem])
+
+
+def _working_size(scene: Scene) -> tuple[int, int]:
+    if scene.masks is not None:
+        return scene.masks.vessel.shape[1], scene.masks.vessel.shape[0]
+    return round(scene.source_size[0] * scene.scale), round(scene.source_size[1] * scene.scale)
+
+
+def _at_size(mask: Mask, size: tuple[int, int]) -> Mask:
+    if (mask.shape[1], mask.shape[0]) == size:
+        return mask
+    return np.asarray(cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_AREA) > 127)
 
 
 def _statistics(values: Sequence[float]) -> dict[str, float] | None:

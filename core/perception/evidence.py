@@ -1,0 +1,135 @@
+"""What speaks for and against an answer, as numbers, and how sure it is after calibration.
+
+The numbers are collected while perceiving; how they add up to "right with 90 %" is learnt once per model on labelled frames that
+it was not trained on (``calibrate``), by logistic regression (J. Platt, "Probabilistic outputs for support vector machines", 1999),
+and kept in ``model.json``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from core.config import PerceptionConfig
+from core.perception import polyline
+from core.types import Centerline, Masks, Points, RobotPath, Vector
+
+_BEYOND_PX = (4.0, 24.0)
+"""Where a robot that goes on beyond the head that was found would be seen."""
+_AROUND_PX = 60
+"""Half side of the window around the head in which the network's doubt is counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Signs of one answer; all are shares or ratios without unit, but ``log_length`` (natural logarithm of px)."""
+
+    robot_seen: float
+    """Mean robot probability along the last 40 px."""
+    robot_seen_all: float
+    """The same along the whole path."""
+    vessel_seen: float
+    """Mean vessel probability along the centerline's piece."""
+    inside: float
+    """Share of the last 40 px that lies in the vessel."""
+    bridged: float
+    """Share of the path that was bridged."""
+    lead: float
+    """How far the runner-up's score is behind, at most 1."""
+    ambiguity: float
+    off_path: float
+    """Share of the robot's mask that the path does not explain."""
+    beyond: float
+    """Highest robot probability straight beyond the head."""
+    bend: float
+    """Root mean square distance of the last 40 px from their line, in radii."""
+    offset: float
+    """Distance of the head from the centerline, in lumen radii."""
+    off_border: float
+    """1 when the tail is neither at the image border nor at the port."""
+    log_length: float
+    robot_doubt: float
+    """Mean p(1 - p) of the robot around the head, against the robot's share there."""
+    vessel_doubt: float
+    """Mean p(1 - p) of the vessel around the head."""
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        return tuple(field.name for field in fields(cls))
+
+    def to_array(self) -> NDArray[np.float64]:
+        return np.array(astuple(self), np.float64)
+
+
+class Calibration(BaseModel):
+    """Weights of a logistic regression over ``Evidence``: confidence = 1 / (1 + exp(-(offset + weights . (x - mean) / scale)))."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    features: tuple[str, ...]
+    mean: tuple[float, ...]
+    scale: tuple[float, ...]
+    weights: tuple[float, ...]
+    offset: float
+    fitted_on: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.features != Evidence.names():
+            raise ValueError("the calibration is of another version; run calibrate again")
+        if {len(self.mean), len(self.scale), len(self.weights)} != {len(self.features)} or min(self.scale) <= 0.0:
+            raise ValueError("the calibration is damaged; run calibrate again")
+        return self
+
+    def confidence(self, evidence: Evidence) -> float:
+        """Probability 0..1 that the answer is right."""
+        standard = (evidence.to_array() - np.array(self.mean)) / np.array(self.scale)
+        # What lies far beyond anything seen while fitting must not become certainty.
+        logit = self.offset + float(np.clip(standard, -4.0, 4.0) @ np.array(self.weights))
+        return float(1.0 / (1.0 + np.exp(-np.clip(logit, -30.0, 30.0))))
+
+
+def collect(path: RobotPath, robot: Vector, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> Evidence:
+    """All signs of an answer; coordinates in working pixels."""
+    total = float(polyline.arc_length(path.points)[-1])
+    tip = polyline.resample(polyline.cut(path.points, total - config.vectors.robot_length_px, total), 1.0)
+    whole = polyline.resample(path.points, 2.0)
+    direction = np.array(robot.direction)
+    ahead = np.array(path.head) + np.arange(*_BEYOND_PX)[:, None] * direction
+    across = (tip - np.array(robot.center)) @ np.array([-direction[1], direction[0]])
+    radius = max(path.radius_px, 1.0)
+    robot_near, vessel_near = (_around(p, path.head) for p in (masks.robot_probability, masks.vessel_probability))
+    area = float(np.count_nonzero(masks.robot))
+    return Evidence(
+        robot_seen=float(at(masks.robot_probability, tip).mean()),
+        robot_seen_all=float(at(masks.robot_probability, whole).mean()),
+        vessel_seen=float(at(masks.vessel_probability, centerline.piece).mean()),
+        inside=float(at(masks.vessel, tip).mean()),
+        bridged=min(1.0, path.bridged_px / max(total, 1.0)),
+        lead=1.0 if path.runner_up is None else float(np.clip(path.score - path.runner_up, 0.0, 1.0)),
+        ambiguity=centerline.ambiguity,
+        off_path=max(0.0, 1.0 - 2.0 * radius * total / max(area, 1.0)),
+        beyond=float(at(masks.robot_probability, ahead).max()),
+        bend=float(np.sqrt(np.mean((across - across.mean()) ** 2))) / radius,
+        offset=float(np.hypot(*(np.array(path.head) - centerline.nearest))) / max(centerline.radius_px, 1.0),
+        off_border=0.0 if path.entry_on_border else 1.0,
+        log_length=float(np.log(max(total, 1.0))),
+        robot_doubt=float((robot_near * (1 - robot_near)).sum() / max(float(robot_near.sum()), 1.0)),
+        vessel_doubt=float((vessel_near * (1 - vessel_near)).mean()),
+    )
+
+
+def _around(values: NDArray[np.float32], place: tuple[float, float]) -> NDArray[np.float32]:
+    x, y = (round(coordinate) for coordinate in place)
+    return values[max(0, y - _AROUND_PX) : y + _AROUND_PX + 1, max(0, x - _AROUND_PX) : x + _AROUND_PX + 1]
+
+
+def at(values: NDArray[Any], points: Points) -> NDArray[Any]:
+    """A map (h, w) at the pixels nearest to `points`; places beyond the image count as its border."""
+    columns = np.clip(np.rint(points[:, 0]).astype(int), 0, values.shape[1] - 1)
+    rows = np.clip(np.rint(points[:, 1]).astype(int), 0, values.shape[0] - 1)
+    return np.asarray(values[rows, columns])

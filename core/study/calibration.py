@@ -1,0 +1,109 @@
+"""From scored frames to a calibrated confidence, and how far it can be believed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.linear_model import LogisticRegression
+from sklearn.metrics import roc_auc_score
+
+from core.errors import UserError
+from core.perception.evidence import Calibration, Evidence
+from core.study.accuracy import FrameScore
+
+WRONG_THETA_DEG, WRONG_HEAD_PX = 5.0, 15.0
+"""An answer is wrong when theta or head is off by more than this, or when there is no robot at all."""
+_LEAST = 20
+"""Right and wrong answers that a fit needs."""
+
+
+class CalibrationError(UserError):
+    """The frames do not allow a calibration; the message is one line and says what to do."""
+
+
+def is_right(score: FrameScore) -> bool:
+    """Whether an answered frame was answered rightly."""
+    if not score.expected or score.theta_error_deg is None or score.head_error_px is None:
+        return False
+    return abs(score.theta_error_deg) <= WRONG_THETA_DEG and score.head_error_px <= WRONG_HEAD_PX
+
+
+def fit(evidence: Sequence[Sequence[float]], right: Sequence[bool], fitted_on: dict[str, Any]) -> Calibration:
+    """Fit a calibration on the evidence of answered frames (N, F) and whether each answer was right.
+
+    Raises
+    ------
+    CalibrationError
+        Too few right or wrong answers to learn from.
+    """
+    if min(sum(right), len(right) - sum(right)) < _LEAST:
+        found = f"{sum(right)} right and {len(right) - sum(right)} wrong answers"
+        raise CalibrationError(f"{found}: a calibration needs {_LEAST} of each; give it more frames (synth --count)")
+    x = np.array(evidence, np.float64)
+    mean, scale = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-3)
+    standard = np.clip((x - mean) / scale, -4.0, 4.0)
+    regression = LogisticRegression(C=0.3, max_iter=1000).fit(standard, np.array(right))
+    return Calibration(
+        features=Evidence.names(),
+        mean=tuple(mean.tolist()),
+        scale=tuple(scale.tolist()),
+        weights=tuple(regression.coef_[0].tolist()),
+        offset=float(regression.intercept_[0]),
+        fitted_on=fitted_on | {"answers": len(right), "right": int(sum(right))},
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Bin:
+    """Answers whose confidence lies in ``low``..``high``: how many, what they promised on average, and what share was right."""
+
+    low: float
+    high: float
+    count: int
+    mean_confidence: float
+    right_share: float
+
+
+def reliability(confidence: NDArray[np.float64], right: NDArray[np.bool_], edges: Sequence[float]) -> list[Bin]:
+    """The reliability table over the bins between `edges` (ascending, 0..1); empty bins are left out."""
+    place = np.clip(np.digitize(confidence, edges) - 1, 0, len(edges) - 2)
+    bins = []
+    for index in range(len(edges) - 1):
+        inside = place == index
+        if inside.any():
+            promised, kept = float(confidence[inside].mean()), float(right[inside].mean())
+            bins.append(Bin(edges[index], edges[index + 1], int(inside.sum()), promised, kept))
+    return bins
+
+
+def expected_calibration_error(bins: Sequence[Bin]) -> float | None:
+    """Mean distance of promise and truth over the bins, weighted by their counts; None without answers."""
+    total = sum(b.count for b in bins)
+    return sum(b.count * abs(b.mean_confidence - b.right_share) for b in bins) / total if total else None
+
+
+def auroc(confidence: NDArray[np.float64], right: NDArray[np.bool_]) -> float | None:
+    """Probability that a right answer is more confident than a wrong one; None when there are not both kinds."""
+    return float(roc_auc_score(right, confidence)) if right.any() and not right.all() else None
+
+
+_EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 1.0)
+
+
+def describe_confidence(scores: Sequence[FrameScore]) -> dict[str, Any]:
+    """How far the confidence of the answered frames can be believed: AUROC, calibration error, reliability table."""
+    answered = [score for score in scores if score.answered]
+    confidence = np.array([score.confidence for score in answered])
+    right = np.array([is_right(score) for score in answered], np.bool_)
+    bins = reliability(confidence, right, _EDGES)
+    return {
+        "confidence_auroc": auroc(confidence, right),
+        "calibration_error": expected_calibration_error(bins),
+        "reliability": {
+            f"{b.low:.2f}-{b.high:.2f}": {"n": b.count, "promised": b.mean_confidence, "right": b.right_share} for b in bins
+        },
+    }
