@@ -48,18 +48,18 @@ def _level(values: NDArray[np.uint8], share: float) -> float:
 
 
 def sharpness(image: Image) -> float:
-    """Steepest brightness step against the image's whole contrast, per px: 0.3 and more for a sharp edge, 1/width for a blurred
-    one.
+    """Steepest brightness step against the image's whole contrast, per px: some 0.15 for a sharp edge, 1/width for a blurred one.
 
-    It does not depend on exposure, and a light smoothing keeps noise from passing for sharpness.
+    It does not depend on exposure, and it is taken at half size, lightly smoothed, so that noise does not pass for sharpness.
     """
-    grey = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), (0, 0), 1.5)
+    half = cv2.resize(image, (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2)), interpolation=cv2.INTER_AREA)
+    grey = cv2.GaussianBlur(cv2.cvtColor(half, cv2.COLOR_RGB2GRAY), (3, 3), 0.75)
     across, down = cv2.Sobel(grey, cv2.CV_16S, 1, 0, ksize=3), cv2.Sobel(grey, cv2.CV_16S, 0, 1, ksize=3)
-    steepness = np.sort(np.hypot(across[::2, ::2].astype(np.float32), down[::2, ::2]), axis=None)
-    levels = np.sort(grey[::SAMPLE_STEP, ::SAMPLE_STEP], axis=None)
-    contrast = float(levels[int(0.99 * (len(levels) - 1))]) - float(levels[int(0.01 * (len(levels) - 1))])
-    steepest = float(steepness[int(0.995 * (len(steepness) - 1))]) / 8.0
-    return steepest / max(contrast, 1.0)
+    steepness = np.hypot(across.astype(np.float32), down).ravel()
+    place = int(0.995 * (len(steepness) - 1))
+    steepest = float(np.partition(steepness, place)[place]) / 16.0
+    samples = np.ascontiguousarray(grey[::2, ::2])
+    return steepest / max(_level(samples, 0.99) - _level(samples, 0.01), 1.0)
 
 
 def check_masks(masks: Masks) -> Refusal | None:
