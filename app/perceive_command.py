@@ -64,6 +64,8 @@ def run_perceive(
             else:
                 scene = _perceive_one(pipeline, picture, picture.image, tally.done, targets)
                 record = scene_to_json(picture.name, scene)
+                if scene.route_problem:
+                    tally.notes.append(f"{picture.name}: no route to the target: {scene.route_problem}")
                 tally.done += 1
             _write_line(lines, json.dumps(record, allow_nan=False), outputs.jsonl)
             if picture.image is not None:
@@ -83,12 +85,15 @@ class _Tally:
     done: int = 0
     unwritten: int = 0
     problems: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def problem(self, line: str) -> None:
         self.problems.append(line)
 
     def close(self, unused_targets: list[str]) -> None:
         """Say what went wrong, once; raises UserError where nothing could be done or something was not written."""
+        for note in self.notes:
+            sys.stderr.write(f"note: {note}\n")
         if unused_targets:
             sys.stderr.write(f"note: targets of no picture: {', '.join(unused_targets)}\n")
         if self.unwritten:

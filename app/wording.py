@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from core.config import PoseConfig
-from core.types import Advice, Pose, PoseState, Reason, Refusal, Speed
+from core.types import Advice, Pose, PoseState, Reason, Refusal, Scene, Speed
 
 STATE_TITLE = {
     PoseState.A: "On the centerline",
@@ -129,3 +129,10 @@ def advice_headline(advice: Advice) -> str:
     if abs(advice.steer_deg) < 0.5:
         return f"{SPEED_WORD[advice.speed]}, straight"
     return f"{SPEED_WORD[advice.speed]}, {abs(advice.steer_deg):.0f}° {side(advice.steer_deg)}"
+
+
+def target_note(scene: Scene) -> str:
+    """How far it is to the operator's target, or why that is not known."""
+    if scene.route is not None:
+        return f"{scene.route.length_px:.0f} px to go"
+    return f"no way: {scene.route_problem}" if scene.route_problem else "distance unknown without a pose"

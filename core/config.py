@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.errors import UserError
+from core.safety_config import SafetyConfig
 from core.servo_config import ServosConfig
 
 RESOURCES = Path(__file__).resolve().parent.parent / "resources"

@@ -206,7 +206,7 @@ class Scene:
 
     ``scale`` is working pixels per source pixel along the longer side, and ``scale_xy`` in x and y, which differ by the rounding to
     whole pixels (None: both are ``scale``); ``source_size`` is (width, height) of the frame. Stages that were not reached are None.
-    ``latency_ms`` maps stage name to milliseconds, with "total".
+    ``latency_ms`` maps stage name to milliseconds, with "total". ``route_problem`` says why there is no way to the target.
     """
 
     frame_index: int
@@ -225,6 +225,7 @@ class Scene:
     refusal: Refusal | None = None
     latency_ms: dict[str, float] = field(default_factory=dict)
     evidence: tuple[float, ...] | None = None
+    route_problem: str = ""
     scale_xy: tuple[float, float] | None = None
 
     def points_to_source(self, points: Points) -> Points:

@@ -14,6 +14,7 @@ from app import palette
 from app.scene_shapes import scene_shapes
 from app.widgets.head_loupe import HeadLoupe
 from app.widgets.overlays import Layer, Overlay, OverlayItem
+from app.wording import target_note
 from core.types import Frame, Image, Point, Scene
 
 _VESSEL, _ROBOT, _VESSEL_SKELETON, _ROBOT_SKELETON = 1, 2, 4, 8
@@ -142,7 +143,8 @@ class LiveView(QWidget):
     def _show_marks(self) -> None:
         scene = self._scene
         shapes = scene_shapes(scene) if scene is not None else None
-        self._marks.show_overlay(Overlay(shapes, scene.pose if scene is not None else None, self._target))
+        note = target_note(scene) if scene is not None and self._target is not None else ""
+        self._marks.show_overlay(Overlay(shapes, scene.pose if scene is not None else None, self._target, note))
 
     def _show_loupe(self) -> None:
         scene, image = self._scene, self._image

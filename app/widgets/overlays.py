@@ -45,11 +45,12 @@ class Layer(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overlay:
-    """All that the item needs to paint. ``target`` is in source pixels."""
+    """All that the item needs to paint. ``target`` is in source pixels; ``target_note`` is written beside it."""
 
     shapes: SceneShapes | None
     pose: Pose | None
     target: Point | None
+    target_note: str = ""
 
 
 class OverlayItem(pg.GraphicsObject):
@@ -109,6 +110,8 @@ class OverlayItem(pg.GraphicsObject):
                 pencil.ring(shapes.head, palette.HEAD, 8.0)
         if Layer.ROUTE in self._visible and self._overlay.target is not None:
             pencil.crosshair(self._overlay.target, palette.TARGET, 13.0)
+            if self._overlay.target_note:
+                pencil.tag(self._overlay.target, self._overlay.target_note, palette.TARGET)
 
 
 def _draw_robot(pencil: Pencil, shapes: SceneShapes) -> None:

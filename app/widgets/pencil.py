@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF, QTransform
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF, QTransform
 
 from app import palette, theme
 from core.types import Point, Points, Vector
@@ -13,6 +13,7 @@ from core.types import Point, Points, Vector
 _ARC_RADIUS = 44.0
 _LABEL_GAP = 16.0
 _MARGIN = 60.0
+_TAG_PX = 15
 
 
 class Pencil:
@@ -111,6 +112,20 @@ class Pencil:
         box.moveLeft(max(self._room.left() + 4, min(box.left(), self._room.right() - width - 4)))
         box.moveTop(max(self._room.top() + 4, min(box.top(), self._room.bottom() - height - 4)))
         self._labels.append(box)
+        self._text_box(box, text, text_font, name)
+
+    def tag(self, point: Point, text: str, name: str) -> None:
+        """A text of fixed size below `point`, kept inside the window."""
+        text_font = theme.semi_bold(_TAG_PX)
+        width, height = QFontMetricsF(text_font).horizontalAdvance(text) + 14.0, _TAG_PX + 9.0
+        at = self._at(point)
+        box = QRectF(at.x() - width / 2, at.y() + 20.0, width, height)
+        box.moveLeft(max(self._room.left() + 4, min(box.left(), self._room.right() - width - 4)))
+        if box.bottom() > self._room.bottom() - 4:
+            box.moveTop(at.y() - 20.0 - height)
+        self._text_box(box, text, text_font, name)
+
+    def _text_box(self, box: QRectF, text: str, text_font: QFont, name: str) -> None:
         self._painter.setPen(Qt.PenStyle.NoPen)
         self._painter.setBrush(theme.colour(palette.INK, 0.72))
         self._painter.drawRoundedRect(box, 4.0, 4.0)

@@ -12,7 +12,7 @@ from core.perception import gaps, masks, quality, robot_path, skeleton
 from core.perception.centerline import find as find_centerline
 from core.perception.evidence import Calibration, collect
 from core.perception.pose import StateFilter, measure
-from core.perception.route import plan_route
+from core.perception.route import route_or_reason
 from core.perception.segmentation import Segmenter, open_segmenter, to_working
 from core.perception.tracking import Memory, check_jump, recall
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
@@ -126,7 +126,8 @@ class Pipeline:
         assert graph is not None
         assert skeletons is not None
         if target is not None:
-            scene = replace(scene, route=plan_route(graph, path.head, scene.to_working(target)))
+            way = route_or_reason(graph, path.head, scene.to_working(target))
+            scene = replace(scene, route_problem=way) if isinstance(way, str) else replace(scene, route=way)
         robot_vector = fit_robot_vector(path.points, config.vectors.robot_length_px, config.vectors.line_fit)
         refusal = quality.check_path(path, found, config)
         if robot_vector is None or refusal is not None:

@@ -9,6 +9,23 @@ import numpy as np
 from core.perception import polyline
 from core.types import Point, Route, VesselGraph
 
+OFF_VESSEL_PX = 15.0
+"""A click so far beside the lumen is still taken for one on the vessel."""
+
+
+def route_or_reason(graph: VesselGraph, start: Point, target: Point) -> Route | str:
+    """The route, or in plain words why there is none: the target is beside the vessel, or no vessel that was found leads there."""
+    there = _place(graph, target)
+    if there is None:
+        return "no vessel was found"
+    edge = graph.edges[there[0]]
+    away_px, _, _ = polyline.nearest(edge.points, target)
+    place = int(np.argmin(np.sum((edge.points - np.array(target)) ** 2, axis=1)))
+    beside_px = away_px - float(edge.radius[place])
+    if beside_px > OFF_VESSEL_PX:
+        return f"the target is {beside_px:.0f} px beside the vessel"
+    return plan_route(graph, start, target) or "no vessel that was found leads there"
+
 
 def plan_route(graph: VesselGraph, start: Point, target: Point) -> Route | None:
     """The shortest way along the graph from the place beside `start` to the place nearest to `target`.

@@ -189,6 +189,14 @@ def test_a_target_in_source_pixels_becomes_a_route(pipeline: Pipeline, network: 
     assert pipeline(frame(size=size)).route is None
 
 
+def test_a_target_beside_the_vessel_leaves_the_pose_and_says_why(pipeline: Pipeline) -> None:
+    scene = pipeline(frame(), (600.0, 40.0))
+    assert scene.pose is not None
+    assert scene.route is None
+    assert "px beside the vessel" in scene.route_problem
+    assert pipeline(frame()).route_problem == ""
+
+
 # ---- without a model ----
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from core.perception.polyline import arc_length
-from core.perception.route import plan_route
+from core.perception.route import plan_route, route_or_reason
 from core.types import GraphEdge, Point, VesselGraph
 
 
@@ -44,6 +44,16 @@ def test_the_shorter_way_round_a_loop(start: Point, target: Point, length: float
     assert list(corner) in route.points.tolist()
     assert route.points[0] == pytest.approx(start)
     assert route.points[-1] == pytest.approx(target)
+
+
+def test_a_target_that_cannot_be_reached_says_why() -> None:
+    apart = graph_of([(0, 0), (100, 0), (0, 200), (100, 200)], [(0, 1), (2, 3)])
+    assert route_or_reason(apart, (20, 0), (50, 200)) == "no vessel that was found leads there"
+    assert route_or_reason(apart, (20, 0), (50, 60)) == "the target is 50 px beside the vessel"
+    assert route_or_reason(VesselGraph(np.zeros((0, 2)), ()), (20, 0), (50, 60)) == "no vessel was found"
+    near = route_or_reason(apart, (20, 0), (50, 24))  # 14 px beside the lumen of radius 10
+    assert not isinstance(near, str)
+    assert near.length_px == pytest.approx(30)
 
 
 def test_the_way_out_of_a_vessel_and_back_into_it_when_that_is_shorter() -> None:
