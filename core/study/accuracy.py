@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from core.learning.dataset import Sample
 from core.perception.pipeline import Pipeline
+from core.study.classification import kappa
 from core.types import Frame, Image, Mask, Point, Reason, Scene
 
 
@@ -122,20 +123,6 @@ def _statistics(values: Sequence[float]) -> dict[str, float] | None:
         return None
     array = np.abs(np.array(values))
     return {"median": float(np.median(array)), "mean": float(array.mean()), "p95": float(np.percentile(array, 95))}
-
-
-def kappa(true: Sequence[str], found: Sequence[str]) -> float | None:
-    """Cohen's kappa of two labellings; None when it is not defined."""
-    labels = sorted(set(true) | set(found))
-    table = np.zeros((len(labels), len(labels)))
-    for a, b in zip(true, found, strict=True):
-        table[labels.index(a), labels.index(b)] += 1
-    total = table.sum()
-    if total == 0:
-        return None
-    observed = np.trace(table) / total
-    chance = float((table.sum(0) * table.sum(1)).sum() / total**2)
-    return None if chance >= 1.0 else float((observed - chance) / (1 - chance))
 
 
 def summarise(scores: Sequence[FrameScore]) -> dict[str, Any]:

@@ -1,0 +1,186 @@
+"""``evaluate``: algorithm against manual measures, as the paper did it: figures, table, report."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.evaluation_report import print_tables, render_report
+from app.learning_commands import progress_bar
+from core.config import Config, load_config
+from core.study.evaluation import EvaluationError, Measurement, angle_pairs, evaluate, read_measurements, write_measurements
+from core.study.paper_study import PAPER, against_paper, choose_images, measure_twice, wanted_images
+from core.types import Frame, PoseState
+
+
+@dataclass(frozen=True, slots=True)
+class LikePaper:
+    """A study built like the paper's: its share of states, two manual measures with an error of so many degrees (SD)."""
+
+    manual_sd_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Study:
+    """What is to be evaluated, where it comes from, and what is to be said about it."""
+
+    rows: list[Measurement]
+    source: dict[str, Any]
+    notes: list[str]
+
+
+def run_evaluate(
+    folder: Path | None,
+    csv: Path | None,
+    out: Path,
+    *,
+    as_json: bool,
+    model: str | None,
+    preset: str | None,
+    config_path: Path | None,
+    like_paper: LikePaper | None,
+    seed: int,
+) -> None:
+    """Evaluate a table or a labelled set and write everything to `out`; raises UserError."""
+    if (folder is None) == (csv is None):
+        raise EvaluationError("give either a labelled set (evaluate DIR) or a table (evaluate --csv FILE)")
+    if csv is not None:
+        if like_paper is not None or model is not None or preset is not None or config_path is not None:
+            raise EvaluationError("--like-paper, --model, --preset and --config need a labelled set (evaluate DIR), not --csv")
+        study = _Study(read_measurements(csv), {"kind": "table of measures", "name": csv.name}, [])
+        _make_folder(out)
+    else:
+        assert folder is not None
+        truth = _read_set(folder)
+        _make_folder(out)
+        config = load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model else None)
+        study = _perceive_set(folder, truth, config, preset, like_paper, seed)
+    metrics = {"source": study.source, "seed": seed} | evaluate(study.rows, seed)
+    if csv is not None and not metrics["angle"]["n"] and not metrics["state"]["n"]:
+        raise EvaluationError(f"{csv}: no row has both a manual and an algorithmic measure; nothing to compare")
+    metrics["notes"] = study.notes + metrics["notes"]
+    metrics["paper"] = PAPER
+    if like_paper is not None:
+        metrics["against_paper"] = against_paper(metrics)
+    try:
+        _write(out, study.rows, metrics)
+    except OSError as error:
+        raise EvaluationError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from None
+    if as_json:
+        sys.stdout.write(json.dumps(metrics, allow_nan=False) + "\n")
+    else:
+        print_tables(metrics)
+        sys.stderr.write(f"report and figures are in {out}\n")
+
+
+def _make_folder(out: Path) -> None:
+    """Before the work, so that nobody waits for results that cannot be kept."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise EvaluationError(f"{out}: cannot be made ({error.strerror}); choose another --out") from None
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise EvaluationError(f"{out}: cannot be written to; choose another --out")
+
+
+def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
+    from app.evaluation_figures import ENDINGS, FIGURES, draw_figures, save_figure
+
+    (out / "metrics.json").write_text(json.dumps(metrics, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    write_measurements(out / "measurements.csv", rows)
+    figures = draw_figures(angle_pairs(rows), metrics)
+    for name in FIGURES:
+        for ending in ENDINGS:
+            path = out / f"{name}{ending}"
+            if name in figures:
+                save_figure(figures[name], path)
+            else:  # of an earlier evaluation; it would belie this one
+                path.unlink(missing_ok=True)
+    (out / "report.html").write_text(render_report(metrics, figures), encoding="utf-8")
+
+
+@dataclass(frozen=True, slots=True)
+class _Truth:
+    """A labelled image; theta and state are None where it shows no pose."""
+
+    stem: str
+    image: Path
+    theta_deg: float | None
+    state: str | None
+
+
+def _read_set(folder: Path) -> list[_Truth]:
+    """The images of a labelled set with their truth, by name; raises EvaluationError, DatasetError."""
+    from core.learning.dataset import find_samples, read_truth
+
+    if not (folder / "truth.jsonl").is_file() or not (folder / "images").is_dir():
+        what = "needs images/ and truth.jsonl, as synth writes them" if folder.is_dir() else "no such folder"
+        raise EvaluationError(f"{folder}: not a labelled set ({what}); for a table use --csv FILE")
+    truth = read_truth(folder)
+    found = []
+    for sample in find_samples([folder]):
+        row = truth.get(sample.stem)
+        if row is None:
+            raise EvaluationError(f"{folder}: frame {sample.stem} lacks a truth; write the set again with synth")
+        theta, state = row.get("theta_deg"), row.get("state")
+        if not (theta is None or isinstance(theta, int | float)) or not (state is None or state in set(PoseState)):
+            raise EvaluationError(f"{folder}: frame {sample.stem}: theta_deg {theta!r} or state {state!r} makes no sense")
+        posed = theta is not None and state is not None
+        found.append(_Truth(sample.stem, sample.image, float(theta) if posed else None, state if posed else None))
+    return found
+
+
+def _perceive_set(
+    folder: Path, truth: list[_Truth], config: Config, preset: str | None, like_paper: LikePaper | None, seed: int
+) -> _Study:
+    """Perceive each image by itself; the truth (or two noisy measures of it) stands for the manual measure."""
+    notes: list[str] = []
+    source: dict[str, Any] = {"kind": "labelled set", "name": folder.name}
+    measured: dict[str, tuple[float, float | None]] = {t.stem: (t.theta_deg, None) for t in truth if t.theta_deg is not None}
+    if like_paper is not None:
+        states = {t.stem: t.state for t in truth if t.state is not None}
+        chosen = choose_images(states, seed)
+        if not chosen:
+            raise EvaluationError(f"{folder}: has no image of the states B, C and D, which the paper's test consists of")
+        truth = [t for t in truth if t.stem in set(chosen)]
+        angles = [t.theta_deg for t in truth if t.theta_deg is not None]
+        measured = dict(zip([t.stem for t in truth], measure_twice(angles, like_paper.manual_sd_deg, seed), strict=True))
+        wanted, having = wanted_images(), Counter(t.state for t in truth)
+        source |= {"kind": "study like the paper's", "wanted": wanted, "manual_sd_deg": like_paper.manual_sd_deg}
+        notes += [f"The set has {having[s]} of the {n} wanted images of state {s}." for s, n in wanted.items() if having[s] < n]
+        notes.append(
+            f"Built like the paper's test: {len(truth)} images drawn with seed {seed}; each manual angle is the true one with a "
+            f"normal error of {like_paper.manual_sd_deg:g}° (SD), the manual state is the true one."
+        )
+    rows, reasons, engine = _perceive(truth, measured, config)
+    source |= {"model": config.perception.segmentation.model, "preset": preset, "engine": engine, "refused": reasons}
+    poseless = [row for row in rows if row.state is None]
+    if poseless:
+        answered = sum(row.algorithm_state is not None for row in poseless)
+        notes.append(f"{len(poseless)} images show no pose to measure (the algorithm answered {answered} of them).")
+    return _Study(rows, source, notes)
+
+
+def _perceive(
+    truth: list[_Truth], measured: dict[str, tuple[float, float | None]], config: Config
+) -> tuple[list[Measurement], dict[str, int], str]:
+    """Rows, how often which reason was given on images with a pose, and where the network ran."""
+    from core.images import read_image
+    from core.perception.pipeline import open_pipeline
+
+    pipeline = open_pipeline(config.perception)
+    rows: list[Measurement] = []
+    reasons: Counter[str] = Counter()
+    with progress_bar() as bar:
+        for one in bar.track(truth, description="images"):
+            scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(one.image)))
+            angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
+            rows.append(Measurement(one.stem, *measured.get(one.stem, (None, None)), one.state, angle, state))
+            if scene.refusal is not None and one.state is not None:
+                reasons[scene.refusal.reason.value] += 1
+    return rows, dict(sorted(reasons.items())), pipeline.engine

@@ -1,0 +1,177 @@
+"""What an evaluation shows: the rows of its tables, on the terminal and in ``report.html``."""
+
+from __future__ import annotations
+
+import io
+import re
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from core.config import RESOURCES
+from core.study.bootstrap import RESAMPLES
+from core.study.paper_study import ANGLE_FIGURES, CLASS_SCORES, PAPER, STATE_FIGURES, FigureKind, Kind, Verdict, verdict
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_NAMED = 8
+"""So many figures that are not bettered are named; the tables and ``against_paper`` in metrics.json have them all."""
+_AVERAGES = {"macro": "Macro average", "weighted": "Weighted average"}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One figure of the evaluation beside the paper's, as text."""
+
+    label: str
+    ours: str
+    interval: str
+    paper: str
+    verdict: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClassRow:
+    """Precision, recall and F1 of a state or an average, ours and the paper's, as text; ``index`` is the state's own FM."""
+
+    label: str
+    n: str
+    ours: tuple[str, ...]
+    index: str
+    paper: tuple[str, ...]
+    is_average: bool
+
+
+def comparison_rows(metrics: Mapping[str, Any], figures: Sequence[FigureKind]) -> list[Row]:
+    """The given figures with their intervals, and the paper's where it has them."""
+    rows = []
+    for figure in figures:
+        section, write = metrics[figure.section], figure.kind.write
+        ours, interval = section[figure.name], section["ci95"][figure.name]
+        paper = PAPER.get(figure.section, {}).get(figure.name)
+        judged = verdict(figure.kind, figure.better, ours, paper)
+        span = f"{write(interval[0], unit=False)} to {write(interval[1])}" if interval else "–"
+        rows.append(Row(figure.label, write(ours), span, write(paper), judged.value if judged else ""))
+    return rows
+
+
+def class_rows(state: Mapping[str, Any]) -> list[ClassRow]:
+    """The paper's table of states: one row per state that occurs, then both averages."""
+
+    def texts(row: Mapping[str, Any] | None) -> tuple[str, ...]:
+        return tuple(Kind.RATIO.write(row[score] if row else None) for score in CLASS_SCORES)
+
+    papers = PAPER["state"]
+    rows = []
+    for label, row in state["per_class"].items():
+        index, paper = Kind.RATIO.write(row["fowlkes_mallows"]), texts(papers["per_class"].get(label))
+        rows.append(ClassRow(label, str(row["n"]), texts(row), index, paper, False))
+    if rows:
+        n = str(state["n"])
+        rows += [ClassRow(words, n, texts(state[key]), "", texts(papers[key]), True) for key, words in _AVERAGES.items()]
+    return rows
+
+
+def print_tables(metrics: Mapping[str, Any]) -> None:
+    """All figures on standard output, the paper's beside ours, then the notes."""
+    console, judged = Console(), "against_paper" in metrics
+    for title, figures, n in (("Angle", ANGLE_FIGURES, metrics["angle"]["n"]), ("State", STATE_FIGURES, metrics["state"]["n"])):
+        table = _table(f"{title} (n = {n})", "here", "95 % interval", "paper", *(["verdict"] if judged else []))
+        for row in comparison_rows(metrics, figures):
+            table.add_row(row.label, row.ours, row.interval, row.paper, *([row.verdict] if judged else []))
+        console.print(table, "")
+    classes, state = class_rows(metrics["state"]), metrics["state"]
+    if classes:
+        table = _table("State", "n", "precision", "recall", "F1", "FM", "paper's P, R, F1")
+        for each in classes:
+            table.add_row(each.label, each.n, *each.ours, each.index, "  ".join(each.paper))
+        counts = _table("manual \\ algorithm", *state["labels"])
+        for label, numbers in zip(state["labels"], state["confusion"], strict=True):
+            counts.add_row(label, *map(str, numbers))
+        console.print(table, "", counts, "")
+    if judged:
+        console.print(summary_against_paper(metrics["against_paper"]), soft_wrap=True)
+    for note in metrics["notes"]:
+        console.print(f"note: {note}", soft_wrap=True, highlight=False)
+
+
+def _table(first: str, *others: str) -> Table:
+    """Without lines: the widest one fits into eighty columns."""
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
+    table.add_column(first, no_wrap=True)
+    for heading in others:
+        table.add_column(heading, justify="right", no_wrap=True)
+    return table
+
+
+def summary_against_paper(verdicts: Mapping[str, str | None]) -> str:
+    """How many of the paper's figures are bettered, and which are not."""
+    rest = [f"{name} ({value or 'undefined'})" for name, value in verdicts.items() if value != Verdict.BETTER]
+    better = f"{len(verdicts) - len(rest)} of the paper’s {len(verdicts)} figures are bettered"
+    return f"{better}; not: {', '.join(rest)}." if 0 < len(rest) <= _NAMED else f"{better}."
+
+
+def render_report(metrics: Mapping[str, Any], figures: Mapping[str, Figure]) -> str:
+    """The report as one HTML page that needs nothing else, figures inside as SVG."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(loader=FileSystemLoader(RESOURCES / "report"), autoescape=True, undefined=StrictUndefined)
+    environment.trim_blocks = environment.lstrip_blocks = True
+    source, angle, state = metrics["source"], metrics["angle"], metrics["state"]
+    verdicts = metrics.get("against_paper")
+    notes = [*([summary_against_paper(verdicts)] if verdicts else []), *metrics["notes"]]
+    text = environment.get_template("evaluation.html.j2").render(
+        title=f"Evaluation of {source['name']}",
+        lead=_lead(metrics),
+        notes=notes,
+        verdicts=bool(verdicts),
+        angle_rows=_typeset(comparison_rows(metrics, ANGLE_FIGURES)),
+        state_rows=_typeset(comparison_rows(metrics, STATE_FIGURES)),
+        class_rows=class_rows(state),
+        angle_caption=f"Angle between robot and vessel, algorithm against manual, n = {angle['n']}.",
+        state_caption=f"Pose state, algorithm against manual, n = {state['n']}.",
+        figures={name: inline_svg(figure, name) for name, figure in figures.items()},
+        resamples=RESAMPLES,
+        seed=metrics["seed"],
+    )
+    return re.sub(r"\n\s*\n+", "\n", text) + "\n"
+
+
+def _typeset(rows: list[Row]) -> list[Row]:
+    """With true minus signs."""
+
+    def minus(text: str) -> str:
+        return re.sub(r"-(?=\d)", "−", text)
+
+    return [Row(row.label, minus(row.ours), minus(row.interval), minus(row.paper), row.verdict) for row in rows]
+
+
+def _lead(metrics: Mapping[str, Any]) -> str:
+    source, images = metrics["source"], metrics["images"]
+    parts = [f"{source['kind'][0].upper()}{source['kind'][1:]}, {images['n']} images"]
+    if images["unanswered"]:
+        parts.append(f"{images['answered']} of {images['measured']} measured ones answered")
+    if "model" in source:
+        parts.append(f"model {source['model']}" + (f", preset {source['preset']}" if source["preset"] else ""))
+    parts.append(time.strftime("%Y-%m-%d", time.gmtime()))
+    return " · ".join(parts)
+
+
+def inline_svg(figure: Figure, prefix: str) -> str:
+    """The figure as an ``<svg>`` element for HTML: no outside names, and ids of its own among other figures."""
+    from app.evaluation_figures import write_svg
+
+    buffer = io.StringIO()
+    write_svg(figure, buffer)
+    svg = buffer.getvalue()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", svg)  # HTML knows both name spaces by itself
+    svg = re.sub(r'\sid="', rf"\g<0>{prefix}-", svg)
+    svg = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{prefix}-", svg)
+    return svg.strip()

@@ -1,0 +1,132 @@
+"""How well two measures of an angle agree: bias, spread, correlation, limits of agreement, intraclass correlation. In degrees.
+
+Statistics run along the last axis, so that one call computes all bootstrap resamples. What is undefined is NaN in arrays and
+None in the dictionaries that leave this module.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.stats import ConstantInputWarning, NearConstantInputWarning, pearsonr, rankdata
+
+from core.study.bootstrap import Floats, bootstrap_rows
+
+RANGE_DEG = 180.0
+SHARE_EDGES_PERCENT = (0, 4, 8, 12, 16)
+LIMITS_SD = 1.96
+"""Bland-Altman limits of agreement lie so many standard deviations from the mean error."""
+
+
+def icc_absolute(ratings: Floats) -> Floats:
+    """Intraclass correlation ICC(2,1): two-way random effects, absolute agreement, single measure.
+
+    Parameters
+    ----------
+    ratings : shape (..., n, k): n subjects, each measured by k raters.
+
+    Returns
+    -------
+    array
+        Shape (...); NaN where all ratings are equal, or there is only one subject.
+
+    References
+    ----------
+    Shrout and Fleiss, "Intraclass correlations: uses in assessing rater reliability", Psychological Bulletin 86 (1979), case 2.
+    """
+    n, k = ratings.shape[-2:]
+    if n < 2 or k < 2:
+        return np.full(ratings.shape[:-2], np.nan)
+    centred = ratings - ratings.mean((-2, -1), keepdims=True)
+    subjects, raters = centred.mean(-1, keepdims=True), centred.mean(-2, keepdims=True)
+    between_subjects = k * (subjects**2).sum((-2, -1)) / (n - 1)
+    between_raters = n * (raters**2).sum((-2, -1)) / (k - 1)
+    residual = ((centred - subjects - raters) ** 2).sum((-2, -1)) / ((n - 1) * (k - 1))
+    total = between_subjects + (k - 1) * residual + k * (between_raters - residual) / n
+    varied = np.ptp(ratings, axis=(-2, -1)) > 0
+    undefined = np.full(total.shape, np.nan)
+    return np.asarray(np.divide(between_subjects - residual, total, out=undefined, where=varied & (total > 0)))
+
+
+def correlation(first: Floats, second: Floats) -> Floats:
+    """Pearson's correlation along the last axis; NaN where one of the two is constant or has fewer than two values."""
+    if first.shape[-1] < 2:
+        return np.full(first.shape[:-1], np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConstantInputWarning)
+        warnings.simplefilter("ignore", NearConstantInputWarning)
+        found = np.asarray(pearsonr(first, second, axis=-1).statistic, np.float64)
+    # Rounding of the mean leaves a constant column some 1e-16 of spread, which would correlate with anything.
+    varied = (np.ptp(first, axis=-1) > 0) & (np.ptp(second, axis=-1) > 0)
+    return np.where(varied, found, np.nan)
+
+
+def shares(error_deg: Floats) -> dict[str, Floats]:
+    """Fractions of ``|error|`` per bin of percent of 180 degrees; an error on an edge belongs to the bin below it."""
+    # 1e-9: the difference of two angles given in tenths must not miss an edge by rounding.
+    percent = np.abs(error_deg) / RANGE_DEG * 100.0 - 1e-9
+    found = {}
+    for low, high in zip(SHARE_EDGES_PERCENT, SHARE_EDGES_PERCENT[1:], strict=False):
+        inside = (percent <= high) & ((percent > low) | (low == 0))
+        found[f"share_{low}_{high}"] = inside.mean(-1)
+    found[f"share_over_{SHARE_EDGES_PERCENT[-1]}"] = (percent > SHARE_EDGES_PERCENT[-1]).mean(-1)
+    return found | {"share_0_8": (percent <= 8).mean(-1)}
+
+
+def angle_statistics(manual_deg: Floats, algorithm_deg: Floats) -> dict[str, Floats]:
+    """All statistics of algorithm against manual along the last axis (n values, n >= 1), each of shape (...).
+
+    Error = algorithm - manual; the standard deviation is the sample's (n - 1). Names are those of ``metrics.json``.
+    """
+    error = algorithm_deg - manual_deg
+    mean = error.mean(-1)
+    sd = error.std(-1, ddof=1) if error.shape[-1] > 1 else np.full(mean.shape, np.nan)
+    size = np.abs(error)
+    return {
+        "mean_error_deg": mean,
+        "sd_deg": sd,
+        "median_deg": np.median(error, axis=-1),
+        "mean_abs_error_deg": size.mean(-1),
+        "median_abs_error_deg": np.median(size, axis=-1),
+        "pearson": correlation(manual_deg, algorithm_deg),
+        "spearman": correlation(rankdata(manual_deg, axis=-1), rankdata(algorithm_deg, axis=-1)),
+        "icc": icc_absolute(np.stack([manual_deg, algorithm_deg], -1)),
+        "loa_low_deg": mean - LIMITS_SD * sd,
+        "loa_high_deg": mean + LIMITS_SD * sd,
+    } | shares(error)
+
+
+def _repeat_statistics(first_deg: Floats, second_deg: Floats) -> dict[str, Floats]:
+    """Of the two manual measures: ICC, and the standard deviation of one measure, which is that of the difference / sqrt(2)."""
+    difference = second_deg - first_deg
+    mean = difference.mean(-1)
+    sd = difference.std(-1, ddof=1) if difference.shape[-1] > 1 else np.full(mean.shape, np.nan)
+    return {
+        "mean_difference_deg": mean,
+        "repeatability_sd_deg": sd / np.sqrt(2.0),
+        "icc": icc_absolute(np.stack([first_deg, second_deg], -1)),
+    }
+
+
+def angle_metrics(manual_deg: Floats, algorithm_deg: Floats, seed: int = 0) -> dict[str, Any]:
+    """Statistics of algorithm against manual angles, both of shape (n,), with 95 % bootstrap intervals under ``ci95``."""
+    return _with_intervals(angle_statistics, (manual_deg, algorithm_deg), seed)
+
+
+def repeat_metrics(first_deg: Floats, second_deg: Floats, seed: int = 0) -> dict[str, Any]:
+    """Agreement of two manual measures of the same images, both of shape (n,), with 95 % bootstrap intervals under ``ci95``."""
+    return _with_intervals(_repeat_statistics, (first_deg, second_deg), seed)
+
+
+def _with_intervals(statistics: Any, columns: tuple[Floats, ...], seed: int) -> dict[str, Any]:
+    n = len(columns[0])
+    if n == 0:
+        names = statistics(*(np.zeros(1) for _ in columns))
+        return {"n": 0} | dict.fromkeys(names) | {"ci95": dict.fromkeys(names)}
+    values: Mapping[str, Floats] = statistics(*columns)
+    point = {name: float(value) if np.isfinite(value) else None for name, value in values.items()}
+    intervals = bootstrap_rows(statistics, columns, seed)
+    return {"n": n} | point | {"ci95": {name: intervals[name] if point[name] is not None else None for name in point}}

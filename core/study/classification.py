@@ -1,0 +1,131 @@
+"""How well two labellings agree: confusion, precision and recall, kappa, and both indices named after Fowlkes and Mallows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.metrics import cohen_kappa_score, fowlkes_mallows_score, precision_recall_fscore_support
+
+from core.study.bootstrap import RESAMPLES, Floats, interval_95
+
+_AVERAGED = ("precision", "recall", "f1")
+
+
+def kappa(true: Sequence[str], found: Sequence[str]) -> float | None:
+    """Cohen's kappa of two labellings; None when both know one label only, where chance alone agrees."""
+    return float(cohen_kappa_score(list(true), list(found))) if len({*true, *found}) > 1 else None
+
+
+def fowlkes_mallows_pairs(true: Sequence[str], found: Sequence[str]) -> float | None:
+    """The pair-counting index: of all pairs of images, how alike the two labellings put them together.
+
+    It compares groupings, blind to the labels' names; None when one of the labellings puts no two images together.
+    """
+    if any(len(set(labels)) == len(labels) for labels in (true, found)):
+        return None
+    return float(fowlkes_mallows_score(list(true), list(found)))
+
+
+def table_statistics(tables: NDArray[np.int64]) -> dict[str, Floats]:
+    """Statistics of many confusion tables at once, for the bootstrap (scikit-learn does one at a time, from labels).
+
+    Parameters
+    ----------
+    tables : shape (R, k, k), rows manual, columns algorithm, each with at least one count.
+
+    Returns
+    -------
+    dict
+        Name -> shape (R,), NaN where undefined. Classes absent from a table are left out of its macro averages.
+    """
+    n = tables.sum((1, 2)).astype(np.float64)
+    hits = np.diagonal(tables, axis1=1, axis2=2).astype(np.float64)
+    manual, algorithm = tables.sum(2).astype(np.float64), tables.sum(1).astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        chance = (manual * algorithm).sum(1) / n**2
+        f1 = 2 * hits / (manual + algorithm)
+        per_class = np.sqrt(hits / manual * (hits / algorithm))
+        together = ((tables * (tables - 1)).sum((1, 2))) / np.sqrt(
+            (manual * (manual - 1)).sum(1) * (algorithm * (algorithm - 1)).sum(1)
+        )
+        accuracy = hits.sum(1) / n
+        return {
+            "accuracy": accuracy,
+            "kappa": (accuracy - chance) / (1 - chance),
+            "fowlkes_mallows_pairs": together,
+            "fowlkes_mallows_macro": _mean_of_defined(per_class),
+            "macro_f1": _mean_of_defined(f1),
+            "weighted_f1": np.where(manual > 0, f1 * manual, 0.0).sum(1) / n,
+        }
+
+
+def _mean_of_defined(values: Floats) -> Floats:
+    defined = np.isfinite(values)
+    count = defined.sum(1)
+    return np.asarray(np.where(count > 0, np.where(defined, values, 0.0).sum(1) / np.maximum(count, 1), np.nan))
+
+
+def state_metrics(manual: Sequence[str], algorithm: Sequence[str], seed: int = 0) -> dict[str, Any]:
+    """Statistics of the algorithm's states against the manual ones, with 95 % bootstrap intervals under ``ci95``.
+
+    Parameters
+    ----------
+    manual, algorithm : labels of the same n images.
+    seed : of the bootstrap.
+
+    Returns
+    -------
+    dict
+        As ``metrics.json`` has it. ``labels`` are those that occur on either side; ``confusion`` has manual rows and algorithm
+        columns. Precision of a class that the algorithm never gave, and recall of one that nobody saw, are None and left out of
+        the averages. ``fowlkes_mallows_pairs`` is the pair-counting index, ``fowlkes_mallows_macro`` the mean over the classes
+        of ``sqrt(precision * recall)``, the formula of the paper's table.
+    """
+    n, labels = len(manual), sorted(set(manual) | set(algorithm))
+    if n == 0:
+        return _nothing()
+    confusion = np.zeros((len(labels), len(labels)), np.int64)
+    np.add.at(confusion, ([labels.index(label) for label in manual], [labels.index(label) for label in algorithm]), 1)
+    classes = np.array(_scores(manual, algorithm, labels, None))
+    rows = [{name: _defined(value) for name, value in zip(_AVERAGED, column, strict=True)} for column in classes.T]
+    per_class_fm = np.sqrt(classes[0] * classes[1])
+    cells = np.random.default_rng(seed).multinomial(n, confusion.ravel() / n, RESAMPLES).reshape(-1, *confusion.shape)
+    point = {
+        "accuracy": float(np.trace(confusion) / n),
+        "kappa": kappa(manual, algorithm),
+        "fowlkes_mallows_pairs": fowlkes_mallows_pairs(manual, algorithm),
+        "fowlkes_mallows_macro": _defined(_mean_of_defined(per_class_fm[None])[0]),
+    }
+    averages = {kind: dict(zip(_AVERAGED, map(_defined, _scores(manual, algorithm, labels, kind)), strict=True)) for kind in _KINDS}
+    known = point | {f"{kind}_f1": averages[kind]["f1"] for kind in _KINDS}
+    intervals = {name: interval_95(values) for name, values in table_statistics(cells).items()} if n > 1 else {}
+    per_class = {
+        label: row | {"fowlkes_mallows": _defined(index), "n": int(count)}
+        for label, row, index, count in zip(labels, rows, per_class_fm, confusion.sum(1), strict=True)
+    }
+    ci95 = {name: intervals.get(name) if known[name] is not None else None for name in known}
+    counts = {"n": n, "labels": labels, "confusion": confusion.tolist()}
+    return counts | point | {"per_class": per_class} | averages | {"ci95": ci95}
+
+
+_KINDS = ("macro", "weighted")
+
+
+def _scores(manual: Sequence[str], algorithm: Sequence[str], labels: list[str], average: str | None) -> Any:
+    """Precision, recall and F1: of each class, or averaged."""
+    return precision_recall_fscore_support(list(manual), list(algorithm), labels=labels, average=average, zero_division=np.nan)[:3]
+
+
+def _defined(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _nothing() -> dict[str, Any]:
+    names = ("accuracy", "kappa", "fowlkes_mallows_pairs", "fowlkes_mallows_macro")
+    averages = {kind: dict.fromkeys(_AVERAGED) for kind in _KINDS}
+    empty: dict[str, Any] = {"n": 0, "labels": [], "confusion": []}
+    ci95 = dict.fromkeys((*names, "macro_f1", "weighted_f1"))
+    return empty | dict.fromkeys(names) | {"per_class": {}} | averages | {"ci95": ci95}

@@ -1,0 +1,212 @@
+"""From a table of manual and algorithmic measures to the figures of the paper's evaluation (METHOD section 7)."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from core.errors import UserError
+from core.study.agreement import RANGE_DEG, angle_metrics, repeat_metrics
+from core.study.classification import state_metrics
+from core.types import PoseState
+
+_FULL_TURN_DEG = 360.0
+
+
+class EvaluationError(UserError):
+    """Measures cannot be evaluated; the message is one line and says what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """One image, measured by hand (once or twice) and by the algorithm; None = not measured. Field names are the CSV's columns."""
+
+    image: str
+    angle_1: float | None
+    angle_2: float | None
+    state: str | None
+    algorithm_angle: float | None
+    algorithm_state: str | None
+
+    @property
+    def manual_angle_deg(self) -> float | None:
+        """The mean of the manual measures there are."""
+        measured = [angle for angle in (self.angle_1, self.angle_2) if angle is not None]
+        return sum(measured) / len(measured) if measured else None
+
+
+COLUMNS = tuple(column.name for column in fields(Measurement))
+
+
+def read_measurements(path: Path) -> list[Measurement]:
+    """Rows of a CSV file with the columns ``COLUMNS`` in any order; others are ignored, blank cells mean "not measured".
+
+    Commas, semicolons or tabs separate cells, as the header shows; where it is not the comma, numbers may have a decimal comma.
+
+    Raises
+    ------
+    EvaluationError
+        With file, line and column in one line.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise EvaluationError(f"{path}: no such file") from None
+    except OSError as error:
+        raise EvaluationError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise EvaluationError(f"{path}: not a text file in UTF-8; save the table as CSV (UTF-8)") from None
+    if not text.strip():
+        raise EvaluationError(f"{path}: empty; needs the columns {', '.join(COLUMNS)}")
+    separator = max(",;\t", key=text.partition("\n")[0].count)
+    table = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+    try:
+        place = _places(path, [cell.strip() for cell in next(table)])
+        filled = (cells for cells in table if any(map(str.strip, cells)))
+        rows = [_measurement(f"{path}: line {table.line_num}", cells, place, separator) for cells in filled]
+    except csv.Error as error:
+        raise EvaluationError(f"{path}: line {table.line_num}: not valid CSV ({error})") from None
+    if not rows:
+        raise EvaluationError(f"{path}: has a header but no rows")
+    return rows
+
+
+def _places(path: Path, header: list[str]) -> dict[str, int]:
+    """Where each column stands."""
+    for name in COLUMNS:
+        if header.count(name) > 1:
+            raise EvaluationError(f"{path}: column {name!r} occurs {header.count(name)} times")
+        if name not in header:
+            alike = difflib.get_close_matches(name, [h for h in header if h not in COLUMNS], 1, cutoff=0.75)
+            found = f"; is {alike[0]!r} meant?" if alike else f"; needs {', '.join(COLUMNS)} (blank where not measured)"
+            raise EvaluationError(f"{path}: column {name!r} is missing{found}")
+    return {name: header.index(name) for name in COLUMNS} | {"": len(header)}
+
+
+def _measurement(where: str, cells: list[str], place: dict[str, int], separator: str) -> Measurement:
+    if len(cells) > place[""] and any(map(str.strip, cells[place[""] :])):
+        raise EvaluationError(f"{where}: {len(cells)} cells under {place['']} columns")
+    text = {name: cells[place[name]].strip() if place[name] < len(cells) else "" for name in COLUMNS}
+
+    def angle(name: str) -> float | None:
+        if not text[name]:
+            return None
+        try:
+            value = float(text[name] if separator == "," else text[name].replace(",", "."))
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= _FULL_TURN_DEG:
+            raise EvaluationError(f"{where}: {name} is {text[name]!r}; must be an angle in degrees, or blank where not measured")
+        return value
+
+    def state(name: str) -> str | None:
+        label = text[name].upper()
+        if label and label not in set(PoseState):
+            known = ", ".join(PoseState)
+            raise EvaluationError(f"{where}: {name} is {text[name]!r}; must be one of {known}, or blank where not measured")
+        return label or None
+
+    return Measurement(
+        text["image"], angle("angle_1"), angle("angle_2"), state("state"), angle("algorithm_angle"), state("algorithm_state")
+    )
+
+
+def write_measurements(path: Path, rows: Iterable[Measurement]) -> None:
+    """The rows as a CSV file that ``read_measurements`` reads; raises OSError."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(COLUMNS)
+        table.writerows([["" if value is None else value for value in (getattr(row, name) for name in COLUMNS)] for row in rows])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnglePairs:
+    """Images with a manual and an algorithmic angle: arrays of shape (n,), degrees."""
+
+    manual_deg: np.ndarray
+    algorithm_deg: np.ndarray
+
+
+def angle_pairs(rows: Sequence[Measurement]) -> AnglePairs:
+    """The rows that have both; the two manual measures are averaged."""
+    pairs = [(row.manual_angle_deg, row.algorithm_angle) for row in rows]
+    both = np.array([(m, a) for m, a in pairs if m is not None and a is not None], np.float64).reshape(-1, 2)
+    return AnglePairs(both[:, 0], both[:, 1])
+
+
+def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
+    """The content of ``metrics.json``.
+
+    Parameters
+    ----------
+    rows : images, measured by hand and by the algorithm; each statistic takes those that have what it needs.
+    seed : of the bootstrap intervals.
+
+    Returns
+    -------
+    dict
+        ``images``, ``angle``, ``state``, ``manual`` (the two manual measures against each other) and ``notes``: one sentence for
+        each thing that a reader should know. Undefined figures are None, and a note says why.
+    """
+    pairs = angle_pairs(rows)
+    twice = np.array([(r.angle_1, r.angle_2) for r in rows if r.angle_1 is not None and r.angle_2 is not None], np.float64)
+    twice = twice.reshape(-1, 2)
+    labelled = [(r.state, r.algorithm_state) for r in rows if r.state is not None and r.algorithm_state is not None]
+    metrics = {
+        "images": _counts(rows),
+        "angle": angle_metrics(pairs.manual_deg, pairs.algorithm_deg, seed),
+        "state": state_metrics([str(m) for m, _ in labelled], [str(a) for _, a in labelled], seed),
+        "manual": repeat_metrics(twice[:, 0], twice[:, 1], seed),
+    }
+    return metrics | {"notes": _angle_notes(metrics, rows) + _state_notes(metrics["state"])}
+
+
+def _counts(rows: Sequence[Measurement]) -> dict[str, int]:
+    manual = [row for row in rows if row.manual_angle_deg is not None or row.state is not None]
+    answered = sum(row.algorithm_angle is not None or row.algorithm_state is not None for row in manual)
+    return {"n": len(rows), "measured": len(manual), "answered": answered, "unanswered": len(manual) - answered}
+
+
+def _angle_notes(metrics: dict[str, Any], rows: Sequence[Measurement]) -> list[str]:
+    angle, manual, counts, notes = metrics["angle"], metrics["manual"], metrics["images"], []
+    if counts["unanswered"]:
+        notes.append(
+            f"The algorithm gave no answer for {counts['unanswered']} of {counts['measured']} images that were measured by hand; "
+            "they are in none of the figures."
+        )
+    outside = sum(not 0 <= a <= RANGE_DEG for r in rows for a in (r.angle_1, r.angle_2, r.algorithm_angle) if a is not None)
+    if outside:
+        notes.append(f"{outside} angles lie outside 0° to 180°; they are taken as they are.")
+    if angle["n"] == 0:
+        notes.append("No image has both a manual and an algorithmic angle: no angle statistics.")
+    elif angle["n"] == 1:
+        notes.append("One image with angles: spread, correlation and intervals are undefined.")
+    elif angle["pearson"] is None:
+        notes.append("All manual or all algorithmic angles are equal: their correlation is undefined.")
+    if angle["n"] > 1 and manual["n"] < 2:
+        notes.append("Fewer than two images were measured twice by hand: repeatability and the manual ICC are undefined.")
+    return notes
+
+
+def _state_notes(state: dict[str, Any]) -> list[str]:
+    if state["n"] == 0:
+        return ["No image has both a manual and an algorithmic state: no state statistics."]
+    notes = []
+    if state["kappa"] is None:
+        notes.append("Only one state occurs on both sides: kappa is undefined.")
+    if state["fowlkes_mallows_pairs"] is None:
+        notes.append("No two images share a state on one of the sides: the pair-counting Fowlkes-Mallows index is undefined.")
+    for label, row in state["per_class"].items():
+        if row["precision"] is None:
+            notes.append(f"The algorithm never gave state {label}: its precision is undefined and left out of the averages.")
+        if row["recall"] is None:
+            notes.append(f"No image has the manual state {label}: its recall is undefined and left out of the averages.")
+    return notes

@@ -1,0 +1,115 @@
+"""Statistics of angles against values worked out by hand or printed elsewhere."""
+
+import numpy as np
+import pytest
+from scipy.stats import spearmanr
+
+from core.study.agreement import angle_metrics, correlation, icc_absolute, repeat_metrics, shares
+from core.study.bootstrap import bootstrap_rows, interval_95
+
+MANUAL = np.array([10.0, 20.0, 30.0, 40.0])
+ALGORITHM = np.array([11.0, 19.0, 33.0, 41.0])  # errors 1, -1, 3, 1
+
+
+def test_bias_and_spread_by_hand() -> None:
+    found = angle_metrics(MANUAL, ALGORITHM)
+    sd = np.sqrt((0 + 4 + 4 + 0) / 3)
+    assert found["n"] == 4
+    assert found["mean_error_deg"] == pytest.approx(1.0)
+    assert found["median_deg"] == pytest.approx(1.0)
+    assert found["sd_deg"] == pytest.approx(sd)
+    assert found["mean_abs_error_deg"] == pytest.approx(1.5)
+    assert found["loa_low_deg"] == pytest.approx(1.0 - 1.96 * sd)
+    assert found["loa_high_deg"] == pytest.approx(1.0 + 1.96 * sd)
+    # deviations -15 -5 5 15 and -15 -7 7 15: 520 / sqrt(500 * 548)
+    assert found["pearson"] == pytest.approx(520 / np.sqrt(500 * 548))
+    assert found["spearman"] == pytest.approx(1.0)
+
+
+def test_the_median_is_signed_like_the_papers() -> None:
+    assert angle_metrics(np.zeros(3), np.array([-5.0, -1.0, 4.0]))["median_deg"] == -1.0
+
+
+def test_spearman_with_ties() -> None:
+    first, second = np.array([1.0, 2.0, 2.0, 5.0, 9.0]), np.array([3.0, 1.0, 4.0, 4.0, 8.0])
+    assert angle_metrics(first, second)["spearman"] == pytest.approx(spearmanr(first, second).statistic)
+
+
+def test_shares_in_percent_of_180_degrees() -> None:
+    """4 % are 7.2 degrees; an error on an edge belongs below it, in spite of rounding."""
+    found = shares(np.array([0.0, -7.2, 47.2 - 40.0, 7.3, -14.4, 14.5, 25.0, 100.0]))
+    assert {name: float(value) * 8 for name, value in found.items()} == {
+        "share_0_4": 3, "share_4_8": 2, "share_8_12": 1, "share_12_16": 1, "share_over_16": 1, "share_0_8": 5,
+    }  # fmt: skip
+
+
+def test_icc_of_shrout_and_fleiss() -> None:
+    """Their worked example of 1979: six targets, four judges; ICC(2,1) = .29."""
+    ratings = [[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6], [10, 5, 6, 9], [6, 2, 4, 7]]
+    assert icc_absolute(np.array(ratings, float)) == pytest.approx(0.2898, abs=5e-5)
+
+
+def test_icc_counts_a_bias_that_correlation_does_not_see() -> None:
+    """Second rater 10 higher: mean squares of subjects 200, of raters 150, residual 0."""
+    first = np.array([0.0, 10.0, 20.0])
+    assert correlation(first, first + 10) == pytest.approx(1.0)
+    assert icc_absolute(np.stack([first, first + 10], -1)) == pytest.approx(200 / (200 + 2 * 150 / 3))
+    assert icc_absolute(np.stack([first, first], -1)) == pytest.approx(1.0)
+
+
+def test_two_manual_measures() -> None:
+    found = repeat_metrics(np.array([10.0, 20.0, 30.0]), np.array([11.0, 21.0, 34.0]))
+    assert found["mean_difference_deg"] == pytest.approx(2.0)
+    assert found["repeatability_sd_deg"] == pytest.approx(np.sqrt(3.0) / np.sqrt(2.0))  # differences 1, 1, 4
+
+
+@pytest.mark.parametrize("constant", [5.0, 0.1])
+def test_constant_values_have_no_correlation(constant: float) -> None:
+    found = angle_metrics(np.full(3, constant), np.array([1.0, 2.0, 3.0]))
+    assert found["pearson"] is found["spearman"] is None
+    assert found["ci95"]["pearson"] is None
+    assert found["mean_error_deg"] == pytest.approx(2.0 - constant)
+    assert angle_metrics(np.full(3, constant), np.full(3, constant))["icc"] is None
+
+
+def test_one_value_has_an_error_but_no_spread() -> None:
+    found = angle_metrics(MANUAL[:1], ALGORITHM[:1])
+    assert (found["n"], found["mean_error_deg"], found["share_0_4"]) == (1, 1.0, 1.0)
+    assert found["sd_deg"] is found["loa_low_deg"] is found["pearson"] is found["icc"] is None
+    assert set(found["ci95"].values()) == {None}
+
+
+def test_no_value_has_nothing_but_all_names() -> None:
+    nothing = angle_metrics(MANUAL[:0], ALGORITHM[:0])
+    assert nothing.keys() == angle_metrics(MANUAL, ALGORITHM).keys()
+    assert {value for name, value in nothing.items() if name not in {"n", "ci95"}} == {None}
+
+
+def test_intervals_are_seeded_and_hold_the_value() -> None:
+    rng = np.random.default_rng(5)
+    manual = rng.uniform(0, 60, 200)
+    algorithm = manual + rng.normal(1.0, 4.0, 200)
+    found = angle_metrics(manual, algorithm, seed=3)
+    assert found == angle_metrics(manual, algorithm, seed=3)
+    assert found["ci95"] != angle_metrics(manual, algorithm, seed=4)["ci95"]
+    low, high = found["ci95"]["mean_error_deg"]
+    assert low < found["mean_error_deg"] < high
+    # mean +- 1.96 SD / sqrt(n), which the bootstrap of a mean must come near
+    assert high - low == pytest.approx(2 * 1.96 * found["sd_deg"] / np.sqrt(200), rel=0.1)
+
+
+def test_an_interval_is_the_middle_95_percent() -> None:
+    assert interval_95(np.arange(1001.0)) == [25.0, 975.0]
+    assert interval_95(np.array([1.0] * 8 + [np.nan] * 2)) is None, "undefined in a fifth of the resamples"
+
+
+def test_large_sets_are_drawn_in_blocks() -> None:
+    seen: list[int] = []
+
+    def mean(values: np.ndarray) -> dict[str, np.ndarray]:
+        seen.append(values.size)
+        return {"mean": values.mean(-1)}
+
+    assert bootstrap_rows(mean, (np.arange(5000.0),), seed=0)["mean"] is not None
+    assert max(seen) <= 500_000
+    assert sum(seen) == 2000 * 5000
