@@ -144,6 +144,31 @@ def calibrate(
 
 
 @app.command()
+def evaluate(
+    out: Annotated[Path, typer.Option(help="folder for metrics.json, measurements.csv, figures and report.html")],
+    labelled: Annotated[Path | None, typer.Argument(metavar="DIR", help="labelled set as synth writes it")] = None,
+    csv: Annotated[
+        Path | None,
+        typer.Option(help="columns image, angle_1, angle_2, state, algorithm_angle, algorithm_state; blank where not measured"),
+    ] = None,
+    json: JsonOption = False,
+    like_paper: Annotated[
+        bool, typer.Option("--like-paper", help="draw a test like the paper's: 48 images, measured twice with an error")
+    ] = False,
+    manual_sd: Annotated[float, typer.Option(min=0, max=30, help="SD of one such manual measure, degrees")] = 1.5,
+    seed: Annotated[int, typer.Option(min=0, help="of the drawn images, their manual errors and the bootstrap")] = 0,
+    model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """The algorithm against manual measures, with the statistics of the paper beside its own figures."""
+    from app.evaluate_command import LikePaper, run_evaluate
+
+    study = LikePaper(manual_sd) if like_paper else None
+    run_evaluate(labelled, csv, out, as_json=json, model=model, preset=preset, config_path=config, like_paper=study, seed=seed)
+
+
+@app.command()
 def benchmark(
     json: JsonOption = False,
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
@@ -164,3 +189,22 @@ def benchmark(
         run_accuracy(accuracy, model=model, preset=preset, config_path=config, as_json=json, store=store, true_masks=true_masks)
     else:
         run_speed(frames, model=model, preset=preset, config_path=config, as_json=json)
+
+
+@app.command()
+def ablation(
+    labelled: Annotated[Path | None, typer.Argument(metavar="SET", help="labelled set as synth writes it")] = None,
+    json: JsonOption = False,
+    out: Annotated[Path | None, typer.Option(help="folder for ablation.json, ablation.md and ablation_frames.csv")] = None,
+    true_masks: Annotated[bool, typer.Option("--true-masks", help="the true masks instead of the network's")] = False,
+    sequence: Annotated[int, typer.Option(min=0, max=100_000, help="also measure tracking on so many frames of the twin")] = 0,
+    phantom: Annotated[list[str] | None, typer.Option(help="named phantom of these frames; default: all, in turn")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="of the bootstrap and of the twin")] = 0,
+    model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
+    config: ConfigOption = None,
+) -> None:
+    """What each step is worth: from the paper taken literally to ours, on the same masks of the same frames."""
+    from app.ablation_command import Plan, run_ablation
+
+    plan = Plan(labelled, model, config, true_masks, sequence, tuple(phantom or ()), seed, out)
+    run_ablation(plan, as_json=json)

@@ -90,6 +90,9 @@ class VectorConfig(_Section):
     vessel_rule: Literal["graph", "window"] = Field(
         "graph", description="window = all skeleton pixels near the head, the paper's way"
     )
+    line_fit: Literal["total_least_squares", "least_squares"] = Field(
+        "total_least_squares", description="least_squares = the paper's linear fit: y on x (in a steep piece x on y)"
+    )
 
 
 class PoseConfig(_Section):
@@ -105,9 +108,10 @@ class PoseConfig(_Section):
 class QualityConfig(_Section):
     """When perception refuses to answer, and with which reason."""
 
+    enabled: bool = Field(True, description="false = answer wherever a pose can be computed at all, as the paper does")
     black_level: float = Field(12.0, ge=0.0, le=255.0, description="99th percentile of brightness below this: black")
     white_level: float = Field(250.0, ge=0.0, le=255.0, description="1st percentile of brightness above this: overexposed")
-    min_sharpness: float = Field(0.0, ge=0.0, le=1e6, description="0 = not checked")
+    min_sharpness: float = Field(0.045, ge=0.0, le=1.0, description="steepest step per px against the contrast; 0 = not checked")
     min_robot_length_px: float = Field(20.0, ge=2.0, le=640.0)
     min_inside_vessel: Share = Field(0.6, description="share of the robot's last 40 px that must lie in the lumen")
     max_bridged_share: Share = Field(0.4, description="repaired length over path length")
@@ -180,6 +184,7 @@ class Config(_Section):
     perception: PerceptionConfig = PerceptionConfig()
     advice: AdviceConfig = AdviceConfig()
     servos: ServosConfig = ServosConfig()
+    safety: SafetyConfig = SafetyConfig()
     window: WindowConfig = WindowConfig()
 
 

@@ -13,6 +13,9 @@ from core.types import Masks, Point, Points, RobotPath, VesselGraph
 
 END_PART_PX = 20.0
 """How much of each end is compared for thickness."""
+STILL_HEAD_PX = 15.0
+"""An end this near to the last frame's head is that head, also where it has just reached the image border, if the robot's other
+end lies at an end of the vessel."""
 NEARER_BY = 0.6
 """An end is at the vessel's end only if the other end is clearly farther from one: this share or less of its distance."""
 
@@ -40,9 +43,9 @@ def is_entry(place: Points, around: Surroundings) -> bool:
 def tail_first(points: Points, around: Surroundings) -> Points:
     """The path ordered from tail to head.
 
-    Asked in this order, the first clear answer counts: the one end at border or port; the last frame's tail and head; the end that
-    lies farther outside the vessel; the one end at an end of the vessel; the thicker end; and at last the end nearer to an end of
-    the vessel.
+    Asked in this order, the first clear answer counts: the one end at border or port (unless it is a head that has just arrived
+    there); the last frame's tail and head; the end that lies farther outside the vessel; the one end at an end of the vessel; the
+    thicker end; and at last the end nearer to an end of the vessel.
     """
     for looks_like_tail, margin in (
         (_entry, 0.5),
@@ -59,6 +62,12 @@ def tail_first(points: Points, around: Surroundings) -> Points:
 
 
 def _entry(points: Points, around: Surroundings) -> float:
+    before = around.previous
+    arrived = before is not None and float(np.hypot(*(points[0] - before.points[-1]))) <= STILL_HEAD_PX
+    if arrived and around.vessel is not None:
+        distance, radius = _distance_to_vessel_end(points[-1], around.vessel)
+        if distance <= 2.0 * radius + 5.0:
+            return 0.0
     return float(is_entry(points[0], around))
 
 

@@ -86,7 +86,7 @@ def rebuild(centre: Points, radius_px: float, arms: list[Arm]) -> tuple[Points, 
     rebuilt = []
     for index, (arm, way, gate) in enumerate(zip(arms, along, gates, strict=True)):
         if gate is None:
-            rebuilt.append(Arm(np.concatenate([place[None], arm.points[1:]]), arm.radius, arm.far_is_junction))
+            rebuilt.append(_rejoined(arm, way, place))
             continue
         bridge = bridges.get(index)
         if bridge is None:
@@ -96,6 +96,15 @@ def rebuild(centre: Points, radius_px: float, arms: list[Arm]) -> tuple[Points, 
         radius = np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest]])
         rebuilt.append(Arm(points, radius, arm.far_is_junction))
     return place, rebuilt
+
+
+def _rejoined(arm: Arm, along: NDArray[np.float64], place: NDArray[np.float64]) -> Arm:
+    """An arm too short to have a gate, led from the junction's new place: what lies behind that place would be a hook in it."""
+    aside_px, position_px, _ = polyline.nearest(arm.points, (float(place[0]), float(place[1])))
+    rest = along > position_px + max(aside_px, 0.5 * STEP_PX)
+    rest[-1] = True
+    points, radius = arm.points[rest], arm.radius[rest]
+    return Arm(np.concatenate([place[None], points]), np.concatenate([radius[:1], radius]), arm.far_is_junction)
 
 
 def _gate(arm: Arm, along: NDArray[np.float64], radius_px: float, at_least_px: float) -> _Gate | None:
@@ -177,4 +186,3 @@ def _meeting_point(gates: list[_Gate], centre: Points, radius_px: float) -> Poin
 def _straight(start: Points, end: Points) -> Points:
     count = max(2, round(float(np.hypot(*(end - start))) / STEP_PX) + 1)
     return np.asarray(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start))
-

@@ -49,11 +49,12 @@ def find_pieces(graph: PixelGraph, vessel: Mask) -> list[Piece]:
 def check_pieces(graph: PixelGraph, pieces: list[Piece], config: PerceptionConfig) -> Refusal | None:
     """GAP_TOO_LONG when the robot goes on beyond a gap, SEVERAL_ROBOTS when the rest is too large to be outliers.
 
-    Either way the largest piece's end would be taken for the head, wrongly. ``several_robots_share = 1`` turns the check off.
+    Either way the largest piece's end would be taken for the head, wrongly. ``several_robots_share = 1`` turns the check off, and
+    so does a disabled quality gate.
     """
     share, first = config.quality.several_robots_share, pieces[0]
     others = [piece for piece in pieces[1:] if piece.size_px >= config.path.min_length_px]
-    if share >= 1.0 or not others:
+    if share >= 1.0 or not config.quality.enabled or not others:
         return None
     headings = _headings(graph)
     for other in others:

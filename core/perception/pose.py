@@ -76,27 +76,26 @@ def classify(
 class StateFilter:
     """Steadies the state of a stream: a hysteresis on every threshold and a dwell time, so that the badge does not chatter.
 
-    A new state must show for ``dwell_frames`` frames in a row. A frame without a pose forgets everything: the next pose starts
-    anew, and no stale state is ever shown.
+    A state is left once it was contradicted for ``dwell_frames`` frames in a row, for the one seen most often in them (of equals
+    the latest): frames that waver between two others do not keep it. A frame without a pose forgets everything: the next pose
+    starts anew, and no stale state is ever shown.
     """
 
     def __init__(self, config: PoseConfig) -> None:
         self._config = config
         self._current: PoseState | None = None
-        self._waiting: PoseState | None = None
-        self._seen = 0
+        self._against: list[PoseState] = []
 
     def update(self, pose: Pose | None) -> Pose | None:
         """The same pose with the steadied state; None for None."""
         if pose is None:
-            self._current, self._waiting, self._seen = None, None, 0
+            self._current, self._against = None, []
             return None
         shown = classify(pose.c_head_px, pose.c_tail_px, pose.theta_deg, self._config, self._current)
         if self._current is None or shown is self._current:
-            self._current, self._waiting, self._seen = shown, None, 0
+            self._current, self._against = shown, []
         else:
-            self._seen = self._seen + 1 if shown is self._waiting else 1
-            self._waiting = shown
-            if self._seen >= self._config.dwell_frames:
-                self._current, self._waiting, self._seen = shown, None, 0
+            self._against.append(shown)
+            if len(self._against) >= self._config.dwell_frames:
+                self._current, self._against = max(reversed(self._against), key=self._against.count), []
         return replace(pose, state=self._current)

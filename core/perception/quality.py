@@ -51,8 +51,8 @@ def _level(values: NDArray[np.uint8], share: float) -> float:
 def sharpness(image: Image) -> float:
     """Steepest brightness step against the image's whole contrast, per px: some 0.15 for a sharp edge, 1/width for a blurred one.
 
-    It does not depend on exposure, and it is taken at half size, lightly smoothed, so that noise does not pass for sharpness. An image
-    of one colour has no edge to judge by and passes for sharp.
+    It does not depend on exposure, and it is taken at half size, lightly smoothed, so that noise does not pass for sharpness. An
+    image of one colour has no edge to judge by and passes for sharp.
     """
     half = cv2.resize(image, (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2)), interpolation=cv2.INTER_AREA)
     grey = cv2.GaussianBlur(cv2.cvtColor(half, cv2.COLOR_RGB2GRAY), (3, 3), 0.75)
@@ -60,7 +60,7 @@ def sharpness(image: Image) -> float:
     steepness = np.hypot(across.astype(np.float32), down).ravel()
     place = int(0.995 * (len(steepness) - 1))
     steepest = float(np.partition(steepness, place)[place]) / 16.0
-    samples = np.ascontiguousarray(grey[::2, ::2])
+    samples = np.asarray(grey[::2, ::2], np.uint8)
     contrast = _level(samples, 0.99) - _level(samples, 0.01)
     return steepest / contrast if contrast >= _LEAST_CONTRAST else 1.0
 

@@ -83,7 +83,8 @@ def find(
         return _why_no_candidate(graph, config.path)
     eligible = candidates if previous is None else [*candidates, *rivals]
     best = max(eligible, key=lambda candidate: candidate.score + candidate.continuity)
-    if previous is None and all(is_entry(place, around) for place in best.trail.points[[0, -1]]):
+    must_show_head = config.quality.enabled and previous is None
+    if must_show_head and all(is_entry(place, around) for place in best.trail.points[[0, -1]]):
         return Refusal(Reason.AMBIGUOUS_PATH, "both of its ends lie at the image border, so its head may be out of view")
     points = tail_first(best.trail.points, around)
     line, radius_px = path_shape.refine(points, masks, radius_px, config.path.smoothing_px, config.cleaning.extend_ends)

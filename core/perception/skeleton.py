@@ -162,8 +162,12 @@ def without_spurs(skeleton: Mask, mask: Mask) -> Mask:
     lengths = [float(arc_length(chain.points)[-1]) for chain in graph.chains]
     limit_px = SPUR_RADII * mean_radius(skeleton, mask) + 1.0
     pruned = skeleton.copy()
+    chains_at: list[list[int]] = [[] for _ in graph.nodes]
+    for index, chain in enumerate(graph.chains):
+        for node in {chain.start, chain.end}:
+            chains_at[node].append(index)
     for node in np.flatnonzero(degrees >= 3).tolist():
-        touching = [index for index, chain in enumerate(graph.chains) if node in (chain.start, chain.end)]
+        touching = chains_at[node]
         spurs = [i for i in touching if lengths[i] < limit_px and degrees[_other_end(graph.chains[i], node)] == 1]
         kept = [graph.chains[i] for i in touching if i not in spurs]
         if not spurs or not kept:

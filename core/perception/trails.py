@@ -45,6 +45,7 @@ def explore(graph: PixelGraph, start: int, config: PathConfig, budget: int | Non
     """
     leaving = _chains_at(graph)
     degrees = graph.degrees()
+    headings = {(index, start): _heading(chain, start) for index, chain in enumerate(graph.chains) for start in (True, False)}
     finished: list[tuple[Steps, float]] = []
     stopped: list[tuple[Steps, float]] = []
     pending: list[tuple[int, Steps, float]] = [(start, (), 0.0)]
@@ -56,11 +57,11 @@ def explore(graph: PixelGraph, start: int, config: PathConfig, budget: int | Non
             finished.append((steps, turning))
             continue
         used = {index for index, _ in steps}
-        arriving = -_heading(graph.chains[steps[-1][0]], not steps[-1][1]) if steps else None
+        arriving = -headings[steps[-1][0], not steps[-1][1]] if steps else None
         options = []
         for index, onward in leaving[node]:
             if index not in used:
-                turn = 0.0 if arriving is None else 1.0 - float(arriving @ _heading(graph.chains[index], onward))
+                turn = 0.0 if arriving is None else 1.0 - float(arriving @ headings[index, onward])
                 options.append((turn, index, onward))
         if not options and steps:
             stopped.append((steps, turning))

@@ -45,7 +45,9 @@ class _RadiusMap:
     def __init__(self, mask: Mask) -> None:
         cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
         half = cv2.erode(mask.view(np.uint8), cross, borderType=cv2.BORDER_REPLICATE)[::2, ::2]
-        self._map = np.asarray(cv2.distanceTransform(np.ascontiguousarray(half), cv2.DIST_L2, 5), np.float32)
+        distance = cv2.distanceTransform(np.ascontiguousarray(half), cv2.DIST_L2, 5)
+        # A mask that fills the image has no wall, and its distance would be the largest number there is.
+        self._map = np.minimum(np.asarray(distance, np.float32), np.float32(max(half.shape)))
 
     def at(self, points: Points) -> NDArray[np.float64]:
         return 2.0 * polyline.sample(self._map, points / 2.0) + EROSION_PX
@@ -126,8 +128,12 @@ def border_distance(place: Points, direction: Points, shape: tuple[int, ...]) ->
 def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: _RadiusMap) -> None:
     degrees = _degrees(lines, len(nodes))
     sizes = radius.at(nodes)
+    at_node: dict[int, list[tuple[_Line, bool]]] = {}
+    for line in lines:
+        at_node.setdefault(line.start, []).append((line, True))
+        at_node.setdefault(line.end, []).append((line, False))
     for node in np.flatnonzero(degrees >= 3).tolist():
-        touching = [(line, True) for line in lines if line.start == node] + [(line, False) for line in lines if line.end == node]
+        touching = at_node[node]
         arms = [
             Arm(line.points, line.radius, bool(degrees[line.end] >= 3))
             if outward

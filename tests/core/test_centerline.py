@@ -317,3 +317,25 @@ def test_the_vessels_direction_beside_the_head_to_a_degree() -> None:
         assert len(vectors) == 2
         angles = [np.degrees(np.arctan2(v.direction[1], v.direction[0])) for v in vectors if v is not None]
         assert abs(angles[0] - angles[1]) < 1.0
+
+
+@pytest.mark.parametrize("apart_px", [16.0, 24.0, 34.0])
+def test_branches_that_leave_close_to_each_other_leave_no_hook(apart_px: float) -> None:
+    trunk = curve((60.0, 240.0), (320.0, 240.0), (580.0, 240.0))
+    up = curve((300.0, 240.0), (350.0, 150.0), (400.0, 60.0))
+    down = curve((300.0 + apart_px, 240.0), (360.0 + apart_px, 330.0), (420.0 + apart_px, 420.0))
+    found = perceived((trunk, 16.0), (up, 12.0), (down, 12.0))
+    assert degrees(found).count(1) == 4
+    for edge in found.edges:
+        steps = np.diff(edge.points, axis=0)
+        steps = steps[np.hypot(steps[:, 0], steps[:, 1]) > 0]
+        assert (np.einsum("ij,ij->i", steps[:-1], steps[1:]) > 0).all(), "the centerline never goes back on itself"
+        assert len(edge.radius) == len(edge.points)
+
+
+def test_a_vessel_that_fills_the_image_has_a_radius_of_its_size() -> None:
+    full = np.ones((480, 640), bool)
+    line = np.zeros((480, 640), bool)
+    line[240] = True
+    (edge,) = build_graph(line, full, CleaningConfig()).edges
+    assert edge.radius.max() <= 641.0

@@ -126,6 +126,12 @@ def test_the_first_pose_counts_at_once_and_a_new_state_after_its_dwell() -> None
     assert states([inside, far, far, inside, far, far, far]) == "AAAAAAC"
 
 
+def test_frames_that_waver_between_two_other_states_do_not_keep_the_old_one() -> None:
+    inside, away, crossed = pose(2, 2, 2), pose(20, 10, 30), pose(-9, 15, 40)
+    assert states([inside, away, crossed, away, away, away]) == "AAACCC"  # two of three spoke for C
+    assert states([inside, *[crossed, away] * 2, crossed]) == "AAADDD"
+
+
 def test_noise_within_the_band_does_not_change_the_state() -> None:
     assert states([pose(5.5, 5.5, 5), *[pose(6.5, 5.5, 11)] * 6]) == "AAAAAAA"
     assert states([pose(5.5, 5.5, 5), *[pose(7.5, 5.5, 5)] * 6]) == "AAACCCC"

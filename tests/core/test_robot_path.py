@@ -293,3 +293,29 @@ def test_the_papers_score_chooses_among_all_pieces() -> None:
     robot = probability(depth(S_CURVE, 4.0), straight)
     literal = PerceptionConfig(path=PathConfig(outlier_share=0.0))
     assert path_of(robot, config=literal).head[0] > 550  # shorter and straighter: why outliers are put aside before scoring
+
+
+def test_in_a_stream_a_head_that_reaches_the_border_stays_the_head() -> None:
+    vessel = probability(depth(curve((100, 240), (300, 240), (660, 240)), 22.0))
+    path: RobotPath | None = None
+    for head_x in (610.0, 620.0, 630.0, 637.0):  # the tail lies in the picture, where an opaque fitting ends
+        robot = probability(depth(curve((110, 240), (300, 243), (head_x, 240)), 4.0))
+        path = path_of(robot, vessel=vessel, previous=path)
+        assert path.head[0] == pytest.approx(head_x, abs=2.0)
+        assert path.tail[0] == pytest.approx(110.0, abs=2.0)
+
+
+def test_in_a_stream_a_tail_that_comes_into_view_at_the_border_is_the_tail() -> None:
+    line = curve((-20, 240), (300, 243), (420, 240))
+    whole, torn = probability(depth(line, 4.0)), probability(depth(curve((120, 241), (300, 243), (420, 240)), 4.0))
+    swapped = path_of(torn)
+    before = RobotPath(swapped.points if swapped.head[0] < 200 else swapped.points[::-1], 1.0, None, False, 0.0, 4.0)
+    assert path_of(whole, previous=before).head[0] > 400
+
+
+def test_in_a_stream_a_wrong_head_beside_the_border_is_mended_when_it_shows_to_be_the_entry() -> None:
+    vessel = probability(depth(curve((-20, 240), (300, 240), (660, 240)), 22.0))
+    line = curve((9, 240), (150, 243), (300, 240))
+    before = RobotPath(line[::-1], 1.0, None, False, 0.0, 4.0)
+    path = path_of(probability(depth(curve((-20, 240), (150, 243), (300, 240)), 4.0)), vessel=vessel, previous=before)
+    assert path.head[0] == pytest.approx(300.0, abs=2.0)
