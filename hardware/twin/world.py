@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -62,6 +63,8 @@ class TwinWorld:
         self._stop = threading.Event()
         self.frames: Latest[Frame] = Latest()
         self.failure: str | None = None
+        self.drive: Callable[[float], Command] | None = None
+        """Asked for the command of the coming seconds instead of the robot, when something else moves it (the servos)."""
 
     def advance(self, duration_s: float) -> None:
         """Step the physics by simulated seconds under the robot's current command."""
@@ -69,7 +72,7 @@ class TwinWorld:
             left = duration_s
             while left > 1e-9:
                 step = min(_CONTROL_S, left)
-                self.physics.step(self.robot.current_command, step)
+                self.physics.step(self.robot.current_command if self.drive is None else self.drive(step), step)
                 left -= step
 
     def insert(self, length_mm: float, speed_mm_s: float = 40.0, target: int | None = None) -> None:

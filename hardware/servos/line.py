@@ -1,0 +1,318 @@
+"""Requests and answers on the servo line, with every trap of the vendor's SDK between them and us handled.
+
+One thread owns a line. A request ends in bounded time with the bytes, or with a typed error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import termios
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from dynamixel_sdk import BROADCAST_ID, COMM_RX_CORRUPT, COMM_RX_TIMEOUT, COMM_SUCCESS, GroupSyncWrite
+
+from hardware.servos.errors import NoAnswer, NotReady, PortError, PortLost, Refused
+from hardware.servos.packets import LockedPort, StuffingHandler
+from hardware.servos.status_block import TAG_BYTES
+
+LATE_S = 0.04
+"""An answer may come so much later than the request that gave up on it; who asks again before takes it for the new answer."""
+ALERT_BIT = 0x80
+_ERROR_TEXT = {
+    1: "could not process it",
+    2: "does not know the instruction",
+    3: "received it damaged",
+    4: "refused the value (bus watchdog tripped, or value out of range)",
+    5: "refused its length",
+    6: "refused the value as beyond its limits",
+    7: "refused the access (torque on, or read-only)",
+}
+_STATUS_BODY = 9
+"""Where a status packet's data begin: header, id, length, instruction, error."""
+_ATTEMPTS = 3
+
+
+class Miss(StrEnum):
+    """Why a request has no answer."""
+
+    SILENT = "no answer"
+    CORRUPT = "damaged answer"
+    WAITING = "a late answer may still come"
+    BEHIND = "no answer, behind two silent servos"
+
+
+@dataclass(slots=True)
+class LineCounts:
+    """What went wrong since the line was opened."""
+
+    silent: int = 0
+    corrupt: int = 0
+    late: int = 0
+    retries: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class GroupAnswer:
+    """Data by id and reason by id of those without; every id asked for is in one of them."""
+
+    data: dict[int, bytes]
+    missed: dict[int, Miss]
+
+
+@dataclass(slots=True)
+class _Round:
+    """One group request: who still has to answer."""
+
+    waiting: list[int]
+    length: int
+    data: dict[int, bytes] = field(default_factory=dict)
+    corrupt: int = 0
+
+
+class ServoLine:
+    """The port with the packet handler. All methods but the constructor raise ``PortLost`` when the port vanishes."""
+
+    def __init__(self, port: str, baud: int) -> None:
+        self.port, self.baud = port, baud
+        self.counts = LineCounts()
+        self._port: LockedPort | None = None
+        self._handler = StuffingHandler()
+        self._quiet_until: dict[int, float] = {}
+        self._owner: int | None = None
+
+    @property
+    def is_open(self) -> bool:
+        return self._port is not None
+
+    def open(self) -> None:
+        """Open and lock the port.
+
+        Raises
+        ------
+        PortError
+            Missing, not permitted, not a serial port, not this speed; ``PortTaken`` when another program holds it.
+        """
+        self.close()
+        port = LockedPort(self.port)
+        with self._guard_new(port):
+            if not port.setBaudRate(self.baud):
+                raise PortError(f"servos.baud {self.baud} is not a speed of these servos: use 57600, 115200, 1000000, 2000000 ...")
+        self._port, self._owner = port, threading.get_ident()
+        self.counts = LineCounts()
+        self._quiet_until.clear()
+
+    def close(self) -> None:
+        """Give the port back; never fails, and may be called twice."""
+        port, self._port = self._port, None
+        if port is not None:
+            # A vanished port raises termios.error, which is no OSError.
+            with contextlib.suppress(OSError, termios.error):
+                port.closePort()
+
+    @contextlib.contextmanager
+    def _guard_new(self, port: LockedPort) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, termios.error) as error:
+            with contextlib.suppress(OSError, termios.error, AttributeError):
+                port.closePort()
+            raise PortError(f"servo port {self.port} vanished while it was opened ({error}): check the USB cable") from None
+
+    @contextlib.contextmanager
+    def _exchange(self) -> Iterator[LockedPort]:
+        """The open port for one request. Whatever happens, its busy flag is reset, and a lost port is closed."""
+        port = self._port
+        if port is None:
+            raise NotReady("the servo port is not open: open it first")
+        if threading.get_ident() != self._owner:
+            raise RuntimeError("the servo line belongs to the thread that opened it")
+        try:
+            yield port
+        except (OSError, termios.error) as error:  # SerialException is an OSError, termios.error is none
+            self.close()
+            raise PortLost(f"servo port {self.port} is lost ({_short(error)}): check the USB cable, then connect again") from None
+        finally:
+            port.is_using = False
+
+    def ping(self, servo_id: int) -> int | None:
+        """Model number, or None without a (whole) answer."""
+        self._let_late_answers_pass(servo_id)
+        with self._exchange() as port:
+            try:
+                model, result, _ = self._handler.ping(port, servo_id)
+            except IndexError:
+                self.counts.corrupt += 1
+                return None
+        self._note(servo_id, result)
+        return int(model) if result == COMM_SUCCESS else None
+
+    def others(self) -> list[int]:
+        """Ids of all servos that answer a broadcast ping; takes 0.8 s at 1 Mbps, so only for error messages."""
+        with self._exchange() as port:
+            try:
+                found, _ = self._handler.broadcastPing(port)
+            except IndexError:  # a damaged answer
+                return []
+        return sorted(found)
+
+    def read(self, servo_id: int, address: int, length: int) -> bytes:
+        """`length` bytes of the control table; two retries.
+
+        Raises
+        ------
+        NoAnswer, Refused
+        """
+        data, error = self._request(servo_id, lambda port: self._handler.readTxRx(port, servo_id, address, length), length)
+        if error & ~ALERT_BIT:
+            raise Refused(f"servo {servo_id} answered a read of register {address}: it {_error_text(error)}")
+        return data
+
+    def write(self, servo_id: int, address: int, data: bytes) -> None:
+        """Write and wait for the servo's consent; two retries (a register write may be repeated).
+
+        Raises
+        ------
+        NoAnswer, Refused
+        """
+
+        def once(port: LockedPort) -> tuple[list[int], int, int]:
+            result, error = self._handler.writeTxRx(port, servo_id, address, len(data), list(data))
+            return [], result, error
+
+        _, error = self._request(servo_id, once, 0)
+        if error & ~ALERT_BIT:
+            raise Refused(f"servo {servo_id} did not take a write of register {address}: it {_error_text(error)}")
+
+    def reboot(self, servo_id: int) -> None:
+        """Restart a servo. Its answer is not waited for twice: a second request would restart it again."""
+        self._let_late_answers_pass(servo_id)
+        with self._exchange() as port, contextlib.suppress(IndexError):
+            self._handler.reboot(port, servo_id)
+
+    def broadcast(self, address: int, data: bytes) -> None:
+        """Write to all servos in one packet; nobody answers."""
+        with self._exchange() as port:
+            self._handler.writeTxOnly(port, BROADCAST_ID, address, len(data), list(data))
+
+    def group_write(self, address: int, data: dict[int, bytes]) -> None:
+        """One packet with a register for each id; nobody answers, so read what was taken."""
+        length = len(next(iter(data.values())))
+        with self._exchange() as port:
+            group = GroupSyncWrite(port, self._handler, address, length)
+            for servo_id, value in data.items():
+                group.addParam(servo_id, list(value))
+            group.txPacket()
+
+    def group_read(self, ids: list[int], address: int, length: int) -> GroupAnswer:
+        """`length` bytes of each servo, in one request; at most two silences (35 ms each) are waited for, and one retry is made.
+
+        A silent servo may also silence those after it in the list: the rest is asked again without it. A servo that was silent is
+        left alone until its answer cannot come any more.
+        """
+        now = time.monotonic()
+        data: dict[int, bytes] = {}
+        missed = {i: Miss.WAITING for i in ids if self._quiet_until.get(i, 0.0) > now}
+        rest = [i for i in ids if i not in missed]
+        silences = retries = 0
+        while rest:
+            turn = self._group_round(rest, address, length)
+            data.update(turn.data)
+            rest = [i for i in rest if i not in turn.data]
+            if rest and turn.corrupt:
+                self.counts.corrupt += turn.corrupt
+                if retries:
+                    missed.update(dict.fromkeys(rest, Miss.CORRUPT))
+                    break
+                retries += 1
+                self.counts.retries += 1
+            elif rest:
+                missed[rest[0]] = Miss.SILENT
+                self._note(rest.pop(0), COMM_RX_TIMEOUT)
+                silences += 1
+                if silences == 2:
+                    for servo_id in rest:
+                        missed[servo_id] = Miss.BEHIND
+                        self._note(servo_id, COMM_RX_TIMEOUT)
+                    break
+        return GroupAnswer(data, missed)
+
+    def _group_round(self, ids: list[int], address: int, length: int) -> _Round:
+        """Ask once and take what comes, until all have answered, or none comes any more.
+
+        After a damaged answer the others are still taken: asking again at once would talk into them.
+        """
+        turn = _Round(list(ids), length)
+        with self._exchange() as port:
+            if self._handler.syncReadTx(port, address, length, turn.waiting, len(ids), False) != COMM_SUCCESS:
+                return turn
+            # The vendor's group read drops the error byte, stops at the first fault, and then reads as 0.
+            while len(turn.data) + turn.corrupt < len(ids):
+                try:
+                    packet, result = self._handler.rxPacket(port, False)
+                except IndexError:
+                    turn.corrupt += 1
+                    continue
+                if result == COMM_RX_TIMEOUT:
+                    break
+                if result == COMM_SUCCESS:
+                    self._take(turn, packet)
+                else:
+                    turn.corrupt += 1
+        return turn
+
+    def _take(self, turn: _Round, packet: list[int]) -> None:
+        servo_id, data = packet[4], packet[_STATUS_BODY:-2]
+        if servo_id not in turn.waiting or servo_id in turn.data:
+            self.counts.late += 1
+        elif packet[8] & ~ALERT_BIT or len(data) < turn.length - TAG_BYTES:
+            turn.corrupt += 1
+        elif len(data) != turn.length:
+            self.counts.late += 1  # an answer to an earlier request: those ask for other lengths
+        else:
+            turn.data[servo_id] = bytes(data)
+
+    def _request(self, servo_id: int, ask: Callable[[LockedPort], tuple[list[int], int, int]], length: int) -> tuple[bytes, int]:
+        """A single servo's `length` bytes and error byte, asked for at most three times: nobody waits for these."""
+        miss = Miss.SILENT
+        for attempt in range(_ATTEMPTS):
+            self.counts.retries += attempt > 0
+            self._let_late_answers_pass(servo_id)
+            with self._exchange() as port:
+                try:
+                    data, result, error = ask(port)
+                except IndexError:
+                    data, result, error = [], COMM_RX_CORRUPT, 0
+            if result == COMM_SUCCESS and (len(data) == length or error & ~ALERT_BIT):
+                return bytes(data), error
+            result = COMM_RX_CORRUPT if result == COMM_SUCCESS else result
+            self._note(servo_id, result)
+            miss = Miss.SILENT if result == COMM_RX_TIMEOUT else Miss.CORRUPT
+        raise NoAnswer(
+            f"servo {servo_id}: {miss}, {_ATTEMPTS} times: check its supply and cable, and that no two servos have the same id"
+        )
+
+    def _note(self, servo_id: int, result: int) -> None:
+        if result == COMM_RX_TIMEOUT:
+            self.counts.silent += 1
+            self._quiet_until[servo_id] = time.monotonic() + LATE_S
+        elif result != COMM_SUCCESS:
+            self.counts.corrupt += 1
+
+    def _let_late_answers_pass(self, servo_id: int) -> None:
+        """Before a single request: the sender drops what has come until then."""
+        wait = self._quiet_until.get(servo_id, 0.0) - time.monotonic()
+        if wait > 0:
+            time.sleep(wait)
+
+
+def _error_text(error: int) -> str:
+    return _ERROR_TEXT.get(error & ~ALERT_BIT, f"answered with error {error & ~ALERT_BIT}")
+
+
+def _short(error: BaseException) -> str:
+    """One line of an error's text."""
+    return " ".join(str(error).split())[:80]
