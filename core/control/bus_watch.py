@@ -1,0 +1,118 @@
+"""Health of the servo bus: a report per cycle in, active faults out. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from core.control.faults import Cause, Fault
+from core.safety_config import SafetyConfig
+from core.servo_config import JOINT_NAMES, ServosConfig
+
+
+@dataclass(frozen=True, slots=True)
+class BusReport:
+    """One cycle of the bus; tuples are per joint, in the order of JOINT_NAMES, and empty when not read in this cycle.
+
+    ``misses`` are answers missed in a row by now; ``errors`` the bad packets (CRC, garbage, short) since the last report, after the
+    retry; ``hardware_errors`` the servos' register 70; ``tracking_mm`` goal minus measured position.
+    """
+
+    port_open: bool = True
+    misses: Sequence[int] = ()
+    errors: int = 0
+    hardware_errors: Sequence[int] = ()
+    temperatures_c: Sequence[float] = ()
+    voltages_v: Sequence[float] = ()
+    tracking_mm: Sequence[float] = ()
+    rebooted: bool = False
+    watchdog_tripped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class BusWatch:
+    """What is remembered of the bus. What a report leaves out keeps its last reading."""
+
+    seen_s: float | None = None
+    newest: BusReport = BusReport()
+    errors: tuple[tuple[float, int], ...] = ()
+    astray_since_s: float | None = None
+    astray: str = ""
+    rebooted: bool = False
+
+
+def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConfig, safety: SafetyConfig) -> BusWatch:
+    """The watch after a report. A restarted servo stays so until the servos are checked again (``checked``)."""
+    kept = tuple(entry for entry in watch.errors if now_s - entry[0] <= safety.bus_errors_window_s)
+    errors = (*kept, (now_s, report.errors)) if report.errors > 0 else kept
+    old, since_s, astray = watch.newest, watch.astray_since_s, watch.astray
+    if report.tracking_mm:
+        astray = _beyond(report.tracking_mm, servos.tracking_error_mm)
+        began_s = since_s if since_s is not None else now_s
+        since_s = began_s if astray else None
+    newest = replace(
+        report,
+        hardware_errors=report.hardware_errors or old.hardware_errors,
+        temperatures_c=report.temperatures_c or old.temperatures_c,
+        voltages_v=report.voltages_v or old.voltages_v,
+    )
+    return BusWatch(now_s, newest, errors, since_s, astray, watch.rebooted or report.rebooted)
+
+
+def checked(watch: BusWatch) -> BusWatch:
+    """The watch after all servos were found, checked and, if restarted, zeroed."""
+    return replace(watch, rebooted=False)
+
+
+def _beyond(tracking_mm: Sequence[float], limit_mm: float) -> str:
+    """The first joint that is farther from its goal than allowed; a reading that is no number counts as beyond."""
+    for name, error_mm in zip(JOINT_NAMES, tracking_mm, strict=False):
+        if not abs(error_mm) <= limit_mm:
+            return f"{name} off by {error_mm:.2f} mm (at most {limit_mm:g} mm)"
+    return ""
+
+
+def bus_faults(watch: BusWatch, now_s: float, servos: ServosConfig, safety: SafetyConfig) -> list[Fault]:
+    """The active faults of the servos and their bus."""
+    faults = []
+    age_s = math.inf if watch.seen_s is None else now_s - watch.seen_s
+    if age_s > safety.bus_disarm_s:
+        faults.append(Fault(Cause.BUS_DEAD, "no report yet" if math.isinf(age_s) else f"silent for {1000 * age_s:.0f} ms"))
+    elif age_s > safety.bus_hold_s:
+        faults.append(Fault(Cause.BUS_SILENT, f"for {1000 * age_s:.0f} ms"))
+    newest = watch.newest
+    if not newest.port_open:
+        faults.append(Fault(Cause.PORT_LOST))
+    if silent := [n for n, misses in zip(JOINT_NAMES, newest.misses, strict=False) if misses >= safety.missed_answers]:
+        faults.append(Fault(Cause.SERVO_SILENT, ", ".join(silent)))
+    bad = sum(count for time_s, count in watch.errors if now_s - time_s <= safety.bus_errors_window_s)
+    if bad > safety.bus_errors:
+        faults.append(Fault(Cause.BUS_NOISE, f"{bad} in {safety.bus_errors_window_s:g} s (at most {safety.bus_errors})"))
+    if alerted := [f"{n} {bits:#04x}" for n, bits in zip(JOINT_NAMES, newest.hardware_errors, strict=False) if bits != 0]:
+        faults.append(Fault(Cause.SERVO_ALERT, ", ".join(alerted)))
+    if watch.astray_since_s is not None and now_s - watch.astray_since_s >= safety.tracking_time_s:
+        faults.append(Fault(Cause.TRACKING, watch.astray))
+    if watch.rebooted:
+        faults.append(Fault(Cause.REBOOTED))
+    if newest.watchdog_tripped:
+        faults.append(Fault(Cause.WATCHDOG))
+    return [*faults, *_supply_faults(newest, servos, safety)]
+
+
+def _supply_faults(newest: BusReport, servos: ServosConfig, safety: SafetyConfig) -> list[Fault]:
+    """Heat and voltage; comparisons are turned so that a reading that is no number counts as too hot or too low."""
+    faults = []
+    warm_c, sagging_v = (
+        servos.max_temperature_c - safety.temperature_warn_margin_c,
+        servos.min_voltage_v + safety.voltage_warn_margin_v,
+    )
+    for hot_c, cause in ((servos.max_temperature_c, Cause.HOT), (warm_c, Cause.WARM)):
+        if found := [f"{n} {c:.0f} °C" for n, c in zip(JOINT_NAMES, newest.temperatures_c, strict=False) if not c < hot_c]:
+            faults.append(Fault(cause, ", ".join(found)))
+            break
+    for low_v, cause in ((servos.min_voltage_v, Cause.VOLTAGE_LOW), (sagging_v, Cause.VOLTAGE_SAGS)):
+        if found := [f"{n} {v:.1f} V" for n, v in zip(JOINT_NAMES, newest.voltages_v, strict=False) if not v > low_v]:
+            faults.append(Fault(cause, ", ".join(found)))
+            break
+    return faults

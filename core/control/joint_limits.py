@@ -1,0 +1,70 @@
+"""The limits of one joint: how far its goal may go in one tick."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from core.servo_config import JointConfig
+
+_ROUNDING_MM = 1e-9
+
+
+class Limit(StrEnum):
+    """What bounded a goal. ENTRY: the first goal is the measured position; STEP: distance from the measured position."""
+
+    ENTRY = "bumpless start"
+    ENVELOPE = "end of the envelope"
+    MARGIN = "near the end of the envelope"
+    RATE = "speed"
+    ACCELERATION = "acceleration"
+    STEP = "step from the measured position"
+
+
+def joint_room(measured_mm: float, joint: JointConfig) -> tuple[float, float]:
+    """Lowest and highest goal inside the envelope and within one step of `measured_mm`; empty (low > high) too far outside."""
+    return max(joint.low_mm, measured_mm - joint.max_step_mm), min(joint.high_mm, measured_mm + joint.max_step_mm)
+
+
+def limited_goal(
+    asked_mm: float,
+    last_mm: float,
+    speed_mm_s: float,
+    measured_mm: float,
+    passed_s: float,
+    joint: JointConfig,
+    margin_speed_share: float,
+) -> tuple[float, Limit | None]:
+    """The goal nearest to `asked_mm` that the joint's limits allow, and the tightest limit that was applied.
+
+    Parameters
+    ----------
+    last_mm, speed_mm_s : last goal, inside the envelope, and its speed.
+    passed_s : time since the last goal.
+    margin_speed_share : of the full speed, on the way outwards inside the warn margin.
+
+    Returns
+    -------
+    tuple
+        The goal is inside envelope and step in any case. It lies farther from `last_mm` than the speed allows only when the joint
+        was moved away from where it was sent; the gate then rejects it.
+    """
+    direction = 1.0 if asked_mm > last_mm else -1.0
+    to_end_mm = joint.high_mm - last_mm if direction > 0 else last_mm - joint.low_mm
+    reach_mm = joint.max_speed_mm_s * passed_s
+    # up to the margin at full speed, the rest of the tick slowly
+    free_mm = max(0.0, to_end_mm - joint.warn_margin_mm)
+    faster_mm_s = max(0.0, speed_mm_s * direction) + joint.max_acceleration_mm_s2 * passed_s
+    bounds = (
+        (Limit.ENVELOPE, to_end_mm),
+        (Limit.RATE, reach_mm),
+        (Limit.MARGIN, free_mm + margin_speed_share * (reach_mm - free_mm)),
+        (Limit.ACCELERATION, faster_mm_s * passed_s),
+    )
+    step_mm, limit = abs(asked_mm - last_mm), None
+    for name, most_mm in bounds:
+        if step_mm > most_mm:
+            step_mm, limit = most_mm, name
+    goal_mm = last_mm + direction * step_mm
+    low_mm, high_mm = joint_room(measured_mm, joint)
+    inside_mm = min(max(goal_mm, low_mm), high_mm)
+    return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit

@@ -1,0 +1,103 @@
+"""Command -> goals of the seven joints in mm: bends become pulls of antagonistic tendons, speeds are integrated.
+
+The mapping starts from the goals that the gate really let through, so nothing winds up while the gate limits or holds. It already
+keeps within speed and envelope; the gate checks it all the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from core.safety_config import SafetyConfig
+from core.servo_config import JOINT_NAMES, JointConfig, JointName, ServosConfig
+from core.types import Command
+
+Joints = tuple[float, ...]
+"""One value per joint, in the order of JOINT_NAMES; millimetres unless said otherwise."""
+NO_GOALS: Joints = (math.nan,) * len(JOINT_NAMES)
+
+_TOUCHING_MM = 1e-9
+_ADVANCE, _DELIVERY = JOINT_NAMES.index("advance"), JOINT_NAMES.index("delivery_1")
+
+
+@dataclass(frozen=True, slots=True)
+class SentGoals:
+    """The goals that were sent last (mm), and when."""
+
+    goals_mm: Joints
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class JointRequest:
+    """Goals to ask the gate for, and the joints that were stopped short by the end of their envelope."""
+
+    goals_mm: Joints
+    at_end: tuple[JointName, ...] = ()
+
+
+def joint_goals(
+    command: Command, last: SentGoals | None, measured_mm: Sequence[float], now_s: float, servos: ServosConfig, safety: SafetyConfig
+) -> JointRequest:
+    """The goals that a command means now.
+
+    Parameters
+    ----------
+    command : bend and pitch beyond -1..1 and speeds beyond the joint's are limited.
+    last : what the gate sent last in this motion (``GateState.sent``); None after a start or a hold: then the goals are the
+        measured positions, as the first goal moves nothing.
+    measured_mm : positions of the seven joints.
+
+    Returns
+    -------
+    JointRequest
+        All seven goals are NaN when a number of the command or the time is not finite: the gate rejects that by name, while a clamp
+        would turn it into full speed (``min(1.0, nan)`` is 1.0). A pause longer than a command may be old counts as that age.
+    """
+    numbers = (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s, now_s)
+    if not all(math.isfinite(number) for number in numbers):
+        return JointRequest(NO_GOALS)
+    if last is None:
+        return JointRequest(tuple(measured_mm))
+    elapsed_s = min(max(0.0, now_s - last.time_s), safety.command_max_age_s)
+    wanted = [*_tendon_goals(command, last.goals_mm, elapsed_s, servos)]
+    wanted += _fed([last.goals_mm[_ADVANCE]], command.advance_mm_s, elapsed_s, servos.joints[_ADVANCE:_DELIVERY])
+    wanted += _fed(last.goals_mm[_DELIVERY:], command.delivery_mm_s, elapsed_s, servos.joints[_DELIVERY:])
+    goals = tuple(goal for goal, _ in wanted)
+    return JointRequest(goals, tuple(joint.name for joint, (_, ended) in zip(servos.joints, wanted, strict=True) if ended))
+
+
+def _tendon_goals(command: Command, last_mm: Joints, elapsed_s: float, servos: ServosConfig) -> list[tuple[float, bool]]:
+    goals = []
+    for first, share in ((0, command.bend), (2, command.pitch)):
+        pulling, letting = servos.joints[first], servos.joints[first + 1]
+        asked_mm = _limited(share, 1.0) * servos.max_pull_mm
+        pull_mm = _pair_pull(asked_mm, pulling, letting, servos.pretension_mm)
+        for place, signed_mm in ((first, pull_mm), (first + 1, -pull_mm)):
+            old_mm, reach_mm = last_mm[place], servos.joints[place].max_speed_mm_s * elapsed_s
+            goals.append((old_mm + _limited(servos.pretension_mm + signed_mm - old_mm, reach_mm), pull_mm != asked_mm))
+    return goals
+
+
+def _pair_pull(asked_mm: float, one: JointConfig, other: JointConfig, pretension_mm: float) -> float:
+    """One tendon pulls as far as the other lets go: what the envelope of either forbids, the pair leaves, so that no wire hangs."""
+    most_mm = max(0.0, min(one.high_mm - pretension_mm, pretension_mm - other.low_mm))
+    least_mm = min(0.0, max(one.low_mm - pretension_mm, pretension_mm - other.high_mm))
+    return min(max(asked_mm, least_mm), most_mm)
+
+
+def _fed(last_mm: Sequence[float], speed_mm_s: float, elapsed_s: float, joints: Sequence[JointConfig]) -> list[tuple[float, bool]]:
+    """Joints that move the same catheter go the same way: where one of them must stop, all of them do."""
+    speed_mm_s = _limited(speed_mm_s, min(joint.max_speed_mm_s for joint in joints))
+    asked_mm = speed_mm_s * elapsed_s
+    forward = asked_mm > 0
+    rooms = [joint.high_mm - old if forward else old - joint.low_mm for joint, old in zip(joints, last_mm, strict=True)]
+    step_mm = _limited(asked_mm, max(0.0, min(rooms)))
+    ended = abs(asked_mm) > abs(step_mm) + _TOUCHING_MM
+    return [(old + step_mm, ended and room <= abs(step_mm) + _TOUCHING_MM) for old, room in zip(last_mm, rooms, strict=True)]
+
+
+def _limited(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))

@@ -1,0 +1,108 @@
+"""Who drives, what the operator may ask for, and what the supervisor answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from core.control.faults import Cause, Fault
+from core.control.gate_checks import Source
+from core.control.health import Health, Report
+
+
+class Mode(StrEnum):
+    """Who drives."""
+
+    ADVISORY = "ADVISORY"
+    ARMED = "ARMED"
+    AUTONOMOUS = "AUTONOMOUS"
+    HOLD = "HOLD"
+    STOPPED = "STOPPED"
+
+
+class Act(StrEnum):
+    """What the operator does. INPUT is a movement of the controls; TAKE_BACK ends autonomy without one, also at the destination."""
+
+    STOP = "stop"
+    ACKNOWLEDGE = "acknowledge"
+    ARM = "arm"
+    HAND_OVER = "hand over"
+    TAKE_BACK = "take back"
+    DISARM = "disarm"
+    INPUT = "input"
+
+
+class Hindrance(StrEnum):
+    """Why a request is refused, beside active faults."""
+
+    IS_STOPPED = "stopped"
+    UNACKNOWLEDGED = "fault not acknowledged"
+    ALREADY_ARMED = "already armed"
+    CAMERA_SETTLING = "camera not well for long enough"
+    PERCEPTION_SETTLING = "perception not well for long enough"
+    SERVOS_UNCHECKED = "servos not checked"
+    NOT_YET_ARMED = "arm first"
+    ALREADY_AUTONOMOUS = "already handed over"
+    NO_DESTINATION = "no destination chosen"
+    DESTINATION_BEHIND = "destination behind the robot"
+    DEADMAN_NOT_HELD = "deadman not held"
+    DEADMAN_HELD_BEFORE = "deadman was down before arming"
+    OPERATOR_DRIVING = "controls in use"
+
+
+Event = Act | Report
+
+DRIVING_MODES = frozenset({Mode.AUTONOMOUS, Mode.HOLD})
+ARMED_MODES = DRIVING_MODES | {Mode.ARMED}
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """A request that was not granted, and all its reasons at once."""
+
+    act: Act
+    reasons: tuple[Hindrance | Cause, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Latched:
+    """The first cause of a disarm or stop; it stays until acknowledged."""
+
+    fault: Fault
+    since_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisorState:
+    """All that the supervisor remembers; a fresh one is the boot: disarmed, nothing known."""
+
+    mode: Mode = Mode.ADVISORY
+    health: Health = field(default_factory=Health)
+    time_s: float | None = None
+    latched: Latched | None = None
+    active: tuple[Fault, ...] = ()
+    hold_since_s: float = 0.0
+    well_since_s: float | None = None
+    resumed_s: float | None = None
+    camera_unwell_s: float = 0.0
+    perception_unwell_s: float = 0.0
+    input_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What follows from the tick.
+
+    ``permitted`` is whose commands the gate may let through. ``blanked`` is why no advice may be shown. ``writes_blocked``: after
+    one last hold nothing is written to the bus. ``raised`` are the faults that were not active in the tick before.
+    """
+
+    mode: Mode
+    permitted: Source | None
+    blanked: Fault | None
+    writes_blocked: bool
+    hold_expired: bool
+    latched: Fault | None
+    active: tuple[Fault, ...]
+    raised: tuple[Fault, ...]
+    refused: tuple[Refused, ...]

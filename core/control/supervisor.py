@@ -1,0 +1,247 @@
+"""The mode machine: who may drive, and why not.
+
+ADVISORY: the operator drives, the program advises. ARMED: the same, and the program may be handed over to. AUTONOMOUS: the program
+drives while the deadman is held. HOLD: an autonomous motion is interrupted. STOPPED: nothing moves, latched.
+
+Arming arms the *program*. The operator drives by hand in ADVISORY, too, as soon as the servos were checked: he must be able to
+bring back a robot that perception lost. So a fault of camera or perception never takes the hand controls away, one of the servos
+always does.
+
+In one tick, however its events are ordered: an acknowledgement comes first and never clears what the same tick reports; every
+report counts, even when a later one in the tick is better; faults react; then requests are heard, the more careful ones last; and
+the operator's input comes last of all and ends autonomy. Only a stop beats it.
+
+Nothing re-arms itself: out of ADVISORY and STOPPED leads only an operator's request. HOLD alone clears itself, within
+``hold_clear_s`` and with the deadman held; later it needs a new hand-over.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence, Set
+from dataclasses import replace
+
+from core.control.faults import AREA, CAUSES, REACTION, RECHECK, Area, Cause, Fault, Reaction, worst
+from core.control.frame_watch import RouteState
+from core.control.gate_checks import Source
+from core.control.health import DeadmanReport, Health, Report, deadman_held, disarmed, driving_faults, faults_now, take
+from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Latched, Mode, Refused, SupervisorState
+from core.safety_config import SafetyConfig
+from core.servo_config import ServosConfig
+
+__all__ = ["Act", "Decision", "Event", "Hindrance", "Latched", "Mode", "Refused", "SupervisorState", "supervise"]
+
+
+def supervise(
+    state: SupervisorState, events: Sequence[Event], now_s: float, servos: ServosConfig, safety: SafetyConfig
+) -> tuple[SupervisorState, Decision]:
+    """One tick: at least every 20 ms, whether anything happened or not.
+
+    Parameters
+    ----------
+    state : the state that the last tick returned.
+    events : what was reported and asked for since then, in any order.
+    now_s : monotonic clock of the frames.
+    """
+    state, now_s, clock = _read_clock(state, now_s, safety)
+    acts = {event for event in events if isinstance(event, Act)}
+    if Act.ACKNOWLEDGE in acts:
+        state = replace(state, latched=None, mode=Mode.ADVISORY if state.mode is Mode.STOPPED else state.mode)
+    reports = [event for event in events if not isinstance(event, Act)]
+    before = state.active
+    health, active = _listen(state, reports, now_s, servos, safety)
+    stop = [Fault(Cause.STOP_PRESSED)] if Act.STOP in acts else []
+    in_use = state.health.servos_ready or health.servos_ready
+    state = _react(replace(state, health=health, active=(*stop, *clock, *active)), in_use, now_s, safety)
+    refused = []
+    if Act.ACKNOWLEDGE in acts and state.latched is not None:
+        refused.append(Refused(Act.ACKNOWLEDGE, (state.latched.fault.cause,)))
+    state, denied = _obey(state, acts, now_s, safety)
+    return state, _decide(state, before, (*refused, *denied), now_s, safety)
+
+
+def _read_clock(state: SupervisorState, now_s: float, safety: SafetyConfig) -> tuple[SupervisorState, float, list[Fault]]:
+    """Times from before a jump of the clock mean nothing any more: all knowledge of the world but the model's is forgotten."""
+    if math.isfinite(now_s) and state.time_s is None:
+        return replace(state, time_s=now_s, camera_unwell_s=now_s, perception_unwell_s=now_s), now_s, []
+    last_s = state.time_s if state.time_s is not None else 0.0
+    if 0.0 <= now_s - last_s <= safety.clock_gap_s:
+        return replace(state, time_s=now_s), now_s, []
+    known_s = now_s if math.isfinite(now_s) else last_s
+    fresh = replace(
+        state,
+        time_s=known_s if math.isfinite(now_s) else state.time_s,
+        health=Health(model=state.health.model),
+        camera_unwell_s=known_s,
+        perception_unwell_s=known_s,
+        input_s=None,
+        resumed_s=None,
+    )
+    return fresh, known_s, [Fault(Cause.CLOCK, f"from {last_s:.3f} s to {now_s:.3f} s")]
+
+
+def _listen(
+    state: SupervisorState, reports: Sequence[Report], now_s: float, servos: ServosConfig, safety: SafetyConfig
+) -> tuple[Health, tuple[Fault, ...]]:
+    """The health after all reports; the faults that are active then, and those that any of the reports brought in between."""
+    driving = state.mode in DRIVING_MODES
+
+    def faults(health: Health) -> dict[Cause, Fault]:
+        found = faults_now(health, now_s, servos, safety) + (driving_faults(health, now_s, safety) if driving else [])
+        return {fault.cause: fault for fault in found}
+
+    health = replace(state.health, reported=())
+    active = faults(health)
+    brought: dict[Cause, Fault] = {}
+    for report in reports:
+        health = take(health, report, armed=state.mode in ARMED_MODES, now_s=now_s, servos=servos, safety=safety)
+        before, active = active, faults(health)
+        brought |= {cause: fault for cause, fault in active.items() if cause not in before}
+        if driving and report == DeadmanReport(False):
+            brought[Cause.DEADMAN] = Fault(Cause.DEADMAN)
+    return health, tuple((brought | active).values())
+
+
+def _holds(fault: Fault) -> bool:
+    return REACTION[fault.cause] >= Reaction.HOLD
+
+
+def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyConfig) -> SupervisorState:
+    """The state after the active faults had their effect. Servos not `in_use` hinder arming, but there is nothing to stop."""
+    state = _note_unwell(state, now_s)
+    faults = tuple(fault for fault in state.active if in_use or AREA[fault.cause] is not Area.SERVOS)
+    recheck = any(fault.cause in RECHECK for fault in state.active)
+    stop, disarm = worst(faults, Reaction.STOP), worst(faults, Reaction.DISARM)
+    if state.mode is Mode.ADVISORY:
+        disarm = worst(tuple(fault for fault in faults if AREA[fault.cause] is Area.SERVOS), Reaction.DISARM)
+    if stop is not None:
+        state, recheck = _leave(state, Mode.STOPPED, stop, now_s), True
+    elif disarm is not None and state.mode is not Mode.STOPPED:
+        state = _leave(state, Mode.ADVISORY, disarm, now_s)
+    elif state.mode is Mode.AUTONOMOUS and any(_holds(fault) for fault in faults):
+        # soon after the last one it is the same hold, or a fault that comes and goes would never end
+        again = state.resumed_s is not None and now_s - state.resumed_s < safety.hold_repeat_s
+        state = replace(state, mode=Mode.HOLD, hold_since_s=state.hold_since_s if again else now_s, well_since_s=None)
+    elif state.mode is Mode.HOLD:
+        state = _clear_hold(state, now_s, safety)
+    return replace(state, health=replace(state.health, servo_problems=None)) if recheck else state
+
+
+def _note_unwell(state: SupervisorState, now_s: float) -> SupervisorState:
+    areas = {AREA[fault.cause] for fault in state.active if _holds(fault)}
+    if Area.CAMERA in areas:
+        state = replace(state, camera_unwell_s=now_s)
+    if Area.PERCEPTION in areas or not state.health.frames.well:
+        state = replace(state, perception_unwell_s=now_s)
+    return state
+
+
+def _leave(state: SupervisorState, mode: Mode, fault: Fault, now_s: float) -> SupervisorState:
+    """Out of autonomy; the first cause is kept."""
+    return replace(state, mode=mode, health=disarmed(state.health), latched=state.latched or Latched(fault, now_s))
+
+
+def _clear_hold(state: SupervisorState, now_s: float, safety: SafetyConfig) -> SupervisorState:
+    """Back to autonomy when all was well for the dwell time, soon enough after the hold began."""
+    if any(_holds(fault) for fault in state.active):
+        return replace(state, well_since_s=None)
+    since_s = state.well_since_s if state.well_since_s is not None else now_s
+    if now_s - since_s >= safety.hold_dwell_s and not _hold_expired(state, now_s, safety):
+        return replace(state, mode=Mode.AUTONOMOUS, resumed_s=now_s)
+    return replace(state, well_since_s=since_s)
+
+
+def _hold_expired(state: SupervisorState, now_s: float, safety: SafetyConfig) -> bool:
+    return state.mode is Mode.HOLD and now_s - state.hold_since_s > safety.hold_clear_s
+
+
+def _obey(
+    state: SupervisorState, acts: Set[Act], now_s: float, safety: SafetyConfig
+) -> tuple[SupervisorState, tuple[Refused, ...]]:
+    """The state after the operator's requests, and those that were refused."""
+    refused = []
+    if Act.INPUT in acts:
+        state = replace(state, input_s=now_s)
+    for act, against, mode in (
+        (Act.ARM, _against_arming, Mode.ARMED),
+        (Act.HAND_OVER, _against_hand_over, Mode.AUTONOMOUS),
+    ):
+        if act in acts:
+            if reasons := against(state, now_s, safety):
+                refused.append(Refused(act, reasons))
+            else:
+                state = replace(state, mode=mode, resumed_s=None)
+    if state.mode in DRIVING_MODES and not acts.isdisjoint({Act.INPUT, Act.TAKE_BACK}):
+        state = replace(state, mode=Mode.ARMED)
+    if state.mode in ARMED_MODES and Act.DISARM in acts:
+        state = replace(state, mode=Mode.ADVISORY, health=disarmed(state.health))
+    return state, tuple(refused)
+
+
+def _against_arming(state: SupervisorState, now_s: float, safety: SafetyConfig) -> tuple[Hindrance | Cause, ...]:
+    reasons: list[Hindrance | Cause] = []
+    if state.mode is Mode.STOPPED:
+        reasons.append(Hindrance.IS_STOPPED)
+    if state.mode in ARMED_MODES:
+        reasons.append(Hindrance.ALREADY_ARMED)
+    if state.latched is not None:
+        reasons.append(Hindrance.UNACKNOWLEDGED)
+    active = [fault.cause for fault in state.active if _holds(fault)]
+    reasons += active
+    areas = {AREA[cause] for cause in active}
+    if Area.CAMERA not in areas and now_s - state.camera_unwell_s < safety.healthy_s:
+        reasons.append(Hindrance.CAMERA_SETTLING)
+    if Area.PERCEPTION not in areas and now_s - state.perception_unwell_s < safety.healthy_s:
+        reasons.append(Hindrance.PERCEPTION_SETTLING)
+    if state.health.servo_problems is None:
+        reasons.append(Hindrance.SERVOS_UNCHECKED)
+    return tuple(reasons)
+
+
+def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfig) -> tuple[Hindrance | Cause, ...]:
+    reasons: list[Hindrance | Cause] = []
+    if state.mode is Mode.STOPPED:
+        reasons.append(Hindrance.IS_STOPPED)
+    if state.mode is Mode.ADVISORY:
+        reasons.append(Hindrance.NOT_YET_ARMED)
+    if state.mode is Mode.AUTONOMOUS:
+        reasons.append(Hindrance.ALREADY_AUTONOMOUS)
+    reasons += [fault.cause for fault in state.active if _holds(fault) and AREA[fault.cause] is not Area.OPERATOR]
+    if state.health.frames.route is RouteState.NONE:
+        reasons.append(Hindrance.NO_DESTINATION)
+    if state.health.frames.route is RouteState.BEHIND:
+        reasons.append(Hindrance.DESTINATION_BEHIND)
+    if not deadman_held(state.health, now_s, safety):
+        down = state.health.deadman.pressed is True and not state.health.deadman.counts
+        reasons.append(Hindrance.DEADMAN_HELD_BEFORE if down else Hindrance.DEADMAN_NOT_HELD)
+    if state.input_s is not None and now_s - state.input_s < safety.operator_quiet_s:
+        reasons.append(Hindrance.OPERATOR_DRIVING)
+    return tuple(reasons)
+
+
+def _decide(
+    state: SupervisorState, before: Collection[Fault], refused: tuple[Refused, ...], now_s: float, safety: SafetyConfig
+) -> Decision:
+    known = {fault.cause for fault in before}
+    blank = [fault for fault in state.active if _holds(fault) and AREA[fault.cause] in {Area.CAMERA, Area.PERCEPTION}]
+    return Decision(
+        mode=state.mode,
+        permitted=_permitted(state),
+        blanked=min(blank, key=lambda fault: CAUSES.index(fault.cause), default=None),
+        writes_blocked=state.mode is Mode.STOPPED,
+        hold_expired=_hold_expired(state, now_s, safety),
+        latched=state.latched.fault if state.latched is not None else None,
+        active=state.active,
+        raised=tuple(fault for fault in state.active if fault.cause not in known),
+        refused=refused,
+    )
+
+
+def _permitted(state: SupervisorState) -> Source | None:
+    if state.mode is Mode.AUTONOMOUS:
+        return Source.PROGRAM
+    causes = [fault.cause for fault in state.active if _holds(fault)]
+    if state.latched is not None:
+        causes.append(state.latched.fault.cause)
+    by_hand = state.mode in {Mode.ADVISORY, Mode.ARMED} and state.health.servos_ready
+    return Source.OPERATOR if by_hand and all(AREA[cause] is not Area.SERVOS for cause in causes) else None
