@@ -11,6 +11,7 @@ from core.config import Config
 from core.devices import Camera, DeviceError, Robot
 
 if TYPE_CHECKING:
+    from hardware.servos.servo_robot import ServoRobot
     from hardware.twin.world import TwinWorld
 
 
@@ -79,8 +80,40 @@ def _open_twin(config: Config) -> Rig:
     # A robot that already lies in the vessel: the first picture shows all that the program can tell.
     world.insert(_START_INSERTION_MM)
     camera = TwinCamera(world)
-    robot = world.robot if config.rig.robot == "twin" else None
-    if robot is not None:
-        robot.connect()
-    camera.open()
+    robot: Robot | None = None
+    if config.rig.robot == "twin":
+        robot = _servo_robot(config, world) if config.servos.driver == "dynamixel" else _direct_robot(world)
+    try:
+        camera.open()
+    except DeviceError:
+        if robot is not None:
+            robot.close()
+        raise
     return Rig(config.rig.name, RigKind.SIM, camera, robot, world)
+
+
+def _direct_robot(world: TwinWorld) -> Robot:
+    world.robot.connect()
+    return world.robot
+
+
+def _servo_robot(config: Config, world: TwinWorld) -> ServoRobot:
+    """The twin's robot moved by seven software servos, through the real driver in its own process; zeroed, not armed."""
+    from hardware.servos.servo_robot import ServoRobot
+    from hardware.twin.servo_bus import SoftServoBus
+    from hardware.twin.servo_joints import drive_world
+
+    if config.servos.port is not None:
+        raise DeviceError(f"rig {config.rig.name} has servos of its own: leave servos.port ({config.servos.port}) out")
+    servos = SoftServoBus(config.servos, wire_time=True)
+    servos.start()
+    drive_world(world, servos, config.servos)
+    settings = config.servos.model_copy(update={"port": servos.port})
+    robot = ServoRobot(settings, config.safety, name="bench twin with servos", truth=world.physics.status, on_close=servos.stop)
+    try:
+        robot.connect()
+        robot.zero()  # its wires are slack, as nothing has pulled yet
+    except DeviceError:
+        robot.close()
+        raise
+    return robot

@@ -39,3 +39,7 @@ class NotReady(ServoError):
 
 class TorqueStillOn(ServoError):
     """The torque could not be proven to be off."""
+
+
+class BusProcessLost(ServoError):
+    """The process that owns the servo bus cannot be started, is gone, or does not answer."""

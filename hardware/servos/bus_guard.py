@@ -1,0 +1,198 @@
+"""What the bus process decides: who may move the servos, with what goals, and what ends a motion. No port, no clock of its own."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from core.control.bus_watch import BusReport, BusWatch, bus_faults, see_bus
+from core.control.faults import REACTION, Cause, Fault, Reaction, worst
+from core.control.gate import Clamp, GateState, GateStep, GoalRequest, Measurement, Rejection, RejectReason, Source, gate_step
+from core.control.joints import Joints, joint_goals
+from core.safety_config import SafetyConfig
+from core.servo_config import JointName, ServosConfig
+from core.types import Command
+from hardware.servos.bus_messages import Heartbeat, Order, Sent
+from hardware.servos.errors import NotReady
+from hardware.servos.jam import JamWatch
+from hardware.servos.one_step import OneStep
+from hardware.servos.status_block import MissingServo, ServoReading, ServoState
+
+_MENDED_BY_ARMING = frozenset({Cause.WATCHDOG, Cause.REBOOTED})
+
+
+def report_of(readings: Sequence[ServoReading], *, armed: bool, errors: int, rebooted: bool = False) -> BusReport:
+    """A cycle's readings as the supervisor wants them; values of a servo that is missing in this cycle are left out for all."""
+    states = [reading for reading in readings if isinstance(reading, ServoState)]
+    missing = [reading for reading in readings if isinstance(reading, MissingServo)]
+    whole = bool(states) and not missing
+    astray = [state.goal_mm - state.position_mm for state in states if state.goal_mm is not None and state.position_mm is not None]
+    return BusReport(
+        misses=tuple(reading.misses if isinstance(reading, MissingServo) else 0 for reading in readings),
+        errors=errors,
+        # a servo with an error may be the only one that answers
+        hardware_errors=tuple(int(r.error) if isinstance(r, ServoState) else 0 for r in readings),
+        temperatures_c=tuple(state.temperature_c for state in states) if whole else (),
+        voltages_v=tuple(state.voltage_v for state in states) if whole else (),
+        # goals mean something only while they are followed; nobody is astray before
+        tracking_mm=() if not whole else tuple(astray) if armed and len(astray) == len(readings) else (0.0,) * len(readings),
+        rebooted=rebooted or any(reading.restarted for reading in missing) or (armed and any(not s.torque for s in states)),
+        watchdog_tripped=any(state.watchdog_tripped for state in states),
+    )
+
+
+class BusGuard:
+    """State from cycle to cycle: armed or not, the first cause, and what the gate remembers."""
+
+    def __init__(self, servos: ServosConfig, safety: SafetyConfig, now_s: float) -> None:
+        self._servos, self._safety = servos, safety
+        self.armed = self.stopped = False
+        self.latched: Fault | None = None
+        self.active: tuple[Fault, ...] = ()
+        self.fault_counts: Counter[Cause] = Counter()
+        self.restarts = 0
+        self.sent: Sent | None = None
+        self.rejection: Rejection | None = None
+        self.clamps: tuple[Clamp, ...] = ()
+        self.at_end: tuple[JointName, ...] = ()
+        self.rejections: Counter[RejectReason] = Counter()
+        self.clamp_count = 0
+        self._watch = BusWatch()
+        self._gate = GateState()
+        self._one_step = OneStep(servos.joints)
+        self._jam = JamWatch(servos.joints, safety.tracking_time_s)
+        self._measurement: Measurement | None = None
+        self._before: Measurement | None = None
+        self._heard_s = self._cycle_s = self._armed_s = now_s
+
+    def silence_s(self, beat: Heartbeat | None, now_s: float) -> float:
+        """How long the application has given no sign of life; a request is one, too (``heard``)."""
+        return now_s - max(self._heard_s, beat.time_s if beat is not None else self._heard_s)
+
+    def heard(self, now_s: float) -> None:
+        """The application asked for something, and waits for the answer."""
+        self._heard_s = now_s
+
+    def see(self, readings: Sequence[ServoReading], errors: int, beat: Heartbeat | None, now_s: float) -> Fault | None:
+        """Take in one cycle; the fault that ends the motion, when one is going on and must end."""
+        report = report_of(readings, armed=self.armed, errors=errors)
+        self.restarts += sum(isinstance(reading, MissingServo) and reading.restarted for reading in readings)
+        self._watch = see_bus(self._watch, report, now_s, self._servos, self._safety)
+        self._measure(readings)
+        faults = bus_faults(self._watch, now_s, self._servos, self._safety)
+        if self.armed:
+            faults += self._faults_of_motion(beat, now_s)
+        self._cycle_s = now_s
+        self._activate(faults)
+        return self._ends() if self.armed else None
+
+    def lost_port(self) -> Fault:
+        """Nothing is known about the servos any more."""
+        self._watch, self._measurement, self._before = BusWatch(), None, None
+        fault = Fault(Cause.PORT_LOST)
+        self._activate([fault])
+        return fault
+
+    def end_motion(self, fault: Fault) -> None:
+        """Disarmed, and the first cause latched; a fault that stops also blocks arming until it is acknowledged."""
+        self.armed = False
+        self.stopped = self.stopped or REACTION[fault.cause] is Reaction.STOP
+        self.latched = self.latched or fault
+        if fault.cause is Cause.STOP_PRESSED:
+            self.fault_counts[fault.cause] += 1
+        self.disarm()
+
+    def disarm(self) -> None:
+        """No more goals; nothing is latched."""
+        self.armed = False
+        self._gate = GateState()
+        self._jam.forget()
+        self.rejection, self.clamps, self.at_end = None, (), ()
+
+    def acknowledge(self) -> None:
+        """The operator has seen the cause. Faults that are still there go on to hinder arming."""
+        self.latched, self.stopped = None, False
+
+    def check_arming(self) -> None:
+        """Raise NotReady with all reasons that hinder arming, but for those that the driver finds."""
+        reasons = []
+        if self.latched is not None:
+            reasons.append(f"acknowledge first: {_text(self.latched)}")
+        if self.armed:
+            reasons.append("already armed")
+        hinder = [f for f in self.active if REACTION[f.cause] >= Reaction.HOLD and f.cause not in _MENDED_BY_ARMING]
+        if reasons := reasons + [_text(fault) for fault in hinder]:
+            raise NotReady(f"not armed: {'; '.join(reasons)}")
+
+    def set_armed(self, now_s: float) -> None:
+        """The driver has armed the servos. Orders from before do not count."""
+        self._watch = BusWatch()
+        self._gate, self._measurement, self._before = GateState(), None, None
+        self._jam.forget()
+        self.armed = True
+        self._heard_s = self._cycle_s = self._armed_s = now_s
+
+    def step(self, order: Order | None, beat: Heartbeat | None, now_s: float) -> GateStep:
+        """The goals for this cycle, through the gate."""
+        request, at_end = self._request(order, now_s), self.at_end
+        # A permission holds good no longer than an order: whoever gives it must still be watching.
+        fresh = beat is not None and now_s - beat.time_s <= self._safety.command_max_age_s
+        permitted: Source | None = beat.permitted if self.armed and beat is not None and fresh else None
+        step = gate_step(self._gate, request, self._measurement, permitted, now_s, self._servos, self._safety)
+        self._gate = step.state
+        self.rejection, self.clamps = step.rejection, step.clamps
+        self.at_end = () if step.is_hold else at_end
+        self.clamp_count += len(step.clamps)
+        if step.rejection is not None:
+            self.rejections[step.rejection.reason] += 1
+        return step
+
+    def wrote(self, goals_mm: Joints, order: Order | None, now_s: float) -> None:
+        """These goals went out, as the servos count them."""
+        right, left, up, down, *_ = goals_mm
+        speeds, pull_mm = self._gate.speeds_mm_s, 2.0 * self._servos.max_pull_mm
+        motion = Command((right - left) / pull_mm, (up - down) / pull_mm, speeds[4], (speeds[5] + speeds[6]) / 2.0)
+        self.sent = Sent(goals_mm, motion, now_s, order if self.rejection is None else None)
+
+    def _request(self, order: Order | None, now_s: float) -> GoalRequest | None:
+        self.at_end = ()
+        if order is None or order.command is None or self._measurement is None or order.issued_s < self._armed_s:
+            return None
+        at_mm = tuple(self._measurement.positions_mm)
+        before_mm = tuple((self._before or self._measurement).positions_mm)
+        wanted = joint_goals(order.command, self._gate.sent, at_mm, now_s, self._servos, self._safety)
+        self.at_end = wanted.at_end
+        goals_mm = self._one_step.bounded(wanted.goals_mm, (order.issued_s, order.command), before_mm)
+        return GoalRequest(goals_mm, order.source, order.issued_s, order.captured_s)
+
+    def _measure(self, readings: Sequence[ServoReading]) -> None:
+        """A whole set of positions replaces the last one; one with gaps does not."""
+        found = [(r.position_mm, r.time_s) for r in readings if isinstance(r, ServoState) and r.position_mm is not None]
+        if readings and len(found) == len(readings):
+            self._before = self._measurement
+            self._measurement = Measurement(tuple(at for at, _ in found), min(time_s for _, time_s in found))
+
+    def _faults_of_motion(self, beat: Heartbeat | None, now_s: float) -> list[Fault]:
+        faults = []
+        silence_s, gap_s = self.silence_s(beat, now_s), now_s - self._cycle_s
+        if silence_s > self._servos.heartbeat_timeout_s:
+            faults.append(Fault(Cause.WORKER_DEAD, f"no heartbeat of the application for {1000 * silence_s:.0f} ms"))
+        if not 0.0 <= gap_s <= self._safety.clock_gap_s:
+            faults.append(Fault(Cause.CLOCK, f"the bus process stood still for {gap_s:.2f} s"))
+        if self._measurement is not None and self._gate.goals_mm is not None:
+            jammed = self._jam.see(self._gate.goals_mm, self._measurement.positions_mm, now_s)
+            if jammed is not None:
+                faults.append(Fault(Cause.TRACKING, jammed))
+        return faults
+
+    def _activate(self, faults: Sequence[Fault]) -> None:
+        known = {fault.cause for fault in self.active}
+        self.active = tuple(faults)
+        self.fault_counts.update(fault.cause for fault in faults if fault.cause not in known)
+
+    def _ends(self) -> Fault | None:
+        return worst(self.active, Reaction.STOP) or worst(self.active, Reaction.DISARM)
+
+
+def _text(fault: Fault) -> str:
+    return f"{fault.cause} ({fault.detail})" if fault.detail else fault.cause.value

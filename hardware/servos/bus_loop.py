@@ -1,0 +1,253 @@
+"""The bus process's loop: read all servos, decide, write; and listen to STOP and requests in between."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from core.control.faults import REACTION, Cause, Fault, Reaction
+from core.safety_config import SafetyConfig
+from core.servo_config import ServosConfig
+from hardware.servos.bus_guard import BusGuard
+from hardware.servos.bus_messages import BusPhase, BusStatus
+from hardware.servos.dynamixel import ServoBus
+from hardware.servos.errors import NotReady, PortLost, ServoError
+from hardware.servos.guard_end import GuardEnd, Request
+from hardware.servos.status_block import ServoReading, ServoState
+from hardware.servos.stopwatch import Stopwatch
+
+_LINGER_S = 0.2
+"""So long after disarming for silence the servos are still polled, to see that they hold."""
+_REOPEN_S = 1.0
+_SETTLE_CYCLES = 5
+_SETTLED_MM = 0.2
+_WINDOW_S = 10.0
+
+
+class BusLoop:
+    """Owns bus and guard. ``run`` returns when the application ends it, or is gone; the servos hold by then."""
+
+    def __init__(self, end: GuardEnd, bus: ServoBus, servos: ServosConfig, safety: SafetyConfig) -> None:
+        self._end, self._bus, self._servos = end, bus, servos
+        self._guard = BusGuard(servos, safety, time.monotonic())
+        self._period_s = 1.0 / servos.bus_hz
+        self._times = Stopwatch(round(_WINDOW_S * servos.bus_hz))
+        self._cycle = 0
+        self._readings: tuple[ServoReading, ...] = ()
+        self._corrupt = self._bad_packets = 0
+        self._settle = 0
+        self._ended = self._quiet = self._lost = False
+        self._reopen_at_s = 0.0
+        self._does: dict[str, Callable[[Request], None]] = {
+            "open": lambda _: self._open(),
+            "zero": lambda request: bus.set_zero(request.details.get("names")),
+            "arm": lambda _: self._arm(),
+            "disarm": lambda _: self._disarm(),
+            "acknowledge": lambda _: self._guard.acknowledge(),
+            "reboot": self._reboot,
+            "torque off": lambda _: self._torque_off(),
+        }
+
+    def end(self) -> None:
+        """Let ``run`` return soon; for a signal handler."""
+        self._ended = True
+
+    def run(self) -> None:
+        """Turn until the end. Afterwards the servos hold and the port is free."""
+        due_s = time.monotonic()
+        try:
+            while not self._ended:
+                self._listen_until(due_s)
+                if not self._ended:
+                    self._turn()
+                    due_s = max(due_s + self._period_s, time.monotonic())
+        finally:
+            self._bus.close()
+
+    def _listen_until(self, due_s: float) -> None:
+        """Serve STOP and requests at once, until the next cycle is due."""
+        while not self._ended:
+            left_s = due_s - time.monotonic()
+            line, requests = self._end.wait(left_s)
+            if line and self._end.take_stop():
+                self._guard_port(lambda: self._end_motion(Fault(Cause.STOP_PRESSED)))
+            if requests and (request := self._end.take_request()) is not None:
+                self._serve(request)
+            self._ended = self._ended or self._end.is_alone
+            if left_s <= 0.0:
+                return
+
+    def _turn(self) -> None:
+        """One cycle."""
+        started_s = time.monotonic()
+        self._cycle += 1
+        silence_s = self._guard.silence_s(self._end.heartbeat(), started_s)
+        self._quiet = not self._guard.armed and silence_s > self._servos.heartbeat_timeout_s + _LINGER_S
+        self._readings = ()
+        if self._bus.is_open and not self._quiet:
+            self._guard_port(self._talk)
+        elif self._lost and started_s >= self._reopen_at_s:
+            self._reopen(started_s)
+        self._publish(time.monotonic())
+        self._times.note(started_s, time.monotonic())
+
+    def _talk(self) -> None:
+        """Read, decide, write."""
+        self._readings = self._bus.read()
+        errors = self._new_errors()
+        now_s = time.monotonic()
+        fault = self._guard.see(self._readings, errors, self._end.heartbeat(), now_s)
+        if fault is not None:
+            self._end_motion(fault)
+        elif self._guard.armed:
+            self._drive()
+        elif self._settle > 0:
+            self._settle -= 1
+            if not self._holds():
+                self._bus.hold()
+
+    def _drive(self) -> None:
+        order, beat = self._end.order(), self._end.heartbeat()
+        now_s = time.monotonic()  # after both: nothing in them is from the future
+        step = self._guard.step(order, beat, now_s)
+        if step.goals_mm is None:
+            return
+        try:
+            self._guard.wrote(self._bus.write(step.goals_mm), order, now_s)
+        except (NotReady, ValueError) as error:  # the driver saw what the guard did not, or the zeros leave no room for the goals
+            self._end_motion(Fault(Cause.SERVOS_WRONG, str(error)))
+
+    def _end_motion(self, fault: Fault) -> None:
+        """Goal = measured; no more goals. What stops may switch the torque off, too."""
+        self._guard.end_motion(fault)
+        if not self._bus.is_open:
+            return
+        self._settle = _SETTLE_CYCLES
+        self._bus.disarm()
+        if REACTION[fault.cause] is Reaction.STOP and self._servos.torque_off_on_stop:
+            try:
+                self._bus.torque_off()
+            except PortLost:
+                raise
+            except ServoError as error:
+                self._guard.latched = replace(fault, detail=f"{fault.detail} {error}".strip())
+
+    def _holds(self) -> bool:
+        """Whether all servos that tell have a goal where they are; a hold has no answer, and may have got lost."""
+        return all(
+            abs(reading.goal_ticks - reading.ticks) <= _SETTLED_MM * abs(joint.ticks_per_mm)
+            for joint, reading in zip(self._servos.joints, self._readings, strict=True)
+            if isinstance(reading, ServoState) and reading.torque
+        )
+
+    def _guard_port(self, action: Callable[[], None]) -> None:
+        """Do it; a port that vanishes meanwhile stops everything, and is opened again when it comes back. Never armed again."""
+        try:
+            action()
+        except PortLost:
+            self._lose_port()
+
+    def _lose_port(self) -> None:
+        self._guard.end_motion(self._guard.lost_port())
+        self._readings = ()
+        self._lost = True
+        self._reopen_at_s = time.monotonic() + _REOPEN_S
+
+    def _reopen(self, now_s: float) -> None:
+        self._reopen_at_s = now_s + _REOPEN_S
+        if os.path.exists(self._servos.port or ""):
+            with contextlib.suppress(ServoError):
+                self._open()
+
+    def _open(self) -> None:
+        if not self._bus.is_open:
+            self._bus.open()
+            self._corrupt = self._bus.counts.corrupt
+            self._lost = False
+
+    def _arm(self) -> None:
+        if not self._bus.is_open:
+            raise NotReady("not armed: the servo port is not open")
+        self._guard.check_arming()
+        self._bus.arm()
+        self._settle = 0
+        self._guard.set_armed(time.monotonic())
+
+    def _disarm(self) -> None:
+        self._guard.disarm()
+        if self._bus.is_open:
+            self._settle = _SETTLE_CYCLES
+            self._bus.disarm()
+
+    def _reboot(self, request: Request) -> None:
+        if self._guard.armed:
+            raise NotReady("the servos are armed: disarm before a reboot")
+        self._bus.reboot(int(request.details.get("servo_id", -1)))
+
+    def _torque_off(self) -> None:
+        self._guard.disarm()
+        self._settle = 0
+        self._bus.torque_off()
+
+    def _serve(self, request: Request) -> None:
+        if request.what == "end":
+            self._ended = True
+            return
+        error: ServoError | None = None
+        try:
+            if (action := self._does.get(request.what)) is None:
+                raise NotReady(f"the servo bus process does not know how to {request.what}")
+            action(request)
+        except PortLost as lost:
+            error = lost
+            self._lose_port()
+        except ServoError as refused:
+            error = refused
+        self._guard.heard(time.monotonic())
+        self._publish(time.monotonic())
+        self._end.answer(request, error)
+
+    def _new_errors(self) -> int:
+        """Damaged answers since the last cycle."""
+        errors = self._bus.counts.corrupt - self._corrupt
+        self._corrupt += errors
+        self._bad_packets += errors
+        return errors
+
+    def _phase(self) -> BusPhase:
+        guard = self._guard
+        if not self._bus.is_open:
+            return BusPhase.CLOSED
+        if guard.armed:
+            return BusPhase.ARMED
+        if guard.stopped:
+            return BusPhase.STOPPED
+        return BusPhase.QUIET if self._quiet else BusPhase.DISARMED
+
+    def _publish(self, now_s: float) -> None:
+        guard = self._guard
+        self._end.publish(
+            BusStatus(
+                cycle=self._cycle,
+                time_s=now_s,
+                phase=self._phase(),
+                servos=self._readings,
+                active=guard.active,
+                latched=guard.latched,
+                fault_counts=dict(guard.fault_counts),
+                sent=guard.sent,
+                rejection=guard.rejection,
+                clamps=guard.clamps,
+                at_end=guard.at_end,
+                rejections=dict(guard.rejections),
+                clamp_count=guard.clamp_count,
+                line=replace(self._bus.counts),
+                bad_packets=self._bad_packets,
+                restarts=guard.restarts,
+                times=self._times.summary,
+                zeroed=tuple(zero is not None for zero in self._bus.zero_ticks),
+            )
+        )

@@ -1,0 +1,269 @@
+"""The robot behind the ``Robot`` protocol, moved by seven servos through the guarded bus process."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Sequence
+
+from core.control.bus_watch import BusReport
+from core.control.gate import Source
+from core.safety_config import SafetyConfig
+from core.servo_config import JointConfig, JointName, ServosConfig
+from core.types import Command, RobotStatus
+from hardware.servos.bus_guard import report_of
+from hardware.servos.bus_link import BusLink
+from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order
+from hardware.servos.errors import BusProcessLost, NotReady
+from hardware.servos.status_block import ServoReading, ServoState
+
+_OPEN_S, _ARM_S, _REQUEST_S = 20.0, 10.0, 5.0
+_TORQUE_NM_PER_A = 4.1 / 2.3
+"""Stall torque over stall current of an XM430-W350 at 12 V (Robotis e-Manual)."""
+
+
+class ServoRobot:
+    """Seven servos, in a process of their own. All methods may be called from any thread.
+
+    Parameters
+    ----------
+    servos, safety : the configuration; ``servos.port`` must be set.
+    name : for people.
+    truth : tells the status instead of the servos, where the robot is simulated.
+    on_close : called once, after the servos were let go.
+
+    Notes
+    -----
+    Nothing moves before ``zero`` and ``arm``. Orders and permissions hold good for 100 ms and must be repeated. A program with a
+    supervisor calls ``beat`` at its every tick, and from the first call on nothing else is a sign of life; in a program without
+    one ``send``, ``hold`` and ``status`` are, and permit the operator. ``arm``, ``zero`` and the like wait for their answer,
+    ``stop`` waits for nothing.
+    """
+
+    def __init__(
+        self,
+        servos: ServosConfig,
+        safety: SafetyConfig,
+        *,
+        name: str = "servo robot",
+        truth: Callable[[], RobotStatus] | None = None,
+        on_close: Callable[[], None] | None = None,
+    ) -> None:
+        self._servos, self._safety = servos, safety
+        self._name = name
+        self._truth, self._on_close = truth, on_close
+        self._lock = threading.Lock()
+        self._link: BusLink | None = None
+        self._supervised = False
+        self._states: tuple[ServoReading, ...] = ()
+        self._reported = (0, 0, 0)  # cycle, bad packets and restarts of the last report
+
+    @property
+    def name(self) -> str:
+        return self._name
+
+    @property
+    def failure(self) -> str | None:
+        """One line when the bus process is gone though nobody closed it."""
+        link = self._link
+        return link.failure if link is not None else None
+
+    def connect(self) -> None:
+        """Start the bus process, open and lock the port, check all servos. Nothing moves, and nothing is armed.
+
+        Raises
+        ------
+        ServoError
+            What is wrong with port or servos; all is closed again.
+        """
+        self._disconnect()
+        if self._servos.port is None:
+            raise NotReady("no servo port is configured: set servos.port")
+        link = BusLink(self._servos, self._safety)
+        try:
+            link.request("open", _OPEN_S)
+        except BaseException:
+            link.close()
+            raise
+        self._reported = (0, 0, 0)
+        self._states = ()
+        self._supervised = False
+        self._link = link
+
+    def zero(self, names: Sequence[JointName] | None = None) -> None:
+        """The present positions are zero, of all joints or of those named; the wires must be slack.
+
+        Raises
+        ------
+        NotReady, NoAnswer
+        """
+        self._connected().request("zero", _REQUEST_S, names=None if names is None else list(names))
+
+    def arm(self) -> None:
+        """Torque on, each servo holding where it stands; from now on the permitted one's orders are followed.
+
+        Raises
+        ------
+        NotReady
+            With all reasons: not zeroed, a fault that was not acknowledged or is still there.
+        """
+        self._connected().request("arm", _ARM_S)
+        self._live()
+
+    def disarm(self) -> None:
+        """Hold, and follow no more orders. The torque stays on."""
+        self._connected().request("disarm", _REQUEST_S)
+
+    def stop(self) -> None:
+        """STOP: hold at once, latched, and the torque off if the configuration says so. Never fails and never waits."""
+        if (link := self._link) is not None:
+            link.stop()
+
+    def acknowledge(self) -> None:
+        """The operator has seen why the servos were disarmed or stopped; arming is another request."""
+        self._connected().request("acknowledge", _REQUEST_S)
+
+    def reboot(self, servo_id: int) -> None:
+        """Restart a servo, which clears its hardware error; its joint must be zeroed again."""
+        self._connected().request("reboot", _REQUEST_S, servo_id=servo_id)
+
+    def torque_off(self) -> None:
+        """Disarm and switch all torque off, which releases the tension of the wires.
+
+        Raises
+        ------
+        TorqueStillOn
+        """
+        self._connected().request("torque off", _REQUEST_S)
+
+    def beat(self, permitted: Source | None) -> None:
+        """A sign of life of the application, with what its supervisor says: whose orders may be followed (None: nobody's)."""
+        self._supervised = True
+        if (link := self._link) is not None:
+            link.put_heartbeat(Heartbeat(time.monotonic(), permitted))
+
+    def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
+        """Make `command` the newest order.
+
+        Parameters
+        ----------
+        command : limited to -1..1 and to the joints' speeds.
+        source, captured_s : who asks; the program must say when the frame behind it was taken (monotonic).
+
+        Returns
+        -------
+        Command
+            The motion that really left the gate in the newest cycle of the bus, not more than a cycle before this order.
+
+        Raises
+        ------
+        ValueError
+            When a number is not finite; the order before stays.
+        BusProcessLost
+            Not connected, or the bus process is gone.
+        """
+        if not all(math.isfinite(number) for number in (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s)):
+            raise ValueError(f"command is not finite: {command}")
+        joints = self._servos.joints
+        limited = Command(
+            bend=_limited(command.bend, 1.0),
+            pitch=_limited(command.pitch, 1.0),
+            advance_mm_s=_limited(command.advance_mm_s, joints[4].max_speed_mm_s),
+            delivery_mm_s=_limited(command.delivery_mm_s, min(joint.max_speed_mm_s for joint in joints[5:])),
+        )
+        link = self._connected()
+        link.put_order(Order(limited, source, time.monotonic(), captured_s))
+        self._live()
+        status = link.status()
+        return status.sent.motion if status is not None and status.armed and status.sent is not None else Command()
+
+    def hold(self) -> None:
+        """Stop all motion and keep the bend; stays armed."""
+        if (link := self._link) is not None:
+            link.put_order(Order(None, Source.OPERATOR, time.monotonic()))
+            self._live()
+
+    def status(self) -> RobotStatus:
+        """Where the robot is, as far as its servos told last (``time_s``, monotonic); 0 for a joint that is not zeroed.
+
+        Raises
+        ------
+        BusProcessLost
+        """
+        self._live()
+        self._connected()
+        self.bus_status()
+        if self._truth is not None:
+            return self._truth()
+        states = [reading for reading in self._states if isinstance(reading, ServoState)]
+        if not states:
+            return RobotStatus(time.monotonic(), 0.0, 0.0, (0.0,) * 4, (0.0,) * 4)
+        at_mm = [state.position_mm or 0.0 for state in states]
+        right, left, up, down = (_force_mn(joint, state) for joint, state in zip(self._servos.joints[:4], states[:4], strict=True))
+        return RobotStatus(
+            time_s=min(state.time_s for state in states),
+            insertion_mm=at_mm[4],
+            delivery_mm=(at_mm[5] + at_mm[6]) / 2.0,
+            tendon_pull_mm=(at_mm[0], at_mm[1], at_mm[2], at_mm[3]),
+            tendon_force_mn=(right, left, up, down),
+        )
+
+    def bus_status(self) -> BusStatus | None:
+        """The newest status of the bus process, also after its end (see ``failure``); None before the first. No heartbeat."""
+        link = self._link
+        status = link.status() if link is not None else None
+        if status is not None and status.servos and all(isinstance(reading, ServoState) for reading in status.servos):
+            self._states = status.servos
+        return status
+
+    def report(self) -> BusReport | None:
+        """What the supervisor wants to know of the cycles since the last call; None when there was none, or the bus is quiet."""
+        status = self.bus_status()
+        with self._lock:
+            cycle, bad_packets, restarts = self._reported
+            if status is None or status.cycle == cycle or self.failure is not None:
+                return None
+            self._reported = status.cycle, bad_packets, restarts
+            if status.phase is BusPhase.CLOSED:
+                return BusReport(port_open=False)
+            if not status.servos:
+                return None
+            self._reported = status.cycle, status.bad_packets, status.restarts
+        errors, rebooted = status.bad_packets - bad_packets, status.restarts > restarts
+        return report_of(status.servos, armed=status.armed, errors=errors, rebooted=rebooted)
+
+    def close(self) -> None:
+        """Hold, end the bus process and give the port back. The torque stays on."""
+        self._disconnect()
+        on_close, self._on_close = self._on_close, None
+        if on_close is not None:
+            on_close()
+
+    def _disconnect(self) -> None:
+        link, self._link = self._link, None
+        if link is not None:
+            link.close()
+
+    def _connected(self) -> BusLink:
+        link = self._link
+        if link is None:
+            raise BusProcessLost(f"the {self._name} is not connected: connect it first")
+        if (failure := link.failure) is not None:
+            raise BusProcessLost(failure)
+        return link
+
+    def _live(self) -> None:
+        """A sign of life of a program without a supervisor."""
+        if (link := self._link) is not None and not self._supervised:
+            link.put_heartbeat(Heartbeat(time.monotonic(), Source.OPERATOR))
+
+
+def _force_mn(joint: JointConfig, state: ServoState) -> float:
+    """Pull of a wire as the motor's current tells it, friction included; 0 for models that report no current."""
+    radius_m = joint.mm_per_turn / (2.0 * math.pi) / 1000.0
+    return joint.sign * (state.current_ma or 0.0) / 1000.0 * _TORQUE_NM_PER_A / radius_m * 1000.0
+
+
+def _limited(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))

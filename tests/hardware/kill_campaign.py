@@ -1,0 +1,167 @@
+"""Kills and stops the application, or its bus process, while the program drives, and measures in the servos what becomes of them.
+
+``python -m tests.hardware.kill_campaign [COUNT] [SEED]`` prints one line per strike and a summary. Three processes: the servos live
+in this one and are asked for their mechanical positions; the application (``bus_application``) and its bus process are the victims.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from core.servo_config import ServosConfig
+from hardware.twin.servo_bus import SoftServoBus
+
+ROOT = Path(__file__).resolve().parents[2]
+BOUND_S = 0.3
+REST_MM = 0.01
+"""One position unit of the servos."""
+BOUND_STEPS = 1.0 + REST_MM / 0.6
+"""One step, and one position unit for rounding, in the steps of the joints that have the shortest."""
+_SAMPLE_S, _WATCH_S, _GONE_S = 0.004, 1.0, 5.0
+KINDS = tuple((victim, number) for victim in ("application", "bus process") for number in (signal.SIGKILL, signal.SIGSTOP))
+Sample = tuple[float, tuple[float, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """``stop_ms`` until the last servo stood still for good, ``steps`` the longest way of a servo in its own bounded steps.
+
+    ``before_mm`` is how far the fastest servo went in the 100 ms before; ``bus_gone`` whether the bus process ended without us.
+    The strike itself fell within ``blur_ms``: times count from its beginning, ways from its end.
+    """
+
+    victim: str
+    signal: str
+    stop_ms: float
+    steps: float
+    before_mm: float
+    bus_gone: bool
+    blur_ms: float
+
+
+class Recorder(threading.Thread):
+    """Writes down where the servos' horns are."""
+
+    def __init__(self, servos: SoftServoBus) -> None:
+        super().__init__(name="positions", daemon=True)
+        self.samples: list[Sample] = []
+        self._servos = servos
+        self._done = threading.Event()
+
+    def run(self) -> None:
+        while not self._done.wait(_SAMPLE_S):
+            self.take()
+
+    def take(self) -> Sample:
+        positions = self._servos.positions_mm()
+        sample = time.monotonic(), positions
+        self.samples.append(sample)
+        return sample
+
+    def end(self) -> list[Sample]:
+        self._done.set()
+        self.join()
+        return sorted(self.samples)
+
+
+@contextmanager
+def application(servos: SoftServoBus) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A driving application and its bus process's id; both are gone afterwards."""
+    command = [sys.executable, "-m", "tests.hardware.bus_application", servos.port]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    bus_pid = None
+    try:
+        line = process.stdout.readline()
+        bus_pid = json.loads(line or "{}").get("bus_pid")
+        if bus_pid is None:
+            raise RuntimeError(f"the application did not arm: {line!r}")
+        yield process, bus_pid
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+        if bus_pid is not None and not _gone(bus_pid, _GONE_S):
+            os.kill(bus_pid, signal.SIGKILL)
+
+
+def strike(servos: SoftServoBus, victim: str, number: signal.Signals, delay_s: float) -> Outcome:
+    """One application, hit `delay_s` after it began to drive."""
+    with application(servos) as (process, bus_pid):
+        recorder = Recorder(servos)
+        recorder.start()
+        time.sleep(delay_s)
+        target = process.pid if victim == "application" else bus_pid
+        hit_s, _ = recorder.take()
+        os.kill(target, number)
+        struck_s, start_mm = recorder.take()
+        time.sleep(_WATCH_S)
+        samples = recorder.end()
+        gone = _gone(bus_pid, 0.0)
+        if not gone and victim != "application":
+            os.kill(bus_pid, signal.SIGKILL)  # a stopped process does not end by itself
+    joints = ServosConfig().joints
+    after = [sample for sample in samples if sample[0] >= hit_s]
+    end_mm = after[-1][1]
+    moving = [n for n, (_, at) in enumerate(after) if max(abs(a - b) for a, b in zip(at, end_mm, strict=True)) > REST_MM]
+    stopped_s = after[moving[-1] + 1][0] if moving else hit_s
+    late = [at for time_s, at in after if time_s >= struck_s]
+    steps = max(abs(a - b) / j.max_step_mm for at in late for a, b, j in zip(at, start_mm, joints, strict=True))
+    before = next(at for time_s, at in samples if time_s >= hit_s - 0.1)
+    before_mm = max(abs(a - b) for a, b in zip(before, start_mm, strict=True))
+    stop_ms, blur_ms = 1000.0 * (stopped_s - hit_s), 1000.0 * (struck_s - hit_s)
+    return Outcome(victim, number.name, stop_ms, steps, before_mm, gone, blur_ms)
+
+
+def _gone(pid: int, timeout_s: float) -> bool:
+    """Whether a process that is not our child has ended; a zombie has."""
+    until = time.monotonic() + timeout_s
+    while True:
+        try:
+            ended = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in {"Z", "X"}
+        except (FileNotFoundError, ProcessLookupError):
+            ended = True
+        if ended or time.monotonic() >= until:
+            return ended
+        time.sleep(0.01)
+
+
+def campaign(count: int, seed: int = 0) -> Iterator[Outcome]:
+    """`count` strikes at random moments, all kinds in turn."""
+    draw = random.Random(seed)
+    servos = SoftServoBus(ServosConfig(), wire_time=True, seed=seed)
+    servos.start()
+    try:
+        for turn in range(count):
+            yield strike(servos, *KINDS[turn % len(KINDS)], delay_s=draw.uniform(0.2, 1.2))
+    finally:
+        servos.stop()
+
+
+def main(count: int = 60, seed: int = 0) -> None:
+    outcomes = []
+    for outcome in campaign(count, seed):
+        outcomes.append(outcome)
+        sys.stdout.write(f"{outcome}\n")
+        sys.stdout.flush()
+    for victim, number in KINDS:
+        of_kind = [outcome for outcome in outcomes if (outcome.victim, outcome.signal) == (victim, number.name)]
+        if of_kind:
+            times = sorted(outcome.stop_ms for outcome in of_kind)
+            line = f"{number.name} {victim}: n {len(times)}, stop median {times[len(times) // 2]:.0f} ms, max {times[-1]:.0f} ms, "
+            sys.stdout.write(line + f"farthest {max(outcome.steps for outcome in of_kind):.2f} steps\n")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
