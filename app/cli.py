@@ -169,6 +169,41 @@ def evaluate(
 
 
 @app.command()
+def trial(
+    seeds: Annotated[str, typer.Option(help="A:B, phantoms, looks, robots and targets A to B - 1")],
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(help="pursuit, table, push or random; may be repeated to compare; default: the configured one"),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="processes")] = 1,
+    json: Annotated[bool, typer.Option("--json", help="one JSON object per trial, then the summary, on standard output")] = False,
+    out: Annotated[Path | None, typer.Option(help="folder for trials.jsonl and report.html; trials already there are kept")] = None,
+    true_masks: Annotated[bool, typer.Option("--true-masks", help="the twin's own masks instead of the network's")] = False,
+    max_seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="simulated time after which a trial has failed")] = 120.0,
+    look: Annotated[str, typer.Option(help="random: every trial another picture; bench: the default clear one")] = "random",
+    scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler that takes the place of --workers")] = None,
+    model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
+    config: ConfigOption = None,
+) -> None:
+    """Closed-loop trials in the bench twin: a policy drives the robot to a target that it has never seen."""
+    from app.trial_command import run_trials
+
+    run_trials(
+        seeds,
+        policy or [],
+        workers=workers,
+        out=out,
+        model=model,
+        config_path=config,
+        true_masks=true_masks,
+        max_seconds=max_seconds,
+        look=look,
+        scheduler=scheduler,
+        as_json=json,
+    )
+
+
+@app.command()
 def benchmark(
     json: JsonOption = False,
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,

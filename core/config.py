@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.errors import UserError
+from core.policy_config import PolicyConfig
 from core.safety_config import SafetyConfig
 from core.servo_config import ServosConfig
 
@@ -183,6 +184,7 @@ class Config(_Section):
     twin: TwinConfig = TwinConfig()
     perception: PerceptionConfig = PerceptionConfig()
     advice: AdviceConfig = AdviceConfig()
+    policy: PolicyConfig = PolicyConfig()
     servos: ServosConfig = ServosConfig()
     safety: SafetyConfig = SafetyConfig()
     window: WindowConfig = WindowConfig()

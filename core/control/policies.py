@@ -1,0 +1,103 @@
+"""The policies by name. All of them take a scene and give advice; the same object advises the operator and drives."""
+
+from __future__ import annotations
+
+from typing import Protocol, get_args
+
+import numpy as np
+
+from core.config import Config
+from core.control.policy import table_policy
+from core.control.pursuit import Pursuit, speed_word
+from core.policy_config import PolicyName
+from core.types import Advice, RobotStatus, Scene, Speed
+
+POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
+
+
+class Policy(Protocol):
+    """Advice for a scene; `status` adds what the robot itself reports. None: no advice, so nothing stale is shown or driven.
+
+    A policy may remember the frames before; ``reset`` makes it forget them.
+    """
+
+    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None: ...
+    def reset(self) -> None: ...
+
+
+class Table:
+    """The paper's state table."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config.advice
+
+    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+        return table_policy(scene, self._config)
+
+    def reset(self) -> None: ...
+
+
+class Push:
+    """Baseline: straight on at moderate speed without steering, whatever the picture shows."""
+
+    def __init__(self, config: Config) -> None:
+        self._advice = Advice(Speed.MODERATE, config.advice.moderate_mm_s, 0.0, "straight on")
+
+    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+        return self._advice
+
+    def reset(self) -> None: ...
+
+
+class RandomOperator:
+    """Baseline: an operator who changes speed and steering at random every half to one and a half seconds; seeded."""
+
+    def __init__(self, config: Config, seed: int) -> None:
+        self._config = config.advice
+        self._seed = seed
+        self.reset()
+
+    def reset(self) -> None:
+        self._rng = np.random.default_rng([self._seed, 50021])
+        self._until_s: float | None = None
+        self._advice: Advice | None = None
+
+    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+        if self._until_s is None or scene.captured_s >= self._until_s:
+            words, rng = self._config, self._rng
+            speeds = (words.slowest_mm_s, words.slow_mm_s, words.moderate_mm_s, words.fast_mm_s, -words.slow_mm_s)
+            speed_mm_s = float(rng.choice(speeds, p=(0.1, 0.2, 0.35, 0.25, 0.1)))
+            steer_deg = float(rng.uniform(-1.0, 1.0)) * words.max_steer_deg
+            self._advice = Advice(speed_word(abs(speed_mm_s), words), speed_mm_s, steer_deg, "at random")
+            self._until_s = scene.captured_s + float(rng.uniform(0.5, 1.5))
+        return self._advice
+
+
+class StopsAtTarget:
+    """Any policy, which stops where the way to the target is used up: the paper's table knows no target."""
+
+    def __init__(self, policy: Policy, arrive_px: float) -> None:
+        self._policy = policy
+        self._arrive_px = arrive_px
+
+    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+        if scene.pose is not None and scene.route is not None and scene.route.length_px <= self._arrive_px:
+            return Advice(Speed.STOP, 0.0, 0.0, "at the target")
+        return self._policy(scene, status)
+
+    def reset(self) -> None:
+        self._policy.reset()
+
+
+def make_policy(name: PolicyName, config: Config, seed: int = 0) -> Policy:
+    """A new policy; `seed` matters to the random operator only."""
+    policy: Policy
+    if name == "pursuit":
+        policy = Pursuit(config.policy.pursuit, config.advice)
+    elif name == "table":
+        policy = Table(config)
+    elif name == "push":
+        policy = Push(config)
+    else:
+        policy = RandomOperator(config, seed)
+    return StopsAtTarget(policy, config.policy.pursuit.arrive_px)

@@ -1,0 +1,273 @@
+"""One closed-loop trial in the twin, in lock-step: picture -> perception -> policy -> drive -> robot, against the truth.
+
+Nothing looks at a clock but the simulated one, so the same seed and settings give the same bits. What the loop needs in reality
+between picture and motion is put in as a delay of whole frames.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from core.config import Config
+from core.control.drive import Drive
+from core.control.policies import Policy, make_policy
+from core.perception import polyline
+from core.perception.pipeline import Pipeline
+from core.perception.route import plan_route
+from core.policy_config import PolicyName
+from core.study.accuracy import TrueMasks
+from core.study.trial import Measure, Row, TrialLog, trial_row
+from core.types import Advice, Command, Frame, Point, Points, Scene, Speed
+from hardware.twin.appearance import default_appearance, random_appearance
+from hardware.twin.autopilot import RouteFollower
+from hardware.twin.camera import TwinCamera
+from hardware.twin.phantom import Phantom
+from hardware.twin.phantoms import make_phantom
+from hardware.twin.view import View
+from hardware.twin.world import TwinWorld
+
+FIRST_SEED = 2_000_000
+"""Trial 0 has this seed's phantom, look and robot; sets for training stay below it."""
+REACHED_MM = 5.0
+DELAY_FRAMES = 2
+"""67 ms at 30 frames per second, of the 100 ms that capture to servo may take."""
+_START_MM, _START_MOST_MM, _BEFORE_JUNCTION_MM = 22.0, 45.0, 12.0
+_BEFORE_END_MM = 6.0
+_LEAST_WAY_MM = 60.0
+_MARGIN_PX = 14.0
+_MEASURE_EVERY = 3
+_SETTLE_S = 0.5
+_NO_PROGRESS_S, _PROGRESS_MM = 40.0, 2.0  # time to back out of a missed branch and to try again
+_HELP_S, _HELP_MM_S, _MAX_HELP = 1.0, 5.0, 5
+
+
+Look = Literal["random", "bench"]
+
+
+@dataclass(frozen=True, slots=True)
+class TrialPlan:
+    """What all trials of a campaign share.
+
+    ``true_masks``: the twin's masks stand in for the network's. ``look``: every trial another picture, or the default clear bench.
+    """
+
+    config: Config
+    true_masks: bool = False
+    max_seconds: float = 120.0
+    look: Look = "random"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """A place to go to: the end ``node``, the ``route`` (N, 2) to it in board mm, ``at_mm`` along it, and the operator's click."""
+
+    node: int
+    route: Points
+    at_mm: float
+    point_mm: Point
+    click_px: Point
+
+
+def choose_target(phantom: Phantom, view: View, seed: int) -> Target:
+    """One of the ends that the camera sees the way to, drawn at random; the click lies on the centerline shortly before the end.
+
+    An end outside the picture is aimed at as far as the picture goes.
+    """
+    targets = [_target_at(phantom, view, node) for node in phantom.targets]
+    whole = [t for t in targets if t.at_mm >= _LEAST_WAY_MM]
+    if not whole:
+        return max(targets, key=lambda t: t.at_mm)
+    return whole[int(np.random.default_rng([seed, 30011]).integers(len(whole)))]
+
+
+def _target_at(phantom: Phantom, view: View, node: int) -> Target:
+    follower = RouteFollower(phantom, node)
+    along = polyline.arc_length(follower.route)
+    pixels = view.project(follower.route)
+    limit = np.array(view.size) - 1 - _MARGIN_PX
+    hidden = np.any((pixels < _MARGIN_PX) | (pixels > limit), axis=1) & (along > _START_MM)
+    seen_mm = float(along[int(np.argmax(hidden))]) if hidden.any() else follower.length_mm
+    at_mm = min(seen_mm, follower.length_mm - _BEFORE_END_MM)
+    point = polyline.point_at(follower.route, along, np.array([at_mm]))
+    click = view.project(point)[0]
+    return Target(node, follower.route, at_mm, (float(point[0, 0]), float(point[0, 1])), (float(click[0]), float(click[1])))
+
+
+def start_mm(phantom: Phantom, target: Target) -> float:
+    """How far the robot is brought in by hand: to shortly before the first bifurcation, so that autonomy takes all."""
+    graph = phantom.graph
+    degree = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
+    places = [polyline.nearest(target.route, (x, y))[:2] for x, y in graph.nodes[degree >= 3].tolist()]
+    first_mm = min((along for away, along in places if away < 0.5), default=math.inf)
+    return max(_START_MM, min(_START_MOST_MM, first_mm - _BEFORE_JUNCTION_MM, target.at_mm - _LEAST_WAY_MM / 2))
+
+
+class Trial:
+    """One trial. ``run`` turns it to its end and returns its row.
+
+    Parameters
+    ----------
+    plan, seed, policy : what to do.
+    pipeline : perception; its memory of other streams is cleared.
+    masks : where the pipeline looks when it runs on true masks, else None.
+    """
+
+    def __init__(self, plan: TrialPlan, seed: int, policy: PolicyName, pipeline: Pipeline, masks: TrueMasks | None = None) -> None:
+        config, own_seed = plan.config, FIRST_SEED + seed
+        phantom = make_phantom(f"random:{own_seed}")
+        self._plan, self._seed, self._name = plan, seed, policy
+        look = random_appearance(own_seed) if plan.look == "random" else default_appearance()
+        self._world = TwinWorld(config.twin, phantom=phantom, appearance=look, perception=config.perception, seed=own_seed)
+        self.target = choose_target(phantom, self._world.view, own_seed)
+        self._camera = TwinCamera(self._world, lock_step=True)
+        self._pipeline, self._masks = pipeline, masks
+        pipeline.reset()
+        self._policy: Policy = make_policy(policy, config, own_seed)
+        self._drive = Drive(config.policy.drive)
+        self._operator = _Operator(config.safety.pose_disarm_s)
+        self._hand = RouteFollower(phantom, self.target.node)
+        self._log = TrialLog()
+        self._on_the_way = deque([Command()] * DELAY_FRAMES)
+        self._backing_off = False
+        self._first_mm = self._left_mm = self._best_mm = math.inf
+        self._best_s = 0.0
+        self._reached_s: float | None = None
+
+    def run(self) -> Row:
+        """Turn the loop until the target is reached or nothing helps any more."""
+        world = self._world
+        world.insert(start_mm(world.phantom, self.target), target=self.target.node)
+        world.robot.connect()
+        start_s = world.physics.time_s
+        outcome = ""
+        while not outcome:
+            try:
+                outcome = self._turn(start_s)
+            except FloatingPointError:  # never seen; a campaign of hundreds must not end with it
+                outcome = "physics diverged"
+        return trial_row(
+            self._log,
+            seed=self._seed,
+            policy=self._name,
+            phantom=world.phantom.name,
+            outcome=outcome,
+            way_mm=self._first_mm - self._left_mm if math.isfinite(self._first_mm) else 0.0,
+            target_mm=self.target.point_mm,
+        )
+
+    def _turn(self, start_s: float) -> str:
+        """One frame; how the trial has ended with it, "" while it goes on."""
+        frame = self._read()
+        scene = self._pipeline(frame, self.target.click_px)
+        status = self._world.robot.status()
+        advice = self._policy(scene, status)
+        if scene.pose is not None and scene.pose.confidence < self._plan.config.safety.min_confidence:
+            advice = None  # where autonomy has to hold
+        self._on_the_way.append(self._command(advice, frame.captured_s))
+        self._world.robot.send(self._on_the_way.popleft())
+        time_s, contact_n = frame.captured_s - start_s, status.wall_contact_n or 0.0
+        self._log.count(scene.pose, scene.refusal.reason.value if scene.refusal else "", contact_n)
+        if len(self._log.forces_n) % _MEASURE_EVERY == 1:
+            self._measure(scene, time_s, status.insertion_mm, contact_n)
+        return self._outcome(time_s, advice)
+
+    def _read(self) -> Frame:
+        if self._masks is None:
+            frame = self._camera.read(0.0)
+            assert frame is not None
+            return frame
+        world = self._world
+        world.advance(1.0 / world.config.frames_per_second)
+        picture = world.picture(world.physics.robot_points_mm(), world.physics.delivery_mm)
+        self._masks.show(picture.vessel, picture.robot)
+        return Frame(len(self._log.forces_n), world.physics.time_s, picture.image)
+
+    def _command(self, advice: Advice | None, now_s: float) -> Command:
+        # The eye follows all the time: by hand the way is known from where the head is.
+        by_hand = self._hand.command(self._world.physics.robot_points_mm(), _HELP_MM_S, 1.0 / self._world.config.frames_per_second)
+        helping = self._operator.acts(advice is not None, now_s)
+        if helping is None:
+            backing_off = advice is not None and advice.advance_mm_s < 0.0
+            self._log.back_offs += backing_off and not self._backing_off
+            self._backing_off = backing_off
+            return self._drive.command(advice, now_s)
+        if helping:
+            self._log.interventions += 1
+        self._policy.reset()
+        self._drive.take_over(by_hand.bend)
+        return by_hand
+
+    def _measure(self, scene: Scene, time_s: float, insertion_mm: float, wall_contact_n: float) -> None:
+        truth = self._world.truth(self.target.click_px)
+        theta_error = head_error = None
+        if scene.pose is not None and scene.path is not None and truth.pose is not None and truth.head_xy is not None:
+            theta_error = abs((scene.pose.theta_signed_deg - truth.pose.theta_signed_deg + 180.0) % 360.0 - 180.0)
+            head_error = math.dist(scene.path.head, truth.head_xy)
+        d_px = None
+        if truth.offset_ratio is not None and truth.lumen_radius_px is not None:
+            d_px = truth.offset_ratio * truth.lumen_radius_px
+        head_mm = self._world.physics.head_mm
+        self._log.measures.append(
+            Measure(
+                time_s=time_s,
+                head_mm=head_mm,
+                insertion_mm=insertion_mm,
+                wall_contact_n=wall_contact_n,
+                d_px=d_px,
+                offset_ratio=truth.offset_ratio,
+                head_clearance_mm=truth.head_clearance_mm,
+                theta_error_deg=theta_error,
+                head_error_px=head_error,
+            )
+        )
+        self._follow(head_mm, time_s)
+
+    def _follow(self, head_mm: Point, time_s: float) -> None:
+        """How far it is still, by the phantom's own graph, and when that last became less."""
+        left = plan_route(self._world.phantom.graph, head_mm, self.target.point_mm)
+        assert left is not None  # a phantom is of one piece
+        self._left_mm = left.length_px
+        if math.isinf(self._first_mm):
+            self._first_mm = self._left_mm
+        if self._left_mm < self._best_mm - _PROGRESS_MM:
+            self._best_mm, self._best_s = self._left_mm, time_s
+        if self._reached_s is None and math.dist(head_mm, self.target.point_mm) <= REACHED_MM:
+            self._reached_s = time_s
+
+    def _outcome(self, time_s: float, advice: Advice | None) -> str:
+        """How the trial has ended, "" while it goes on."""
+        stopped = advice is not None and advice.speed is Speed.STOP
+        if self._reached_s is not None and (stopped or time_s - self._reached_s >= _SETTLE_S):
+            return "reached"
+        if self._log.interventions > _MAX_HELP:
+            return "lost"
+        if time_s - self._best_s >= _NO_PROGRESS_S:
+            return "stopped short" if stopped else "stuck"
+        return "time out" if time_s >= self._plan.max_seconds else ""
+
+
+class _Operator:
+    """Takes over when there was no advice for longer than autonomy may last without: steers by eye for a second (5 mm)."""
+
+    def __init__(self, patience_s: float) -> None:
+        self._patience_s = patience_s
+        self._well_s: float | None = None
+        self._until_s = -math.inf
+
+    def acts(self, advised: bool, now_s: float) -> bool | None:
+        """None: autonomy goes on. True: the operator takes over now. False: the operator still has it."""
+        if now_s < self._until_s:
+            self._well_s = now_s
+            return False
+        if advised or self._well_s is None:
+            self._well_s = now_s
+            return None
+        if now_s - self._well_s <= self._patience_s:
+            return None
+        self._until_s, self._well_s = now_s + _HELP_S, now_s
+        return True

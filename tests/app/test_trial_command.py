@@ -1,0 +1,235 @@
+"""``trial`` as a user calls it: JSON of the contract, resuming, interruption, workers, Dask, errors in one line."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from app import trial_command
+from app.trial_command import TrialError, parse_policies, parse_seeds, run_one, run_trials
+from app.trial_report import summary_rows
+from core.config import Config
+from core.study.trial import Measure, Row, TrialLog, summarise, trial_row
+from hardware.twin.trial import TrialPlan
+
+MAIN = Path(__file__).resolve().parents[2] / "main.py"
+
+
+def fake_row(plan: TrialPlan, job: tuple[str, int]) -> Row:
+    """What a trial would give, without running one."""
+    log = TrialLog(forces_n=[0.0, 0.1 + 0.1 * job[1]])
+    log.measures = [Measure(0.1 * k, (10.0 + k, 70.0), 20.0 + k, 0.05, 1.0, 0.1, 1.0, 0.5, 0.4) for k in range(4)]
+    return trial_row(
+        log,
+        seed=job[1],
+        policy=job[0],
+        phantom=f"random:{2_000_000 + job[1]}",
+        outcome="reached",
+        way_mm=3.0,
+        target_mm=(15.0, 70.0),
+    )
+
+
+@pytest.fixture
+def faked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
+    """Trials that take no time; gives the jobs that were run."""
+    ran: list[tuple[str, int]] = []
+
+    def run(plan: TrialPlan, job: tuple[str, int]) -> Row:
+        ran.append(job)
+        return fake_row(plan, job)
+
+    monkeypatch.setattr(trial_command, "run_one", run)
+    return ran
+
+
+def call(seeds: str = "0:2", policies: tuple[str, ...] = (), **changed: Any) -> None:
+    options: dict[str, Any] = {
+        "workers": 1, "out": None, "model": None, "config_path": None, "true_masks": True, "max_seconds": 5.0,
+        "look": "random", "scheduler": None, "as_json": True,
+    }  # fmt: skip
+    run_trials(seeds, policies, **(options | changed))
+
+
+def test_seeds_are_read_as_a_python_range() -> None:
+    assert list(parse_seeds("3:6")) == [3, 4, 5]
+    assert list(parse_seeds("7")) == [7]
+
+
+@pytest.mark.parametrize("text", ["", "a:b", "5:5", "5:3", "-1:3", "1:2:3", "0:9999999"])
+def test_seeds_that_make_no_sense_are_named(text: str) -> None:
+    with pytest.raises(TrialError, match="--seeds"):
+        parse_seeds(text)
+
+
+def test_policies_are_known_by_name_and_taken_once() -> None:
+    assert parse_policies(["table", "push", "table"]) == ("table", "push")
+    with pytest.raises(TrialError, match="unknown policy 'magic'; known: pursuit, table, push, random"):
+        parse_policies(["magic"])
+
+
+def test_an_unknown_look_is_named() -> None:
+    with pytest.raises(TrialError, match="unknown look 'velvet'; known: random, bench"):
+        call(look="velvet")
+
+
+def test_json_is_a_line_per_trial_and_then_the_summary(faked: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
+    call("0:2")
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [line["seed"] for line in lines[:-1]] == [0, 1]
+    assert {
+        "seed", "reached", "time_s", "insertion_mm", "path_ratio", "wall_contact_n", "time_near_wall_s", "mean_d_px",
+        "state_shares", "interventions", "theta_error_median_deg", "head_error_median_px",
+    } <= set(lines[0])  # fmt: skip
+    assert "track" not in lines[0]
+    assert set(lines[0]["wall_contact_n"]) == {"mean", "p95", "max"}
+    assert {
+        "trials", "reached_share", "wall_force_p95_n", "wall_force_max_n", "mean_offset_ratio", "theta_error_median_deg",
+        "head_error_median_px", "mean_time_s",
+    } <= set(lines[-1]["summary"])  # fmt: skip
+    assert lines[-1]["summary"]["policy"] == "pursuit"
+    assert lines[-1]["summary"]["wall_force_max_n"] == pytest.approx(0.2)
+
+
+def test_policies_stand_side_by_side(faked: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
+    call("0:1", ("pursuit", "push"))
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert set(last["by_policy"]) == {"pursuit", "push"}
+    call("0:1", ("pursuit", "push"), as_json=False)
+    text = capsys.readouterr().out
+    assert "Target reached" in text
+    assert "push" in text
+
+
+def test_a_campaign_goes_on_where_it_was(faked: list[Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    call("0:2", out=tmp_path)
+    with (tmp_path / "trials.jsonl").open("a", encoding="utf-8") as stream:
+        stream.write('{"seed": 2, "polic')  # a crash in the middle of a line
+    faked.clear()
+    call("0:3", out=tmp_path)
+    assert faked == [("pursuit", 2)]
+    assert len((tmp_path / "trials.jsonl").read_text().splitlines()) == 3
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["summary"]["trials"] == 3
+    report = (tmp_path / "report.html").read_text()
+    assert "Trials to look at first" in report
+    assert report.count("<svg") == 4
+    assert json.loads((tmp_path / "summary.json").read_text())["pursuit"]["trials"] == 3
+
+
+def test_a_folder_of_other_settings_is_refused(faked: list[Any], tmp_path: Path) -> None:
+    call("0:1", out=tmp_path)
+    with pytest.raises(TrialError, match="other settings"):
+        call("0:1", out=tmp_path, max_seconds=9.0)
+
+
+@pytest.mark.parametrize("name", ["plan.json", "trials.jsonl"])
+def test_a_damaged_folder_is_refused_and_left_alone(faked: list[Any], tmp_path: Path, name: str) -> None:
+    call("0:1", out=tmp_path)
+    (tmp_path / name).write_text("no json\n")
+    with pytest.raises(TrialError, match="damaged"):
+        call("0:1", out=tmp_path)
+    assert (tmp_path / name).read_text() == "no json\n"
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(faked: list[Any], tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(TrialError, match="choose another --out"):
+        call("0:1", out=tmp_path / "file")
+
+
+def test_an_interruption_keeps_what_is_done(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(plan: TrialPlan, job: tuple[str, int]) -> Row:
+        if job[1] == 1:
+            raise KeyboardInterrupt
+        return fake_row(plan, job)
+
+    monkeypatch.setattr(trial_command, "run_one", run)
+    with pytest.raises(KeyboardInterrupt):
+        call("0:3", out=tmp_path)
+    shown = capsys.readouterr()
+    assert json.loads(shown.out.splitlines()[-1])["summary"]["trials"] == 1
+    assert "1 of 3 trials were done" in shown.err
+    assert len((tmp_path / "trials.jsonl").read_text().splitlines()) == 1
+
+
+def test_without_dask_the_scheduler_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(TrialError, match="needs Dask: install it"):
+        call(scheduler="tcp://127.0.0.1:8786")
+
+
+def test_trials_run_on_a_dask_cluster(
+    faked: list[Any], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Against a stand-in that has what is used of ``distributed``."""
+
+    class Future:
+        def __init__(self, row: Row) -> None:
+            self._row = row
+
+        def result(self) -> Row:
+            return self._row
+
+    class Client:
+        def __init__(self, address: str, timeout: str) -> None:
+            if address != "tcp://here:1":
+                raise OSError("Timed out")
+
+        def __enter__(self) -> Client:
+            return self
+
+        def __exit__(self, *_: object) -> None: ...
+
+        def map(self, function: Callable[..., Row], plans: list[TrialPlan], jobs: list[Any], pure: bool) -> list[Future]:
+            return [Future(function(*each)) for each in zip(plans, jobs, strict=True)]
+
+        def cancel(self, futures: list[Future]) -> None: ...
+
+    def as_completed(futures: list[Future]) -> Iterator[Future]:
+        return reversed(futures)
+
+    module = ModuleType("distributed")
+    module.Client, module.as_completed = Client, as_completed  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "distributed", module)
+    call("0:3", scheduler="tcp://here:1")
+    assert [json.loads(line).get("seed") for line in capsys.readouterr().out.splitlines()] == [0, 1, 2, None]
+    with pytest.raises(TrialError, match="no Dask scheduler answers there"):
+        call("0:3", scheduler="tcp://elsewhere:1")
+
+
+def test_figures_that_miss_their_target_are_marked() -> None:
+    failed = fake_row(TrialPlan(Config()), ("push", 6)) | {"reached": False}
+    rows = {row.label: row.cells[0] for row in summary_rows({"push": summarise([failed])})}
+    assert rows["Target reached"] == ("0 %", "missed")
+    assert rows["Wall contact force, largest"] == ("0.700 N", "missed")
+    assert rows["Wall contact force, p95"] == ("0.050 N", "met")
+    assert rows["Time to the target, mean"] == ("–", "")
+
+
+def test_workers_find_what_one_process_finds(tmp_path: Path) -> None:
+    arguments = ("trial", "--seeds", "0:2", "--true-masks", "--max-seconds", "1", "--workers", "2", "--json", "--out", tmp_path)
+    done = subprocess.run([sys.executable, str(MAIN), *map(str, arguments)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text().splitlines()]
+    assert sorted(row["seed"] for row in rows) == [0, 1]
+    alone = run_one(TrialPlan(Config(), true_masks=True, max_seconds=1.0), ("pursuit", 1))
+    assert next(row for row in rows if row["seed"] == 1) == json.loads(json.dumps(alone))
+
+
+def test_errors_are_one_line_and_exit_code_2() -> None:
+    command = [sys.executable, str(MAIN), "trial", "--seeds", "0:1"]
+    for extra, text in ((["--policy", "magic"], "unknown policy 'magic'"), (["--model", "nowhere"], "nowhere")):
+        done = subprocess.run([*command, *extra, "--json"], capture_output=True, text=True, check=False)
+        assert done.returncode == 2
+        assert done.stdout == ""
+        assert text in done.stderr
+        assert len(done.stderr.strip().splitlines()) == 1

@@ -1,0 +1,260 @@
+"""The look-ahead policy on drawn scenes: it turns to the right side, slows for what lies ahead, backs off, and stops."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from core.config import AdviceConfig, Config
+from core.control.policies import POLICY_NAMES, RandomOperator, make_policy
+from core.control.pursuit import Pursuit, look_ahead, speed_word
+from core.control.stall import BackOff, ContactLimit, Stall
+from core.perception.centerline import centerline_at
+from core.perception.pose import measure
+from core.perception.route import plan_route
+from core.perception.vectors import fit_robot_vector, fit_vessel_vector
+from core.policy_config import PursuitConfig
+from core.types import GraphEdge, Point, Points, Reason, Refusal, RobotPath, RobotStatus, Scene, Speed, VesselGraph
+
+CONFIG, WORDS = PursuitConfig(smoothing_s=0.0), AdviceConfig()
+
+
+def _edge(start: int, end: int, points: Points) -> GraphEdge:
+    return GraphEdge(start, end, points, np.full(len(points), 15.0))
+
+
+def _line(a: Point, b: Point) -> Points:
+    return np.linspace(a, b, 101)
+
+
+STRAIGHT = VesselGraph(np.array([(0.0, 100.0), (400.0, 100.0)]), (_edge(0, 1, _line((0, 100), (400, 100))),))
+_ARC = np.array([(200 + 60 * math.sin(t), 160 - 60 * math.cos(t)) for t in np.linspace(0, math.pi / 2, 60)])
+BEND = VesselGraph(
+    np.array([(0.0, 100.0), (260.0, 300.0)]),
+    (_edge(0, 1, np.vstack([_line((0, 100), (199, 100)), _ARC, _line((260, 161), (260, 300))])),),
+)
+FORK = VesselGraph(
+    np.array([(0.0, 100.0), (200.0, 100.0), (400.0, 100.0), (300.0, 200.0)]),
+    (
+        _edge(0, 1, _line((0, 100), (200, 100))),
+        _edge(1, 2, _line((200, 100), (400, 100))),
+        _edge(1, 3, _line((200, 100), (300, 200))),
+    ),
+)
+
+
+def _scene(
+    graph: VesselGraph, head: Point, target: Point | None, heading_deg: float = 0.0, time_s: float = 0.0, length_px: float = 60.0
+) -> Scene:
+    """A straight robot that points along `heading_deg` (0: right, 90: down)."""
+    way = np.array([math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg))])
+    points = np.asarray(head) - np.arange(length_px, -1.0, -2.0)[:, None] * way
+    robot = fit_robot_vector(points, 40.0)
+    assert robot is not None
+    route = plan_route(graph, head, target) if target is not None else None
+    centerline = centerline_at(graph, head, robot.direction, 20.0, route)
+    assert centerline is not None
+    vessel = fit_vessel_vector(centerline)
+    assert vessel is not None
+    pose = measure(robot, vessel, Config().perception.pose)
+    path = RobotPath(points, 1.0, None, True, 0.0, 3.5)
+    return Scene(
+        0, time_s, (640, 480), 1.0, path=path, vessel_graph=graph, route=route, centerline=centerline,
+        robot_vector=robot, vessel_vector=vessel, pose=pose,
+    )  # fmt: skip
+
+
+def _status(contact_n: float | None) -> RobotStatus:
+    return RobotStatus(0.0, 50.0, 0.0, (0, 0, 0, 0), (0, 0, 0, 0), contact_n)
+
+
+def test_in_the_middle_and_along_it_goes_fast_and_straight() -> None:
+    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 100), (380, 100)))
+    assert advice is not None
+    assert (advice.speed, advice.advance_mm_s) == (Speed.FAST, WORDS.fast_mm_s)
+    assert advice.steer_deg == pytest.approx(0.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("y", "heading", "sign"), [(94, 0, 1), (106, 0, -1), (100, 20, -1), (100, -20, 1)])
+def test_it_turns_towards_the_route(y: float, heading: float, sign: int) -> None:
+    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, y), (380, 100), heading))
+    assert advice is not None
+    assert math.copysign(1, advice.steer_deg) == sign
+
+
+def test_the_error_is_the_angle_to_the_look_ahead_point() -> None:
+    config = CONFIG.model_copy(update={"follow_arc": 0.0, "min_bend_radius_px": 10.0})
+    way = look_ahead(_scene(STRAIGHT, (100, 94), (380, 100)), 12.0, config)
+    assert way is not None
+    # The route is walked in steps of 2 px: its first point at least 12 px away lies 12 px ahead and 6 px aside.
+    assert way.error_deg == pytest.approx(math.degrees(math.atan2(6, 12)), abs=0.1)
+
+
+def test_steering_is_limited_to_the_tightest_arc() -> None:
+    way = look_ahead(_scene(STRAIGHT, (100, 90), (380, 100), -60), 12.0, CONFIG)
+    assert way is not None
+    assert way.error_deg == pytest.approx(math.degrees(math.asin(12.0 / (2 * CONFIG.min_bend_radius_px))))
+
+
+def test_without_a_target_it_follows_the_centerlines_piece() -> None:
+    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 94), None))
+    assert advice is not None
+    assert advice.steer_deg > 0
+    assert advice.advance_mm_s > 0
+
+
+def test_a_bend_ahead_slows_it_down() -> None:
+    advice = Pursuit(CONFIG, WORDS)(_scene(BEND, (190, 100), (260, 290)))
+    assert advice is not None
+    assert 0 < advice.advance_mm_s < WORDS.fast_mm_s
+    assert advice.why == "a bend ahead"
+
+
+def test_a_bifurcation_ahead_slows_it_down_even_straight_on() -> None:
+    advice = Pursuit(CONFIG, WORDS)(_scene(FORK, (165, 100), (390, 100)))
+    assert advice is not None
+    assert (advice.speed, advice.why) == (Speed.MODERATE, "a bifurcation ahead")
+    far = Pursuit(CONFIG, WORDS)(_scene(FORK, (100, 100), (390, 100)))
+    assert far is not None
+    assert far.speed is Speed.FAST
+
+
+def test_near_the_wall_it_goes_slow() -> None:
+    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 111), (380, 100)))  # 11 of 15 - 3.5 px
+    assert advice is not None
+    assert advice.advance_mm_s <= WORDS.slow_mm_s
+
+
+def test_the_nearer_the_target_the_slower_and_there_it_stops() -> None:
+    speeds = []
+    for x in (340.0, 360.0, 375.0):
+        advice = make_policy("pursuit", Config())(_scene(STRAIGHT, (x, 100), (380, 100)))
+        assert advice is not None
+        speeds.append(advice.advance_mm_s)
+    assert speeds[0] > speeds[1] > speeds[2] == 0.0
+
+
+def test_contact_slows_and_then_backs_off_for_a_while() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    scene = _scene(STRAIGHT, (100, 100), (380, 100))
+    leaning = pursuit(scene, _status(0.15))
+    assert leaning is not None
+    assert leaning.advance_mm_s == WORDS.slow_mm_s
+    back = [
+        pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), _status(0.3 if k == 1 else 0.0)) for k in range(1, 20)
+    ]
+    speeds = [advice.advance_mm_s for advice in back if advice is not None]
+    assert speeds[0] == -WORDS.slow_mm_s
+    assert speeds[-1] > 0
+    backwards_mm = 0.1 * sum(-v for v in speeds if v < 0)
+    assert backwards_mm == pytest.approx(CONFIG.back_off_mm / 2, abs=0.31)
+
+
+def test_without_a_force_sensor_contact_is_not_guessed() -> None:
+    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 100), (380, 100)), _status(None))
+    assert advice is not None
+    assert advice.speed is Speed.FAST
+
+
+def test_a_head_that_is_fed_and_does_not_move_is_taken_back() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    advised = [pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)) for k in range(20)]
+    assert [a for a in advised if a is not None and a.advance_mm_s < 0 and "does not move" in a.why]
+
+
+def test_a_missed_branch_is_backed_out_of_until_it_lies_well_ahead() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    seen = []
+    x = 230.0
+    for frame in range(300):
+        advice = pursuit(_scene(FORK, (x, 100), (290, 190), time_s=0.1 * frame))
+        assert advice is not None
+        seen.append((x, advice.advance_mm_s))
+        if advice.advance_mm_s > 0:
+            break
+        x += 0.3 * advice.advance_mm_s  # 3 px/mm
+    assert [speed for _, speed in seen[:3]] == [0.0, 0.0, 0.0]  # first it looks again
+    assert seen[4][1] < 0
+    assert seen[-1][1] > 0
+    assert seen[-1][0] < 190.0
+
+
+def test_no_pose_no_advice() -> None:
+    assert Pursuit(CONFIG, WORDS)(Scene(0, 0.0, (640, 480), 1.0, refusal=Refusal(Reason.NO_ROBOT)), _status(0.9)) is None
+
+
+def test_the_steering_is_smoothed_in_time() -> None:
+    pursuit = Pursuit(PursuitConfig(smoothing_s=0.1), WORDS)
+    pursuit(_scene(STRAIGHT, (100, 100), (380, 100)))
+    first = pursuit(_scene(STRAIGHT, (100, 94), (380, 100), time_s=0.1))
+    alone = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 94), (380, 100)))
+    assert first is not None
+    assert alone is not None
+    assert 0 < first.steer_deg < alone.steer_deg
+
+
+def test_stall_tells_only_after_its_time_and_only_without_progress() -> None:
+    stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
+    assert not stall.update(100.0, 5.0, 0.5)
+    assert stall.update(98.0, 5.0, 0.5)  # 2 px of the 15 px that were fed
+    assert not stall.update(98.0, 5.0, 0.5)
+    assert not stall.update(88.0, 5.0, 0.5)  # 10 of 15
+    assert not stall.update(None, 5.0, 5.0)
+
+
+def test_a_way_back_counts_from_where_its_reason_is_gone() -> None:
+    back = BackOff("test", 2.0)
+    assert not back.done(True, 5.0)
+    assert not back.done(False, 1.0)
+    assert not back.done(True, 1.0)
+    assert not back.done(False, 1.9)
+    assert back.done(False, 0.2)
+
+
+def test_the_contact_limit_rises_where_the_body_leans_and_falls_back_farther_on() -> None:
+    limit = ContactLimit(PursuitConfig(contact_back_off_n=0.2, contact_limit_n=0.4))
+    assert not limit.exceeded(0.19, 300.0)
+    assert limit.exceeded(0.24, 300.0)  # now 0.3
+    assert not limit.exceeded(0.29, 290.0)
+    assert limit.exceeded(0.39, 290.0)  # now 0.4, and never more
+    assert limit.exceeded(0.41, 290.0)
+    assert limit.exceeded(0.21, 200.0)  # 90 px farther on
+    assert not limit.exceeded(None, 100.0)
+
+
+def test_speeds_have_the_papers_words() -> None:
+    assert [speed_word(v, WORDS) for v in (0.0, 0.5, 3.4, 4.6, 7.0)] == [
+        Speed.STOP, Speed.SLOWEST, Speed.SLOW, Speed.MODERATE, Speed.FAST,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", POLICY_NAMES)
+def test_every_policy_stops_at_the_target(name: str) -> None:
+    policy = make_policy(name, Config())  # type: ignore[arg-type]
+    advice = policy(_scene(STRAIGHT, (375, 100), (380, 100)), _status(0.0))
+    assert advice is not None
+    assert (advice.speed, advice.advance_mm_s, advice.steer_deg) == (Speed.STOP, 0.0, 0.0)
+
+
+def test_push_never_steers_and_the_random_operator_is_seeded() -> None:
+    push = make_policy("push", Config())(_scene(STRAIGHT, (100, 110), (380, 100), 30))
+    assert push is not None
+    assert (push.steer_deg, push.speed) == (0.0, Speed.MODERATE)
+    scenes = [_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.5 * k) for k in range(12)]
+
+    def played(operator: RandomOperator) -> list[object]:
+        return [operator(scene) for scene in scenes]
+
+    operator = RandomOperator(Config(), 3)
+    first = played(operator)
+    operator.reset()
+    assert played(operator) == first == played(RandomOperator(Config(), 3))
+    assert played(RandomOperator(Config(), 4)) != first
+    assert len(set(first)) > 3
+
+
+def test_contact_limits_that_contradict_each_other_are_refused() -> None:
+    with pytest.raises(ValueError, match="contact_slow_n must be below"):
+        PursuitConfig(contact_slow_n=0.3, contact_back_off_n=0.2)
