@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from _pytest.runner import runtestprotocol
 
 # Before anything imports Qt or numpy. QT_QPA_PLATFORM=xcb make test shows real windows.
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -37,3 +38,21 @@ def no_thread_stays_behind() -> Iterator[None]:
     while (left := [t for t in threading.enumerate() if t not in before and not t.daemon]) and time.monotonic() < until:
         time.sleep(0.01)
     assert not left, f"threads left running: {[thread.name for thread in left]}"
+
+
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """Tests marked ``real_time`` are tried again when they fail.
+
+    An SDK that waits 34 ms for an answer meets a machine that pauses for longer now and then. What is really broken fails thrice.
+    """
+    if item.get_closest_marker("real_time") is None:
+        return None
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    for attempt in range(3):
+        reports = runtestprotocol(item, nextitem=nextitem, log=False)
+        if attempt == 2 or not any(report.failed for report in reports):
+            break
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True

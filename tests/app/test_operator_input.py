@@ -155,6 +155,7 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     assert opened[-1] == "random:1"
 
 
+@pytest.mark.real_time
 def test_window_stays_alive_while_a_phantom_is_opened(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
     def open_slowly(_config: Config) -> FakeEngine:
         time.sleep(0.4)

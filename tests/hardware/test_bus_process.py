@@ -31,6 +31,8 @@ from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servo_bus import SoftServoBus
 from tests.hardware.kill_campaign import BOUND_S, BOUND_STEPS, KINDS, strike
 
+pytestmark = pytest.mark.real_time
+
 ROOT = Path(__file__).resolve().parents[2]
 # Watchdog and heartbeat are patient, so that a machine that stalls does not trip them; what is about them says so.
 CONFIG, SAFETY = ServosConfig(watchdog_s=2.5, heartbeat_timeout_s=3.0), SafetyConfig()

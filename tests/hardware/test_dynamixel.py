@@ -25,6 +25,8 @@ from hardware.servos.status_block import HardwareError, MissingServo, ServoState
 from hardware.twin.servo_bus import SoftServoBus
 from hardware.twin.servo_packets import Instruction
 
+pytestmark = pytest.mark.real_time
+
 ROOT = Path(__file__).resolve().parents[2]
 # The servos' watchdog is long, so that a machine that stalls does not trip it; the tests of the watchdog turn the servos' clock.
 CONFIG = ServosConfig(watchdog_s=2.0)

@@ -21,6 +21,8 @@ from hardware.twin.servo_packets import InstructionPacket, PacketParser, crc16, 
 from hardware.twin.servo_table import ControlTable
 from hardware.twin.world import TwinWorld
 
+pytestmark = pytest.mark.real_time
+
 CONFIG = ServosConfig()
 ACCESS, RANGE, LENGTH, LIMIT, RESULT = 7, 4, 5, 6, 1
 # The vendor's own examples of a ping to id 1, and of the answer of an XM430-W210 (model 1030) with firmware 38.
