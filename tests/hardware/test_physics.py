@@ -174,6 +174,7 @@ def test_clearance_of_a_straight_robot_in_a_straight_channel() -> None:
 
 def test_the_same_commands_give_the_same_bits_and_reset_starts_afresh() -> None:
     """Long enough that the chain is swapped for a longer and again for a shorter one."""
+
     def drive(physics: TwinPhysics) -> bytes:
         trace = []
         rng = np.random.default_rng(5)
