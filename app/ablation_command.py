@@ -88,12 +88,9 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
 
 
 def _labelled(folder: Path) -> tuple[list[Sample], dict[str, dict[str, Any]]]:
-    from core.learning.dataset import DatasetError, find_samples, read_truth
+    from core.learning.dataset import DatasetError, find_labelled
 
-    samples, truth = find_samples([folder]), read_truth(folder)
-    untold = [sample.stem for sample in samples if sample.stem not in truth]
-    if untold:
-        raise DatasetError(f"{folder}: {len(untold)} frames lack a truth (the first: {untold[0]}); write the set again with synth")
+    samples, truth = find_labelled(folder)
     rows = [truth[sample.stem] for sample in samples if truth[sample.stem].get("state") is not None]
     if not rows:
         raise DatasetError(f"{folder}: no frame of truth.jsonl has a pose; nothing can be compared")

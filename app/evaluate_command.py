@@ -116,17 +116,15 @@ class _Truth:
 
 def _read_set(folder: Path) -> list[_Truth]:
     """The images of a labelled set with their truth, by name; raises EvaluationError, DatasetError."""
-    from core.learning.dataset import find_samples, read_truth
+    from core.learning.dataset import find_labelled
 
     if not (folder / "truth.jsonl").is_file() or not (folder / "images").is_dir():
         what = "needs images/ and truth.jsonl, as synth writes them" if folder.is_dir() else "no such folder"
         raise EvaluationError(f"{folder}: not a labelled set ({what}); for a table use --csv FILE")
-    truth = read_truth(folder)
+    samples, truth = find_labelled(folder)
     found = []
-    for sample in find_samples([folder]):
-        row = truth.get(sample.stem)
-        if row is None:
-            raise EvaluationError(f"{folder}: frame {sample.stem} lacks a truth; write the set again with synth")
+    for sample in samples:
+        row = truth[sample.stem]
         theta, state = row.get("theta_deg"), row.get("state")
         if not (theta is None or isinstance(theta, int | float)) or not (state is None or state in set(PoseState)):
             raise EvaluationError(f"{folder}: frame {sample.stem}: theta_deg {theta!r} or state {state!r} makes no sense")

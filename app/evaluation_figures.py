@@ -7,64 +7,32 @@ green and dashed, as in the paper.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TextIO
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib import font_manager
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+from app.figure_style import BLUE, GREY, INK, PALE, styled
 from app.palette import GREEN, VERMILLION
-from core.config import RESOURCES
 from core.study.agreement import LIMITS_SD, RANGE_DEG
 from core.study.evaluation import AnglePairs
 
-INK, GREY, PALE, BLUE = "#1A1D21", "#6B727C", "#E4E7EB", "#0B5C94"
 _MEAN, _LIMIT = VERMILLION, GREEN
 _SIZE_IN = (3.46, 2.75)
 """One column of a journal's page: 88 mm."""
-_STYLE = {
-    "font.family": ["Inter", "DejaVu Sans"],
-    "font.size": 7.5,
-    "axes.labelsize": 7.5,
-    "axes.edgecolor": GREY,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "svg.fonttype": "path",
-    "pdf.fonttype": 42,  # outlines of Type 3 are refused by some journals
-    "svg.hashsalt": "lumenpilot",  # the same figure gives the same file
-    "axes.unicode_minus": True,
-    "text.color": INK,
-}
 FIGURES = ("error_distribution", "bland_altman", "scatter", "confusion")
 ENDINGS = (".svg", ".pdf")
 _DATELESS: dict[str, dict[str, Any]] = {".svg": {"Date": None, "Creator": None}, ".pdf": {"CreationDate": None}}
 
 
-def _styled() -> AbstractContextManager[None]:
-    known = {entry.fname for entry in font_manager.fontManager.ttflist}
-    for path in sorted((RESOURCES / "fonts").glob("Inter-*.otf")):
-        if str(path) not in known:
-            font_manager.fontManager.addfont(path)
-    return mpl.rc_context(_STYLE)
-
-
 def draw_figures(pairs: AnglePairs, metrics: dict[str, Any]) -> dict[str, Figure]:
     """The figures there is something to draw for, by name."""
     figures: dict[str, Figure] = {}
-    with _styled():
+    with styled():
         if len(pairs.manual_deg):
             for name, draw in (("error_distribution", error_distribution), ("bland_altman", bland_altman), ("scatter", scatter)):
                 figures[name] = _on_axes(lambda axes, draw=draw: draw(axes, pairs, metrics["angle"]))
@@ -75,13 +43,13 @@ def draw_figures(pairs: AnglePairs, metrics: dict[str, Any]) -> dict[str, Figure
 
 def save_figure(figure: Figure, path: Path) -> None:
     """As SVG, PDF or PNG by `path`'s ending, without a date, so that equal figures are equal files; raises OSError."""
-    with _styled():
+    with styled():
         figure.savefig(path, metadata=_DATELESS.get(path.suffix), dpi=160)
 
 
 def write_svg(figure: Figure, stream: TextIO) -> None:
     """As SVG into an open text stream."""
-    with _styled():
+    with styled():
         figure.savefig(stream, format="svg", metadata=_DATELESS[".svg"])
 
 
@@ -172,7 +140,7 @@ def confusion(axes: Axes, state: dict[str, Any]) -> None:
     table = np.array(state["confusion"], float)
     support = table.sum(1, keepdims=True)
     share = np.divide(table, support, out=np.zeros_like(table), where=support > 0)
-    shades = mpl.colors.LinearSegmentedColormap.from_list("paper", ["#FFFFFF", BLUE])
+    shades = LinearSegmentedColormap.from_list("paper", ["#FFFFFF", BLUE])
     # A mesh stays vectors; an image would be a bitmap in the file.
     edges = np.arange(len(table) + 1) - 0.5
     axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0, vmax=1, edgecolors=PALE, linewidth=0.8)

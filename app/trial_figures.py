@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -14,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from app.evaluation_figures import BLUE, GREY, INK, PALE
+from app.figure_style import BLUE, GREY, INK, PALE, styled
 from app.palette import GREEN, ORANGE, VERMILLION
 from core.perception.polyline import normals
 from hardware.twin.phantoms import make_phantom
@@ -25,27 +23,9 @@ _MOST_N = 0.5
 _FORCE = LinearSegmentedColormap.from_list("force", [BLUE, ORANGE, VERMILLION])
 
 
-def _styled() -> AbstractContextManager[None]:
-    return mpl.rc_context(
-        {
-            "font.size": 7.5,
-            "axes.edgecolor": GREY,
-            "axes.labelcolor": INK,
-            "axes.linewidth": 0.7,
-            "axes.spines.top": False,
-            "axes.spines.right": False,
-            "xtick.color": GREY,
-            "ytick.color": GREY,
-            "xtick.labelcolor": INK,
-            "ytick.labelcolor": INK,
-            "text.color": INK,
-        }
-    )
-
-
 def draw_spreads(by_policy: Mapping[str, Rows]) -> Figure:
     """One dot per trial and policy: path ratio, largest and 95th-percentile force, time, offset; bars are medians."""
-    with _styled():
+    with styled():
         figure = Figure(figsize=(7.2, 2.5), layout="constrained")
         FigureCanvasAgg(figure)
         panels: list[Axes] = list(figure.subplots(1, 4))
@@ -93,7 +73,7 @@ def _dots(axes: Axes, values: Mapping[str, list[tuple[float, bool]]]) -> None:
 def draw_track(row: Mapping[str, Any]) -> Figure:
     """The head's way over the phantom, coloured by contact force up to 0.5 N; a ring is the target, a cross the end of the way."""
     graph = make_phantom(row["phantom"]).graph
-    with _styled():
+    with styled():
         figure = Figure(figsize=(3.4, 2.6), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()

@@ -98,7 +98,8 @@ def find_labelled(folder: Path) -> tuple[list[Sample], dict[str, dict[str, Any]]
     samples, truth = find_samples([folder]), read_truth(folder)
     untold = [sample.stem for sample in samples if sample.stem not in truth]
     if untold:
-        raise DatasetError(f"{folder}: {len(untold)} frames lack a truth (the first: {untold[0]}); write the set again with synth")
+        share = f"{len(untold)} of {len(samples)} frames lack a truth (the first: {untold[0]})"
+        raise DatasetError(f"{folder}: {share}; write the set again with synth")
     return samples, truth
 
 

@@ -80,18 +80,23 @@ def read_model_info(folder: Path, *, verify: tuple[str, ...] = (WEIGHTS, ONNX)) 
         first: Any = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         raise ModelError(f"{path}: damaged ({key + ': ' if key else ''}{first['msg']}); restore the model folder") from None
+    check_files(info, folder, verify)
+    return info
+
+
+def check_files(info: ModelInfo, folder: Path, names: Sequence[str]) -> None:
+    """Raise ModelError when one of the named files is missing, damaged, or not part of the model."""
     wanted = {WEIGHTS: info.weights_sha256, ONNX: info.onnx_sha256, ONNX_INT8: info.onnx_int8_sha256}
-    for name in verify:
+    for name in names:
         file = folder / name
         if wanted[name] is None:
-            raise ModelError(f"{path}: the model has no {name}; choose precision fp32, or train it again")
+            raise ModelError(f"{folder / INFO}: the model has no {name}; choose precision fp32, or train it again")
         try:
             found = sha256_of(file)
         except OSError as error:
             raise ModelError(f"{file}: cannot be read ({error.strerror}); restore the model folder") from None
         if found != wanted[name]:
             raise ModelError(f"{file}: SHA-256 differs from {INFO}: the file is cut or damaged; restore the model folder")
-    return info
 
 
 def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:

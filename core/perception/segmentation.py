@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import SegmentationConfig
-from core.learning.model_file import ONNX, ONNX_INT8, ModelError, model_folder, read_model_info
+from core.learning.model_file import ONNX, ONNX_INT8, ModelError, check_files, model_folder, read_model_info
 from core.types import Image
 
 Probability = NDArray[np.float32]
@@ -64,7 +64,7 @@ class OpenVinoSegmenter:
         self.info = read_model_info(folder, verify=())
         self._int8 = precision == "int8" or (precision == "auto" and self.info.onnx_int8_sha256 is not None)
         name = ONNX_INT8 if self._int8 else ONNX
-        read_model_info(folder, verify=(name,))
+        check_files(self.info, folder, (name,))
         self._core = openvino.Core()
         self._threads = threads or _cores()
         try:

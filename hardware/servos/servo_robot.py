@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 
 from core.control.bus_watch import BusReport
 from core.control.gate import Source
@@ -80,12 +81,11 @@ class ServoRobot:
         self._disconnect()
         if self._servos.port is None:
             raise NotReady("no servo port is configured: set servos.port")
-        link = BusLink(self._servos, self._safety)
-        try:
+        with ExitStack() as undo:
+            link = BusLink(self._servos, self._safety)
+            undo.callback(link.close)
             link.request("open", _OPEN_S)
-        except BaseException:
-            link.close()
-            raise
+            undo.pop_all()
         self._reported = (0, 0, 0)
         self._states = ()
         self._supervised = False

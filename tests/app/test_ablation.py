@@ -123,7 +123,7 @@ def test_bad_input_is_one_clear_line(frames: Path, tmp_path: Path) -> None:
     for plan, words in (
         (Plan(None), "nothing to measure on"),
         (Plan(tmp_path / "missing"), "no labelled frames"),
-        (Plan(untold), "1 frames lack a truth (the first: 000005)"),
+        (Plan(untold), "1 of 6 frames lack a truth (the first: 000005)"),
         (Plan(poseless), "no frame of truth.jsonl has a pose"),
         (Plan(halved), "lacks head_xy"),
         (Plan(frames, out=file), "cannot be made"),

@@ -299,7 +299,7 @@ def test_a_set_with_a_hole_is_one_clear_line(labelled: Path, tmp_path: Path) -> 
     (broken / "masks").mkdir()
     _write_frame(broken, "a", np.zeros((120, 160, 3), np.uint8))
     for text, words in (
-        ('{"stem": "b"}\n', "frame a lacks a truth"),
+        ('{"stem": "b"}\n', "1 of 1 frames lack a truth"),
         ('{"stem": "a", "theta_deg": "x", "state": "B"}\n', "makes no sense"),
         ('{"stem": "a", "theta_deg": 3, "state": "E"}\n', "makes no sense"),
     ):

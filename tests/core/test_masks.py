@@ -18,12 +18,7 @@ CLUTTERED = art("""
 
 def test_specks_go_and_pinholes_are_filled() -> None:
     assert picture(clean_mask(CLUTTERED, min_area_px=5, max_hole_area_px=1)) == (
-        "..............\n"
-        "....########..\n"
-        "....########..\n"
-        "....########..\n"
-        "....########..\n"
-        "....########.."
+        "..............\n....########..\n....########..\n....########..\n....########..\n....########.."
     )
 
 
