@@ -12,13 +12,13 @@ from PySide6.QtCore import QObject, QTimer
 
 from app.benchmark_command import quantiles
 from app.operator_window import OperatorWindow
-from core.types import Command
+from core.control.hand import AT_REST, Jog
 
 _WARM_UP_S = 10.0
 _DRIVE_EVERY_MS = 50
 _MOVE_S = 1.5
 _LOOK_EVERY_MS = 5
-_MOVES = (Command(0.4, 0.0, 8.0), Command(-0.5, 0.0, 6.0), Command(0.2, 0.0, -10.0), Command())
+_MOVES = (Jog(bend=0.4, advance=0.8), Jog(bend=-0.6, advance=0.6), Jog(bend=0.2, advance=-1.0), AT_REST)
 
 
 @dataclass(slots=True)
@@ -64,7 +64,7 @@ class WindowWatch(QObject):
             self._window.close()
 
     def _drive(self) -> None:
-        # As a held key does, the command is repeated: a robot whose driver falls silent is held.
+        # As a held key does, the motion is repeated: silence counts as let go.
         place = int((time.monotonic() - self._started_s) / _MOVE_S)
         self._window.drive(_MOVES[place % len(_MOVES)])
 

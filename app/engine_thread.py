@@ -11,9 +11,11 @@ from typing import Protocol
 
 from PySide6.QtCore import QObject, QThread, Signal
 
-from core.devices import DeviceError, EndOfStream
+from core.control.pilot import Pilot
+from core.devices import EndOfStream
 from core.latest import Latest
-from core.types import Command, Point, Tick
+from core.types import Point, Tick
+from hardware.servos.bus_messages import BusStatus
 
 STEP_TIMEOUT_S = 0.1
 
@@ -21,10 +23,12 @@ _log = logging.getLogger(__name__)
 
 
 class EngineLike(Protocol):
-    """What the thread needs of ``core.control.engine.Engine``."""
+    """What the thread needs of an engine."""
 
+    @property
+    def pilot(self) -> Pilot | None: ...
     def step(self, timeout_s: float) -> Tick | None: ...
-    def jog(self, command: Command) -> None: ...
+    def bus_status(self) -> BusStatus | None: ...
     def set_target(self, target_px: Point | None) -> None: ...
     def close(self) -> None: ...
 
@@ -84,17 +88,16 @@ class EngineThread(QThread):
             self._stopping = True
             self._changed.set()
 
-    def jog(self, command: Command) -> bool:
-        """Hand an operator's command over; False when there is no engine or the robot refuses."""
+    @property
+    def pilot(self) -> Pilot | None:
+        """The running engine's; None when there is no engine, or nobody to drive."""
         engine = self._engine
-        if engine is None:
-            return False
-        try:
-            engine.jog(command)
-        except DeviceError as error:
-            _log.warning("command not taken: %s", error)
-            return False
-        return True
+        return engine.pilot if engine is not None else None
+
+    def bus_status(self) -> BusStatus | None:
+        """The newest status of the servo bus; None where there is none."""
+        engine = self._engine
+        return engine.bus_status() if engine is not None else None
 
     def set_target(self, target_px: Point | None) -> bool:
         """Set or clear the destination, in source pixels; False when there is no engine."""

@@ -4,33 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
 
 from app import palette, theme
 from app.pace import Pace
 from app.widgets.advice_line import AdviceLine
+from app.widgets.alert_strip import AlertStrip
 from app.widgets.card import Card
+from app.widgets.clearance_bar import ClearanceBar
+from app.widgets.command_panel import CommandPanel
 from app.widgets.distance_bars import DistanceBars
+from app.widgets.event_log import EventKind, EventLog
 from app.widgets.help_overlay import HelpOverlay
 from app.widgets.jog_panel import JogPanel
 from app.widgets.live_view import LiveView
 from app.widgets.mode_badge import ModeBadge
+from app.widgets.mode_bar import ModeBar
 from app.widgets.notice import Notice
 from app.widgets.overlay_bar import OverlayBar
 from app.widgets.performance_panel import PerformancePanel
 from app.widgets.phantom_picker import PhantomPicker
+from app.widgets.servo_table import ServoTable
 from app.widgets.sim_banner import SimBanner
 from app.widgets.state_badge import StateBadge
 from app.widgets.theta_gauge import ThetaGauge
 from app.widgets.toast import Toast
 from app.widgets.trend_plot import TrendPlot
 from app.wording import REASON_TEXT
-from core.config import PoseConfig
-from core.types import Command, PoseState, Tick
+from core.config import Config
+from core.control.alerts import Alert
+from core.control.drive_view import DriveView
+from core.types import PoseState, Tick
 from hardware.rig import RigKind
+from hardware.servos.bus_messages import BusStatus
 
 TEXT_EVERY_S = 0.2
 _RIGHT_WIDTH = (470, 660)
+_TALL_PX = 780
 
 
 class OperatorPanels(QWidget):
@@ -39,13 +51,16 @@ class OperatorPanels(QWidget):
     ``picker`` is None when there is no phantom to choose.
     """
 
-    def __init__(self, limits: PoseConfig, kind: RigKind, phantoms: Sequence[tuple[str, str]], phantom: str) -> None:
+    def __init__(self, config: Config, kind: RigKind, phantoms: Sequence[tuple[str, str]]) -> None:
         super().__init__()
+        limits, pixels_per_mm = config.perception.pose, config.policy.pursuit.pixels_per_mm
+        self._servo_config = config.servos
         self.banner = SimBanner(kind)
         self.mode = ModeBadge()
-        self.picker = PhantomPicker(phantoms, phantom) if phantoms else None
-        self.live = LiveView()
+        self.picker = PhantomPicker(phantoms, config.twin.phantom) if phantoms else None
+        self.live = LiveView(pixels_per_mm)
         self.notice = Notice(self.live)
+        self.alerts = AlertStrip(self.live)
         self.toast = Toast(self.live)
         self.overlay_bar = OverlayBar()
         self.advice = AdviceLine()
@@ -54,30 +69,57 @@ class OperatorPanels(QWidget):
         self.bars = DistanceBars(limits.d_allow_px)
         self.trends = TrendPlot(limits)
         self.performance = PerformancePanel()
-        self.jog = JogPanel()
+        self.jog = JogPanel(config.servos.max_pull_mm)
+        self.mode_bar = ModeBar()
+        self.servos = ServoTable()
+        self.commands = CommandPanel()
+        self.clearance = ClearanceBar(pixels_per_mm)
+        self.events = EventLog()
         self._limits = limits
         self._text_pace = Pace(TEXT_EVERY_S)
+        self._servo_pace = Pace(TEXT_EVERY_S)
         self._state: PoseState | None = None
+        self._blanked = ""
         stage = QWidget()
         self._lay_out(stage)
         self.help = HelpOverlay(stage)  # the banner stays in sight
 
-    def show_tick(self, tick: Tick, command: Command, max_block_ms: float) -> None:
+    def show_drive(self, view: DriveView | None, bus: BusStatus | None) -> None:
+        """Show who drives, and what the servos say; None: there is nothing to drive."""
+        self._blanked = view.blanked if view is not None else ""
+        self.mode.show_view(view)
+        self.mode_bar.show_view(view)
+        if view is not None:
+            self.alerts.show_view(view)
+        if self._servo_pace.due():
+            self.servos.show_status(bus, self._servo_config)
+            self.commands.show_view(view, bus)
+
+    def show_alerts(self, alerts: tuple[Alert, ...]) -> None:
+        """Show new alerts over the picture."""
+        self.alerts.show_alerts(alerts)
+
+    def log(self, kind: EventKind, text: str) -> None:
+        """Keep a line in the log."""
+        self.events.add(kind, text)
+
+    def show_tick(self, tick: Tick, max_block_ms: float) -> None:
         """Show one turn of the engine on all panels."""
         scene, pose = tick.scene, tick.scene.pose
         state = pose.state if pose is not None else None
         # a new state renews all texts together: the numbers beside it must be the ones that made it
         renew_text = self._text_pace.due() or state is not self._state
         self._state = state
-        self.live.show_frame(tick.frame, scene)
+        self.live.show_frame(tick.frame, scene, tick.advice)
         self.badge.show_scene(scene, renew_text=renew_text)
         self.gauge.show_pose(pose, renew_text=renew_text)
         self.bars.show_pose(pose, renew_text=renew_text)
-        why_none = REASON_TEXT[scene.refusal.reason].title.lower() if scene.refusal is not None else "no pose"
+        why_none = REASON_TEXT[scene.refusal.reason].title.lower() if scene.refusal is not None else self._blanked or "the pose is not steady yet"
         self.advice.show_advice(tick.advice, state, why_none, renew_text=renew_text)
         self.trends.add(scene)
         self.performance.add(tick, max_block_ms)
-        self.jog.show_command(command, tick.status)
+        self.jog.show_status(tick.status)
+        self.clearance.show_scene(scene, tick.status)
 
     def blank(self, title: str, why: str) -> None:
         """Show nothing that was understood of an older picture, and say why."""
@@ -86,6 +128,7 @@ class OperatorPanels(QWidget):
         self.gauge.show_pose(None)
         self.bars.show_pose(None)
         self.advice.show_advice(None, None, title[0].lower() + title[1:])
+        self.clearance.show_scene(None, None)
 
     def forget(self) -> None:
         """Empty trends and performance: what comes next has nothing to do with them."""
@@ -102,13 +145,31 @@ class OperatorPanels(QWidget):
         columns = QHBoxLayout(stage)
         columns.setContentsMargins(0, 0, 0, 0)
         columns.setSpacing(theme.GAP)
-        columns.addLayout(_column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0)), 62)
+        columns.addLayout(_column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0), (self.mode_bar, 0)), 62)
         columns.addWidget(self._right_side(), 38)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(theme.GAP, 4, theme.GAP, theme.GAP)
         rows.setSpacing(theme.GAP)
         rows.addLayout(header)
         rows.addWidget(stage, 1)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        tall = self.height() >= _TALL_PX
+        if tall is not self._is_tall:
+            self._place_trends(tall=tall)
+
+    def _place_trends(self, *, tall: bool) -> None:
+        """The trends stand by themselves where there is room, else on a page of their own."""
+        self._is_tall = tall
+        card = self._trends_card
+        if tall:
+            self.pages.removeTab(self.pages.indexOf(card))
+            self._right.insertWidget(self._right.indexOf(self.pages), card, 3)
+            card.show()
+        else:
+            self._right.removeWidget(card)
+            self.pages.insertTab(1, card, "Trends")
 
     def _right_side(self) -> QWidget:
         limits = self._limits
@@ -120,7 +181,17 @@ class OperatorPanels(QWidget):
         trends = Card("Last 30 seconds", self.trends, legend)
         hands = _row(Card("Move the robot", self.jog, "hold"), Card("Performance", self.performance))
         side = QWidget()
-        side.setLayout(_column((Card("", self.badge), 0), (_row(angle, distances), 3), (trends, 3), (hands, 3)))
+        self.pages = QTabWidget()
+        self.pages.setDocumentMode(True)
+        self.pages.tabBar().setDrawBase(False)
+        self.pages.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.pages.tabBar().setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the arrows move the robot
+        for page, name in ((hands, "Drive"), (self.servos, "Servos"), (self.commands, "Commands"), (self.events, "Log")):
+            self.pages.addTab(page, name)
+        self._trends_card = trends
+        self._right = _column((Card("", self.badge), 0), (_row(angle, distances), 3), (self.clearance, 0), (self.pages, 3))
+        self._place_trends(tall=False)
+        side.setLayout(self._right)
         side.setMinimumWidth(_RIGHT_WIDTH[0])
         side.setMaximumWidth(_RIGHT_WIDTH[1])
         return side

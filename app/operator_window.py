@@ -13,16 +13,20 @@ from PySide6.QtGui import QAction, QCloseEvent, QDesktopServices, QKeyEvent, QKe
 from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QComboBox, QLabel, QLineEdit, QMainWindow
 
 from app import theme
+from app.drive_desk import DriveDesk
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
 from app.heartbeat import Heartbeat
-from app.jog_keys import JogKeys, Motion
 from app.menus import MenuEntry, add_menu
+from app.next_step import Step
 from app.operator_panels import OperatorPanels
 from app.snapshot import Origin, SnapshotWriter, pictures_folder
+from app.widgets.event_log import EventKind
 from app.widgets.notice import NoticeKind
 from app.widgets.overlays import Layer
 from core.config import Config
-from core.types import Command, Point, Tick
+from core.control.hand import Jog
+from core.control.pilot import Pilot
+from core.types import Point, Tick
 from hardware.rig import RigKind
 
 OpenEngineFor = Callable[[Config], EngineLike]
@@ -63,14 +67,13 @@ class OperatorWindow(QMainWindow):
         self._thread = EngineThread(self)
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
         self._heartbeat = Heartbeat(parent=self)
-        speed = config.twin.jog_advance_mm_s
-        self._jog = JogKeys(self, advance_mm_s=speed, delivery_mm_s=speed)
         self._show_later = QTimer(self)
         self._show_later.setSingleShot(True)
         self._show_later.setTimerType(Qt.TimerType.PreciseTimer)
         self._check = QTimer(self)
         self._check.setInterval(_CHECK_EVERY_MS)
-        self._panels = OperatorPanels(config.perception.pose, kind, phantoms, config.twin.phantom)
+        self._panels = OperatorPanels(config, kind, phantoms)
+        self._desk = DriveDesk(self, self._thread, self._panels)
         self.setCentralWidget(self._panels)
         self._make_menus()
         self._wire()
@@ -93,9 +96,25 @@ class OperatorWindow(QMainWindow):
         """The tick that is on the screen, None before the first and after the last."""
         return self._tick
 
-    def drive(self, command: Command) -> None:
-        """Command the robot as the operator's keys do."""
-        self._on_jog(command)
+    @property
+    def desk(self) -> DriveDesk:
+        """The operator's side of driving."""
+        return self._desk
+
+    @property
+    def pilot(self) -> Pilot | None:
+        """The running rig's pilot; from any thread."""
+        return self._thread.pilot
+
+    @Slot(str, bool)
+    def say(self, message: str, is_fault: bool = False) -> None:
+        """A line for the operator, also kept in the log."""
+        self._panels.toast.show_message(message, is_fault=is_fault)
+        self._panels.log(EventKind.NOTE, message)
+
+    def drive(self, jog: Jog) -> None:
+        """Move the robot as the operator's keys do."""
+        self._desk.drive(jog)
 
     # ---- composition
 
@@ -116,7 +135,10 @@ class OperatorWindow(QMainWindow):
             MenuEntry("&Full screen", self._toggle_full_screen, ("F11",), checked=False),
         ]
         robot_entries = [
-            MenuEntry("S&top and straighten", self._jog.stop, hint="Space"),
+            MenuEntry("S&TOP", self._desk.stop, hint="Space"),
+            None,
+            *(MenuEntry(step.value.name, partial(self._desk.take, step), _keys_of(step)) for step in Step),
+            None,
             MenuEntry("&Clear target", self._clear_target, hint="Esc"),
             None,
             *([MenuEntry("&Another random phantom", panels.picker.roll, ("R",))] if panels.picker is not None else []),
@@ -147,11 +169,26 @@ class OperatorWindow(QMainWindow):
         panels.live.cleared.connect(self._clear_target)
         panels.overlay_bar.toggled.connect(self._on_layer)
         panels.notice.restart.connect(self._restart)
-        self._jog.changed.connect(self._on_jog)
-        self._jog.held_changed.connect(panels.jog.show_held)
-        panels.jog.pressed.connect(self._on_cap_pressed)
-        panels.jog.released.connect(self._on_cap_released)
-        panels.jog.stopped.connect(self._jog.stop)
+        desk = self._desk
+        desk.jog.held_changed.connect(panels.jog.show_held)
+        panels.jog.pressed.connect(desk.press)
+        panels.jog.released.connect(desk.release)
+        panels.jog.speed_changed.connect(desk.jog.set_speed)
+        bar = panels.mode_bar
+        bar.stop_asked.connect(desk.stop)
+        bar.deadman_changed.connect(desk.hold_deadman)
+        for asked, step in (
+            (bar.servos_on_asked, Step.SERVOS_ON),
+            (bar.acknowledge_asked, Step.ACKNOWLEDGE),
+            (bar.arm_asked, Step.ARM),
+            (bar.hand_over_asked, Step.HAND_OVER),
+            (bar.take_back_asked, Step.TAKE_BACK),
+            (bar.disarm_asked, Step.DISARM),
+        ):
+            asked.connect(partial(desk.take, step))
+        panels.servos.reboot_asked.connect(desk.reboot)
+        panels.servos.zero_asked.connect(desk.zero)
+        panels.servos.torque_off_asked.connect(desk.torque_off)
         self._snapshots.saved.connect(panels.toast.show_message)
         self._snapshots.failed.connect(self._on_snapshot_failed)
         if panels.picker is not None:
@@ -164,10 +201,11 @@ class OperatorWindow(QMainWindow):
         self._panels.live.setFocus()
         self._heartbeat.start()
         self._check.start()
+        self._desk.start()
         self._start_rig()
 
     def _start_rig(self) -> None:
-        self._jog.reset()
+        self._desk.reset()
         self._clear_target()
         self._show_phase(Phase.STARTING)
         self._thread.start_engine(partial(self._open_engine, self._config))
@@ -197,9 +235,11 @@ class OperatorWindow(QMainWindow):
         self._tick = None
         self._is_stale = False
         if phase in (Phase.ENDED, Phase.FAULT):
-            self._jog.reset()
-            panels.jog.show_command(self._jog.command, None)
+            self._desk.reset()
+            panels.jog.show_status(None)
         panels.forget()
+        panels.alerts.clear()
+        self._desk.has_rig = phase is Phase.RUNNING
         what = panels.picker.title if panels.picker is not None else self._config.rig.source or self._config.rig.name
         if phase is Phase.STARTING:
             panels.live.clear()
@@ -244,7 +284,7 @@ class OperatorWindow(QMainWindow):
             self._panels.jog.set_enabled(tick.status is not None, "" if tick.status is not None else "This rig has no robot")
         self._tick = tick
         self._panels.notice.clear()
-        self._panels.show_tick(tick, self._jog.command, self._heartbeat.max_block_ms)
+        self._panels.show_tick(tick, self._heartbeat.max_block_ms)
 
     @Slot()
     def _check_age(self) -> None:
@@ -258,30 +298,19 @@ class OperatorWindow(QMainWindow):
 
     # ---- the operator
 
-    @Slot(object)
-    def _on_jog(self, command: Command) -> None:
-        self._thread.jog(command)
-        self._panels.jog.show_command(command, self._tick.status if self._tick is not None else None)
-
-    @Slot(object)
-    def _on_cap_pressed(self, motion: Motion) -> None:
-        self._jog.press(("cap", motion), motion)
-
-    @Slot(object)
-    def _on_cap_released(self, motion: Motion) -> None:
-        self._jog.release(("cap", motion))
-
     @Slot(float, float)
     def _set_target(self, x: float, y: float) -> None:
         self._panels.live.setFocus()
         if self._thread.set_target((x, y)):
             self._target = (x, y)
+            self._desk.log_target(self._target)
             self._panels.live.show_target(self._target)
 
     @Slot()
     def _clear_target(self) -> None:
         if self._target is not None:
             self._target = None
+            self._desk.log_target(None)
             self._thread.set_target(None)
             self._panels.live.show_target(None)
 
@@ -357,7 +386,7 @@ class OperatorWindow(QMainWindow):
         if self._is_shut:
             return
         self._is_shut = True
-        self._jog.detach()
+        self._desk.detach()
         for timer in (self._check, self._show_later):
             timer.stop()
         self._heartbeat.stop()
@@ -374,3 +403,9 @@ class OperatorWindow(QMainWindow):
             _log.error("the rig's driver did not return within %g s; leaving without it", _STOP_WITHIN_MS / 1000)
         if not (has_ended and has_saved):
             os._exit(1)  # Qt would abort on a thread that still runs, or wait for it for ever; the robot was told to stop above
+
+
+def _keys_of(step: Step) -> tuple[str, ...]:
+    """The step's key, which must also be heard while Shift is held as the deadman."""
+    key = step.value.key
+    return (key,) if "+" in key or step is Step.ARM else (key, f"Shift+{key}")

@@ -17,7 +17,8 @@ class SceneShapes:
 
     ``head_foot`` and ``tail_foot`` are the feet of the robot vector's end and start on the vessel line, so that the pieces
     robot_vector.end -> head_foot and robot_vector.start -> tail_foot are d_head and d_tail. ``angle_arc`` (N, 2) turns from the
-    vessel's direction to the robot's around ``robot_vector.start``, with radius 1: painters scale it.
+    vessel's direction to the robot's around ``robot_vector.start``, with radius 1: painters scale it. ``ghost`` (N, 2) is where the
+    head goes next, ``robot_width`` the robot's thickness.
     """
 
     vessel_lines: tuple[Points, ...]
@@ -31,10 +32,15 @@ class SceneShapes:
     tail_foot: Point | None
     angle_arc: Points | None
     route: Points | None
+    ghost: Points | None = None
+    robot_width: float = 0.0
 
 
-def scene_shapes(scene: Scene) -> SceneShapes:
-    """The shapes of `scene`, mapped to source pixels; polylines are thinned to steps of about 5 working pixels."""
+def scene_shapes(scene: Scene, ghost: Points | None = None) -> SceneShapes:
+    """The shapes of `scene`, mapped to source pixels; polylines are thinned to steps of about 5 working pixels.
+
+    `ghost` is the head's predicted path in working pixels.
+    """
     robot, vessel = _vector(scene, scene.robot_vector), _vector(scene, scene.vessel_vector)
     both = robot is not None and vessel is not None and scene.pose is not None
     return SceneShapes(
@@ -49,6 +55,8 @@ def scene_shapes(scene: Scene) -> SceneShapes:
         tail_foot=foot(vessel, robot.start) if both and robot and vessel else None,
         angle_arc=_arc(vessel, robot) if both and robot and vessel else None,
         route=_line(scene, scene.route.points) if scene.route else None,
+        ghost=scene.points_to_source(ghost) if ghost is not None else None,
+        robot_width=2.0 * scene.path.radius_px / scene.scale if scene.path else 0.0,
     )
 
 

@@ -138,6 +138,12 @@ QComboBox QAbstractItemView {{ background: {RAISED}; color: {TEXT}; border: 1px 
     selection-background-color: {SKY}; selection-color: {INK}; outline: none; }}
 QPushButton {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; border-radius: 5px;
     padding: 4px 12px; min-height: 22px; }}
+QTabWidget::pane {{ border: none; }}
+QTabBar {{ background: transparent; }}
+QTabBar::tab {{ background: {WINDOW}; color: {TEXT_DIM}; border: 1px solid {LINE}; border-bottom: none;
+    border-top-left-radius: 5px; border-top-right-radius: 5px; padding: 4px 12px; margin-right: 3px; }}
+QTabBar::tab:selected {{ background: {RAISED}; color: {TEXT}; border-color: {TEXT_FAINT}; }}
+QTabBar::tab:hover {{ color: {TEXT}; }}
 QPushButton:hover {{ border-color: {TEXT_FAINT}; }}
 QPushButton:pressed {{ background: {LINE}; }}
 QPushButton:disabled, QSpinBox:disabled {{ color: {TEXT_FAINT}; background: {WINDOW}; }}

@@ -10,16 +10,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.rig_engine import EngineMaker
 from app.sources import VIDEO_ENDINGS
-from core.config import Config, PerceptionConfig, load_config
-from core.control.engine import Engine, Perceive
-from core.control.policy import table_policy
+from core.config import Config, load_config
 from core.devices import DeviceError
 from core.errors import UserError
-from core.learning.model_file import ModelError
-from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
-from core.types import Advice, Reason, Scene
-from hardware.rig import RigKind, open_rig
+from core.types import Reason
+from hardware.rig import RigKind
 from hardware.twin.phantom import PHANTOM_TITLES
 
 if TYPE_CHECKING:
@@ -28,39 +25,6 @@ if TYPE_CHECKING:
     from app.operator_window import OperatorWindow
 
 RIGS = ("twin",)
-
-
-class EngineMaker:
-    """Opens rig and engine for a configuration, in the engine's thread. The network is loaded once and kept."""
-
-    def __init__(self) -> None:
-        self._perceive: Perceive | None = None
-        self._loaded: PerceptionConfig | None = None
-
-    def __call__(self, config: Config) -> Engine:
-        """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame, with why."""
-        perceive = self._perception(config.perception)
-        if config.rig.camera == "image_folder" and isinstance(perceive, Pipeline):
-            # Pictures that have nothing to do with each other have no past.
-            perceive = perceive.perceive_single
-        rig = open_rig(config)
-
-        def advise(scene: Scene) -> Advice | None:
-            return table_policy(scene, config.advice)
-
-        return Engine(rig.camera, rig.robot, perceive, advise, rig.close)
-
-    def _perception(self, config: PerceptionConfig) -> Perceive:
-        if self._perceive is None or self._loaded != config:
-            try:
-                self._perceive = open_pipeline(config)
-                self._loaded = config
-            except ModelError as error:
-                # Not remembered: once the model is restored, starting the rig again is enough.
-                return NoPerception(str(error))
-        if isinstance(self._perceive, Pipeline):
-            self._perceive.reset()
-        return self._perceive
 
 
 def window_config(rig: str, config_path: Path | None, source: Path | None) -> tuple[Config, RigKind]:
@@ -103,15 +67,21 @@ def make_application() -> QApplication:
 
 def run_window(rig: str, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False) -> int:
     """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
+    from app.operator_devices import OperatorDevices
+
     _check_display()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     config, kind = window_config(rig, config_path, source)
     application = make_application()
     window = make_window(config, kind)
+    devices = OperatorDevices(config, lambda: window.pilot, window)
+    devices.said.connect(window.say)
+    application.aboutToQuit.connect(devices.close)
     application.aboutToQuit.connect(window.shut_down)
     timers = [_quit_on_signal(application)]
     window.show()
     window.start()
+    devices.start()
     if until_first_frame:
         timers.append(_leave_after_first_frame(window))
     return application.exec()

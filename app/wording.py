@@ -125,10 +125,13 @@ def refusal_line(refusal: Refusal) -> str:
 
 
 def advice_headline(advice: Advice) -> str:
-    """For example "Slowest, 18° left"."""
+    """For example "Slowest, 18° left"; "Back off" where the advice is to retract."""
+    how = SPEED_WORD[advice.speed] if advice.advance_mm_s >= 0.0 else f"Back off, {SPEED_WORD[advice.speed].lower()}"
+    if advice.speed is Speed.STOP:
+        return SPEED_WORD[advice.speed]
     if abs(advice.steer_deg) < 0.5:
-        return f"{SPEED_WORD[advice.speed]}, straight"
-    return f"{SPEED_WORD[advice.speed]}, {abs(advice.steer_deg):.0f}° {side(advice.steer_deg)}"
+        return f"{how}, straight"
+    return f"{how}, {abs(advice.steer_deg):.0f}° {side(advice.steer_deg)}"
 
 
 def target_note(scene: Scene) -> str:

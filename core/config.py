@@ -13,7 +13,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.errors import UserError
-from core.policy_config import PolicyConfig
+from core.gamepad_config import GamepadConfig
+from core.pedal_config import PedalConfig
+from core.policy_config import HandConfig, PolicyConfig
+from core.record_config import RecordConfig
 from core.safety_config import SafetyConfig
 from core.servo_config import ServosConfig
 
@@ -161,7 +164,6 @@ class TwinConfig(_Section):
     image_width_px: int = Field(640, ge=160, le=4096)
     image_height_px: int = Field(480, ge=120, le=4096)
     frames_per_second: float = Field(30.0, gt=0.0, le=240.0)
-    jog_advance_mm_s: float = Field(10.0, gt=0.0, le=50.0)
 
 
 class RigConfig(_Section):
@@ -185,9 +187,13 @@ class Config(_Section):
     perception: PerceptionConfig = PerceptionConfig()
     advice: AdviceConfig = AdviceConfig()
     policy: PolicyConfig = PolicyConfig()
+    hand: HandConfig = HandConfig()
     servos: ServosConfig = ServosConfig()
     safety: SafetyConfig = SafetyConfig()
+    pedal: PedalConfig = PedalConfig()
+    gamepad: GamepadConfig = GamepadConfig()
     window: WindowConfig = WindowConfig()
+    record: RecordConfig = RecordConfig()
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

@@ -56,6 +56,14 @@ class DriveConfig(_Section):
     max_gap_s: float = Field(0.1, gt=0.0, le=0.5, description="a longer pause between two commands counts as so much")
 
 
+class HandConfig(_Section):
+    """Driving by hand: speeds at full deflection of a key or a stick."""
+
+    bend_rate_per_s: float = Field(1.2, gt=0.0, le=5.0, description="share of the tendons' full pull per second")
+    advance_mm_s: float = Field(10.0, gt=0.0, le=20.0)
+    delivery_mm_s: float = Field(10.0, gt=0.0, le=20.0)
+
+
 class PolicyConfig(_Section):
     """Who advises, and drives when handed over to."""
 

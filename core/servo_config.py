@@ -70,7 +70,7 @@ def _feed(name: JointName, number: int, low_mm: float, high_mm: float) -> JointC
 class ServosConfig(_Section):
     """The bus and its seven joints."""
 
-    driver: Literal["direct", "dynamixel"] = Field("direct", description="direct: the twin without servos, for lock-step trials")
+    driver: Literal["dynamixel", "direct"] = Field("dynamixel", description="direct: the twin without servos, a lighter load")
     port: str | None = Field(None, min_length=1, description="serial device; None: the twin's own pseudo-terminal")
     baud: int = Field(1_000_000, ge=9600, le=4_500_000)
     model: int = Field(1020, ge=0, le=65535, description="model number that every servo must report (1020: XM430-W350)")

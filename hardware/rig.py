@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from core.config import Config
-from core.devices import Camera, DeviceError, Robot
+from core.control.guarded_robot import GuardedRobot
+from core.devices import Camera, DeviceError
 
 if TYPE_CHECKING:
     from hardware.servos.servo_robot import ServoRobot
@@ -30,7 +31,7 @@ class Rig:
     name: str
     kind: RigKind
     camera: Camera
-    robot: Robot | None
+    robot: GuardedRobot | None
     world: TwinWorld | None = None
 
     @property
@@ -80,9 +81,9 @@ def _open_twin(config: Config) -> Rig:
     # A robot that already lies in the vessel: the first picture shows all that the program can tell.
     world.insert(_START_INSERTION_MM)
     camera = TwinCamera(world)
-    robot: Robot | None = None
+    robot: GuardedRobot | None = None
     if config.rig.robot == "twin":
-        robot = _servo_robot(config, world) if config.servos.driver == "dynamixel" else _direct_robot(world)
+        robot = _servo_robot(config, world) if config.servos.driver == "dynamixel" else _direct_robot(config, world)
     try:
         camera.open()
     except DeviceError:
@@ -92,9 +93,12 @@ def _open_twin(config: Config) -> Rig:
     return Rig(config.rig.name, RigKind.SIM, camera, robot, world)
 
 
-def _direct_robot(world: TwinWorld) -> Robot:
-    world.robot.connect()
-    return world.robot
+def _direct_robot(config: Config, world: TwinWorld) -> GuardedRobot:
+    from hardware.twin.direct_robot import DirectRobot
+
+    robot = DirectRobot(world.robot, config.safety)
+    robot.connect()
+    return robot
 
 
 def _servo_robot(config: Config, world: TwinWorld) -> ServoRobot:

@@ -30,8 +30,8 @@ class AdviceLine(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Advice")
         self.setToolTip(
-            "What the program advises: how fast to advance, and how far to turn the head (right and left as seen on screen).\n"
-            "You steer; nothing is sent to the robot but what you ask for."
+            "What the program advises: how fast to advance or retract, and how far to turn the head (right and left as seen on\n"
+            "screen). Unless you hand over, you steer, and nothing is sent to the robot but what you ask for."
         )
 
     @property
@@ -77,7 +77,7 @@ class AdviceLine(QWidget):
         painter.setBrush(QColor(accent))
         painter.drawRoundedRect(QRectF(frame.left(), frame.top(), 6, frame.height()), 3, 3)
         _paint_arrow(painter, QPointF(frame.left() + 48, frame.center().y()), 24.0, advice.steer_deg, accent)
-        _paint_chevrons(painter, QPointF(frame.left() + 92, frame.center().y()), _CHEVRONS[advice.speed])
+        _paint_chevrons(painter, QPointF(frame.left() + 92, frame.center().y()), _CHEVRONS[advice.speed], advice.advance_mm_s < 0.0)
         left = frame.left() + 168
         width = frame.right() - left - 16
         headline = advice_headline(advice)
@@ -106,8 +106,8 @@ def _paint_arrow(painter: QPainter, middle: QPointF, size: float, turn_deg: floa
     painter.restore()
 
 
-def _paint_chevrons(painter: QPainter, left_middle: QPointF, count: int) -> None:
-    """Four chevrons, `count` of them lit; a square where the advice is to stop."""
+def _paint_chevrons(painter: QPainter, left_middle: QPointF, count: int, backwards: bool) -> None:
+    """Four chevrons, `count` of them lit, that point back where the advice is to retract; a square where it is to stop."""
     if count == 0:
         painter.setBrush(QColor(palette.TEXT))
         painter.drawRect(QRectF(left_middle.x() + 20, left_middle.y() - 11, 22, 22))
@@ -120,4 +120,6 @@ def _paint_chevrons(painter: QPainter, left_middle: QPointF, count: int) -> None
         painter.setBrush(Qt.BrushStyle.NoBrush)
         x = left_middle.x() + 14 * k
         dx, dy = 8 * math.cos(math.radians(30)), 10.0
-        painter.drawPolyline([QPointF(x, left_middle.y() - dy), QPointF(x + dx, left_middle.y()), QPointF(x, left_middle.y() + dy)])
+        base, tip = (x + dx, x) if backwards else (x, x + dx)
+        corners = [QPointF(base, left_middle.y() - dy), QPointF(tip, left_middle.y()), QPointF(base, left_middle.y() + dy)]
+        painter.drawPolyline(corners)

@@ -25,7 +25,7 @@ class DistanceBars(QWidget):
         self._offsets: tuple[float, float] | None = None
         self._numbers: tuple[float, float] | None = None
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setMinimumSize(200, 114)
+        self.setMinimumSize(200, 100)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Distances from the centerline")
         self.setToolTip(f"{QUANTITY_MEANING['d_head']}\n{QUANTITY_MEANING['d_tail']}")

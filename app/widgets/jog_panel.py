@@ -4,24 +4,28 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette, theme
 from app.jog_keys import Motion
-from core.types import Command, RobotStatus
+from core.types import RobotStatus
 
 _LEFT, _RIGHT, _UP, _DOWN = (QPointF(-1, 0), QPointF(1, 0), QPointF(0, -1), QPointF(0, 1))
 
 
 class JogPanel(QWidget):
-    """``pressed`` and ``released`` carry a motion that is held with the mouse; ``stopped`` comes from the stop cap."""
+    """``pressed`` and ``released`` carry a motion that is held with the mouse; ``speed_changed`` a share of full speed, 0..1.
+
+    `max_pull_mm` is the tendons' pull at a bend of 1.
+    """
 
     pressed = Signal(object)
     released = Signal(object)
-    stopped = Signal()
+    speed_changed = Signal(float)
 
-    def __init__(self) -> None:
+    def __init__(self, max_pull_mm: float) -> None:
         super().__init__()
+        self._max_pull_mm = max_pull_mm
         self._caps: dict[Motion, _Cap] = {}
         grid = QGridLayout()
         grid.setSpacing(4)
@@ -42,10 +46,14 @@ class JogPanel(QWidget):
             cap.released.connect(lambda which=motion: self.released.emit(which))
             grid.addWidget(cap, row, column)
             self._caps[motion] = cap
-        self._stop = _Cap(None, "Space", "stop and straighten", wide=True)
-        self._stop.setAccessibleName("stop and straighten")
-        self._stop.pressed.connect(self.stopped)
-        grid.addWidget(self._stop, 2, 0, 1, 4)
+        straighten = _Cap(None, "X", "straighten", wide=True)
+        straighten.setAccessibleName(Motion.STRAIGHTEN.value)
+        straighten.setToolTip("bring bend and pitch back to the middle: hold to move, release to stop")
+        straighten.pressed.connect(lambda: self.pressed.emit(Motion.STRAIGHTEN))
+        straighten.released.connect(lambda: self.released.emit(Motion.STRAIGHTEN))
+        grid.addWidget(straighten, 2, 0, 1, 2)
+        self._caps[Motion.STRAIGHTEN] = straighten
+        grid.addWidget(self._speed_choice(), 2, 2, 1, 2)
         self._readout = _Readout()
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
@@ -63,13 +71,29 @@ class JogPanel(QWidget):
         for motion, cap in self._caps.items():
             cap.light(motion in held)
 
-    def show_command(self, command: Command, status: RobotStatus | None) -> None:
-        """Bend asked for, and how far in the robot is."""
-        self._readout.show_values(command.bend, command.pitch, status.insertion_mm if status is not None else None)
+    def show_status(self, status: RobotStatus | None) -> None:
+        """How the head is bent, as the tendons are pulled, and how far in the robot is."""
+        if status is None:
+            self._readout.show_values(0.0, 0.0, None)
+            return
+        right, left, up, down = status.tendon_pull_mm
+        full_mm = 2.0 * self._max_pull_mm
+        self._readout.show_values((right - left) / full_mm, (up - down) / full_mm, status.insertion_mm)
+
+    def _speed_choice(self) -> QComboBox:
+        """Full speed, or a share of it for fine work."""
+        choice = QComboBox()
+        choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # it would take the keys that move the robot
+        choice.setAccessibleName("Speed of the keys")
+        choice.setToolTip("Speed of all motions by hand, of the configured full speed")
+        for share in (1.0, 0.5, 0.2):
+            choice.addItem(f"{100 * share:.0f} %", share)
+        choice.currentIndexChanged.connect(lambda place: self.speed_changed.emit(choice.itemData(place)))
+        return choice
 
     def set_enabled(self, enabled: bool, why: str = "") -> None:
         """Grey the caps out when there is nothing to move."""
-        for cap in (*self._caps.values(), self._stop):
+        for cap in self._caps.values():
             cap.setEnabled(enabled)
         self._readout.setEnabled(enabled)
         self.setToolTip(why)
@@ -170,7 +194,7 @@ class _Readout(QWidget):
         self.setFixedHeight(18)
         self.setAccessibleName("Bend and insertion")
         self.setAccessibleDescription(self.text)
-        self.setToolTip("Bend of the head that is asked for (share of the tendons' full pull) and how far the robot is in")
+        self.setToolTip("Bend of the head (share of the tendons' full pull, as measured) and how far the robot is in")
 
     @property
     def text(self) -> str:

@@ -15,23 +15,29 @@ from app.scene_shapes import scene_shapes
 from app.widgets.head_loupe import HeadLoupe
 from app.widgets.overlays import Layer, Overlay, OverlayItem
 from app.wording import target_note
-from core.types import Frame, Image, Point, Scene
+from core.control.ghost import predict
+from core.policy_config import PursuitConfig
+from core.types import Advice, Frame, Image, Point, Points, Scene
 
 _VESSEL, _ROBOT, _VESSEL_SKELETON, _ROBOT_SKELETON = 1, 2, 4, 8
 _ZOOM_MAX = 12.0
+_GHOST_S = 2.0
+_PIXELS_PER_MM = PursuitConfig().pixels_per_mm
 
 
 class LiveView(QWidget):
     """Shows a frame and what was understood of it. Plot items are made once and updated in place.
 
-    ``clicked`` carries a place in source pixels; ``cleared`` comes on a right click.
+    ``clicked`` carries a place in source pixels; ``cleared`` comes on a right click. `pixels_per_mm` (working px) gives the ghost
+    of the advised move its length.
     """
 
     clicked = Signal(float, float)
     cleared = Signal()
 
-    def __init__(self) -> None:
+    def __init__(self, pixels_per_mm: float = _PIXELS_PER_MM) -> None:
         super().__init__()
+        self._pixels_per_mm = pixels_per_mm
         self.setMinimumSize(480, 320)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Live picture")
@@ -41,6 +47,7 @@ class LiveView(QWidget):
         self._target: Point | None = None
         self._masks_on = self._vessel_on = self._robot_on = self._loupe_on = True
         self._image: Image | None = None
+        self._ghost: Points | None = None
         self._view = pg.GraphicsView()
         self._view.setBackground(palette.INK)
         self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -63,10 +70,11 @@ class LiveView(QWidget):
     def scene(self) -> Scene | None:
         return self._scene
 
-    def show_frame(self, frame: Frame, scene: Scene) -> None:
-        """Show a frame with its scene."""
+    def show_frame(self, frame: Frame, scene: Scene, advice: Advice | None = None) -> None:
+        """Show a frame with its scene, and where `advice` leads; None: no ghost."""
         self._show_picture(frame.image)
         self._scene = scene
+        self._ghost = predict(scene, advice, _GHOST_S, self._pixels_per_mm) if advice is not None else None
         self._image = frame.image
         self._show_labels()
         self._show_marks()
@@ -142,7 +150,7 @@ class LiveView(QWidget):
 
     def _show_marks(self) -> None:
         scene = self._scene
-        shapes = scene_shapes(scene) if scene is not None else None
+        shapes = scene_shapes(scene, self._ghost) if scene is not None else None
         note = target_note(scene) if scene is not None and self._target is not None else ""
         self._marks.show_overlay(Overlay(shapes, scene.pose if scene is not None else None, self._target, note))
 

@@ -1,41 +1,116 @@
-"""Who drives: in this program the operator does, and the badge says so."""
+"""Who drives, always in sight: the mode's name in a frame and a sign of its own."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QPainter, QPainterPath, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.next_step import who_drives
+from app.widgets.signs import Sign, octagon, paint_sign
+from core.control.drive_view import DriveView
+from core.control.modes import Mode
+
+_SIZE = QSize(284, 34)
+
+
+@dataclass(frozen=True, slots=True)
+class ModeLook:
+    """Colour and sign of a mode; ``filled`` where something other than the operator decides."""
+
+    colour: str
+    filled: bool
+    sign: Sign
+    meaning: str
+
+
+MODE_LOOK = {
+    Mode.ADVISORY: ModeLook(palette.SKY, False, Sign.WHEEL, "you steer, the program only advises"),
+    Mode.ARMED: ModeLook(palette.ORANGE, False, Sign.READY, "you steer; the program may be handed over to"),
+    Mode.AUTONOMOUS: ModeLook(palette.GREEN, True, Sign.DRIVES, "the program drives while the deadman is held"),
+    Mode.HOLD: ModeLook(palette.YELLOW, True, Sign.PAUSE, "the program's motion is interrupted; the robot holds"),
+    Mode.STOPPED: ModeLook(palette.VERMILLION, True, Sign.STOP, "nothing moves until the stop is acknowledged"),
+}
 
 
 class ModeBadge(QWidget):
-    """The mode's name in a frame. ADVISORY is the only mode there is: the program advises and never moves the robot by itself."""
+    """Told by frame and sign as well as by colour: only ARMED has a heavy frame, AUTONOMOUS a point, STOPPED eight corners."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.setFixedSize(214, 34)
+        self._mode = Mode.ADVISORY
+        self._who = ""
+        self.setFixedSize(_SIZE)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Mode: ADVISORY")
-        self.setToolTip("ADVISORY: you steer, the program only advises. It is the only mode of this version.")
+        self.show_view(None)
+
+    @property
+    def mode(self) -> Mode:
+        return self._mode
+
+    @property
+    def who(self) -> str:
+        """Who drives, as shown beside the mode's name."""
+        return self._who
 
     def sizeHint(self) -> QSize:
-        return QSize(214, 34)
+        return _SIZE
+
+    def show_view(self, view: DriveView | None) -> None:
+        """The newest view; None: this rig has no robot."""
+        mode, who = view.mode if view is not None else Mode.ADVISORY, who_drives(view)
+        if (mode, who) == (self._mode, self._who):
+            return
+        self._mode, self._who = mode, who
+        self.setAccessibleName(f"Mode: {mode.value}")
+        self.setAccessibleDescription(who)
+        self.setToolTip("\n".join(_meaning(each, each is mode) for each in Mode))
+        self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        look = MODE_LOOK[self._mode]
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        painter.setPen(QPen(QColor(palette.SKY), 1.5))
-        painter.setBrush(QColor(palette.PANEL))
-        painter.drawRoundedRect(frame, 6, 6)
-        name_font = QFont(theme.bold(15))
-        name_font.setLetterSpacing(name_font.SpacingType.AbsoluteSpacing, 1.0)
-        painter.setFont(name_font)
-        width = painter.fontMetrics().horizontalAdvance("ADVISORY")
-        painter.setPen(QColor(palette.SKY))
-        painter.drawText(frame.adjusted(14, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, "ADVISORY")
-        painter.setFont(theme.font(13))
-        painter.setPen(QColor(palette.TEXT_DIM))
-        painter.drawText(frame.adjusted(14 + width + 12, 0, -8, 0), Qt.AlignmentFlag.AlignVCenter, "you steer")
+        frame = QRectF(self.rect()).adjusted(1.5, 1.5, -1.5, -1.5)
+        colour = QColor(look.colour)
+        painter.setPen(QPen(colour, 3.0 if self._mode is Mode.ARMED else 1.5))
+        painter.setBrush(colour if look.filled else QColor(palette.PANEL))
+        painter.drawPath(_outline(frame, self._mode))
+        ink = QColor(palette.INK) if look.filled else colour
+        paint_sign(painter, QRectF(frame.left() + 9, frame.center().y() - 8.5, 17, 17), look.sign, ink)
+        self._paint_words(painter, frame.adjusted(34, 0, -12, 0), ink, QColor(palette.INK if look.filled else palette.TEXT))
         painter.end()
+
+    def _paint_words(self, painter: QPainter, room: QRectF, ink: QColor, who_ink: QColor) -> None:
+        name_font = QFont(theme.bold(15))
+        name_font.setLetterSpacing(QFont.SpacingType.AbsoluteSpacing, 0.4)
+        painter.setFont(name_font)
+        painter.setPen(ink)
+        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, self._mode.value)
+        left = QFontMetrics(name_font).horizontalAdvance(self._mode.value) + 9
+        painter.setFont(theme.fitted(theme.font(13), self._who, int(room.width() - left)))
+        painter.setPen(who_ink)
+        painter.drawText(room.adjusted(left, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, self._who)
+
+
+def _meaning(mode: Mode, is_now: bool) -> str:
+    mark = "\N{RIGHTWARDS ARROW} " if is_now else ""
+    return f"{mark}{mode.value}: {MODE_LOOK[mode].meaning}"
+
+
+def _outline(frame: QRectF, mode: Mode) -> QPainterPath:
+    path = QPainterPath()
+    if mode is Mode.STOPPED:
+        path.addPolygon(octagon(frame, 9.0))
+        path.closeSubpath()
+    elif mode is Mode.AUTONOMOUS:
+        tip, middle = frame.right() - 12, frame.center().y()
+        corners = [(frame.left(), frame.top()), (tip, frame.top()), (frame.right(), middle), (tip, frame.bottom())]
+        path.addPolygon(QPolygonF([QPointF(x, y) for x, y in (*corners, (frame.left(), frame.bottom()))]))
+        path.closeSubpath()
+    else:
+        path.addRoundedRect(frame, 6, 6)
+    return path

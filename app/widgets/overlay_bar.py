@@ -19,6 +19,7 @@ _SWATCH = {
     Layer.DISTANCES: palette.D_HEAD,
     Layer.ROUTE: palette.ROUTE,
     Layer.LOUPE: palette.TEXT,
+    Layer.GHOST: palette.GHOST,
 }
 
 

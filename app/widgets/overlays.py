@@ -41,6 +41,7 @@ class Layer(Enum):
     DISTANCES = LayerText("7", "Distances", "d_head and d_tail: from the vessel line to both ends of the robot vector")
     ROUTE = LayerText("8", "Route", "The operator's target and the way to it")
     LOUPE = LayerText("9", "Loupe", "The surroundings of the head, magnified, in a corner of the picture")
+    GHOST = LayerText("G", "Ghost", "Where the head goes in the next two seconds if the advice is followed: the broken tube")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,6 +101,8 @@ class OverlayItem(pg.GraphicsObject):
                 pencil.polylines((shapes.route,), palette.ROUTE, 4.0, Qt.PenStyle.DashLine)
             if Layer.ROBOT in self._visible:
                 _draw_robot(pencil, shapes)
+            if Layer.GHOST in self._visible and shapes.ghost is not None:
+                pencil.tube(shapes.ghost, palette.GHOST, shapes.robot_width)
             if Layer.VECTORS in self._visible:
                 _draw_vectors(pencil, shapes, pose, -self._head_side)
             if Layer.DISTANCES in self._visible and pose is not None:

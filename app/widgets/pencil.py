@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF, QTransform
 
 from app import palette, theme
+from core.perception import polyline
 from core.types import Point, Points, Vector
 
 _ARC_RADIUS = 44.0
 _LABEL_GAP = 16.0
 _MARGIN = 60.0
 _TAG_PX = 15
+_TUBE_MIN, _TUBE_DASH = 14.0, 6.0
 
 
 class Pencil:
@@ -92,6 +94,33 @@ class Pencil:
         for point in arc[1:]:
             path.lineTo(point)
         self._stroke(path, name, 2.0)
+
+    def tube(self, line: Points, name: str, width_px: float) -> None:
+        """A see-through tube along `line` (N, 2), `width_px` wide in the picture, with broken edges and an arrow at its end."""
+        t = self._to_screen
+        half = max(_TUBE_MIN, width_px * float(np.hypot(t.m11(), t.m12()))) / 2
+        x, y = line[:, 0] + 0.5, line[:, 1] + 0.5
+        way = np.column_stack([x * t.m11() + y * t.m21() + t.dx(), x * t.m12() + y * t.m22() + t.dy()])
+        way = polyline.resample(way, _TUBE_DASH)
+        if len(way) < 2:
+            return
+        across = half * polyline.normals(way)
+        edges = [[QPointF(*at) for at in edge.tolist()] for edge in (way - across, way + across)]
+        # dashes as pieces of their own: Qt's dashed pens cost three times as much
+        dashes = [QLineF(edge[k], edge[k + 1]) for edge in edges for k in range(0, len(way) - 1, 2)]
+        end, ahead = QPointF(*way[-1].tolist()), _unit(QPointF(*(way[-1] - way[-2]).tolist())) * (half + 8.0)
+        aside = QPointF(-ahead.y(), ahead.x())
+        self._painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)  # the dashes cover the border
+        self._painter.setPen(Qt.PenStyle.NoPen)
+        self._painter.setBrush(theme.colour(name, 0.45))
+        self._painter.drawPolygon(QPolygonF(edges[0] + edges[1][::-1]))
+        self._painter.setPen(QPen(theme.colour(palette.INK, 0.65), 4.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
+        self._painter.drawLines(dashes)
+        self._painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._painter.setPen(QPen(QColor(palette.TEXT), 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
+        self._painter.drawLines(dashes)
+        self._painter.setBrush(QColor(name))
+        self._painter.drawPolygon(QPolygonF([end + ahead * 1.35, end + aside, end - aside]))
 
     def measure(self, foot: Point, point: Point, name: str, style: Qt.PenStyle) -> None:
         """A distance from `foot` on the line to `point`."""

@@ -29,7 +29,7 @@ class ThetaGauge(QWidget):
         self._number: float | None = None
         self._scale: QPixmap | None = None
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setMinimumSize(200, 114)
+        self.setMinimumSize(200, 100)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("theta")
         self.setToolTip(QUANTITY_MEANING["theta"])

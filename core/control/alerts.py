@@ -9,13 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 
 from core.control.faults import REACTION, Cause, Reaction
 from core.control.gate_checks import RejectReason
 from core.control.modes import Hindrance
 
-AlertKey = Cause | Hindrance | RejectReason
+
+class Note(StrEnum):
+    """What is worth a line without being a fault or a refusal."""
+
+    REACHED = "destination reached"
+    AT_END = "joint at its end"
+
+
+AlertKey = Cause | Hindrance | RejectReason | Note
 
 
 class Priority(IntEnum):
@@ -97,13 +105,15 @@ _FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
     Cause.RECORDER_BEHIND: ("The recorder drops frames", "close other programs or record at a lower rate"),
 }
 
-_HINTS: dict[Hindrance | RejectReason, tuple[str, str]] = {
+_HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
+    Note.REACHED: ("Destination reached", "you drive again: choose the next one, or go on by hand"),
+    Note.AT_END: ("A joint is at the end of its travel", "drive the other way"),
     Hindrance.IS_STOPPED: ("Stopped", "acknowledge the stop first"),
     Hindrance.UNACKNOWLEDGED: ("A fault is not acknowledged", "read it and acknowledge it"),
     Hindrance.ALREADY_ARMED: ("Already armed", "choose a destination and hand over"),
     Hindrance.CAMERA_SETTLING: ("The camera is not well for long enough", "wait a second"),
     Hindrance.PERCEPTION_SETTLING: ("Perception is not well for long enough", "wait until the pose is steady for a second"),
-    Hindrance.SERVOS_UNCHECKED: ("The servos are not checked", "connect the servos and check them"),
+    Hindrance.SERVOS_UNCHECKED: ("The servos are off", "switch them on; that checks them, too"),
     Hindrance.NOT_YET_ARMED: ("Not armed", "arm first"),
     Hindrance.ALREADY_AUTONOMOUS: ("Already handed over", "touch the controls to take back"),
     Hindrance.NO_DESTINATION: ("No destination chosen", "click the destination in the picture"),

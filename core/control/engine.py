@@ -1,4 +1,4 @@
-"""The loop: newest frame -> perceive -> advise -> tick. One thread turns it; the operator's commands may come from another."""
+"""The loop: newest frame -> perceive -> advise. One thread turns it; the pilot beside it drives."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
-from core.devices import Camera, Robot
-from core.types import Advice, Command, Frame, Point, Scene, Tick
+from core.control.pilot import Pilot
+from core.control.pilot_loop import PilotLoop
+from core.devices import Camera, DeviceError, Robot
+from core.types import Advice, Frame, Point, RobotStatus, Scene, Tick
 
 
 class Perceive(Protocol):
@@ -18,54 +20,71 @@ class Perceive(Protocol):
 
 
 class Engine:
-    """Owns an open camera and robot and turns them once per ``step``.
+    """Owns an open camera and turns perception once per ``step``.
 
     Parameters
     ----------
-    camera, robot : open devices; ``close`` closes them through `on_close`.
+    camera : open; closed through `on_close`.
     perceive : the perception pipeline.
-    policy : scene -> advice, None when there is none.
+    policy : scene -> advice where there is nobody to drive, None when there is none.
     on_close : closes the rig.
+    pilot : advises and drives the rig's robot; None when there is no robot. Its turns begin now.
+    robot : whose status goes into the ticks.
     """
 
     def __init__(
         self,
         camera: Camera,
-        robot: Robot | None,
         perceive: Perceive,
         policy: Callable[[Scene], Advice | None],
         on_close: Callable[[], None],
+        pilot: Pilot | None = None,
+        robot: Robot | None = None,
     ) -> None:
         self._camera = camera
-        self._robot = robot
         self._perceive = perceive
         self._policy = policy
         self._on_close = on_close
+        self._robot = robot
+        self.pilot = pilot
+        self._loop = PilotLoop(pilot) if pilot is not None else None
         self._lock = threading.Lock()
         self._target: Point | None = None
-        self._sent: Command | None = None
         self._last_index: int | None = None
         self._dropped = 0
         self._times: deque[float] = deque(maxlen=30)
 
     def step(self, timeout_s: float) -> Tick | None:
-        """One turn; None when no new frame came in time. Raises DeviceError when a device is lost."""
+        """One turn; None when no new frame came in time. Raises DeviceError when a device is lost or driving failed."""
+        if self._loop is not None and self._loop.failure is not None:
+            raise DeviceError(self._loop.failure)
         frame = self._camera.read(timeout_s)
         if frame is None:
+            if self.pilot is not None:
+                self.pilot.worker_alive()
             return None
         self._count(frame)
         with self._lock:
-            target, sent = self._target, self._sent
+            target = self._target
+        if self.pilot is not None:
+            self.pilot.frame_arrived(frame)
         scene = self._perceive(frame, target)
-        status = self._robot.status() if self._robot is not None else None
-        return Tick(frame, scene, self._policy(scene), sent, status, self._dropped, self._rate())
+        status = self._status()
+        if self.pilot is None:
+            advice, sent = self._policy(scene), None
+        else:
+            advice = self.pilot.see(frame, scene, status, has_target=target is not None)
+            sent = self.pilot.view.sent
+        return Tick(frame, scene, advice, sent, status, self._dropped, self._rate())
 
-    def jog(self, command: Command) -> None:
-        """Send the operator's command at once (from any thread); what was really sent appears in the next ticks."""
-        if self._robot is not None:
-            sent = self._robot.send(command)
-            with self._lock:
-                self._sent = sent
+    def _status(self) -> RobotStatus | None:
+        """None also when the robot was lost: pictures go on, and the pilot says what happened."""
+        if self._robot is None:
+            return None
+        try:
+            return self._robot.status()
+        except DeviceError:
+            return None
 
     def set_target(self, point: Point | None) -> None:
         """The operator's destination in source pixels; None clears it."""
@@ -75,8 +94,8 @@ class Engine:
     def close(self) -> None:
         """Hold the robot and close the rig."""
         try:
-            if self._robot is not None:
-                self._robot.hold()
+            if self._loop is not None:
+                self._loop.close()
         finally:
             self._on_close()
 

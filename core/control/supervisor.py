@@ -219,6 +219,15 @@ def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfi
     return tuple(reasons)
 
 
+def hindrances(
+    state: SupervisorState, now_s: float, safety: SafetyConfig
+) -> tuple[tuple[Hindrance | Cause, ...], tuple[Hindrance | Cause, ...]]:
+    """Why arming, and why a hand-over, would be refused now; of the deadman, which comes with the hand-over, nothing is said."""
+    deadman = {Hindrance.DEADMAN_NOT_HELD, Hindrance.DEADMAN_HELD_BEFORE}
+    over = _against_hand_over(state, now_s, safety)
+    return _against_arming(state, now_s, safety), tuple(reason for reason in over if reason not in deadman)
+
+
 def _decide(
     state: SupervisorState, before: Collection[Fault], refused: tuple[Refused, ...], now_s: float, safety: SafetyConfig
 ) -> Decision:

@@ -10,6 +10,7 @@ from contextlib import ExitStack
 
 from core.control.bus_watch import BusReport
 from core.control.gate import Source
+from core.control.guarded_robot import SentMotion
 from core.safety_config import SafetyConfig
 from core.servo_config import JointConfig, JointName, ServosConfig
 from core.types import Command, RobotStatus
@@ -18,10 +19,9 @@ from hardware.servos.bus_link import BusLink
 from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order
 from hardware.servos.errors import BusProcessLost, NotReady
 from hardware.servos.status_block import ServoReading, ServoState
+from hardware.servos.units import wire_force_mn
 
 _OPEN_S, _ARM_S, _REQUEST_S = 20.0, 10.0, 5.0
-_TORQUE_NM_PER_A = 4.1 / 2.3
-"""Stall torque over stall current of an XM430-W350 at 12 V (Robotis e-Manual)."""
 
 
 class ServoRobot:
@@ -233,6 +233,22 @@ class ServoRobot:
         errors, rebooted = status.bad_packets - bad_packets, status.restarts > restarts
         return report_of(status.servos, armed=status.armed, errors=errors, rebooted=rebooted)
 
+    def sent_motion(self) -> SentMotion | None:
+        """What left the gate in the newest cycle in which anything did; None before that. No heartbeat."""
+        status = self.bus_status()
+        if status is None or status.sent is None:
+            return None
+        sent, order = status.sent, status.sent.order
+        return SentMotion(
+            cycle=status.cycle,
+            time_s=sent.time_s,
+            motion=sent.motion,
+            source=order.source if order is not None and order.command is not None else None,
+            captured_s=order.captured_s if order is not None else None,
+            rejection=status.rejection.reason if status.rejection is not None else None,
+            at_end=status.at_end,
+        )
+
     def close(self) -> None:
         """Hold, end the bus process and give the port back. The torque stays on."""
         self._disconnect()
@@ -260,9 +276,8 @@ class ServoRobot:
 
 
 def _force_mn(joint: JointConfig, state: ServoState) -> float:
-    """Pull of a wire as the motor's current tells it, friction included; 0 for models that report no current."""
-    radius_m = joint.mm_per_turn / (2.0 * math.pi) / 1000.0
-    return joint.sign * (state.current_ma or 0.0) / 1000.0 * _TORQUE_NM_PER_A / radius_m * 1000.0
+    """Pull of a wire as the motor's current tells it; 0 for models that report no current."""
+    return wire_force_mn(joint, state.current_ma or 0.0)
 
 
 def _limited(value: float, limit: float) -> float:

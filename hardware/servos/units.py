@@ -22,6 +22,8 @@ _CURRENT_MA = {
     **dict.fromkeys((1190, 1200, 1210, 1220, 1230, 1240), 1.0),  # XL330, XC330
 }
 _LOAD_MODELS = frozenset({1060, 1070, 1080, 1090})
+_TORQUE_NM_PER_A = 4.1 / 2.3
+"""Stall torque over stall current of an XM430-W350 at 12 V (Robotis e-Manual)."""
 
 
 def to_ticks(joint: JointConfig, position_mm: float, zero_ticks: int) -> int:
@@ -69,6 +71,12 @@ def watchdog_units(watchdog_s: float) -> int:
 def current_ma(model: int, units: int) -> float | None:
     """Motor current, or None for models that report a load instead."""
     return None if model in _LOAD_MODELS else units * _CURRENT_MA.get(model, _DEFAULT_CURRENT_MA)
+
+
+def wire_force_mn(joint: JointConfig, current_ma: float) -> float:
+    """Pull of a wire as the motor's current tells it, friction included; positive tightens."""
+    radius_m = joint.mm_per_turn / (2.0 * math.pi) / 1000.0
+    return joint.sign * current_ma / 1000.0 * _TORQUE_NM_PER_A / radius_m * 1000.0
 
 
 def signed(data: bytes) -> int:

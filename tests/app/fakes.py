@@ -12,11 +12,14 @@ import numpy as np
 from pytestqt.qtbot import QtBot
 
 from core.config import PoseConfig
-from core.devices import DeviceError
+from core.control.alerts import Alert
+from core.control.drive_view import DriveNews, DriveView
+from core.control.gate_checks import Source
+from core.control.hand import Jog
+from core.control.modes import Act
 from core.types import (
     Advice,
     Centerline,
-    Command,
     Frame,
     GraphEdge,
     Masks,
@@ -203,6 +206,54 @@ def advise(scene: Scene) -> Advice | None:
     return Advice(speed, rate, steer, why)
 
 
+class FakeRequests:
+    """Keeps what was asked of the servos."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def switch_on(self) -> None:
+        self.asked.append("switch on")
+
+    def zero(self, names: object = None) -> None:
+        self.asked.append(f"zero {names}")
+
+    def reboot(self, servo_id: int) -> None:
+        self.asked.append(f"reboot {servo_id}")
+
+    def torque_off(self) -> None:
+        self.asked.append("torque off")
+
+
+class FakePilot:
+    """A pilot that does nothing but keep what it was told; `view` and `alerts` are what the window sees next."""
+
+    def __init__(self) -> None:
+        self.jogs: list[Jog] = []
+        self.acts: list[Act] = []
+        self.deadman_said: list[bool] = []
+        self.beats = 0
+        self.requests = FakeRequests()
+        self.view = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, deadman=False)
+        self.alerts: list[Alert] = []
+
+    def jog(self, source: object, jog: Jog) -> None:
+        self.jogs.append(jog)
+
+    def ask(self, act: Act) -> None:
+        self.acts.append(act)
+
+    def deadman(self, source: object, pressed: bool) -> None:
+        self.deadman_said.append(pressed)
+
+    def window_alive(self) -> None:
+        self.beats += 1
+
+    def news(self) -> DriveNews:
+        alerts, self.alerts = tuple(self.alerts), []
+        return DriveNews(self.view, alerts)
+
+
 class FakeEngine:
     """An engine over the fake bench at `frames_per_second`; what the window asked for is kept for the test."""
 
@@ -219,7 +270,7 @@ class FakeEngine:
         self.refusal = refusal
         self.silent = False
         self.fail_with: Exception | None = None
-        self.commands: list[Command] = []
+        self.pilot = FakePilot()
         self.targets: list[Point | None] = []
         self.closed = threading.Event()
         self._target: Point | None = None
@@ -244,14 +295,15 @@ class FakeEngine:
             scene = replace(scene, path=None, centerline=None)
         if self._edit is not None:
             scene = self._edit(scene)
-        sent = self.commands[-1] if self.commands else None
         status = RobotStatus(now, 84.0, 12.0, (0.4, 0.0, 0.0, 0.0), (130.0, 20.0, 20.0, 20.0), 0.02)
-        return Tick(Frame(self._index, now, image), scene, advise(scene), sent, status, 3, 1.0 / self._period_s)
+        return Tick(Frame(self._index, now, image), scene, advise(scene), None, status, 3, 1.0 / self._period_s)
 
-    def jog(self, command: Command) -> None:
-        if self.closed.is_set():
-            raise DeviceError("the robot is closed")
-        self.commands.append(command)
+    @property
+    def jogs(self) -> list[Jog]:
+        return self.pilot.jogs
+
+    def bus_status(self) -> None:
+        return None
 
     def set_target(self, point: Point | None) -> None:
         self._target = point

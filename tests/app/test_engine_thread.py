@@ -11,7 +11,6 @@ from pytestqt.qtbot import QtBot
 
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
 from core.devices import DeviceError, EndOfStream
-from core.types import Command
 from tests.app.fakes import FakeBench, FakeEngine
 
 
@@ -91,7 +90,7 @@ def test_error_in_the_loop_closes_the_engine(
     engine.fail_with = DeviceError("camera lost")
     qtbot.waitUntil(lambda: Phase.FAULT in phases(statuses))
     assert engine.closed.is_set()
-    assert not thread.jog(Command()), "there is no engine any more"
+    assert thread.pilot is None, "there is no engine any more"
 
 
 def test_end_of_a_recording_is_no_fault(qtbot: QtBot, thread: EngineThread, statuses: list[EngineStatus], bench: FakeBench) -> None:
@@ -137,8 +136,7 @@ def test_of_several_orders_the_last_one_runs(
     qtbot.waitUntil(lambda: Phase.RUNNING in phases(statuses))
     assert slow.closed.is_set(), "opened for nothing, closed at once"
     assert not skipped.closed.is_set(), "never opened"
-    assert thread.jog(Command(bend=0.5))
-    assert last.commands == [Command(bend=0.5)]
+    assert thread.pilot is last.pilot
 
 
 MOMENTS = ["before the start", "while opening", "while running", "while the camera is silent", "after a fault"]
@@ -164,12 +162,3 @@ def test_stop_ends_the_thread(
     thread.stop()
     assert thread.wait(3000)
     assert engine.closed.is_set() is (moment in ("while opening", "while running", "while the camera is silent"))
-
-
-def test_refused_command_is_no_exception(qtbot: QtBot, thread: EngineThread, bench: FakeBench) -> None:
-    engine = FakeEngine(bench)
-    with qtbot.waitSignal(thread.tick_ready):
-        thread.start_engine(lambda: engine)
-    engine.closed.set()
-    assert not thread.jog(Command())
-    engine.closed.clear()

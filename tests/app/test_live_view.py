@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 from app import palette
 from app.widgets.live_view import LiveView
 from app.widgets.overlays import Layer
-from core.types import Frame, Masks, RobotPath, Route, Scene, Skeletons
+from core.types import Advice, Frame, Masks, RobotPath, Route, Scene, Skeletons, Speed
 from tests.app.fakes import FakeBench, make_pose, make_scene
 
 GREY = 90
@@ -100,7 +100,7 @@ def test_each_layer_draws_something_and_nothing_when_off(view: LiveView, bench: 
     frame = Frame(0, 0.0, image)
     for other in Layer:
         view.set_layer(other, False)
-    view.show_frame(frame, scene)
+    view.show_frame(frame, scene, Advice(Speed.FAST, 8.0, 20.0, ""))
     bare = picture(view)
     view.set_layer(layer, True)
     assert picture(view) != bare

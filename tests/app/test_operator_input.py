@@ -16,8 +16,10 @@ from app.engine_thread import Phase
 from app.operator_window import OperatorWindow
 from app.widgets.overlays import Layer
 from core.config import Config
+from core.control.hand import AT_REST, Jog
+from core.control.modes import Act
 from core.devices import DeviceError, EndOfStream
-from core.types import Command, Tick
+from core.types import Tick
 from hardware.rig import RigKind
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, until
@@ -27,18 +29,18 @@ Key = Qt.Key
 
 def test_keys_move_the_robot_while_held(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     qtbot.keyPress(running, Key.Key_W)
-    assert engine.commands[-1].advance_mm_s == pytest.approx(10.0)
+    assert engine.jogs[-1] == Jog(advance=1.0)
     lit = [motion.value for motion, cap in running.panels.jog._caps.items() if cap.is_lit]
     assert lit == ["advance"]
     qtbot.keyRelease(running, Key.Key_W)
-    assert engine.commands[-1] == Command()
+    assert engine.jogs[-1] == AT_REST
     assert not any(cap.is_lit for cap in running.panels.jog._caps.values())
 
 
 def test_losing_the_focus_stops_the_robot(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     qtbot.keyPress(running, Key.Key_W)
     QApplication.sendEvent(running, QEvent(QEvent.Type.WindowDeactivate))
-    assert engine.commands[-1].advance_mm_s == 0.0
+    assert engine.jogs[-1] == AT_REST
 
 
 def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
@@ -46,7 +48,8 @@ def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine
     chip.setFocus()
     qtbot.keyPress(running, Key.Key_W)
     qtbot.keyClick(chip, Key.Key_Space)
-    assert engine.commands[-1] == Command()
+    assert engine.jogs[-1] == AT_REST
+    assert engine.pilot.acts == [Act.STOP]
     assert chip.isChecked(), "space is no click here"
 
 
@@ -87,7 +90,7 @@ def test_escape_in_the_seed_takes_back_what_was_typed_and_gives_the_keys_to_the_
     assert chosen == []
     assert engine.targets[-1] is not None, "the target is not what was meant"
     qtbot.keyPress(running.panels.live, Key.Key_W)
-    assert engine.commands[-1].advance_mm_s > 0.0
+    assert engine.jogs[-1].advance > 0.0
 
 
 def test_the_list_of_phantoms_never_takes_the_keys(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
@@ -101,7 +104,7 @@ def test_the_list_of_phantoms_never_takes_the_keys(running: OperatorWindow, engi
     name = running.panels.picker.name
     qtbot.keyPress(running.panels.live, Key.Key_Down)
     assert running.panels.picker.name == name
-    assert engine.commands[-1].advance_mm_s < 0.0
+    assert engine.jogs[-1].advance < 0.0
 
 
 def test_enter_presses_the_button_that_has_the_focus(running: OperatorWindow, qtbot: QtBot) -> None:
@@ -145,7 +148,7 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     assert window._phase is Phase.STARTING
     assert not window.panels.live._picture.isVisible(), "the old world is not shown as the new one"
     assert window._target is None
-    assert window._jog.command == Command()
+    assert window.desk.jog.held == frozenset()
     until(qtbot, lambda: window.shown_tick is not None)
     assert opened == ["s_curve", "tree"]
     assert engines[0].closed.is_set()
@@ -208,8 +211,7 @@ def test_nothing_is_held_any_more_after_the_end(
     qtbot.keyPress(running, Key.Key_W)
     engine.fail_with = error
     until(qtbot, lambda: running._phase in (Phase.ENDED, Phase.FAULT))
-    assert running._jog.held == frozenset()
-    assert running._jog.command == Command()
+    assert running.desk.jog.held == frozenset()
     assert running.panels.jog.readout.startswith("bend 0.00")
 
 
@@ -226,9 +228,9 @@ def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench
     shown: list[int] = []
     show_tick = window.panels.show_tick
 
-    def spy(tick: Tick, command: Command, max_block_ms: float) -> None:
+    def spy(tick: Tick, max_block_ms: float) -> None:
         shown.append(tick.frame.index)
-        show_tick(tick, command, max_block_ms)
+        show_tick(tick, max_block_ms)
 
     window.panels.show_tick = spy  # type: ignore[method-assign]
     window._due_s = time.monotonic() + 60.0  # no picture's time comes before the end
@@ -301,7 +303,15 @@ def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[
     qtbot.wait(30)
     assert (running.width(), running.height()) == size
     shown = running.panels
-    for widget in (shown.live, shown.badge, shown.gauge, shown.bars, shown.trends, shown.jog, shown.performance):
+    everywhere = (shown.live, shown.badge, shown.gauge, shown.bars, shown.clearance, shown.mode, shown.mode_bar)
+    on_pages = (shown.jog, shown.trends, shown.servos, shown.commands, shown.events)
+    for widget in (*everywhere, *on_pages):
+        page = next((k for k in range(shown.pages.count()) if shown.pages.widget(k).isAncestorOf(widget)), None)
+        page = page if page is not None else shown.pages.indexOf(widget)
+        if page >= 0:
+            shown.pages.setCurrentIndex(page)
+            qtbot.wait(10)
+        assert widget.isVisible(), widget
         assert widget.height() >= widget.minimumSizeHint().height(), widget
         assert widget.height() >= widget.minimumHeight(), widget
         assert widget.width() >= widget.minimumWidth(), widget
@@ -309,14 +319,17 @@ def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[
 
 
 def test_a_screen_of_720_lines_is_enough(running: OperatorWindow, qtbot: QtBot) -> None:
-    """Below 760 lines the chart of the distances gives its room to theta; the legend names only what is drawn."""
+    """In a low window the trends have a page of their own; the legend names only what is drawn."""
     assert running.minimumSizeHint().height() <= 660
     assert theme.MIN_WINDOW[1] <= 660
     legends = [label for label in running.findChildren(QLabel) if "\N{GREEK SMALL LETTER THETA}" in label.text()]
-    for size, has_distances in (((1280, 680), False), ((1600, 900), True), ((1280, 720), False)):
+    for size, is_page in (((1280, 680), True), ((1600, 900), False), ((1280, 720), True)):
         running.resize(*size)
         qtbot.wait(30)
         trends = running.panels.trends
-        assert trends.has_distances is has_distances
+        assert (running.panels.pages.indexOf(running.panels._trends_card) >= 0) is is_page
+        if is_page:
+            running.panels.pages.setCurrentWidget(running.panels._trends_card)
+            qtbot.wait(30)
         assert trends._angle._box.height() >= 36
-        assert ("d_head" in legends[0].text()) is has_distances
+        assert ("d_head" in legends[0].text()) is trends.has_distances

@@ -13,8 +13,9 @@ from pytestqt.qtbot import QtBot
 from app.engine_thread import Phase
 from app.operator_window import OperatorWindow
 from core.config import Config
+from core.control.hand import AT_REST
 from core.devices import DeviceError, EndOfStream
-from core.types import Command, Reason, Refusal
+from core.types import Reason, Refusal
 from hardware.rig import RigKind
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, until
@@ -186,7 +187,7 @@ def test_it_can_be_closed_at_any_moment(
     assert not window.isVisible()
     assert all(engine.closed.is_set() for engine in engines)
     if moment == "while a key is held":
-        assert engines[0].commands[-1] == Command(), "the robot was stopped before the rig was closed"
+        assert engines[0].jogs[-1] == AT_REST, "the robot was stopped before the rig was closed"
     if moment == "while a snapshot is written":
         assert len(list(tmp_path.iterdir())) == 3
 

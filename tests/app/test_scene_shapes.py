@@ -72,3 +72,12 @@ def test_long_lines_are_thinned_but_keep_their_ends() -> None:
     assert shapes.robot_line is not None
     assert 30 < len(shapes.robot_line) < 60
     np.testing.assert_allclose(shapes.robot_line[[0, -1]], points[[0, -1]])
+
+
+def test_ghost_is_mapped_to_source_pixels_with_the_robots_thickness() -> None:
+    path = RobotPath(np.array([[0.0, 0.0], [10.0, 0.0]]), 1.0, None, True, 0.0, 3.0)
+    shapes = scene_shapes(scene(0.5, path=path), np.array([[10.0, 0.0], [20.0, 5.0]]))
+    assert shapes.ghost is not None
+    np.testing.assert_allclose(shapes.ghost, [[20.5, 0.5], [40.5, 10.5]])
+    assert shapes.robot_width == pytest.approx(12.0)
+    assert scene_shapes(scene(0.5, path=path)).ghost is None

@@ -26,7 +26,7 @@ from app.widgets.state_badge import StateBadge
 from app.widgets.theta_gauge import ThetaGauge
 from app.widgets.trend_plot import SPAN_S, TrendPlot
 from core.config import PoseConfig
-from core.types import Advice, Command, PoseState, Reason, Refusal, RobotStatus, Speed
+from core.types import Advice, PoseState, Reason, Refusal, RobotStatus, Speed
 from hardware.rig import RigKind
 from tests.app.fakes import make_pose, make_scene, make_tick
 
@@ -211,7 +211,7 @@ def test_chips_switch_their_layer(qtbot: QtBot) -> None:
 
 
 def test_layers_have_keys_of_their_own() -> None:
-    assert [layer.value.key for layer in Layer] == list("123456789")
+    assert [layer.value.key for layer in Layer] == [*"123456789", "G"]
 
 
 @pytest.mark.parametrize("kind", list(RigKind))
@@ -269,9 +269,10 @@ def test_the_wheel_chooses_nothing(qtbot: QtBot) -> None:
 
 
 def test_jog_panel_says_aloud_what_it_shows(qtbot: QtBot) -> None:
-    panel = JogPanel()
+    panel = JogPanel(max_pull_mm=2.0)
     qtbot.addWidget(panel)
-    panel.show_command(Command(bend=0.5), None)
+    panel.show_status(RobotStatus(0.0, 84.0, 0.0, (1.3, -0.7, 0.3, 0.3), (0.0,) * 4))
+    assert panel.readout == "bend 0.50, pitch 0.00, in 84 mm"
     assert panel._readout.accessibleName()
     assert panel._readout.accessibleDescription() == panel.readout
     panel.set_enabled(False, "Fault")
@@ -301,7 +302,7 @@ def test_seed_counts_when_confirmed_not_at_each_digit(qtbot: QtBot) -> None:
 
 
 def test_key_caps_light_up_and_can_be_held_with_the_mouse(qtbot: QtBot) -> None:
-    panel = JogPanel()
+    panel = JogPanel(2.0)
     qtbot.addWidget(panel)
     panel.resize(280, 140)
     panel.show()
@@ -321,11 +322,11 @@ def test_key_caps_light_up_and_can_be_held_with_the_mouse(qtbot: QtBot) -> None:
 
 
 def test_readout_shows_how_far_the_robot_is_in(qtbot: QtBot) -> None:
-    panel = JogPanel()
+    panel = JogPanel(2.0)
     qtbot.addWidget(panel)
-    panel.show_command(Command(bend=-0.5), RobotStatus(0.0, 84.2, 0.0, (0, 0, 0, 0), (0, 0, 0, 0)))
+    panel.show_status(RobotStatus(0.0, 84.2, 0.0, (-1.0, 1.0, 0, 0), (0, 0, 0, 0)))
     assert panel.readout == "bend -0.50, pitch 0.00, in 84 mm"
-    panel.show_command(Command(), None)
+    panel.show_status(None)
     assert panel.readout.endswith("in – mm")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from core.control.alerts import ALERTS, Alert, AlertKey, AlertQueue, Priority, raise_alerts
+from core.control.alerts import ALERTS, Alert, AlertKey, AlertQueue, Note, Priority, raise_alerts
 from core.control.faults import REACTION, Cause, Reaction
 from core.control.gate import RejectReason
 from core.control.supervisor import Hindrance
@@ -15,8 +15,8 @@ def _raise(queue: AlertQueue, *keys: AlertKey, at_s: float, armed: bool = True) 
 
 
 def test_the_table_has_a_line_for_every_cause_refusal_and_rejection() -> None:
-    assert set(ALERTS) == {*Cause, *Hindrance, *RejectReason}
-    assert len(ALERTS) == len(Cause) + len(Hindrance) + len(RejectReason)  # no name stands for two things
+    assert set(ALERTS) == {*Cause, *Hindrance, *RejectReason, *Note}
+    assert len(ALERTS) == len(Cause) + len(Hindrance) + len(RejectReason) + len(Note)  # no name stands for two things
 
 
 @pytest.mark.parametrize("key", ALERTS, ids=str)
@@ -45,8 +45,8 @@ def test_urgency_and_sound_follow_from_the_reaction(reaction: Reaction, priority
 
 
 def test_hints_are_silent() -> None:
-    assert {ALERTS[key].sound for key in (*Hindrance, *RejectReason)} == {None}
-    assert {ALERTS[key].priority for key in (*Hindrance, *RejectReason)} == {Priority.HINT}
+    assert {ALERTS[key].sound for key in (*Hindrance, *RejectReason, *Note)} == {None}
+    assert {ALERTS[key].priority for key in (*Hindrance, *RejectReason, *Note)} == {Priority.HINT}
 
 
 def test_the_same_line_comes_again_only_after_its_cooldown_and_says_how_often_it_was_held_back() -> None:

@@ -8,7 +8,9 @@ import pytest
 from core.config import AdviceConfig
 from core.control.engine import Engine
 from core.control.policy import table_policy
-from core.types import Command, Frame, Point, Pose, PoseState, Reason, Refusal, RobotStatus, Scene, Speed
+from core.devices import DeviceError
+from core.types import Frame, Point, Pose, PoseState, Reason, Refusal, RobotStatus, Scene, Speed
+from tests.core.pilot_bench import Bench, scene_at
 
 CONFIG = AdviceConfig()
 
@@ -79,27 +81,7 @@ class _Camera:
     def close(self) -> None: ...
 
 
-class _Robot:
-    name = "test"
-
-    def __init__(self) -> None:
-        self.held = False
-
-    def connect(self) -> None: ...
-
-    def send(self, command: Command) -> Command:
-        return Command(bend=min(command.bend, 0.5))
-
-    def status(self) -> RobotStatus:
-        return RobotStatus(0.0, 12.0, 0.0, (0, 0, 0, 0), (0, 0, 0, 0))
-
-    def hold(self) -> None:
-        self.held = True
-
-    def close(self) -> None: ...
-
-
-def _engine(indices: list[int], robot: _Robot | None = None) -> tuple[Engine, list[Point | None], list[str]]:
+def _engine(indices: list[int]) -> tuple[Engine, list[Point | None], list[str]]:
     targets: list[Point | None] = []
     closed: list[str] = []
 
@@ -107,7 +89,7 @@ def _engine(indices: list[int], robot: _Robot | None = None) -> tuple[Engine, li
         targets.append(target)
         return Scene(frame.index, frame.captured_s, (4, 4), 1.0, refusal=Refusal(Reason.BLACK))
 
-    return Engine(_Camera(indices), robot, perceive, lambda _: None, lambda: closed.append("closed")), targets, closed
+    return Engine(_Camera(indices), perceive, lambda _: None, lambda: closed.append("closed")), targets, closed
 
 
 def test_dropped_frames_are_counted_from_the_indices_and_the_rate_from_the_times() -> None:
@@ -117,20 +99,6 @@ def test_dropped_frames_are_counted_from_the_indices_and_the_rate_from_the_times
     assert ticks[-1] is None
     assert ticks[1] is not None
     assert ticks[1].frames_per_second == pytest.approx(30.0)
-
-
-def test_what_was_really_sent_is_shown_not_what_was_asked() -> None:
-    robot = _Robot()
-    engine, _, closed = _engine([0], robot)
-    engine.jog(Command(bend=1.0))
-    tick = engine.step(0.0)
-    assert tick is not None
-    assert tick.sent == Command(bend=0.5)
-    assert tick.status is not None
-    assert tick.status.insertion_mm == 12.0
-    engine.close()
-    assert robot.held
-    assert closed == ["closed"]
 
 
 def test_the_target_reaches_perception_and_can_be_cleared() -> None:
@@ -143,10 +111,44 @@ def test_the_target_reaches_perception_and_can_be_cleared() -> None:
     assert targets == [None, (3.0, 4.0), None]
 
 
-def test_an_engine_without_a_robot_ignores_jogging() -> None:
-    engine, _, _ = _engine([0])
-    engine.jog(Command(bend=1.0))
+def test_an_engine_with_a_pilot_turns_it_and_closes_it_before_the_rig() -> None:
+    order: list[str] = []
+    bench = Bench()
+    bench.robot.hold = lambda: order.append("hold")  # type: ignore[method-assign]
+
+    def perceive(frame: Frame, target: Point | None = None) -> Scene:
+        return scene_at(frame.index, frame.captured_s)
+
+    engine = Engine(_Camera([0, 1]), perceive, lambda _: None, lambda: order.append("rig closed"), bench.pilot, bench.robot)
     tick = engine.step(0.0)
     assert tick is not None
-    assert tick.sent is None
+    assert tick.status is not None
+    assert tick.status.insertion_mm == 10.0
+    engine.close()
+    assert order[-2:] == ["hold", "rig closed"]
+
+
+def test_pictures_go_on_when_the_robot_is_lost() -> None:
+    bench = Bench()
+
+    def lost() -> RobotStatus:
+        raise DeviceError("the servo bus process ended")
+
+    bench.robot.status = lost  # type: ignore[method-assign]
+    perceive = lambda frame, target=None: scene_at(frame.index, frame.captured_s)  # noqa: E731
+    engine = Engine(_Camera([0]), perceive, lambda _: None, lambda: None, bench.pilot, bench.robot)
+    tick = engine.step(0.0)
+    assert tick is not None
     assert tick.status is None
+    engine.close()
+
+
+def test_a_pilot_that_fails_is_a_device_error_with_its_reason(caplog: pytest.LogCaptureFixture) -> None:
+    bench = Bench()
+    bench.robot.report = lambda: 1 // 0  # type: ignore[assignment,return-value]
+    engine = Engine(_Camera([0]), lambda *_: None, lambda _: None, lambda: None, bench.pilot, bench.robot)  # type: ignore[arg-type,return-value]
+    engine._loop._thread.join(5.0)  # type: ignore[union-attr]
+    with pytest.raises(DeviceError, match="driving stopped by an unexpected ZeroDivisionError"):
+        engine.step(0.0)
+    engine.close()
+    assert "Traceback" in caplog.text

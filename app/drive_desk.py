@@ -1,0 +1,196 @@
+"""Ties the operator's controls and the panels that show driving to the pilot of the running rig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from PySide6.QtCore import QObject, QTimer, Slot
+from PySide6.QtWidgets import QWidget
+
+from app.alert_sounds import AlertSounds
+from app.deadman_key import DeadmanKey
+from app.engine_thread import EngineThread
+from app.jog_keys import JogKeys, Motion
+from app.next_step import Step
+from app.widgets.event_log import EventKind
+from core.control.alerts import Alert
+from core.control.drive_view import DriveView
+from core.control.hand import Jog
+from core.control.modes import Act
+from core.servo_config import JointName
+from core.types import Point
+from hardware.servos.bus_messages import BusStatus
+
+_LOOK_EVERY_MS = 50
+_ACT_OF = {
+    Step.ACKNOWLEDGE: Act.ACKNOWLEDGE,
+    Step.ARM: Act.ARM,
+    Step.HAND_OVER: Act.HAND_OVER,
+    Step.TAKE_BACK: Act.TAKE_BACK,
+    Step.DISARM: Act.DISARM,
+}
+
+
+class DrivePanels(Protocol):
+    """What the desk shows things on."""
+
+    def show_drive(self, view: DriveView | None, bus: BusStatus | None) -> None: ...
+    def show_alerts(self, alerts: tuple[Alert, ...]) -> None: ...
+    def log(self, kind: EventKind, text: str) -> None: ...
+
+
+class DriveDesk(QObject):
+    """The operator's side of driving. Without a pilot (a recording) it shows that there is nothing to drive.
+
+    Parameters
+    ----------
+    window : whose keys are listened to.
+    thread : runs the rig.
+    panels : what to show the pilot's view on.
+    """
+
+    def __init__(self, window: QWidget, thread: EngineThread, panels: DrivePanels) -> None:
+        super().__init__(window)
+        self._thread, self._panels = thread, panels
+        self.jog = JogKeys(window)
+        self.deadman = DeadmanKey(window)
+        self.sounds = AlertSounds(self)
+        self._shown: DriveView | None = None
+        self.has_rig = False
+        """Whether a rig runs: before, nobody knows whether there is something to drive."""
+        self._timer = QTimer(self)
+        self._timer.setInterval(_LOOK_EVERY_MS)
+        self._timer.timeout.connect(self._look)
+        self.jog.changed.connect(self._on_jog)
+        self.jog.stop_pressed.connect(self.stop)
+        self.deadman.reported.connect(self._on_deadman)
+
+    @property
+    def view(self) -> DriveView | None:
+        """What is on the screen."""
+        return self._shown
+
+    def start(self) -> None:
+        """Look at the pilot from now on; each look is a sign of life of the window."""
+        self._timer.start()
+
+    def reset(self) -> None:
+        """Let go of everything, for a rig that is being opened."""
+        self.jog.release_all()
+        self.deadman.release()
+
+    def detach(self) -> None:
+        """Let go, look and listen no more."""
+        self._timer.stop()
+        self.jog.detach()
+        self.deadman.detach()
+
+    # ---- requests
+
+    def take(self, step: Step) -> None:
+        """One of the steps that have a button and a key."""
+        if step is Step.SERVOS_ON:
+            self.switch_on()
+        else:
+            self.ask(_ACT_OF[step])
+
+    def ask(self, act: Act) -> None:
+        """A request of the operator; refusals come back as alerts."""
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.ask(act)
+            self._panels.log(EventKind.OPERATOR, act.value)
+
+    @Slot()
+    def stop(self) -> None:
+        """STOP, from any thread's point of view at once."""
+        self.jog.release_all()
+        self.deadman.release()
+        self.ask(Act.STOP)
+
+    @Slot()
+    def switch_on(self) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.requests.switch_on()
+            self._panels.log(EventKind.OPERATOR, "servos on")
+
+    @Slot(int)
+    def reboot(self, servo_id: int) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.requests.reboot(servo_id)
+            self._panels.log(EventKind.OPERATOR, f"restart servo {servo_id}")
+
+    @Slot(object)
+    def zero(self, names: Sequence[JointName] | None) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.requests.zero(names)
+            self._panels.log(EventKind.OPERATOR, f"zero {', '.join(names) if names else 'all servos'}")
+
+    @Slot()
+    def torque_off(self) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.requests.torque_off()
+            self._panels.log(EventKind.OPERATOR, "torque off")
+
+    def drive(self, jog: Jog) -> None:
+        """Move the robot as held keys do; to be repeated."""
+        self._on_jog(jog)
+
+    def log_target(self, target: Point | None) -> None:
+        self._panels.log(EventKind.TARGET, "cleared" if target is None else f"set to {target[0]:.0f}, {target[1]:.0f} px")
+
+    @Slot(object)
+    def press(self, motion: Motion) -> None:
+        """A cap on the screen is held."""
+        self.jog.press(("cap", motion), motion)
+
+    @Slot(object)
+    def release(self, motion: Motion) -> None:
+        self.jog.release(("cap", motion))
+
+    def hold_deadman(self, on: bool) -> None:
+        """The field on the screen is held."""
+        self.deadman.hold("mouse", on)
+
+    # ---- the pilot
+
+    @Slot(object)
+    def _on_jog(self, jog: Jog) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.jog("window", jog)
+
+    @Slot(bool)
+    def _on_deadman(self, held: bool) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.deadman("window", held)
+
+    @Slot()
+    def _look(self) -> None:
+        pilot = self._thread.pilot
+        if pilot is None:
+            self._shown = None
+            if self.has_rig:
+                self._panels.show_drive(None, None)
+            return
+        pilot.window_alive()
+        if not self.deadman.is_held:
+            pilot.deadman("window", False)
+        news = pilot.news()
+        before, self._shown = self._shown, news.view
+        if before is None or before.mode is not news.view.mode:
+            self._panels.log(EventKind.MODE, news.view.mode.value)
+        for alert in news.alerts:
+            detail = f": {alert.detail}" if alert.detail else ""
+            self._panels.log(EventKind.ALERT, f"{alert.spec.text}{detail}")
+            if alert.sound is not None:
+                self.sounds.play(alert.sound)
+        self._panels.show_drive(news.view, self._thread.bus_status())
+        if news.alerts:
+            self._panels.show_alerts(news.alerts)

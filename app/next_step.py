@@ -1,0 +1,149 @@
+"""What the operator may do next, and why it would be refused. Words and keys only, no widgets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from core.control.alerts import ALERTS, AlertKey
+from core.control.drive_view import DriveView
+from core.control.faults import AREA, REACTION, Area, Fault, Reaction
+from core.control.gate_checks import Source
+from core.control.modes import Mode
+
+DEADMAN_KEY = "Shift"
+STOP_KEY = "Space"
+
+
+@dataclass(frozen=True, slots=True)
+class StepWords:
+    """Name on the button, its key, and what it does."""
+
+    name: str
+    key: str
+    meaning: str
+
+
+class Step(Enum):
+    """A request of the operator that has a button. STOP is no step: it is always there."""
+
+    SERVOS_ON = StepWords("Servos on", "F3", "Check all servos and switch their torque on: then you can move the robot by hand")
+    ACKNOWLEDGE = StepWords("Acknowledge", "F4", "I have read why the program stopped; nothing moves by this")
+    ARM = StepWords("Arm", "F6", "Allow the program to be handed over to; nothing moves by this")
+    HAND_OVER = StepWords("Hand over", "F7", "The program drives to the destination for as long as the deadman is held")
+    TAKE_BACK = StepWords("Take back", "F8", "You steer again, at once; moving the controls does the same")
+    DISARM = StepWords("Disarm", "Shift+F6", "The program may not be handed over to any more; you go on steering by hand")
+
+
+@dataclass(frozen=True, slots=True)
+class NextStep:
+    """The main step, and the line beside it.
+
+    Attributes
+    ----------
+    step, other : what the main button asks for; what a second one asks for, if anything.
+    granted : it would be granted now. A request that would be refused may still be made: the answer names all reasons.
+    headline, rest : what is the matter, and what to do or what happens next.
+    reasons : all that `headline` is the first of.
+    """
+
+    step: Step
+    granted: bool
+    headline: str
+    rest: str
+    reasons: tuple[AlertKey, ...] = ()
+    other: Step | None = None
+
+    @property
+    def text(self) -> str:
+        """The one line."""
+        more = f" (+{len(self.reasons) - 1} more)" if len(self.reasons) > 1 else ""
+        return f"{sentence(self.headline)} {sentence(self.rest)}{more}".strip()
+
+    @property
+    def all_reasons(self) -> str:
+        """Every reason on a line of its own."""
+        return "\n".join(f"{sentence(ALERTS[key].text)} {sentence(ALERTS[key].what_to_do)}" for key in self.reasons)
+
+
+NO_ROBOT = NextStep(Step.SERVOS_ON, False, "This rig has no robot", "pictures and advice only")
+NOT_YET = NextStep(Step.SERVOS_ON, False, "Waiting for the rig", "")
+
+
+def who_drives(view: DriveView | None) -> str:
+    """In few words, for the badge."""
+    if view is None:
+        return "pictures only"
+    if view.mode is Mode.HOLD:
+        return "interrupted"
+    if view.mode is Mode.STOPPED:
+        return "nothing moves"
+    if view.permitted is Source.PROGRAM:
+        return "the program drives"
+    if view.permitted is Source.OPERATOR:
+        return "you steer"
+    return "nothing moves" if view.servos_on or view.latched is not None else "servos are off"
+
+
+def next_step(view: DriveView) -> NextStep:
+    """The next sensible step of the operator."""
+    if view.latched is not None or view.mode is Mode.STOPPED:
+        return _acknowledge(view)
+    if view.mode is Mode.AUTONOMOUS:
+        rest = f"let go and it holds; move the controls or press {Step.TAKE_BACK.value.key} to steer yourself"
+        return NextStep(Step.TAKE_BACK, True, "The program drives", rest, other=Step.DISARM)
+    if view.mode is Mode.HOLD:
+        return _interrupted(view)
+    if view.busy:
+        return NextStep(Step.SERVOS_ON, False, sentence(view.busy).rstrip("."), "this takes a moment")
+    if not view.servos_on:
+        faults = tuple(fault.cause for fault in view.active if AREA[fault.cause] is Area.SERVOS and _holds(fault))
+        rest = f"press {Step.SERVOS_ON.value.key}: they are checked, then hold where they are"
+        return _refused(Step.SERVOS_ON, faults) if faults else NextStep(Step.SERVOS_ON, True, "The servos are off", rest)
+    if view.mode is Mode.ARMED:
+        return _hand_over(view)
+    if view.against_arming:
+        return _refused(Step.ARM, view.against_arming)
+    return NextStep(Step.ARM, True, "You steer", f"press {Step.ARM.value.key} to arm; then you can hand over to the program")
+
+
+def sentence(text: str) -> str:
+    """`text` with a capital letter and a full stop; empty stays empty."""
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def _holds(fault: Fault) -> bool:
+    return REACTION[fault.cause] >= Reaction.HOLD
+
+
+def _refused(step: Step, reasons: tuple[AlertKey, ...], other: Step | None = None) -> NextStep:
+    first = ALERTS[reasons[0]]
+    # servos that are in trouble can still be checked: that is the way out
+    return NextStep(step, step is Step.SERVOS_ON, first.text, first.what_to_do, reasons, other)
+
+
+def _acknowledge(view: DriveView) -> NextStep:
+    if view.latched is None:
+        return NextStep(Step.ACKNOWLEDGE, True, "Stopped", f"press {Step.ACKNOWLEDGE.value.key}, then switch the servos on")
+    cause = view.latched.cause
+    # a fault of servos in use that is still there latches again at once
+    remains = view.servos_on and AREA[cause] is Area.SERVOS and any(fault.cause is cause for fault in view.active)
+    return NextStep(Step.ACKNOWLEDGE, not remains, ALERTS[cause].text, ALERTS[cause].what_to_do, (cause,))
+
+
+def _hand_over(view: DriveView) -> NextStep:
+    if view.against_hand_over:
+        return _refused(Step.HAND_OVER, view.against_hand_over, Step.DISARM)
+    key = Step.HAND_OVER.value.key
+    held, loose = f"press {key}: the program drives while you hold", f"hold {DEADMAN_KEY}, then press {key} to hand over"
+    return NextStep(Step.HAND_OVER, True, "Ready", held if view.deadman else loose, other=Step.DISARM)
+
+
+def _interrupted(view: DriveView) -> NextStep:
+    causes = tuple(fault.cause for fault in view.active if _holds(fault))
+    back, again = Step.TAKE_BACK.value.key, Step.HAND_OVER.value.key
+    if causes:
+        first = ALERTS[causes[0]]
+        return NextStep(Step.TAKE_BACK, True, first.text, first.what_to_do, causes, Step.DISARM)
+    rest = f"hold {DEADMAN_KEY} and press {again} to go on, or {back} to take back"
+    return NextStep(Step.TAKE_BACK, True, "Interrupted", rest, other=Step.DISARM)

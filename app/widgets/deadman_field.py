@@ -1,0 +1,158 @@
+"""The deadman as a field on the screen: held with the mouse, lit while any deadman is held."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetrics, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QApplication, QSizePolicy, QWidget
+
+from app import palette, theme
+from app.next_step import DEADMAN_KEY
+from app.widgets.signs import key_cap_width, paint_key_cap
+
+_WINDOW_LOST = (QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked, QEvent.Type.Hide, QEvent.Type.Close)
+
+
+class DeadmanField(QWidget):
+    """``held_changed`` carries whether the left mouse button holds it.
+
+    Whatever might have swallowed the release counts as one: the field is hidden or disabled, the window is left by the pointer,
+    loses the focus or is blocked by a dialog, the grab is lost, or the release went to somebody else.
+    """
+
+    held_changed = Signal(bool)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._held = False
+        self._deadman: bool | None = None
+        self._matters = False
+        self.setMinimumSize(96, 44)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setAccessibleName(f"Deadman: hold to drive ({DEADMAN_KEY})")
+        self.setToolTip(
+            f"The program drives only while you hold this with the mouse, hold {DEADMAN_KEY} or stand on the pedal.\n"
+            "Let go and the robot holds. It must be pressed after arming: what was down before does not count."
+        )
+        self._describe()
+
+    @property
+    def is_held(self) -> bool:
+        """Held with the mouse here."""
+        return self._held
+
+    @property
+    def is_lit(self) -> bool:
+        return self._deadman is True
+
+    @property
+    def word(self) -> str:
+        """What the program sees of the deadman."""
+        return {None: "none", False: "not held", True: "held"}[self._deadman]
+
+    def sizeHint(self) -> QSize:
+        return QSize(136, 54)
+
+    def show_deadman(self, deadman: bool | None, *, matters: bool) -> None:
+        """What the program sees of all deadmen, and whether anything depends on it now."""
+        if (deadman, matters) != (self._deadman, self._matters):
+            self._deadman, self._matters = deadman, matters
+            self._describe()
+            self.update()
+
+    def let_go(self) -> None:
+        """No longer held with the mouse."""
+        if self._held:
+            self._held = False
+            application = QApplication.instance()
+            if application is not None:
+                application.removeEventFilter(self)
+            self.update()
+            self.held_changed.emit(False)
+
+    def _describe(self) -> None:
+        self.setAccessibleDescription(self.word)
+
+    # ---- the mouse
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton and not self._held:
+            self._held = True
+            application = QApplication.instance()
+            if application is not None:
+                application.installEventFilter(self)
+            self.update()
+            self.held_changed.emit(True)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        window = self.window()
+        if not window.rect().contains(self.mapTo(window, event.position().toPoint())):
+            self.let_go()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.let_go()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        self.let_go()
+        super().hideEvent(event)
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.EnabledChange and not self.isEnabled():
+            self.let_go()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Of the whole application, while held: a menu that opens meanwhile gets the release instead of us."""
+        kind = event.type()
+        lost = (
+            (kind == QEvent.Type.MouseButtonRelease and isinstance(event, QMouseEvent) and _is_left(event))
+            or (kind in _WINDOW_LOST and watched is self.window())
+            or (kind == QEvent.Type.UngrabMouse and watched is self)
+            or kind == QEvent.Type.ApplicationDeactivate
+        )
+        if lost:
+            self.let_go()
+        return False
+
+    # ---- the look
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+        back, ink, edge = QColor(palette.RAISED), QColor(palette.TEXT), QColor(palette.TEXT_FAINT)
+        if not self.isEnabled():
+            back, ink, edge = QColor(palette.WINDOW), QColor(palette.TEXT_FAINT), QColor(palette.LINE)
+        elif self.is_lit:
+            back, ink, edge = QColor(palette.SKY), QColor(palette.INK), QColor(palette.SKY)
+        elif self._held:
+            edge = QColor(palette.SKY)
+        elif not self._matters:
+            ink, edge = QColor(palette.TEXT_DIM), QColor(palette.LINE)
+        painter.setPen(QPen(edge, 3.0 if self._held and not self.is_lit else 1.5))
+        painter.setBrush(back)
+        painter.drawRoundedRect(frame, frame.height() / 2.6, frame.height() / 2.6)
+        painter.setPen(ink)
+        painter.setFont(theme.fitted(theme.bold(16), "Hold to drive", int(frame.width() - 20)))
+        painter.drawText(frame.adjusted(0, 4, 0, -22), Qt.AlignmentFlag.AlignCenter, "Hold to drive")
+        self._paint_state(painter, QPointF(frame.center().x(), frame.bottom() - 14), ink)
+        painter.end()
+
+    def _paint_state(self, painter: QPainter, middle: QPointF, ink: QColor) -> None:
+        """Key cap, and beside it a dot, full when held, and the word."""
+        word_font = theme.semi_bold(theme.Size.LABEL)
+        cap, word = key_cap_width(DEADMAN_KEY), QFontMetrics(word_font).horizontalAdvance(self.word)
+        left = middle.x() - (cap + 8 + 12 + word) / 2
+        paint_key_cap(painter, QPointF(left + cap / 2, middle.y()), DEADMAN_KEY, ink)
+        painter.setPen(QPen(ink, 1.5))
+        painter.setBrush(ink if self.is_lit else Qt.BrushStyle.NoBrush)
+        painter.drawEllipse(QPointF(left + cap + 12, middle.y()), 3.6, 3.6)
+        painter.setPen(ink)
+        painter.setFont(word_font)
+        painter.drawText(QRectF(left + cap + 20, middle.y() - 9, word + 4, 18), Qt.AlignmentFlag.AlignVCenter, self.word)
+
+
+def _is_left(event: QMouseEvent) -> bool:
+    return event.button() == Qt.MouseButton.LeftButton

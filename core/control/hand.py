@@ -1,0 +1,81 @@
+"""The operator's hands: held keys and sticks are rates, and become the motion that is asked of the robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from core.policy_config import HandConfig
+from core.types import Command
+
+_LONGEST_STEP_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Jog:
+    """How the controls are held, each -1..1 of full speed; ``straighten`` brings bend and pitch back to the middle."""
+
+    bend: float = 0.0
+    pitch: float = 0.0
+    advance: float = 0.0
+    delivery: float = 0.0
+    straighten: bool = False
+
+    @property
+    def is_rest(self) -> bool:
+        return self == AT_REST
+
+
+AT_REST = Jog()
+
+
+def combined(jogs: Iterable[Jog]) -> Jog:
+    """Several controls held at once: their sum, limited. A number that is not finite counts as rest."""
+    jogs = list(jogs)
+
+    def total(values: Iterable[float]) -> float:
+        return _limited(sum(value for value in values if math.isfinite(value)), 1.0)
+
+    return Jog(
+        total(jog.bend for jog in jogs),
+        total(jog.pitch for jog in jogs),
+        total(jog.advance for jog in jogs),
+        total(jog.delivery for jog in jogs),
+        any(jog.straighten for jog in jogs),
+    )
+
+
+class Hand:
+    """Bend and pitch move while they are held and stay when let go; advance and delivery are speeds, zero when nothing is held."""
+
+    def __init__(self, config: HandConfig) -> None:
+        self._config = config
+        self.take_over(0.0, 0.0)
+
+    def take_over(self, bend: float, pitch: float) -> None:
+        """Start from where the robot is now (-1..1 of full pull): the first command moves nothing."""
+        self._bend, self._pitch = _limited(bend, 1.0), _limited(pitch, 1.0)
+        self._last_s: float | None = None
+
+    def command(self, jog: Jog, now_s: float) -> Command:
+        """The motion for this moment; `now_s` is monotonic."""
+        config = self._config
+        elapsed_s = 0.0 if self._last_s is None else min(max(0.0, now_s - self._last_s), _LONGEST_STEP_S)
+        self._last_s = now_s
+        step = config.bend_rate_per_s * elapsed_s
+        if jog.straighten:
+            self._bend -= _limited(self._bend, step)
+            self._pitch -= _limited(self._pitch, step)
+        self._bend = _limited(self._bend + step * _limited(jog.bend, 1.0), 1.0)
+        self._pitch = _limited(self._pitch + step * _limited(jog.pitch, 1.0), 1.0)
+        return Command(
+            bend=self._bend,
+            pitch=self._pitch,
+            advance_mm_s=config.advance_mm_s * _limited(jog.advance, 1.0),
+            delivery_mm_s=config.delivery_mm_s * _limited(jog.delivery, 1.0),
+        )
+
+
+def _limited(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))

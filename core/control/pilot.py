@@ -1,0 +1,303 @@
+"""The pilot: from what the operator, perception and the servos say to what is asked of the robot, fifty times a second.
+
+It owns the mode machine and is the only one that sends. The operator's requests, his controls and the deadman come from the
+window's thread, frames from perception's, and ``tick`` from a thread of its own, so that neither a slow picture nor a busy window
+keeps the operator's hand from the robot. What was advised, asked for, commanded and sent is kept apart.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, replace
+
+from core.config import Config
+from core.control.alerts import Alert, AlertKey, AlertQueue, Note, raise_alerts
+from core.control.command_latency import CommandLatency
+from core.control.drive import Drive
+from core.control.drive_view import DriveNews, DriveView
+from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
+from core.control.follow import Follow
+from core.control.frame_reports import FrameReports
+from core.control.frame_watch import FrameArrived, RouteState
+from core.control.gate_checks import RejectReason, Source
+from core.control.guarded_robot import GuardedRobot, SentMotion
+from core.control.hand import Hand, Jog
+from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Part
+from core.control.inbox import Inbox, Inputs
+from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Hindrance, Mode, SupervisorState
+from core.control.policies import Policy
+from core.control.servo_requests import ServoRequests
+from core.control.supervisor import hindrances, supervise
+from core.devices import DeviceError
+from core.types import Advice, Command, Frame, RobotStatus, Scene
+
+PERIOD_S = 0.02
+_ARRIVED_S = 0.5
+_MOST_ALERTS = 200
+_NOT_WORTH_A_WORD = frozenset(
+    {RejectReason.NOT_ARMED, RejectReason.WRONG_SOURCE, RejectReason.NO_COMMAND, RejectReason.OUT_OF_ORDER}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """The newest frame that was understood."""
+
+    captured_s: float
+    advice: Advice | None
+    arrived: bool
+
+
+class Pilot:
+    """Drives a guarded robot. Nothing moves before the operator has switched the servos on.
+
+    Parameters
+    ----------
+    robot : connected; ``close`` holds it and leaves it open.
+    policy : advises, and drives while handed over to.
+    config : limits, speeds, thresholds.
+    model : whether perception's model passed its check.
+    clock : monotonic, the one of the frames.
+    """
+
+    def __init__(
+        self, robot: GuardedRobot, policy: Policy, config: Config, model: ModelReport, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._robot, self._policy, self._config, self._clock = robot, policy, config, clock
+        self._inbox = Inbox(config.safety, [model])
+        self.requests = ServoRequests(robot, self._inbox.post)
+        self._reports = FrameReports(config.policy.pursuit)
+        self._state = SupervisorState()
+        self._permitted: Source | None = None
+        self._hand, self._drive, self._follow = Hand(config.hand), Drive(config.policy.drive), Follow()
+        self._latency = CommandLatency()
+        self._told_cycle = -1
+        self._asked_s: float | None = None
+        self._arrived_since_s: float | None = None
+        self._queue = AlertQueue()
+        self._lock = threading.Lock()  # of what follows: other threads read or write it
+        self._seen: _Seen | None = None
+        self._forget = False
+        self._alerts: list[Alert] = []
+        self._view = DriveView(clock())
+
+    # ---- from the window's thread
+
+    def ask(self, act: Act) -> None:
+        """A request of the operator. STOP goes to the robot at once, by its own way."""
+        if act is Act.STOP:
+            self._robot.stop()
+        elif act is Act.ACKNOWLEDGE:
+            self.requests.acknowledge()
+        self._inbox.post(act)
+
+    def jog(self, source: Hashable, jog: Jog) -> None:
+        """How a control is held; to be repeated while it is, since its silence counts as let go."""
+        self._inbox.jog(source, jog, self._clock())
+
+    def deadman(self, source: Hashable, pressed: bool) -> None:
+        """A deadman as it is now; to be repeated many times a second."""
+        self._inbox.deadman(source, pressed, self._clock())
+
+    def window_alive(self) -> None:
+        """A sign of life of the window's thread."""
+        self._inbox.post(Beat(Part.WINDOW))
+
+    def report(self, fault: Fault) -> None:
+        """A fault that another part of the program found."""
+        self._inbox.post(fault)
+
+    @property
+    def view(self) -> DriveView:
+        """The newest view."""
+        with self._lock:
+            return self._view
+
+    def news(self) -> DriveNews:
+        """The newest view, and the alerts since the last call."""
+        with self._lock:
+            alerts, self._alerts = tuple(self._alerts), []
+            return DriveNews(self._view, alerts)
+
+    # ---- from perception's thread
+
+    def frame_arrived(self, frame: Frame) -> None:
+        """The camera gave a frame, which now goes to perception."""
+        self._inbox.post(FrameArrived(frame.captured_s), Beat(Part.WORKER))
+
+    def worker_alive(self) -> None:
+        """A sign of life of perception's thread while there are no frames."""
+        self._inbox.post(Beat(Part.WORKER))
+
+    def see(self, frame: Frame, scene: Scene, status: RobotStatus | None, *, has_target: bool) -> Advice | None:
+        """Take in what was understood of a frame; returns the advice that may be shown."""
+        with self._lock:
+            forget, self._forget = self._forget, False
+            driving, blanked = self._view.mode in DRIVING_MODES, self._view.blanked
+        if forget:
+            self._policy.reset()
+        advice = self._policy(scene, status)
+        report = self._reports.report(frame, scene, has_target=has_target)
+        if driving and report.route is RouteState.BEHIND:
+            report = replace(report, route=RouteState.READY)  # a policy backs out of a branch that it missed by itself
+        arrived = scene.route is not None and scene.route.length_px <= self._config.policy.pursuit.arrive_px
+        with self._lock:
+            self._seen = _Seen(frame.captured_s, advice, arrived)
+        self._inbox.post(report, Beat(Part.WORKER))
+        return None if blanked else advice
+
+    # ---- from the pilot's own thread
+
+    def tick(self) -> DriveView:
+        """One turn: hear, decide, send."""
+        now_s = self._clock()
+        inputs = self._inbox.take(now_s)
+        with self._lock:
+            seen = self._seen
+        sent = self._robot.sent_motion()
+        is_news = sent is not None and sent.cycle != self._told_cycle
+        self._told_cycle = sent.cycle if sent is not None else -1
+        self._latency.see(sent)
+        self._hear(inputs, sent if is_news else None, seen, now_s)
+        before = self._state
+        self._state, decision = supervise(before, inputs.events, now_s, self._config.servos, self._config.safety)
+        if decision.mode is Mode.STOPPED and before.mode is not Mode.STOPPED:
+            self._robot.stop()
+        commanded = self._send(decision, inputs.jog, seen, sent, now_s)
+        self._tell(before, decision, inputs.jog, sent if is_news else None, now_s)
+        view = self._look(decision, inputs, seen, commanded, sent, now_s)
+        with self._lock:
+            self._view = view
+        return view
+
+    def close(self) -> None:
+        """Let nobody drive, and hold the robot."""
+        self._robot.beat(None)
+        self._robot.hold()
+        self.requests.close()
+
+    # ---- parts of a turn
+
+    def _hear(self, inputs: Inputs, sent: SentMotion | None, seen: _Seen | None, now_s: float) -> None:
+        """Add to the events what servos, controls and the way say now."""
+        events = inputs.events
+        if (failure := self._robot.failure) is not None:
+            events.append(Fault(Cause.BUS_DEAD, failure))
+        elif (report := self._robot.report()) is not None:
+            events.append(report)
+        if inputs.deadman is not None:
+            events.append(DeadmanReport(inputs.deadman))
+        if not inputs.jog.is_rest:
+            events.append(Act.INPUT)
+            self._asked_s = now_s
+        if self._state.mode is Mode.HOLD:
+            events.append(GateReport(RejectReason.NOT_ARMED))  # nothing is asked for meanwhile, so nothing is wrong with it
+        elif sent is not None and self._permitted is Source.PROGRAM:
+            events.append(GateReport(sent.rejection))
+        if self._has_arrived(seen, now_s):
+            events.append(Act.TAKE_BACK)
+            self._raise([(Note.REACHED, "")], now_s)
+
+    def _has_arrived(self, seen: _Seen | None, now_s: float) -> bool:
+        """The program drove to the destination and has rested there for a moment."""
+        if self._state.mode is not Mode.AUTONOMOUS or seen is None or not seen.arrived:
+            self._arrived_since_s = None
+            return False
+        self._arrived_since_s = self._arrived_since_s if self._arrived_since_s is not None else now_s
+        return now_s - self._arrived_since_s >= _ARRIVED_S
+
+    def _send(self, decision: Decision, jog: Jog, seen: _Seen | None, sent: SentMotion | None, now_s: float) -> Command | None:
+        """Ask the robot for the motion of whoever may drive; returns the program's."""
+        robot, permitted = self._robot, decision.permitted
+        if permitted is not self._permitted:
+            self._change(permitted, sent)
+        robot.beat(permitted)
+        commanded = None
+        try:
+            if permitted is Source.OPERATOR:
+                robot.send(self._hand.command(jog, now_s), source=Source.OPERATOR)
+            elif permitted is Source.PROGRAM and seen is not None:
+                commanded = self._drive.command(seen.advice, now_s)
+                robot.send(commanded, source=Source.PROGRAM, captured_s=seen.captured_s)
+            else:
+                robot.hold()
+        except DeviceError as error:
+            self._inbox.post(Fault(Cause.BUS_DEAD, str(error)))
+        return commanded
+
+    def _change(self, permitted: Source | None, sent: SentMotion | None) -> None:
+        """Another one drives from now on, from where the robot is."""
+        at = sent.motion if sent is not None else Command()
+        self._hand.take_over(at.bend, at.pitch)
+        self._drive.take_over(at.bend)
+        self._permitted = permitted
+        if permitted is Source.PROGRAM:
+            with self._lock:
+                self._forget = True
+
+    def _tell(self, before: SupervisorState, decision: Decision, jog: Jog, sent: SentMotion | None, now_s: float) -> None:
+        """Alerts of this turn."""
+        raised: list[tuple[AlertKey, str]] = [(f.cause, f.detail) for f in decision.raised if _matters(f, before)]
+        raised += [(reason, "") for refused in decision.refused for reason in refused.reasons]
+        if not jog.is_rest and decision.permitted is None:
+            raised.append((decision.latched.cause if decision.latched is not None else Hindrance.SERVOS_UNCHECKED, ""))
+        if sent is not None and decision.permitted is not None:
+            if sent.rejection is not None and sent.rejection not in _NOT_WORTH_A_WORD:
+                raised.append((sent.rejection, ""))
+            if sent.at_end and not jog.is_rest:
+                raised.append((Note.AT_END, ", ".join(sent.at_end)))
+        self._raise(raised, now_s)
+
+    def _raise(self, raised: list[tuple[AlertKey, str]], now_s: float) -> None:
+        if raised:
+            self._queue, alerts = raise_alerts(self._queue, raised, now_s, armed=self._state.mode in ARMED_MODES)
+            with self._lock:
+                self._alerts = [*self._alerts, *alerts][-_MOST_ALERTS:]
+
+    def _look(
+        self,
+        decision: Decision,
+        inputs: Inputs,
+        seen: _Seen | None,
+        commanded: Command | None,
+        sent: SentMotion | None,
+        now_s: float,
+    ) -> DriveView:
+        safety, rates, jog = self._config.safety, self._config.hand, inputs.jog
+        is_fresh = seen is not None and now_s - seen.captured_s <= safety.pose_disarm_s
+        advice = seen.advice if seen is not None and is_fresh and decision.blanked is None else None
+        arming, hand_over = hindrances(self._state, now_s, safety)
+        by_hand = decision.permitted is Source.OPERATOR
+        return DriveView(
+            time_s=now_s,
+            mode=decision.mode,
+            permitted=decision.permitted,
+            latched=decision.latched,
+            active=decision.active,
+            against_arming=arming,
+            against_hand_over=hand_over,
+            deadman=inputs.deadman,
+            servos_on=self._state.health.servos_ready,
+            busy=self.requests.busy,
+            asked=Command(jog.bend, jog.pitch, rates.advance_mm_s * jog.advance, rates.delivery_mm_s * jog.delivery),
+            asked_s=self._asked_s,
+            advice=advice,
+            blanked="" if decision.blanked is None else decision.blanked.cause.value,
+            commanded=commanded,
+            sent=sent.motion if sent is not None and sent.source is not None else None,
+            sent_by=sent.source if sent is not None else None,
+            latency_s=self._latency.newest_s,
+            latency_p95_s=self._latency.p95_s,
+            follow_share=self._follow.update(jog, advice, now_s) if by_hand else None,
+        )
+
+
+def _matters(fault: Fault, before: SupervisorState) -> bool:
+    """Is it worth an alert? In ADVISORY perception's doubts are on the screen anyway, and idle servos endanger nobody."""
+    if before.mode in ARMED_MODES or fault.cause in {Cause.STOP_PRESSED, Cause.SERVOS_WRONG}:
+        return True
+    if AREA[fault.cause] is Area.SERVOS:
+        return before.health.servos_ready
+    return AREA[fault.cause] is Area.HOST and REACTION[fault.cause] is Reaction.WARN

@@ -1,0 +1,207 @@
+"""Gamepad: drives by hand. Found by itself, also when it is plugged in later, through the joystick interface of Linux."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import re
+import stat
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from core.devices import DeviceError
+from core.gamepad_config import GamepadConfig
+from hardware.device_thread import DeviceThread
+from hardware.gamepad_controls import EVENT, GAMEPAD_BUTTON, GamepadControls, GamepadState, Layout, at_rest
+
+__all__ = ["Gamepad", "GamepadError", "GamepadState"]
+
+PERIOD_S = 0.02
+RESCAN_S = 1.0
+_CHUNK = 512 * EVENT.size
+"""More than the kernel keeps for a reader: one read takes all."""
+_FOLDER = Path("/dev/input")
+
+
+class GamepadError(DeviceError):
+    """A gamepad cannot be used."""
+
+
+class _Lost(Exception):
+    """The gamepad was unplugged."""
+
+
+class Gamepad:
+    """Reads the first gamepad, or the configured one, in a thread of its own, from ``start`` to ``close``.
+
+    Parameters
+    ----------
+    config : section `gamepad`.
+    on_state : gets the state 50 times a second while there is a gamepad, and besides whenever STOP or the deadman changes; all at
+        rest when one was found, when it is lost, and at the end. Called from the gamepad's thread; it should return within some
+        milliseconds, and must not call ``close``. Without a gamepad nothing comes, and silence is rest.
+    on_device : gets ``name`` when a gamepad was found, None when it is lost; and whenever ``problem`` changes. Same thread.
+    """
+
+    def __init__(
+        self,
+        config: GamepadConfig,
+        on_state: Callable[[GamepadState], None],
+        on_device: Callable[[str | None, GamepadError | None], None] | None = None,
+    ) -> None:
+        self._config = config
+        self._on_state = on_state
+        self._on_device = on_device
+        self._thread = DeviceThread("gamepad", self._serve, self._fail)
+        self._name: str | None = None
+        self._problem: GamepadError | None = None
+
+    @property
+    def name(self) -> str | None:
+        """What the gamepad calls itself; None while there is none."""
+        return self._name
+
+    @property
+    def problem(self) -> GamepadError | None:
+        """Why a gamepad that is there, or that the configuration names, cannot be used; in one line that says what to do."""
+        return self._problem
+
+    def start(self) -> None:
+        """Start looking for gamepads; does nothing when the configuration does not want any. It never raises."""
+        if self._config.enabled:
+            self._thread.start()
+
+    def close(self) -> None:
+        """Report all at rest and end; may be called twice."""
+        self._thread.close()
+
+    def _serve(self) -> None:
+        while not self._thread.stopping:
+            try:
+                found = find_gamepad(self._config)
+            except GamepadError as error:
+                self._tell(None, error)
+            else:
+                self._tell(found[1] if found else None, None)
+                if found is not None:
+                    self._listen(*found)
+            self._thread.wait(None, RESCAN_S)
+
+    def _listen(self, device: int, _: str, layout: Layout) -> None:
+        """Until the gamepad is lost, or ``close``."""
+        controls = GamepadControls(self._config, layout)
+        try:
+            self._on_state(at_rest(self._config, time.monotonic()))
+            with contextlib.suppress(_Lost):
+                self._follow(device, controls)
+        finally:
+            os.close(device)
+            self._on_state(at_rest(self._config, time.monotonic()))
+            self._tell(None, None)
+
+    def _follow(self, device: int, controls: GamepadControls) -> None:
+        due_s = time.monotonic()
+        while not self._thread.stopping:
+            if self._thread.wait(device, due_s - time.monotonic()):
+                for state in controls.feed(_read(device), time.monotonic()):
+                    self._on_state(state)
+            now_s = time.monotonic()
+            if now_s >= due_s:
+                self._on_state(controls.tick(now_s))
+                due_s = now_s + PERIOD_S
+
+    def _tell(self, name: str | None, problem: GamepadError | None) -> None:
+        if (name, str(problem)) != (self._name, str(self._problem)):
+            self._name, self._problem = name, problem
+            if self._on_device is not None:
+                self._on_device(name, problem)
+
+    def _fail(self, error: Exception) -> None:
+        self._tell(None, GamepadError(f"the gamepad is no longer read ({type(error).__name__}: {error}): start the program again"))
+
+
+def find_gamepad(config: GamepadConfig) -> tuple[int, str, Layout] | None:
+    """Open the configured gamepad, or the first that there is: file descriptor, name, layout. None when none is plugged in.
+
+    Raises
+    ------
+    GamepadError
+        The configured one is missing, not permitted or no gamepad; or there are some, and none is permitted.
+    """
+    if config.device is not None:
+        return _open(config.device)
+    refused: GamepadError | None = None
+    for path in sorted(_FOLDER.glob("js*"), key=lambda path: (len(path.name), path.name)):  # js2 before js10
+        try:
+            return _open(str(path))
+        except GamepadError as error:
+            # wheels and motion sensors are joysticks, too: nothing to complain about
+            refused = refused or (error if isinstance(error.__cause__, PermissionError) else None)
+    if refused is not None:
+        raise refused
+    return None
+
+
+def _open(path: str) -> tuple[int, str, Layout]:
+    try:
+        device = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except PermissionError as error:
+        raise GamepadError(f"no permission for gamepad {path}: add your user to the group input, then log in again") from error
+    except (OSError, ValueError) as error:
+        missing = isinstance(error, OSError) and error.errno in {errno.ENOENT, errno.ENODEV, errno.ENXIO}
+        reason = "is not there" if missing else "cannot be opened"
+        raise GamepadError(f"gamepad {path} {reason}: plug it in, or leave gamepad.device out to take the first") from error
+    layout = read_layout(device)
+    # A pipe may stand in for a gamepad. Other devices in the same folder talk otherwise, and would be misunderstood as motion.
+    if layout is None and stat.S_ISFIFO(os.fstat(device).st_mode):
+        layout = Layout()
+    if layout is None or GAMEPAD_BUTTON not in layout.buttons:
+        os.close(device)
+        raise GamepadError(f"{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is")
+    return device, _read_name(device) or Path(path).name, layout
+
+
+def _request(number: int, size: int) -> int:
+    """Code of a joystick ioctl that reads `size` bytes (_IOR in linux/ioctl.h)."""
+    return 2 << 30 | size << 16 | ord("j") << 8 | number
+
+
+def _ask(device: int, number: int, size: int) -> bytes | None:
+    buffer = bytearray(size)
+    try:
+        fcntl.ioctl(device, _request(number, size), buffer)
+    except OSError:  # a pipe or a file in its place
+        return None
+    return bytes(buffer)
+
+
+def read_layout(device: int) -> Layout | None:
+    """Which axis and button is which, from the kernel (linux/joystick.h); None when it is no joystick."""
+    axes, buttons = _ask(device, 0x11, 1), _ask(device, 0x12, 1)
+    axis_map, button_map = _ask(device, 0x32, 64), _ask(device, 0x34, 1024)
+    if axes is None or buttons is None or axis_map is None or button_map is None:
+        return None
+    codes = struct.unpack("512H", button_map)
+    return Layout(tuple(axis_map[: axes[0]]), tuple(codes[: buttons[0]]))
+
+
+def _read_name(device: int) -> str | None:
+    raw = _ask(device, 0x13, 128)
+    text = "" if raw is None else raw.split(b"\0")[0].decode("utf-8", "replace")
+    return " ".join(re.sub(r"[^\x20-\uffff]", " ", text).split()) or None
+
+
+def _read(device: int) -> bytes:
+    try:
+        data = os.read(device, _CHUNK)
+    except BlockingIOError:
+        return b""
+    except OSError:
+        raise _Lost from None
+    if not data:
+        raise _Lost
+    return data

@@ -1,0 +1,92 @@
+"""The operator's requests, controls and alerts, in the whole window over a pilot that keeps what it is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.operator_window import OperatorWindow
+from core.control.alerts import ALERTS, Alert
+from core.control.drive_view import DriveView
+from core.control.faults import Cause, Fault
+from core.control.gate_checks import Source
+from core.control.modes import Act, Mode
+from hardware.rig import RigKind
+from tests.app.conftest import MakeWindow
+from tests.app.fakes import FakeBench, FakeEngine, until
+
+Key = Qt.Key
+
+
+def drive_view(**changes: object) -> DriveView:
+    return replace(DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, deadman=False), **changes)  # type: ignore[arg-type]
+
+
+def test_the_keys_of_the_steps_reach_the_pilot(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    for key in (Key.Key_F4, Key.Key_F6, Key.Key_F7, Key.Key_F8):
+        qtbot.keyClick(running, key)
+    assert engine.pilot.acts == [Act.ACKNOWLEDGE, Act.ARM, Act.HAND_OVER, Act.TAKE_BACK]
+    qtbot.keyClick(running, Key.Key_F6, Qt.KeyboardModifier.ShiftModifier)
+    assert engine.pilot.acts[-1] is Act.DISARM
+    qtbot.keyClick(running, Key.Key_F3)
+    assert engine.pilot.requests.asked == ["switch on"]
+
+
+def test_handing_over_is_heard_while_shift_is_held_as_deadman(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    qtbot.keyPress(running, Key.Key_Shift)
+    until(qtbot, lambda: engine.pilot.deadman_said[-3:] == [True] * 3)
+    qtbot.keyClick(running, Key.Key_F7, Qt.KeyboardModifier.ShiftModifier)
+    assert engine.pilot.acts == [Act.HAND_OVER]
+    qtbot.keyRelease(running, Key.Key_Shift)
+    assert engine.pilot.deadman_said[-1] is False
+
+
+def test_the_deadman_is_let_go_with_the_focus(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running.panels.mode_bar.deadman_changed.emit(True)
+    assert engine.pilot.deadman_said[-1] is True
+    QApplication.sendEvent(running, QEvent(QEvent.Type.WindowDeactivate))
+    assert engine.pilot.deadman_said[-1] is False
+
+
+def test_the_window_shows_signs_of_life_as_long_as_it_turns(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    before = engine.pilot.beats
+    until(qtbot, lambda: engine.pilot.beats >= before + 3)
+
+
+def test_alerts_are_shown_logged_and_heard(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard: list[str] = []
+    monkeypatch.setattr(running.desk.sounds, "play", heard.append)
+    latched = Fault(Cause.TRACKING, "left off by 1.8 mm")
+    engine.pilot.view = drive_view(mode=Mode.STOPPED, permitted=None, latched=latched, active=(latched,), servos_on=False)
+    engine.pilot.alerts = [Alert(Cause.TRACKING, ALERTS[Cause.TRACKING], latched.detail, 0, "stop")]
+    until(qtbot, lambda: heard == ["stop"])
+    assert running.panels.alerts.isVisible()
+    assert running.panels.mode.accessibleName() == "Mode: STOPPED"
+    assert any("does not follow" in line for line in running.panels.events.lines)
+
+
+def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    engine = FakeEngine(bench)
+    engine.pilot = None  # type: ignore[assignment]
+    window = make_window(lambda _config: engine, kind=RigKind.PLAYBACK)
+    window.start()
+    until(qtbot, lambda: window.shown_tick is not None)
+    qtbot.keyClick(window, Key.Key_F6)
+    qtbot.keyClick(window, Key.Key_W)
+    qtbot.keyClick(window, Key.Key_Space)
+    qtbot.wait(120)
+    assert window.desk.view is None
+
+
+def test_servo_requests_of_the_table_reach_the_servos(running: OperatorWindow, engine: FakeEngine) -> None:
+    running.panels.servos.reboot_asked.emit(3)
+    running.panels.servos.zero_asked.emit(None)
+    running.panels.servos.zero_asked.emit(["left"])
+    running.panels.servos.torque_off_asked.emit()
+    assert engine.pilot.requests.asked == ["reboot 3", "zero None", "zero ['left']", "torque off"]

@@ -1,0 +1,266 @@
+"""The pilot: who drives, from where, and what it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from core.control.alerts import Note
+from core.control.faults import Cause
+from core.control.gate_checks import RejectReason, Source
+from core.control.hand import AT_REST, Jog
+from core.control.modes import Act, Hindrance, Mode
+from core.control.pilot import PERIOD_S
+from core.types import (
+    Reason,
+    Refusal,
+)
+from tests.core.pilot_bench import ADVICE, WELL, Bench, scene_at
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    bench = Bench()
+    yield bench
+    bench.pilot.close()
+
+
+def test_nothing_is_sent_before_the_servos_were_switched_on(bench: Bench) -> None:
+    bench.jog = Jog(bend=1.0, advance=1.0)
+    bench.seconds(0.5)
+    assert bench.robot.sent == []
+    assert not bench.pilot.view.servos_on
+    assert Hindrance.SERVOS_UNCHECKED in bench.alerts(), "a key that does nothing says why"
+
+
+def test_switching_on_checks_the_servos_and_gives_the_operator_the_hand(bench: Bench) -> None:
+    bench.on()
+    assert bench.robot.calls == ["disarm", "acknowledge", "arm"]
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.permitted is Source.OPERATOR
+    assert bench.pilot.view.against_arming == ()
+
+
+def test_servos_that_are_not_in_order_are_named(bench: Bench) -> None:
+    bench.robot.problem = "servo 3 is an XL430, not an XM430-W350"
+    bench.on()
+    assert not bench.pilot.view.servos_on
+    assert Cause.SERVOS_WRONG in bench.pilot.view.against_arming
+    details = [alert.detail for alert in bench.pilot.news().alerts if alert.key is Cause.SERVOS_WRONG]
+    assert details == [bench.robot.problem]
+
+
+def test_held_keys_are_rates_of_bend_and_speeds_of_feed(bench: Bench) -> None:
+    bench.on().jog = Jog(bend=0.5, advance=-1.0)
+    bench.seconds(0.5)
+    source, command, captured_s = bench.robot.sent[-1]
+    assert (source, captured_s) == (Source.OPERATOR, None)
+    assert command.bend == pytest.approx(0.5 * 0.5 * 1.2, abs=0.02)
+    assert command.advance_mm_s == -10.0
+    bench.jog = AT_REST
+    bench.pilot.jog("keys", AT_REST)
+    bench.turn()
+    rest = bench.robot.sent[-1][1]
+    assert (rest.bend, rest.advance_mm_s) == (command.bend, 0.0)
+
+
+def test_a_window_that_says_no_more_lets_go(bench: Bench) -> None:
+    bench.on().jog = Jog(advance=1.0)
+    bench.seconds(0.2)
+    assert bench.robot.sent[-1][1].advance_mm_s == 10.0
+    bench.jog = AT_REST  # nothing is reported any more, as by a window that hangs
+    bench.seconds(0.14)
+    assert bench.robot.sent[-1][1].advance_mm_s == 0.0
+
+
+def test_arming_and_handing_over_lets_the_program_drive_from_where_the_robot_is(bench: Bench) -> None:
+    bench.on().jog = Jog(bend=1.0)
+    bench.seconds(0.3)
+    bench.jog = AT_REST
+    bench.seconds(0.4)
+    bend = bench.robot.sent[-1][1].bend
+    assert bend > 0.2
+    bench.pilot.ask(Act.ARM)
+    bench.turn().held = True
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn()
+    assert bench.mode is Mode.AUTONOMOUS
+    source, command, captured_s = bench.robot.sent[-1]
+    assert source is Source.PROGRAM
+    assert command.bend == bend, "the first command moves nothing"
+    assert captured_s is not None
+    bench.turn(5)
+    assert bench.robot.sent[-1][1].bend > bend, "the advice is to the right"
+    assert bench.policy.resets == 1
+    assert bench.pilot.view.latency_s == pytest.approx(0.08)
+    assert bench.pilot.view.commanded == bench.robot.sent[-1][1]
+
+
+def test_the_operators_touch_takes_back_in_the_same_turn_and_from_where_the_program_left(bench: Bench) -> None:
+    bench.handed_over().turn(10)
+    bend = bench.robot.sent[-1][1].bend
+    bench.jog = Jog(advance=1.0)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    source, command, _ = bench.robot.sent[-1]
+    assert source is Source.OPERATOR
+    assert command.bend == pytest.approx(bend)
+
+
+def test_a_touch_shorter_than_a_turn_counts(bench: Bench) -> None:
+    bench.handed_over()
+    bench.pilot.jog("pad", Jog(bend=0.1))
+    bench.pilot.jog("pad", AT_REST)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+
+
+def test_letting_the_deadman_go_holds(bench: Bench) -> None:
+    bench.handed_over().turn(3)
+    bench.held = False
+    bench.turn()
+    assert bench.mode is Mode.HOLD
+    assert bench.robot.permitted is None
+    count = len(bench.robot.sent)
+    bench.turn(3)
+    assert len(bench.robot.sent) == count
+
+
+def test_a_deadman_that_falls_silent_is_let_go_within_a_tenth_of_a_second(bench: Bench) -> None:
+    bench.handed_over()
+    last_s = bench.now_s
+    for _ in range(5):
+        bench.now_s += PERIOD_S
+        bench.pilot.window_alive()
+        bench.pilot.tick()
+        if bench.mode is Mode.HOLD:
+            break
+    assert bench.mode is Mode.HOLD
+    assert bench.now_s - last_s <= 0.1 + 1e-9
+
+
+def test_stop_goes_to_the_robot_at_once_and_stays(bench: Bench) -> None:
+    bench.handed_over()
+    bench.pilot.ask(Act.STOP)
+    assert bench.robot.calls[-1] == "stop", "not in the next turn"
+    bench.turn()
+    assert bench.mode is Mode.STOPPED
+    assert bench.alerts() >= {Cause.STOP_PRESSED}
+    bench.pilot.ask(Act.ARM)
+    bench.turn()
+    assert bench.mode is Mode.STOPPED
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.done().turn()
+    assert bench.mode is Mode.ADVISORY
+    assert not bench.pilot.view.servos_on
+    assert "acknowledge" in bench.robot.calls[-1]
+
+
+def test_faults_of_the_servos_stop_them_too(bench: Bench) -> None:
+    bench.armed()
+    bench.robot.bus = replace(WELL, hardware_errors=(0, 0, 32, 0, 0, 0, 0))
+    bench.turn()
+    assert bench.mode is Mode.STOPPED
+    assert bench.robot.calls[-1] == "stop"
+    assert bench.pilot.view.latched is not None
+    assert bench.pilot.view.latched.cause is Cause.SERVO_ALERT
+
+
+def test_a_bus_process_that_is_gone_is_started_again_by_switching_on(bench: Bench) -> None:
+    bench.on()
+    bench.robot.failure = "the servo bus process ended (killed by SIGKILL)"
+    bench.turn(2)
+    assert not bench.pilot.view.servos_on
+    assert bench.pilot.view.latched is not None
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.done().turn(2)
+    bench.pilot.requests.switch_on()
+    bench.done().turn(2)
+    assert "connect" in bench.robot.calls
+    assert bench.pilot.view.servos_on
+
+
+def test_no_advice_is_shown_while_a_fault_blanks_it(bench: Bench) -> None:
+    bench.on()
+    assert bench.shown is ADVICE
+    assert bench.pilot.view.advice is ADVICE
+    bench.scene = lambda scene: replace(scene, pose=None, refusal=Refusal(Reason.SEVERAL_ROBOTS), route=None)
+    bench.turn(4)
+    assert bench.shown is None
+    assert bench.pilot.view.advice is None
+    assert bench.pilot.view.blanked == Cause.SEVERAL_ROBOTS.value
+    assert bench.alerts() == set(), "in ADVISORY the screen says it, and nothing beeps"
+
+
+def test_no_advice_survives_a_silent_camera(bench: Bench) -> None:
+    bench.on().seeing = False
+    bench.seconds(0.6)
+    assert bench.pilot.view.advice is None
+
+
+def test_at_the_destination_the_operator_has_the_hand_again(bench: Bench) -> None:
+    bench.handed_over()
+    bench.scene = lambda scene: scene_at(scene.frame_index, scene.captured_s, left_px=5.0)
+    bench.seconds(0.8)
+    assert bench.mode is Mode.ARMED
+    assert Note.REACHED in bench.alerts()
+
+
+def test_a_hand_over_without_a_way_is_refused_with_its_reason(bench: Bench) -> None:
+    bench.scene = lambda scene: replace(scene, route=None)
+    bench.armed().held = True
+    assert bench.pilot.view.against_hand_over == (Hindrance.NO_DESTINATION,)
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    assert Hindrance.NO_DESTINATION in bench.alerts()
+
+
+def test_commands_that_the_gate_rejects_again_and_again_end_autonomy(bench: Bench) -> None:
+    bench.handed_over()
+    bench.robot.edit = lambda sent: replace(sent, source=None, rejection=RejectReason.OVER_RATE)
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    bench.seconds(0.4)
+    assert bench.mode is Mode.ADVISORY
+    assert bench.pilot.view.latched is not None
+    assert bench.pilot.view.latched.cause is Cause.COMMANDS_REJECTED
+
+
+def test_a_joint_at_its_end_is_told_to_him_who_drives_it(bench: Bench) -> None:
+    bench.on().jog = Jog(advance=1.0)
+    bench.robot.edit = lambda sent: replace(sent, at_end=("advance",))
+    bench.turn(4)
+    assert [alert.detail for alert in bench.pilot.news().alerts if alert.key is Note.AT_END] == ["advance"]
+
+
+def test_zeroing_restarting_and_letting_go_need_switching_on_afterwards(bench: Bench) -> None:
+    for request, call in (
+        (bench.pilot.requests.zero, "zero"),
+        (lambda: bench.pilot.requests.reboot(3), "reboot 3"),
+        (bench.pilot.requests.torque_off, "torque off"),
+    ):
+        bench.on()
+        assert bench.pilot.view.servos_on
+        request()
+        bench.done().turn(2)
+        assert bench.robot.calls[-2:] == ["disarm", call]
+        assert not bench.pilot.view.servos_on
+        if bench.pilot.view.latched is not None:
+            bench.pilot.ask(Act.ACKNOWLEDGE)
+            bench.done().turn()
+
+
+def test_following_the_advice_is_measured(bench: Bench) -> None:
+    bench.on().jog = Jog(bend=0.5, advance=0.5)
+    assert bench.seconds(1.0).pilot.view.follow_share == 1.0
+    bench.jog = Jog(bend=-0.5, advance=-0.5)
+    assert 0.0 < (bench.seconds(1.0).pilot.view.follow_share or 0.0) < 1.0
+
+
+def test_closing_holds_and_permits_nobody(bench: Bench) -> None:
+    bench.on().pilot.close()
+    assert bench.robot.permitted is None
+    assert bench.robot.motion.source is None
