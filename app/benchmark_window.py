@@ -12,13 +12,10 @@ from PySide6.QtCore import QObject, QTimer
 
 from app.benchmark_command import quantiles
 from app.operator_window import OperatorWindow
-from core.control.hand import AT_REST, Jog
+from app.scripted_operator import ScriptedOperator
 
 _WARM_UP_S = 10.0
-_DRIVE_EVERY_MS = 50
-_MOVE_S = 1.5
 _LOOK_EVERY_MS = 5
-_MOVES = (Jog(bend=0.4, advance=0.8), Jog(bend=-0.6, advance=0.6), Jog(bend=0.2, advance=-1.0), AT_REST)
 
 
 @dataclass(slots=True)
@@ -29,11 +26,12 @@ class _Readings:
     dropped: int = 0
     block_ms: list[float] = field(default_factory=list)
     latency_ms: list[float] = field(default_factory=list)
+    servo_ms: list[float] = field(default_factory=list)
     memory_mb: list[tuple[float, float]] = field(default_factory=list)
 
 
 class WindowWatch(QObject):
-    """Drives the robot to and fro and takes readings until `seconds` have passed, then closes the window."""
+    """Takes readings until `seconds` have passed, then closes the window. Half of it is driven by hand, the rest handed over."""
 
     def __init__(self, window: OperatorWindow, seconds: float) -> None:
         super().__init__(window)
@@ -42,8 +40,10 @@ class WindowWatch(QObject):
         self._started_s = time.monotonic()
         self._process = psutil.Process()
         self.readings = _Readings()
+        self._operator = ScriptedOperator(window, seconds / 2.0)
+        self._operator.start()
         self._timers: list[QTimer] = []
-        for interval_ms, slot in ((_LOOK_EVERY_MS, self._look), (_DRIVE_EVERY_MS, self._drive), (1000, self._weigh)):
+        for interval_ms, slot in ((_LOOK_EVERY_MS, self._look), (1000, self._weigh)):
             timer = QTimer(self)
             timer.timeout.connect(slot)
             timer.start(interval_ms)
@@ -58,15 +58,14 @@ class WindowWatch(QObject):
             self.readings.latency_ms.append((now - tick.frame.captured_s) * 1e3)
             if self.readings.first_shown_s is None:
                 self.readings.first_shown_s = now
+        view, servo_ms = self._window.desk.view, self.readings.servo_ms
+        if view is not None and view.latency_s is not None and servo_ms[-1:] != [view.latency_s * 1e3]:
+            servo_ms.append(view.latency_s * 1e3)
         if now - self._started_s >= self._seconds:
             for timer in self._timers:
                 timer.stop()
+            self._operator.stop()
             self._window.close()
-
-    def _drive(self) -> None:
-        # As a held key does, the motion is repeated: silence counts as let go.
-        place = int((time.monotonic() - self._started_s) / _MOVE_S)
-        self._window.drive(_MOVES[place % len(_MOVES)])
 
     def _weigh(self) -> None:
         self.readings.block_ms.append(self._window.max_block_ms)
@@ -85,6 +84,8 @@ class WindowWatch(QObject):
             "shown_fps": round(seen.shown / lasted_s, 2),
             "frames_dropped": seen.dropped,
             "capture_to_screen_ms": quantiles(seen.latency_ms),
+            "capture_to_servo_ms": quantiles(seen.servo_ms) if seen.servo_ms else None,
+            "driven_by_program_s": round(self._operator.driven_s, 1),
             "gui_max_block_ms": round(max(seen.block_ms, default=0.0), 1),
             "memory_mb": {"after_10_s": round(steady[0][1], 1), "end": round(steady[-1][1], 1)},
             "memory_growth_mb_per_min": round((steady[-1][1] - steady[0][1]) / span_min, 2) if len(steady) > 1 else None,

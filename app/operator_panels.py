@@ -77,7 +77,6 @@ class OperatorPanels(QWidget):
         self.events = EventLog()
         self._limits = limits
         self._text_pace = Pace(TEXT_EVERY_S)
-        self._servo_pace = Pace(TEXT_EVERY_S)
         self._state: PoseState | None = None
         self._blanked = ""
         stage = QWidget()
@@ -91,9 +90,8 @@ class OperatorPanels(QWidget):
         self.mode_bar.show_view(view)
         if view is not None:
             self.alerts.show_view(view)
-        if self._servo_pace.due():
-            self.servos.show_status(bus, self._servo_config)
-            self.commands.show_view(view, bus)
+        self.servos.show_status(bus, self._servo_config)
+        self.commands.show_view(view, bus)
 
     def show_alerts(self, alerts: tuple[Alert, ...]) -> None:
         """Show new alerts over the picture."""
@@ -114,7 +112,9 @@ class OperatorPanels(QWidget):
         self.badge.show_scene(scene, renew_text=renew_text)
         self.gauge.show_pose(pose, renew_text=renew_text)
         self.bars.show_pose(pose, renew_text=renew_text)
-        why_none = REASON_TEXT[scene.refusal.reason].title.lower() if scene.refusal is not None else self._blanked or "the pose is not steady yet"
+        why_none = self._blanked or "the pose is not steady yet"
+        if scene.refusal is not None:
+            why_none = REASON_TEXT[scene.refusal.reason].title.lower()
         self.advice.show_advice(tick.advice, state, why_none, renew_text=renew_text)
         self.trends.add(scene)
         self.performance.add(tick, max_block_ms)

@@ -165,7 +165,7 @@ class OperatorWindow(QMainWindow):
         self._thread.status_changed.connect(self._on_status)
         self._show_later.timeout.connect(self._show_newest)
         self._check.timeout.connect(self._check_age)
-        panels.live.clicked.connect(self._set_target)
+        panels.live.clicked.connect(self.choose_target)
         panels.live.cleared.connect(self._clear_target)
         panels.overlay_bar.toggled.connect(self._on_layer)
         panels.notice.restart.connect(self._restart)
@@ -299,7 +299,8 @@ class OperatorWindow(QMainWindow):
     # ---- the operator
 
     @Slot(float, float)
-    def _set_target(self, x: float, y: float) -> None:
+    def choose_target(self, x: float, y: float) -> None:
+        """The operator's destination, in source pixels."""
         self._panels.live.setFocus()
         if self._thread.set_target((x, y)):
             self._target = (x, y)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
@@ -12,16 +13,16 @@ from app import palette, theme
 from app.cells import number
 from app.pace import Pace
 from app.wording import REASON_TEXT
-from core.control.clearance import Clearance, Ladder, clearance_of
+from core.control.clearance import BreachWatch, Clearance, Ladder, clearance_of
 from core.types import RobotStatus, Scene
 
 FORCE_MARKS_N = (0.15, 0.5)
 """What 95 % of a trial's forces should keep below, and what none may exceed."""
 _FORCE_RANGE_N = 0.6
 _FORCE_BAND_N = 0.03
-_NEAR_USED, _ALL_USED = 0.85, 1.0
-_USED_BAND = 0.1
-"""About one to two pixels in a usual vessel: the picture's noise."""
+_NEAR_USED, _USED_BAND = 0.85, 0.1
+"""Share of the room that is used up; the band is one to two pixels in a usual vessel, the picture's noise."""
+_AT_WALL_PX = 1.0
 _TEXT_EVERY_S = 0.2
 _COLOUR = (palette.ALLOWED, palette.ORANGE, palette.FAULT)
 _HEIGHT = 48
@@ -47,7 +48,8 @@ class ClearanceBar(QWidget):
     def __init__(self, pixels_per_mm: float | None = None) -> None:
         super().__init__()
         self._pixels_per_mm = pixels_per_mm
-        self._walls = Ladder((_NEAR_USED, _ALL_USED), _USED_BAND)
+        self._walls = Ladder((_NEAR_USED,), _USED_BAND)
+        self._breaches = BreachWatch()
         self._forces = Ladder(FORCE_MARKS_N, _FORCE_BAND_N)
         self._pace = Pace(_TEXT_EVERY_S)
         self._room = _room_block(None, 0, "no picture yet")
@@ -81,6 +83,8 @@ class ClearanceBar(QWidget):
         clearance = clearance_of(scene, self._pixels_per_mm) if scene is not None else None
         force_n = status.wall_contact_n if status is not None else None
         wall = self._walls.update(1.0 - clearance.share if clearance is not None else None)
+        if self._breaches.update(clearance, scene.captured_s if scene is not None else 0.0):
+            wall = 2
         room = _room_block(clearance, wall, _why_unknown(scene))
         force = _force_block(force_n, self._forces.update(force_n)) if force_n is not None else None
         changed = _kind(room) != _kind(self._room) or _kind(force) != _kind(self._force)
@@ -115,15 +119,18 @@ class ClearanceBar(QWidget):
 def _room_block(clearance: Clearance | None, level: int, why_unknown: str) -> _Block:
     marks = ((0.0, "wall"), (1.0, "centerline"))
     if clearance is None:
-        return _Block((f"Room to the wall: {why_unknown}", why_unknown, "Room: not known", "\N{EN DASH}"), None, 0, marks)
-    room = f"{number(clearance.room_px, 0)} px"
-    both = room if clearance.room_mm is None else f"{room}, {number(clearance.room_mm, 1)} mm"
-    word, short = (("", ""), ("near the wall", "near wall"), ("BREACH: no room to the wall", "no room"))[level]
-    texts = {
-        0: (f"Room to the wall  {both}", f"Room  {both}", f"Room  {room}", room),
-        1: (f"Room to the wall  {both}, {word}", f"Room  {both}, {word}", f"{both}, {short}", f"{room} {short}", room),
-        2: (f"{word}  ({both})", f"{word}  ({room})", f"BREACH: {short} ({room})", f"BREACH {room}"),
-    }[level]
+        return _Block((f"Room to the wall: {why_unknown}", why_unknown, "Room: not known", "not known"), None, 0, marks)
+    # how far the head seems to be in the wall is an error of the picture, as long as it is no breach
+    least = -math.inf if level == 2 else 0.0
+    room = f"{number(max(least, clearance.room_px), 0)} px"
+    both = room if clearance.room_mm is None else f"{room}, {number(max(least, clearance.room_mm), 1)} mm"
+    if level == 2:
+        texts = (f"BREACH: the head is in the wall  ({both})", f"BREACH: in the wall  ({room})", f"BREACH {room}", "BREACH")
+    elif level == 1:
+        word = "at the wall" if clearance.room_px < _AT_WALL_PX else "near the wall"
+        texts = (f"Room to the wall  {both}, {word}", f"Room  {both}, {word}", f"{room}, {word}", word)
+    else:
+        texts = (f"Room to the wall  {both}", f"Room  {both}", f"Room  {room}", room)
     return _Block(texts, max(0.0, min(1.0, clearance.share)), level, marks)
 
 

@@ -7,24 +7,27 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from app import palette, theme
+from app.next_step import DEADMAN_KEY, STOP_KEY, Step
 from app.widgets.overlays import Layer
 
 KEY_TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
         "Move the robot (hold)",
         (
-            ("\N{LEFTWARDS ARROW}  \N{RIGHTWARDS ARROW}   or   A  D", "bend the head left, right"),
-            ("\N{UPWARDS ARROW}  \N{DOWNWARDS ARROW}   or   W  S", "advance, retract"),
+            ("A  D   or   \N{LEFTWARDS ARROW}  \N{RIGHTWARDS ARROW}", "bend the head left, right"),
+            ("W  S   or   \N{UPWARDS ARROW}  \N{DOWNWARDS ARROW}", "advance, retract"),
             ("E   Q", "lift, dip the head"),
             ("PgUp   PgDn", "sheath forward, back"),
-            ("Space", "stop, straighten (always)"),
+            ("X", "straighten the head"),
         ),
     ),
     (
-        "Target",
+        "Who drives",
         (
-            ("Click", "destination: advice goes there"),
-            ("Right click   or   Esc", "clear the target"),
+            (STOP_KEY, "STOP, in any focus"),
+            *((step.value.key, step.value.name.lower()) for step in Step if step is not Step.DISARM),
+            (DEADMAN_KEY, "deadman: hold it"),
+            ("Any moving key", "takes back at once"),
         ),
     ),
     (
@@ -34,6 +37,8 @@ KEY_TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
         "Window",
         (
+            ("Click", "destination"),
+            ("Right click, Esc", "clear it"),
             ("P   or   Ctrl+S", "snapshot into your pictures"),
             ("R", "another random phantom"),
             ("F5", "start the rig again"),
@@ -45,9 +50,9 @@ KEY_TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
         ),
     ),
 )
-_COLUMNS = (((0, 1), 0.41), ((2,), 0.19), ((3,), 0.40))  # tables, share of the width
+_SHARES = (0.29, 0.27, 0.16, 0.28)
+_KEYS_PX = (134.0, 116.0, 34.0, 108.0)
 _ROW = 30
-_OVERLAY_TABLE = 2
 _HEAD = 40
 
 
@@ -88,22 +93,20 @@ class HelpOverlay(QWidget):
         painter.setFont(theme.bold(22))
         painter.drawText(page.adjusted(32, 22, 0, 0), Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, "Keys")
         left = page.left() + 32
-        for tables, share in _COLUMNS:
+        for index, share in enumerate(_SHARES):
             width = (page.width() - 40) * share
-            y = page.top() + 68
-            for index in tables:
-                y = self._paint_table(painter, left, y, width - 16, index) + 14
+            self._paint_table(painter, left, page.top() + 68, width - 16, index)
             left += width
         painter.end()
 
     @staticmethod
-    def _paint_table(painter: QPainter, left: float, top: float, width: float, index: int) -> float:
+    def _paint_table(painter: QPainter, left: float, top: float, width: float, index: int) -> None:
         title, rows = KEY_TABLE[index]
         painter.setPen(QColor(palette.SKY))
         painter.setFont(theme.semi_bold(14))
         painter.drawText(QRectF(left, top, width, _HEAD - 8), Qt.AlignmentFlag.AlignVCenter, title)
         top += _HEAD - 6
-        keys_width = 36.0 if index == _OVERLAY_TABLE else 158.0
+        keys_width = _KEYS_PX[index]
         for key, text in rows:
             painter.setPen(QColor(palette.TEXT))
             painter.setFont(theme.semi_bold(13))
@@ -114,4 +117,3 @@ class HelpOverlay(QWidget):
             shown = theme.elide(text_font, text, int(width - keys_width))
             painter.drawText(QRectF(left + keys_width, top, width - keys_width, _ROW), Qt.AlignmentFlag.AlignVCenter, shown)
             top += _ROW
-        return top

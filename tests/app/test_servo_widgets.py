@@ -564,11 +564,11 @@ def test_repeats_renew_their_row(panel: CommandPanel, clock: Clock) -> None:
 # ---- the room to the wall
 
 
-def wall_scene(offset_px: float) -> Scene:
-    """Lumen radius 24 px, robot radius 4 px: 20 px of room on the centerline."""
-    path = RobotPath(np.array([(10.0, 100.0), (100.0, 100.0 + offset_px)]), 1.0, None, True, 0.0, 4.0)
+def wall_scene(offset_px: float, captured_s: float = 0.0) -> Scene:
+    """Lumen radius 24 px, robot radius 4 px: 20 px of room on the centerline, the robot lies along it."""
+    path = RobotPath(np.array([(10.0, 100.0 + offset_px), (100.0, 100.0 + offset_px)]), 1.0, None, True, 0.0, 4.0)
     line = Centerline(np.array([(50.0, 100.0), (150.0, 100.0)]), (100.0, 100.0), 24.0)
-    return replace(make_scene(make_pose()), path=path, centerline=line)
+    return replace(make_scene(make_pose(), captured_s=captured_s), path=path, centerline=line)
 
 
 def force(newton: float | None) -> RobotStatus:
@@ -588,16 +588,29 @@ def test_room_in_pixels_and_millimetres(bar: ClearanceBar) -> None:
     assert bar.text == "Room to the wall  12 px, 3.0 mm"
 
 
-def test_breach_is_said_at_once_and_stays_until_it_is_clearly_over(bar: ClearanceBar) -> None:
+def test_near_the_wall_is_said_at_once_and_until_it_is_clearly_over(bar: ClearanceBar) -> None:
     seen = []
-    for offset_px in (10.0, 18.0, 20.5, 19.5, 18.5, 17.9, 16.0, 14.0):
+    for offset_px in (10.0, 16.9, 17.1, 16.0, 15.1, 14.9, 19.5, 22.0):
         bar.show_scene(wall_scene(offset_px), None)
-        seen.append((bar.is_breach, "near the wall" in bar.text))
-    assert [breach for breach, _ in seen] == [False, False, True, True, True, False, False, False]
-    assert [near for _, near in seen] == [False, True, False, False, False, True, True, False]
+        seen.append(bar.text.rpartition(", ")[2] if "wall" in bar.text.rpartition(", ")[2] else "")
+    assert seen == ["", "", *["near the wall"] * 3, "", "at the wall", "at the wall"]
+
+
+def test_at_the_wall_an_error_of_the_picture_is_no_negative_room(bar: ClearanceBar) -> None:
     bar.show_scene(wall_scene(22.0), None)
-    assert bar.text.startswith("BREACH: no room to the wall")
-    assert palette.FAULT in bar_colours(bar)
+    assert bar.text == "Room to the wall  0 px, 0.0 mm, at the wall"
+    assert not bar.is_breach
+
+
+def test_breach_is_said_when_it_lasts_and_until_it_is_clearly_over(bar: ClearanceBar) -> None:
+    seen = []
+    for k, offset_px in enumerate((24.0, 24.0, 24.0, 22.5, 21.6, 21.4)):
+        bar.show_scene(wall_scene(offset_px, 0.1 * k), None)
+        seen.append(bar.is_breach)
+        if k == 2:
+            assert bar.text == f"BREACH: the head is in the wall  ({MINUS}4 px, {MINUS}1.0 mm)"
+            assert palette.FAULT in bar_colours(bar)
+    assert seen == [False, False, True, True, True, False]
 
 
 def bar_colours(bar: ClearanceBar) -> set[str]:
@@ -623,7 +636,9 @@ def test_a_rig_that_tells_no_force_shows_none(bar: ClearanceBar) -> None:
 
 
 def test_without_a_pose_the_reason_stands_there(bar: ClearanceBar) -> None:
-    bar.show_scene(wall_scene(22.0), None)
+    for captured_s in (0.0, 0.3):
+        bar.show_scene(wall_scene(26.0, captured_s), None)
+    assert bar.is_breach
     bar.show_scene(make_scene(refusal=Refusal(Reason.OUTSIDE_VESSEL)), None)
     assert bar.text == "Room to the wall: robot is outside the vessel"
     assert not bar.is_breach
@@ -635,8 +650,8 @@ def test_without_a_pose_the_reason_stands_there(bar: ClearanceBar) -> None:
 def test_bar_paints_at_every_width(bar: ClearanceBar, width: int) -> None:
     bar.resize(width, 48)
     for newton in (None, 0.2, 0.7):
-        for offset_px in (0.0, 18.0, 23.0):
-            bar.show_scene(wall_scene(offset_px), force(newton))
+        for k, offset_px in enumerate((0.0, 18.0, 25.0, 25.0)):
+            bar.show_scene(wall_scene(offset_px, 0.5 * k), force(newton))
             assert len(bar_colours(bar)) > 3
 
 
