@@ -42,6 +42,9 @@ def run_speed(frames: int, *, model: str | None, preset: str | None, config_path
     from core.perception.pipeline import open_pipeline
 
     config = _config(model, preset, config_path)
+    if config.perception.segmentation.mirrored == "pictures":  # frames of a stream are what is timed
+        overrides = {"perception": {"segmentation": {"mirrored": "never"} | ({"model": model} if model else {})}}
+        config = load_config(config_path, preset, overrides)
     pipeline = open_pipeline(config.perception)
     first_frame_s = _first_frame_s()
     peak_memory_mb, baseline = _warm_up(pipeline)

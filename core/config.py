@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from core.camera_config import CameraConfig
 from core.errors import UserError
 from core.gamepad_config import GamepadConfig
 from core.pedal_config import PedalConfig
@@ -40,6 +41,9 @@ class SegmentationConfig(_Section):
     device: Literal["auto", "openvino", "torch"] = Field("auto", description="inference engine")
     precision: Literal["auto", "int8", "fp32"] = Field("auto", description="of OpenVINO; auto = int8 where the model has it")
     threads: int = Field(0, ge=0, le=64, description="CPU threads; 0 = all cores")
+    mirrored: Literal["pictures", "always", "never"] = Field(
+        "pictures", description="average over the picture and its mirror image: single pictures only, streams too, or never"
+    )
     vessel_threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
     robot_threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
 
@@ -170,9 +174,10 @@ class RigConfig(_Section):
     """Which camera and robot are used."""
 
     name: str = Field("twin", min_length=1)
-    camera: Literal["twin", "video_file", "image_folder"] = "twin"
-    robot: Literal["twin", "none"] = "twin"
-    source: str | None = Field(None, description="path of the video or folder")
+    camera: Literal["twin", "realsense", "webcam", "video_file", "image_folder"] = "twin"
+    robot: Literal["twin", "servos", "none"] = Field("twin", description="servos: real ones, on servos.port")
+    source: str | None = Field(None, description="path of the video, folder, or RealSense recording (.bag)")
+    watch_folder: bool = Field(False, description="image_folder: wait for new pictures, instead of playing those that are there")
 
 
 class WindowConfig(_Section):
@@ -183,6 +188,7 @@ class WindowConfig(_Section):
 
 class Config(_Section):
     rig: RigConfig = RigConfig()
+    camera: CameraConfig = CameraConfig()
     twin: TwinConfig = TwinConfig()
     perception: PerceptionConfig = PerceptionConfig()
     advice: AdviceConfig = AdviceConfig()

@@ -48,6 +48,7 @@ class ModelInfo(BaseModel):
     onnx_int8_sha256: str | None = Field(None, pattern="^[0-9a-f]{64}$")
     training: dict[str, Any] = {}
     calibration: Calibration | None = None
+    calibration_mirrored: Calibration | None = None
     figures: dict[str, Any] = {}
 
 
@@ -186,9 +187,12 @@ def write_figures(folder: Path, figures: dict[str, Any]) -> None:
     _update(folder, {"figures": figures})
 
 
-def write_calibration(folder: Path, calibration: Calibration) -> None:
-    """Store how evidence becomes confidence in the manifest of a model, atomically. Figures measured before are no longer true."""
-    _update(folder, {"calibration": calibration, "figures": {}})
+def write_calibration(folder: Path, calibration: Calibration, mirrored: Calibration | None = None) -> None:
+    """Store how evidence becomes confidence in the manifest of a model, atomically. Figures measured before are no longer true.
+
+    `mirrored` is for masks averaged over picture and mirror image; None: the same.
+    """
+    _update(folder, {"calibration": calibration, "calibration_mirrored": mirrored, "figures": {}})
 
 
 def _update(folder: Path, changes: dict[str, Any]) -> None:

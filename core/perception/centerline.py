@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import VectorConfig
-from core.perception import polyline
+from core.perception import bundle, polyline
+from core.perception.bundle import Bundle
 from core.perception.route import incidence_of, plan_route
 from core.perception.vessel_graph import build_graph
 from core.types import Centerline, Mask, Point, Points, Route, VesselGraph
@@ -28,6 +29,7 @@ REACH_RADII = 1.5
 """Vessels farther from the head than this many of their radii are not looked at."""
 TIE_COST = 0.2
 """A path whose cost is this much above the best one's no longer counts as nearly as good."""
+SAME_COST = 1e-9
 TIE_ANGLE_DEG = 20.0
 """Two nearly as good paths that differ by this much make the answer fully ambiguous; by less, proportionally less so."""
 
@@ -121,22 +123,28 @@ def centerline_at(
                     candidates.append(candidate)
     if not candidates:
         return None
-    best = min(candidates, key=lambda candidate: candidate.cost)
+    # The same line is found from each edge it runs along: rounding alone must not decide which one's radius counts.
+    least = min(candidate.cost for candidate in candidates)
+    best = next(candidate for candidate in candidates if candidate.cost <= least + SAME_COST)
     ambiguity = max(_rivalry(best, other) for other in candidates)
     return Centerline(best.piece, best.nearest, best.radius, ambiguity)
 
 
 def _feet(graph: VesselGraph, head: Point, half_length: float) -> list[tuple[int, float, float]]:
     """Edges that the head may belong to, as (edge, arc-length position of its foot, radius there)."""
-    found = []
-    for index, edge in enumerate(graph.edges):
-        if len(edge.points) < 2:
-            continue
-        distance, position, _ = polyline.nearest(edge.points, head)
-        radius = float(np.interp(position, polyline.arc_length(edge.points), edge.radius))
-        found.append((distance, index, position, max(radius, 0.25 * half_length)))
-    if not found:
+    usable = [index for index, edge in enumerate(graph.edges) if len(edge.points) >= 2]
+    if not usable:
         return []
+    away = bundle.distances(Bundle.of([graph.edges[index].points for index in usable]), head).tolist()
+    widest = max(float(graph.edges[index].radius.max()) for index in usable)
+    beyond_reach = min(away) + REACH_RADII * max(widest, 0.25 * half_length)
+    found = []
+    for index in (index for index, distance in zip(usable, away, strict=True) if distance <= beyond_reach):
+        edge = graph.edges[index]
+        along = polyline.arc_length(edge.points)
+        distance, position, _ = polyline.nearest(edge.points, head, along)
+        radius = float(np.interp(position, along, edge.radius))
+        found.append((distance, index, position, max(radius, 0.25 * half_length)))
     least, _, _, radius_there = min(found)
     return [
         (index, position, radius)
@@ -150,11 +158,12 @@ def _walks(
 ) -> list[tuple[Points, frozenset[int]]]:
     """All ways to walk `reach` along the graph from a place on an edge: polylines from that place, and the other edges they use."""
     first = graph.edges[edge]
-    total = float(polyline.arc_length(first.points)[-1])
+    along = polyline.arc_length(first.points)
+    total = float(along[-1])
     if onward:
-        line, node = polyline.cut(first.points, position, min(position + reach, total)), first.end
+        line, node = polyline.cut(first.points, position, min(position + reach, total), along), first.end
     else:
-        line, node = polyline.cut(first.points, max(position - reach, 0.0), position)[::-1], first.start
+        line, node = polyline.cut(first.points, max(position - reach, 0.0), position, along)[::-1], first.start
     walks = []
     left = reach - (total - position if onward else position)
     pending: list[tuple[Points, int, float, frozenset[int]]] = [(line, node, left, frozenset())]
@@ -166,9 +175,9 @@ def _walks(
         for index, starts in options:
             following = graph.edges[index]
             points = following.points if starts else following.points[::-1]
-            length = float(polyline.arc_length(points)[-1])
-            joined = np.concatenate([line, polyline.cut(points, 0.0, left)])
-            pending.append((joined, following.end if starts else following.start, left - length, used | {index}))
+            along = polyline.arc_length(points)
+            joined = np.concatenate([line, polyline.cut(points, 0.0, left, along)])
+            pending.append((joined, following.end if starts else following.start, left - float(along[-1]), used | {index}))
     return walks
 
 
@@ -185,9 +194,10 @@ def _route_ahead(route: Route | None, head: Point, half_length: float, radius: f
 def _candidate(
     line: Points, radius: float, scale: float, head: Point, direction: NDArray[np.float64], half_length: float, ahead: Points | None
 ) -> _Candidate | None:
-    distance, position, nearest = polyline.nearest(line, head)
-    piece = polyline.cut(line, position - half_length, position + half_length)
-    before, after = min(position, half_length), float(polyline.arc_length(piece)[-1]) - min(position, half_length)
+    along = polyline.arc_length(line)
+    distance, position, nearest = polyline.nearest(line, head, along)
+    piece = polyline.cut(line, position - half_length, position + half_length, along)
+    before, after = min(position, half_length), min(float(along[-1]) - position, half_length)
     length = before + after
     if length < MIN_PIECE_SHARE * 2.0 * half_length:
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -16,6 +17,10 @@ END_PART_PX = 20.0
 STILL_HEAD_PX = 15.0
 """An end this near to the last frame's head is that head, also where it has just reached the image border, if the robot's other
 end lies at an end of the vessel."""
+NEAR_PX = 20
+"""Where the robot meets the border is looked for this far around an end beside it."""
+OUTSIDE_LEAD_PX = 10.0
+"""The end that runs this much farther outside the vessel than the other is the tail."""
 NEARER_BY = 0.6
 """An end is at the vessel's end only if the other end is clearly farther from one: this share or less of its distance."""
 
@@ -37,7 +42,12 @@ def is_entry(place: Points, around: Surroundings) -> bool:
     x, y = float(place[0]), float(place[1])
     if min(x, y, width - 1 - x, height - 1 - y) <= around.config.border_px:
         return True
-    return around.port is not None and float(np.hypot(x - around.port[0], y - around.port[1])) <= around.config.port_px
+    return _at_port(place, around)
+
+
+def _at_port(place: Points, around: Surroundings) -> bool:
+    port = around.port
+    return port is not None and math.dist((place[0], place[1]), port) <= around.config.port_px
 
 
 def tail_first(points: Points, around: Surroundings) -> Points:
@@ -50,7 +60,7 @@ def tail_first(points: Points, around: Surroundings) -> Points:
     for looks_like_tail, margin in (
         (_entry, 0.5),
         (_as_before, 1.0),
-        (_outside_vessel, 10.0),
+        (_outside_vessel, OUTSIDE_LEAD_PX),
         (_at_vessel_end, 0.5),
         (_thickness, 0.2),
         (_vessel_end_distance, 0.0),
@@ -68,7 +78,22 @@ def _entry(points: Points, around: Surroundings) -> float:
         distance, radius = _distance_to_vessel_end(points[-1], around.vessel)
         if distance <= 2.0 * radius + 5.0:
             return 0.0
-    return float(is_entry(points[0], around))
+    if not is_entry(points[0], around):
+        return 0.0
+    # An end that stops short of the border, of a robot whose other end comes from outside the vessel, is a head about to leave.
+    ahead_px = _outside_vessel(points[::-1], around) - _outside_vessel(points, around)
+    return float(ahead_px <= OUTSIDE_LEAD_PX or _at_port(points[0], around) or _meets_border(points[0], around))
+
+
+def _meets_border(place: Points, around: Surroundings) -> bool:
+    """Whether the robot's mask reaches the image border near a place, as a robot does that comes from beyond it."""
+    x, y = (int(value) for value in place)
+    mask = around.masks.robot
+    height, width = mask.shape
+    rows, columns = (slice(max(v - NEAR_PX, 0), v + NEAR_PX + 1) for v in (y, x))
+    sides = (mask[:2, columns], mask[-2:, columns], mask[rows, :2], mask[rows, -2:])
+    near = (y < NEAR_PX, y >= height - NEAR_PX, x < NEAR_PX, x >= width - NEAR_PX)
+    return any(is_near and bool(side.any()) for side, is_near in zip(sides, near, strict=True))
 
 
 def _as_before(points: Points, around: Surroundings) -> float:

@@ -7,9 +7,11 @@ and kept in ``model.json``.
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+import math
+from dataclasses import dataclass, fields
 from typing import Any, Self
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -62,7 +64,11 @@ class Evidence:
         return tuple(field.name for field in fields(cls))
 
     def to_array(self) -> NDArray[np.float64]:
-        return np.array(astuple(self), np.float64)
+        return np.array(self.values(), np.float64)
+
+    def values(self) -> tuple[float, ...]:
+        """The signs in the order of their ``names``."""
+        return tuple(getattr(self, name) for name in self.__slots__)
 
 
 class Calibration(BaseModel):
@@ -95,32 +101,39 @@ class Calibration(BaseModel):
 
 def collect(path: RobotPath, robot: Vector, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> Evidence:
     """All signs of an answer; coordinates in working pixels."""
-    total = float(polyline.arc_length(path.points)[-1])
-    tip = polyline.resample(polyline.cut(path.points, total - config.vectors.robot_length_px, total), 1.0)
+    along = polyline.arc_length(path.points)
+    total = float(along[-1])
+    tip = polyline.resample(polyline.cut(path.points, total - config.vectors.robot_length_px, total, along), 1.0)
     whole = polyline.resample(path.points, 2.0)
     direction = np.array(robot.direction)
     ahead = np.array(path.head) + np.arange(*_BEYOND_PX)[:, None] * direction
     across = (tip - np.array(robot.center)) @ np.array([-direction[1], direction[0]])
+    across -= _mean(across)
     radius = max(path.radius_px, 1.0)
     robot_near, vessel_near = (_around(p, path.head) for p in (masks.robot_probability, masks.vessel_probability))
-    area = float(np.count_nonzero(masks.robot))
+    area = float(cv2.countNonZero(masks.robot.view(np.uint8)))
+    off_centre = math.dist(path.head, centerline.nearest)
     return Evidence(
-        robot_seen=float(at(masks.robot_probability, tip).mean()),
-        robot_seen_all=float(at(masks.robot_probability, whole).mean()),
-        vessel_seen=float(at(masks.vessel_probability, centerline.piece).mean()),
-        inside=float(at(masks.vessel, tip).mean()),
+        robot_seen=_mean(at(masks.robot_probability, tip)),
+        robot_seen_all=_mean(at(masks.robot_probability, whole)),
+        vessel_seen=_mean(at(masks.vessel_probability, centerline.piece)),
+        inside=_mean(at(masks.vessel, tip)),
         bridged=min(1.0, path.bridged_px / max(total, 1.0)),
-        lead=1.0 if path.runner_up is None else float(np.clip(path.score - path.runner_up, 0.0, 1.0)),
+        lead=1.0 if path.runner_up is None else min(1.0, max(0.0, path.score - path.runner_up)),
         ambiguity=centerline.ambiguity,
         off_path=max(0.0, 1.0 - 2.0 * radius * total / max(area, 1.0)),
         beyond=float(at(masks.robot_probability, ahead).max()),
-        bend=float(np.sqrt(np.mean((across - across.mean()) ** 2))) / radius,
-        offset=float(np.hypot(*(np.array(path.head) - centerline.nearest))) / max(centerline.radius_px, 1.0),
+        bend=math.sqrt(_mean(across * across)) / radius,
+        offset=off_centre / max(centerline.radius_px, 1.0),
         off_border=0.0 if path.entry_on_border else 1.0,
-        log_length=float(np.log(max(total, 1.0))),
+        log_length=math.log(max(total, 1.0)),
         robot_doubt=float((robot_near * (1 - robot_near)).sum() / max(float(robot_near.sum()), 1.0)),
-        vessel_doubt=float((vessel_near * (1 - vessel_near)).mean()),
+        vessel_doubt=_mean(vessel_near * (1 - vessel_near)),
     )
+
+
+def _mean(values: NDArray[Any]) -> float:
+    return float(values.sum()) / values.size
 
 
 def _around(values: NDArray[np.float32], place: tuple[float, float]) -> NDArray[np.float32]:
@@ -130,6 +143,7 @@ def _around(values: NDArray[np.float32], place: tuple[float, float]) -> NDArray[
 
 def at(values: NDArray[Any], points: Points) -> NDArray[Any]:
     """A map (h, w) at the pixels nearest to `points`; places beyond the image count as its border."""
-    columns = np.clip(np.rint(points[:, 0]).astype(int), 0, values.shape[1] - 1)
-    rows = np.clip(np.rint(points[:, 1]).astype(int), 0, values.shape[0] - 1)
-    return np.asarray(values[rows, columns])
+    columns, rows = np.rint(points).T.astype(np.intp)
+    # take clips in one go what two fancy indices would need clipped first.
+    inner = np.minimum(np.maximum(rows, 0), values.shape[0] - 1) * values.shape[1]
+    return np.asarray(np.take(values, inner + np.minimum(np.maximum(columns, 0), values.shape[1] - 1)))

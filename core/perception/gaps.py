@@ -11,9 +11,11 @@ import cv2
 import numpy as np
 
 from core.config import GapConfig
-from core.perception.skeleton import end_direction, end_pixels
+from core.perception.skeleton import Walker, end_pixels
 from core.types import Mask, Point, Points, Skeletons
 
+MAX_ENDS = 150
+"""A robot broken to pieces, and some specks, have some tens of ends. What has more is noise, and every two ends are compared."""
 TOUCHING_PX = 3.0
 """Two ends this near are joined however they look."""
 NEAR_PX = 10.0
@@ -32,9 +34,12 @@ def repair(skeletons: Skeletons, config: GapConfig) -> Skeletons:
 
     With ``rule = "components"`` ends of different components are joined, nearest first, where the robot would not have to turn by
     more than ``max_turn_deg``; each end is used once. With ``rule = "every_pair"`` every two ends nearer than the threshold are
-    joined, as the paper's pseudocode says: also the two ends of one short piece.
+    joined, as the paper's pseudocode says: also the two ends of one short piece. A skeleton of more than ``MAX_ENDS`` ends is left
+    as it is.
     """
     places = end_pixels(skeletons.robot)
+    if len(places) > MAX_ENDS:
+        return skeletons
     if not any(math.dist(a, b) < config.gap_threshold_px for a, b in combinations(places, 2)):
         return skeletons
     ends = _described(places, skeletons.robot)
@@ -55,7 +60,8 @@ def _described(places: list[tuple[int, int]], skeleton: Mask) -> list[_End]:
     x, y, width, height = cv2.boundingRect(skeleton.view(np.uint8))
     window = np.ascontiguousarray(skeleton[y : y + height, x : x + width])
     _, labels = cv2.connectedComponents(window.view(np.uint8), connectivity=8)
-    return [_End((u, v), end_direction(skeleton, (u, v)), int(labels[v - y, u - x])) for u, v in places]
+    walker = Walker(window)
+    return [_End((u, v), walker.direction((u - x, v - y)), int(labels[v - y, u - x])) for u, v in places]
 
 
 def _distance(a: _End, b: _End) -> float:

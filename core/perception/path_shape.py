@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,22 +50,24 @@ def _centred(line: Points, probability: NDArray[np.float32], radius_px: float) -
     side = int(np.ceil(1.5 * radius_px + 2.0))
     offsets = np.arange(-side, side + 1, dtype=np.float64)
     across = polyline.normals(line)
-    places = line[:, None, :] + offsets[None, :, None] * across[:, None, :]
-    weight = polyline.sample(probability, places)
+    x, y = (line[:, axis] + offsets[:, None] * across[:, axis] for axis in (0, 1))
+    weight = polyline.sample_at(probability, x, y)
     # Looking outwards the weight may only fall: another stretch of robot close by does not pull.
-    weight[:, side:] = np.minimum.accumulate(weight[:, side:], axis=1)
-    weight[:, side::-1] = np.minimum.accumulate(weight[:, side::-1], axis=1)
-    total = weight.sum(axis=1)
-    shift = np.where(total > 1.0, (weight @ offsets) / np.maximum(total, 1e-6), 0.0)
-    shift = np.clip(shift, -radius_px, radius_px)
-    width = float(np.median(total[total > 1.0])) if np.any(total > 1.0) else 2.0 * radius_px
+    weight[side:] = np.minimum.accumulate(weight[side:])
+    weight[side::-1] = np.minimum.accumulate(weight[side::-1])
+    total = weight.sum(axis=0)
+    seen = total > 1.0
+    shift = np.where(seen, (offsets @ weight) / np.maximum(total, 1e-6), 0.0)
+    shift = np.minimum(np.maximum(shift, -radius_px), radius_px)
+    width = polyline.median(total[seen]) if seen.any() else 2.0 * radius_px
     return line + shift[:, None] * across, 0.5 * width
 
 
 def _to_edge(line: Points, masks: Masks, radius_px: float) -> Points:
     """The last point replaced by where the path's own direction leaves the mask."""
     along = polyline.arc_length(line)
-    trimmed = polyline.cut(line, 0.0, along[-1] - min(TRIM_RADII * radius_px, 0.3 * along[-1]))
+    total = float(along[-1])
+    trimmed = polyline.cut(line, 0.0, total - min(TRIM_RADII * radius_px, 0.3 * total), along)
     onward = _continued(trimmed, 6.0 * radius_px + 10.0)
     reach = edge_distance(onward, masks.robot, masks.robot_probability)
     if reach <= 0.0:
@@ -73,30 +78,36 @@ def _to_edge(line: Points, masks: Masks, radius_px: float) -> Points:
 def _continued(line: Points, length_px: float) -> Points:
     """How the path would go on from its last point, bending as it did before: a point every px, the last point first."""
     along = polyline.arc_length(line)
-    marks = along[-1] - np.array([0.0, 0.5, 1.0]) * min(END_HEADING_PX, along[-1])
-    last, middle, first = polyline.point_at(line, along, marks)
-    before, after = np.arctan2(*(middle - first)[::-1]), np.arctan2(*(last - middle)[::-1])
-    turn = float((after - before + np.pi) % (2.0 * np.pi) - np.pi)
+    total = float(along[-1])
+    back_px = min(END_HEADING_PX, total)
+    last, middle, first = polyline.point_at(line, along, np.array([total, total - 0.5 * back_px, total - back_px])).tolist()
+    before = math.atan2(middle[1] - first[1], middle[0] - first[0])
+    after = math.atan2(last[1] - middle[1], last[0] - middle[0])
+    turn = (after - before + math.pi) % (2.0 * math.pi) - math.pi
     per_px = BEND_SHARE * turn / max(0.5 * END_HEADING_PX, 1.0)
     # From the middle of the last half, where its chord has the path's direction, to each further step.
     headings = after + per_px * (0.25 * END_HEADING_PX + 0.5 + np.arange(int(length_px)))
-    steps = np.column_stack([np.cos(headings), np.sin(headings)])
-    return np.concatenate([last[None], last + np.cumsum(steps, axis=0)])
+    onward = np.empty((len(headings) + 1, 2))
+    onward[0] = last
+    np.cos(headings, out=onward[1:, 0])
+    np.sin(headings, out=onward[1:, 1])
+    return np.add.accumulate(onward, axis=0, out=onward)
 
 
 def edge_distance(places: Points, mask: Mask, probability: NDArray[np.float32]) -> float:
     """How far a line of points, 1 px apart, runs in a mask: to a fraction of a pixel, where the probability falls through 0.5."""
     height, width = mask.shape
-    columns, rows = np.rint(places[:, 0]).astype(int), np.rint(places[:, 1]).astype(int)
-    on_image = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
-    inside = on_image & mask[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]
-    outside = np.flatnonzero(~inside)
-    if len(outside) == 0 or outside[0] == 0:
+    inside = 0
+    for x, y in places.tolist():
+        column, row = round(x), round(y)
+        if not (0 <= column < width and 0 <= row < height and mask[row, column]):
+            break
+        inside += 1
+    if inside in (0, len(places)):  # it never was in the mask, or never leaves it
         return 0.0
-    last = int(outside[0]) - 1
-    level = polyline.sample(probability, places[max(last - 1, 0) : last + 3])
-    falls = np.flatnonzero((level[:-1] >= 0.5) & (level[1:] < 0.5))
-    if len(falls) == 0:
-        return float(last)
-    k = int(falls[0])
-    return float(max(last - 1, 0) + k + (level[k] - 0.5) / (level[k] - level[k + 1]))
+    first = max(inside - 2, 0)
+    level = polyline.sample(probability, places[first : inside + 2]).tolist()
+    for k, (here, there) in enumerate(pairwise(level)):
+        if here >= 0.5 > there:
+            return float(first + k + (here - 0.5) / (here - there))
+    return float(inside - 1)

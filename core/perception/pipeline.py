@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import astuple, replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 from core.config import PerceptionConfig
@@ -13,7 +13,7 @@ from core.perception.centerline import find as find_centerline
 from core.perception.evidence import Calibration, collect
 from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
-from core.perception.segmentation import Segmenter, open_segmenter, to_working
+from core.perception.segmentation import Mirrored, Segmenter, open_segmenter, to_working
 from core.perception.tracking import Memory, check_jump, recall
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
@@ -40,16 +40,31 @@ class _Stopwatch:
         return replace(scene, latency_ms=self.latency_ms)
 
 
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """A network as it is asked, and what its evidence means (None: not calibrated)."""
+
+    segment: Segmenter
+    calibration: Calibration | None = None
+
+
 class Pipeline:
     """Perception of single images or of a stream.
 
     A call perceives a frame of a stream: the last frames decide between near-equal paths, an impossible jump of the head is
-    refused, and the state is steadied. ``perceive_single`` knows nothing of other frames and leaves the stream's memory alone.
+    refused, and the state is steadied. ``perceive_single`` knows nothing of other frames and leaves the stream's memory alone;
+    it may look with another `single` sight, which takes its time.
     """
 
-    def __init__(self, segmenter: Segmenter, config: PerceptionConfig, calibration: Calibration | None = None) -> None:
-        self._segment = segmenter
-        self._calibration = calibration
+    def __init__(
+        self,
+        segmenter: Segmenter,
+        config: PerceptionConfig,
+        calibration: Calibration | None = None,
+        single: Sight | None = None,
+    ) -> None:
+        self._stream = Sight(segmenter, calibration)
+        self._single = single or self._stream
         self._config = config
         self._states = StateFilter(config.pose)
         self._memory: Memory | None = None
@@ -58,7 +73,7 @@ class Pipeline:
     @property
     def engine(self) -> str:
         """Where the network runs, in words."""
-        return self._segment.engine
+        return self._stream.segment.engine
 
     def reset(self) -> None:
         """Forget the stream's past."""
@@ -68,18 +83,19 @@ class Pipeline:
     def perceive_single(self, frame: Frame, target: Point | None = None) -> Scene:
         """A frame by itself; `target` is the operator's destination in source pixels."""
         watch = _Stopwatch()
-        return watch.finish(self._perceive(frame, target, None, watch))
+        return watch.finish(self._perceive(frame, target, None, watch, self._single))
 
     def __call__(self, frame: Frame, target: Point | None = None) -> Scene:
         """The next frame of a stream; `target` is the operator's destination in source pixels."""
         tracking = self._config.tracking
         if not tracking.enabled:
-            return self.perceive_single(frame, target)
+            watch = _Stopwatch()
+            return watch.finish(self._perceive(frame, target, None, watch, self._stream))
         if frame.image.shape != self._shape:  # another camera or another mode of it: what is remembered lies in other pixels
             self.reset()
             self._shape = frame.image.shape
         watch = _Stopwatch()
-        scene = self._perceive(frame, target, recall(self._memory, frame.captured_s, tracking), watch)
+        scene = self._perceive(frame, target, recall(self._memory, frame.captured_s, tracking), watch, self._stream)
         if scene.pose is not None and scene.path is not None:
             jump = check_jump(scene.path, self._memory, frame.captured_s, tracking)
             if jump is None:
@@ -88,7 +104,7 @@ class Pipeline:
                 scene = replace(scene, pose=None, refusal=jump)
         return watch.finish(replace(scene, pose=self._states.update(scene.pose)))
 
-    def _perceive(self, frame: Frame, target: Point | None, previous: RobotPath | None, watch: _Stopwatch) -> Scene:
+    def _perceive(self, frame: Frame, target: Point | None, previous: RobotPath | None, watch: _Stopwatch, sight: Sight) -> Scene:
         config = self._config
         height, width = frame.image.shape[:2]
         with watch.stage("prepare"):
@@ -98,7 +114,7 @@ class Pipeline:
         if refusal is not None:
             return replace(scene, refusal=refusal)
         with watch.stage("network"):
-            vessel_probability, robot_probability = self._segment(image)
+            vessel_probability, robot_probability = sight.segment(image)
         with watch.stage("masks"):
             found = masks.clean(vessel_probability, robot_probability, config)
         scene = replace(scene, masks=found)
@@ -112,14 +128,17 @@ class Pipeline:
         with watch.stage("graph"):
             graph = build_graph(skeletons.vessel, found.vessel, config.cleaning)
         scene = replace(scene, skeletons=skeletons, vessel_graph=graph)
+        refusal = quality.check_graph(graph, config.vectors)
+        if refusal is not None:
+            return replace(scene, refusal=refusal)
         with watch.stage("path"):
             path = robot_path.find(skeletons, found, config, previous, graph)
         if isinstance(path, Refusal):
             return replace(scene, refusal=path)
         with watch.stage("pose"):
-            return self._pose(replace(scene, path=path), path, found, target)
+            return self._pose(replace(scene, path=path), path, found, target, sight.calibration)
 
-    def _pose(self, scene: Scene, path: RobotPath, found: Masks, target: Point | None) -> Scene:
+    def _pose(self, scene: Scene, path: RobotPath, found: Masks, target: Point | None, calibration: Calibration | None) -> Scene:
         """Vectors, the centerline's piece, the pose, and the quality gate's word on each."""
         config = self._config
         graph, skeletons = scene.vessel_graph, scene.skeletons
@@ -139,9 +158,9 @@ class Pipeline:
         if centerline is None or vessel_vector is None or refusal is not None:
             return replace(scene, refusal=refusal or Refusal(Reason.NO_VESSEL, "the centerline beside the head has no direction"))
         evidence = collect(path, robot_vector, centerline, found, config)
-        scene = replace(scene, evidence=astuple(evidence))
-        if self._calibration is not None:
-            confidence = self._calibration.confidence(evidence)
+        scene = replace(scene, evidence=evidence.values())
+        if calibration is not None:
+            confidence = calibration.confidence(evidence)
         else:
             confidence = quality.confidence(path, centerline, found, config)
         refusal = quality.check_confidence(confidence, config.quality)
@@ -153,7 +172,11 @@ class Pipeline:
 def open_pipeline(config: PerceptionConfig) -> Pipeline:
     """Load the configured model and build the pipeline around it; raises ModelError."""
     segmenter = open_segmenter(config.segmentation)
-    return Pipeline(segmenter, config, segmenter.info.calibration)
+    info, mirrored = segmenter.info, config.segmentation.mirrored
+    plain = Sight(segmenter, info.calibration)
+    twice = Sight(Mirrored(segmenter), info.calibration_mirrored or info.calibration)
+    stream = twice if mirrored == "always" else plain
+    return Pipeline(stream.segment, config, stream.calibration, plain if mirrored == "never" else twice)
 
 
 class NoPerception:

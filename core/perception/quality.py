@@ -11,14 +11,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.config import PerceptionConfig, QualityConfig
+from core.config import PerceptionConfig, QualityConfig, VectorConfig
 from core.perception import polyline
 from core.perception.evidence import at
-from core.types import Centerline, Image, Mask, Masks, Reason, Refusal, RobotPath
+from core.perception.vessel_graph import MAX_CHAINS
+from core.types import Centerline, Image, Mask, Masks, Reason, Refusal, RobotPath, VesselGraph
 
 SAMPLE_STEP = 4
 """Brightness is judged on every fourth pixel."""
 _LEAST_CONTRAST = 4.0
+MAX_ROBOT_SHARE = 0.3
+"""Of the image. A robot of 60 px across all of it is half of that; thinning a larger one takes long, and finds none."""
 
 
 def check_image(image: Image, config: QualityConfig) -> Refusal | None:
@@ -66,12 +69,28 @@ def sharpness(image: Image) -> float:
 
 
 def check_masks(masks: Masks) -> Refusal | None:
-    """NO_VESSEL or NO_ROBOT, when nothing is left of a mask after cleaning."""
-    if not masks.vessel.any():
-        return Refusal(Reason.NO_VESSEL, f"highest vessel probability {float(masks.vessel_probability.max(initial=0.0)):.2f}")
-    if not masks.robot.any():
-        return Refusal(Reason.NO_ROBOT, f"highest robot probability {float(masks.robot_probability.max(initial=0.0)):.2f}")
+    """NO_VESSEL or NO_ROBOT, when nothing is left of a mask after cleaning, or what is left cannot be a robot."""
+    for mask, probability, name, reason in (
+        (masks.vessel, masks.vessel_probability, "vessel", Reason.NO_VESSEL),
+        (masks.robot, masks.robot_probability, "robot", Reason.NO_ROBOT),
+    ):
+        if not mask.any():
+            highest = float(probability.max(initial=0.0))
+            scattered = ", but only in specks" if highest >= 0.5 else ""
+            return Refusal(reason, f"highest {name} probability {highest:.2f}{scattered}")
+    share = float(np.count_nonzero(masks.robot)) / masks.robot.size
+    if share > MAX_ROBOT_SHARE:
+        return Refusal(
+            Reason.NO_ROBOT, f"what looks like it covers {100 * share:.0f} % of the image (at most {100 * MAX_ROBOT_SHARE:.0f} %)"
+        )
     return None
+
+
+def check_graph(graph: VesselGraph, config: VectorConfig) -> Refusal | None:
+    """NO_VESSEL, when the mask gave no graph that the configured rule could look at: it is a dot, or branches all over."""
+    if graph.edges or config.vessel_rule == "window":
+        return None
+    return Refusal(Reason.NO_VESSEL, f"its mask has no centerline, or more than {MAX_CHAINS} branches")
 
 
 def check_path(path: RobotPath, masks: Masks, config: PerceptionConfig) -> Refusal | None:

@@ -17,6 +17,8 @@ from core.types import Masks, Point, Points, Reason, Refusal, RobotPath, Skeleto
 
 MAX_CHAINS = 80
 """A robot with all its false branches has some ten; a graph of more is a mesh, and any way through it is as good as another."""
+MAX_ALL_CHAINS = 150
+"""The same for all pieces together, of which a broken robot and some specks have some tens: more are not even looked at."""
 SAME_END_PX = 10.0
 """Paths whose heads are this near to each other are the same answer."""
 RIVAL_SHARE = 0.8
@@ -63,6 +65,8 @@ def find(
     traced = trace(skeletons.robot)
     if not traced.chains:
         return Refusal(Reason.NO_ROBOT, "nothing in the image looks like the robot")
+    if len(traced.chains) > MAX_ALL_CHAINS:
+        return Refusal(Reason.AMBIGUOUS_PATH, f"it is a mesh of {len(traced.chains)} branches (at most {MAX_ALL_CHAINS})")
     total_px = sum(_length(chain.points) for chain in traced.chains)
     radius_px = float(np.clip(0.5 * cv2.countNonZero(masks.robot.view(np.uint8)) / max(total_px, 1.0), 0.5, 30.0))
     graph = _without_short_links(traced, 3.0 * radius_px)

@@ -26,6 +26,24 @@ class Segmenter(Protocol):
     def __call__(self, image: Image) -> tuple[Probability, Probability]: ...
 
 
+class Mirrored:
+    """The mean over a picture and its mirror image: surer than either, at twice the price."""
+
+    def __init__(self, segmenter: Segmenter) -> None:
+        self._segment = segmenter
+
+    @property
+    def engine(self) -> str:
+        return f"{self._segment.engine}, mirrored"
+
+    def __call__(self, image: Image) -> tuple[Probability, Probability]:
+        straight = self._segment(image)
+        mirrored = self._segment(np.ascontiguousarray(image[:, ::-1]))
+        half = np.float32(0.5)
+        vessel, robot = (half * (one + other[:, ::-1]) for one, other in zip(straight, mirrored, strict=True))
+        return np.asarray(vessel, np.float32), np.asarray(robot, np.float32)
+
+
 def to_working(image: Image, working_size_px: int) -> tuple[Image, tuple[float, float]]:
     """Scale an image so that its longer side is `working_size_px`; returns it and working pixels per source pixel in x and y.
 

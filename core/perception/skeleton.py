@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from skimage.morphology import skeletonize
 
 from core.config import CleaningConfig, PerceptionConfig
 from core.perception.pixel_graph import Chain, trace
 from core.perception.polyline import arc_length
+from core.perception.thinning import thin, thin_half_size, thin_parts
 from core.types import Mask, Masks, Point, Points, Skeletons
 
-MIN_HALF_SIZE_SHARE = 0.35
-"""Half-size thinning needs a lumen some 10 px wide. In a narrower one the step to half size leaves less than this share of it."""
+MAX_KNOTS = 200
+"""A robot's skeleton has some ten ends and junctions; one of so many is noise, that no mending makes a robot of."""
 SPUR_RADII = 2.5
 """The arms of a fork at a broken end of the robot run to its corners: at most about one and a half radii, and a bit for noise."""
 TANGENT_PX = 10
@@ -26,67 +28,27 @@ def thin_masks(masks: Masks, config: PerceptionConfig) -> Skeletons:
     x, y, width, height = cv2.boundingRect(masks.robot.view(np.uint8))
     if width:
         window = np.s_[y : y + height, x : x + width]
-        robot[window] = _thin_robot(np.ascontiguousarray(masks.robot[window]), config.cleaning)
+        robot[window] = _robot_skeleton(np.ascontiguousarray(masks.robot[window]), config.cleaning)
     vessel = thin_half_size(masks.vessel) if config.cleaning.half_size_thinning else thin(masks.vessel)
     return Skeletons(vessel=vessel, robot=robot)
 
 
-def _thin_robot(mask: Mask, config: CleaningConfig) -> Mask:
-    skeleton = thin(mask)
-    if config.prune_spurs:
+def _robot_skeleton(mask: Mask, config: CleaningConfig) -> Mask:
+    """The robot's skeleton in a mask that is cut to its bounding box."""
+    skeleton = thin_parts(mask)
+    links = _count_links(skeleton)[1]
+    if np.count_nonzero(links != 2) > MAX_KNOTS:
+        return skeleton
+    if config.prune_spurs and np.any(links >= 3):
         skeleton = without_spurs(skeleton, mask)
     return extend_ends(skeleton, mask) if config.extend_ends else skeleton
-
-
-def thin(mask: Mask) -> Mask:
-    """The mask thinned to one pixel, with its topology: as many components and loops as before.
-
-    Zhang and Suen's algorithm [1]_, on the mask's bounding box only.
-
-    References
-    ----------
-    .. [1] T. Y. Zhang and C. Y. Suen, "A fast parallel algorithm for thinning digital patterns", CACM 27(3), 1984.
-    """
-    skeleton = np.zeros(mask.shape, np.bool_)
-    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
-    if width:
-        window = np.s_[y : y + height, x : x + width]
-        skeleton[window] = skeletonize(np.ascontiguousarray(mask[window]))
-    return skeleton
-
-
-def thin_half_size(mask: Mask) -> Mask:
-    """A wide mask thinned on every second pixel and drawn back at full size: seven times faster, the same topology.
-
-    A pixel of the half-size mask stands for 3x3 pixels that must all be set: so walls and loops of one pixel survive, and parts
-    that do not touch never merge. What is narrower than about 6 px breaks; a mask that loses too much that way is thinned at full
-    size.
-    """
-    half = cv2.erode(mask.view(np.uint8), np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)[::2, ::2]
-    if 4 * cv2.countNonZero(half) < MIN_HALF_SIZE_SHARE * cv2.countNonZero(mask.view(np.uint8)):
-        return thin(mask)
-    return _double(thin(np.ascontiguousarray(half).view(np.bool_)), mask.shape)
-
-
-def _double(skeleton: Mask, shape: tuple[int, ...]) -> Mask:
-    """A skeleton drawn at twice its size: pixel (x, y) goes to (2x, 2y), and each link between neighbours to the pixel between."""
-    height, width = skeleton.shape
-    grid = np.zeros((2 * height, 2 * width), np.bool_)
-    right, down = skeleton[:, :-1] & skeleton[:, 1:], skeleton[:-1] & skeleton[1:]
-    falling = skeleton[:-1, :-1] & skeleton[1:, 1:] & ~(skeleton[:-1, 1:] | skeleton[1:, :-1])
-    rising = skeleton[1:, :-1] & skeleton[:-1, 1:] & ~(skeleton[:-1, :-1] | skeleton[1:, 1:])
-    grid[::2, ::2] = skeleton
-    grid[::2, 1:-1:2] = right
-    grid[1:-1:2, ::2] = down
-    grid[1:-1:2, 1:-1:2] = falling | rising
-    return np.ascontiguousarray(grid[: shape[0], : shape[1]])
 
 
 def end_pixels(skeleton: Mask) -> list[tuple[int, int]]:
     """End points (x, y) of a skeleton.
 
     The paper's convolution with [[1, 1, 1], [1, 10, 1], [1, 1, 1]] gives 11 at a pixel with exactly one neighbour. That misses an
-    end whose last step is a corner (two neighbours that touch each other), so this convolution tells all 256 neighbourhoods apart.
+    end whose last step is a corner (two neighbours that touch each other), so here all 256 neighbourhoods are told apart.
     """
     x, y, width, height = cv2.boundingRect(skeleton.view(np.uint8))
     window = np.ascontiguousarray(skeleton[y : y + height, x : x + width])
@@ -98,9 +60,14 @@ def _count_links(skeleton: Mask) -> tuple[NDArray[np.intp], NDArray[np.uint8]]:
     """The skeleton's pixels, as flat indices, and how many links each has."""
     if skeleton.size == 0:
         return np.empty(0, np.intp), np.empty(0, np.uint8)
-    bits = cv2.filter2D(skeleton.view(np.uint8), -1, _NEIGHBOUR_BITS, borderType=cv2.BORDER_CONSTANT | cv2.BORDER_ISOLATED)
-    places = np.flatnonzero(skeleton)
-    return places, _LINKS[np.asarray(bits).ravel()[places]]
+    height, width = skeleton.shape
+    framed = np.zeros((height + 2, width + 2), np.bool_)
+    framed[1:-1, 1:-1] = skeleton
+    places = np.flatnonzero(framed)
+    around = framed.ravel()[places + np.array([[dy * (width + 2) + dx] for dx, dy in _AROUND])]
+    links = _LINKS[np.packbits(around, axis=0, bitorder="little")[0]] if len(places) else np.empty(0, np.uint8)
+    rows, columns = np.divmod(places, width + 2)
+    return (rows - 1) * width + columns - 1, links
 
 
 def _links(bits: int) -> int:
@@ -112,41 +79,55 @@ def _links(bits: int) -> int:
 
 
 _AROUND = ((-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1))
-_NEIGHBOUR_BITS = np.array([[1, 2, 4], [8, 0, 16], [32, 64, 128]], np.float32)
 _LINKS = np.array([_links(bits) for bits in range(256)], np.uint8)
+
+
+class Walker:
+    """Walks along a skeleton's branches from their ends."""
+
+    def __init__(self, skeleton: Mask) -> None:
+        height, width = skeleton.shape
+        self._stride = width + 2
+        framed = np.zeros((height + 2, self._stride), np.bool_)
+        framed[1:-1, 1:-1] = skeleton
+        self._pixels = framed.tobytes()  # single pixels are read many times faster from bytes than from an array
+
+    def back(self, end: tuple[int, int], steps: int) -> list[tuple[int, int]]:
+        """Pixels (x, y) from an end point back along its branch: at most `steps` of them, and not beyond a junction."""
+        stride, pixels = self._stride, self._pixels
+        straight_steps = (-1, 1, -stride, stride)
+        diagonal_steps = (-stride - 1, -stride + 1, stride - 1, stride + 1)
+        walked = [(end[1] + 1) * stride + end[0] + 1]
+        while len(walked) <= steps:
+            here, behind = walked[-1], walked[-3:]
+            straight = [here + step for step in straight_steps if pixels[here + step] and here + step not in behind]
+            diagonal = [here + step for step in diagonal_steps if pixels[here + step] and here + step not in behind]
+            # At a corner the diagonal neighbour comes after the straight one.
+            if len(straight) > 1 or len(diagonal) > 1 or not (straight or diagonal):
+                break
+            walked.append((straight or diagonal)[0])
+        return [(place % stride - 1, place // stride - 1) for place in walked]
+
+    def direction(self, end: tuple[int, int]) -> Point | None:
+        """Unit vector in which the branch leaves through its end, or None for a branch of less than 4 pixels."""
+        walked = self.back(end, TANGENT_PX)
+        return None if len(walked) < 4 else _direction(walked)
 
 
 def walk_back(skeleton: Mask, end: tuple[int, int], steps: int) -> list[tuple[int, int]]:
     """Pixels (x, y) from an end point back along its branch: at most `steps` of them, and not beyond a junction."""
-    height, width = skeleton.shape
-    walked = [end]
-    while len(walked) <= steps:
-        x, y = walked[-1]
-        ahead = [
-            (u, v)
-            for u in range(max(x - 1, 0), min(x + 2, width))
-            for v in range(max(y - 1, 0), min(y + 2, height))
-            if skeleton[v, u] and (u, v) not in walked[-3:]
-        ]
-        straight = [place for place in ahead if place[0] == x or place[1] == y]
-        if len(ahead) == 2 and len(straight) == 1:  # a corner: the diagonal neighbour comes after the straight one
-            ahead = straight
-        if len(ahead) != 1:
-            break
-        walked.append(ahead[0])
-    return walked
+    return Walker(skeleton).back(end, steps)
 
 
 def end_direction(skeleton: Mask, end: tuple[int, int]) -> Point | None:
     """Unit vector in which the branch leaves through its end, or None for a branch of less than 4 pixels."""
-    walked = np.array(walk_back(skeleton, end, TANGENT_PX), np.float64)
-    return None if len(walked) < 4 else _direction(walked)
+    return Walker(skeleton).direction(end)
 
 
-def _direction(walked: Points) -> Point | None:
-    chord = walked[0] - walked[-1]
-    length = float(np.hypot(chord[0], chord[1]))
-    return (float(chord[0]) / length, float(chord[1]) / length) if length > 0 else None
+def _direction(walked: list[tuple[int, int]]) -> Point | None:
+    across, down = walked[0][0] - walked[-1][0], walked[0][1] - walked[-1][1]
+    length = math.hypot(across, down)
+    return (across / length, down / length) if length > 0 else None
 
 
 def without_spurs(skeleton: Mask, mask: Mask) -> Mask:
@@ -200,12 +181,13 @@ def extend_ends(skeleton: Mask, mask: Mask) -> Mask:
     """
     extended = skeleton.copy()
     trim = round(mean_radius(skeleton, mask))
+    walker = Walker(skeleton)
     for end in end_pixels(skeleton):
-        walked = walk_back(skeleton, end, trim + TANGENT_PX)
+        walked = walker.back(end, trim + TANGENT_PX)
         if len(walked) < 4:
             continue
         hook = min(trim, len(walked) - 4)
-        direction = _direction(np.array(walked[hook:], np.float64))
+        direction = _direction(walked[hook:])
         if direction is None:
             continue
         for x, y in walked[:hook]:

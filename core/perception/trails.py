@@ -114,24 +114,32 @@ def score(points: Points, length_share: float, config: PathConfig) -> float:
     """
     # Steps of one pixel only know multiples of 45 degrees; the paper's form takes them as they are.
     line = polyline.resample(points, config.step_px) if config.step_px > 1.0 else points
+    steps = _unit_steps(line)
     return (
         config.weight_length * length_share
-        + config.weight_smoothness * smoothness(line, config.cosine)
-        + config.weight_consistency * consistency(line, config.cosine)
+        + config.weight_smoothness * _smoothness(steps, config.cosine)
+        + config.weight_consistency * _consistency(line, steps, config.cosine)
     )
 
 
 def smoothness(line: Points, cosine: Literal["signed", "absolute"]) -> float:
     """Mean cosine of the change of direction at each inner point: 1 for a straight line."""
-    steps = _unit_steps(line)
-    if len(steps) < 2:
-        return 1.0
-    return _mean_cosine(np.einsum("ij,ij->i", steps[:-1], steps[1:]), cosine)
+    return _smoothness(_unit_steps(line), cosine)
 
 
 def consistency(line: Points, cosine: Literal["signed", "absolute"]) -> float:
     """Mean cosine between each step and the vector from start to end: 1 for a straight line, 0 for a closed one."""
-    steps = _unit_steps(line)
+    return _consistency(line, _unit_steps(line), cosine)
+
+
+def _smoothness(steps: Points, cosine: Literal["signed", "absolute"]) -> float:
+    if len(steps) < 2:
+        return 1.0
+    before, after = steps[:-1], steps[1:]
+    return _mean_cosine(before[:, 0] * after[:, 0] + before[:, 1] * after[:, 1], cosine)
+
+
+def _consistency(line: Points, steps: Points, cosine: Literal["signed", "absolute"]) -> float:
     chord = line[-1] - line[0]
     length = float(np.hypot(chord[0], chord[1]))
     if length == 0.0 or len(steps) == 0:
@@ -140,10 +148,11 @@ def consistency(line: Points, cosine: Literal["signed", "absolute"]) -> float:
 
 
 def _unit_steps(line: Points) -> Points:
-    steps = np.diff(line, axis=0)
+    steps = line[1:] - line[:-1]
     length = np.hypot(steps[:, 0], steps[:, 1])
-    return np.asarray(steps[length > 0] / length[length > 0, None])
+    moved = length > 0.0
+    return np.asarray(steps[moved] / length[moved, None])
 
 
 def _mean_cosine(cosines: NDArray[np.float64], cosine: Literal["signed", "absolute"]) -> float:
-    return float(np.mean(np.abs(cosines) if cosine == "absolute" else cosines))
+    return float((np.abs(cosines) if cosine == "absolute" else cosines).sum()) / len(cosines)

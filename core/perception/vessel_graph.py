@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import cv2
@@ -9,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import CleaningConfig
-from core.perception import pixel_graph, polyline
+from core.perception import bundle, pixel_graph, polyline
+from core.perception.bundle import Bundle
 from core.perception.junctions import Arm, rebuild
-from core.types import GraphEdge, Mask, Points, VesselGraph
+from core.types import GraphEdge, Mask, Point, Points, VesselGraph
 
+MAX_CHAINS = 200
+"""A vessel tree with all its spurs has some twenty to fifty chains of pixels; a skeleton of more is a mesh of noise."""
 STEP_PX = 2.0
 SMOOTHING_PX = 8.0
 """Standard deviation of the smoothing along the way: more than a radius of boundary noise, less than a bend."""
@@ -54,7 +58,7 @@ class _RadiusMap:
 
 
 def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGraph:
-    """The vessel graph of a skeleton.
+    """The vessel graph of a skeleton; empty where that is a mesh of more than ``MAX_CHAINS`` chains.
 
     Parameters
     ----------
@@ -63,6 +67,8 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
     config : whether spurs are pruned.
     """
     traced = pixel_graph.trace(skeleton)
+    if len(traced.chains) > MAX_CHAINS:
+        return VesselGraph(np.empty((0, 2)), ())
     radius = _RadiusMap(mask)
     lines = [_Line(chain.start, chain.end, chain.points) for chain in traced.chains]
     if config.prune_spurs:
@@ -72,9 +78,7 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
             if len(kept) == len(lines):
                 break
             lines = _merged(kept)
-    for line in lines:
-        line.points = _centred(line.points, radius)
-        line.radius = radius.at(line.points)
+    _centre(lines, radius)
     nodes = traced.nodes.copy()
     if config.rebuild_junctions:
         _rebuild_junctions(lines, nodes, radius)
@@ -85,41 +89,51 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
 
 def _straighten_ends(lines: list[_Line], nodes: Points, radius: _RadiusMap, shape: tuple[int, ...]) -> None:
     """Ends of vessels without the hook that thinning leaves there; at the image border they go on to the border."""
-    degrees = _degrees(lines, len(nodes))
+    degrees = _degrees(lines, len(nodes)).tolist()
+    changed = []
     for line in lines:
-        for node, backwards in ((line.start, True), (line.end, False)):
-            if degrees[node] != 1 or len(line.points) < 4:
-                continue
-            last = slice(None, RADIUS_POINTS) if backwards else slice(-RADIUS_POINTS, None)
-            own_radius = float(np.median(line.radius[last]))  # in the corner where the skeleton ends it would be nearly nothing
+        ends = [side for side, node in (("start", line.start), ("end", line.end)) if degrees[node] == 1 and len(line.points) >= 4]
+        for side in ends:
+            backwards = side == "start"
+            last = line.radius[:RADIUS_POINTS] if backwards else line.radius[-RADIUS_POINTS:]
+            own_radius = polyline.median(last)  # in the corner where the skeleton ends the radius would be nearly nothing
             points = _straight_end(line.points[::-1] if backwards else line.points, own_radius, shape)
             line.points = points[::-1] if backwards else points
-            line.radius = radius.at(line.points)
-            nodes[node] = points[-1]
+            nodes[line.start if backwards else line.end] = points[-1]
+            if backwards and len(ends) == 2:
+                line.radius = radius.at(line.points)  # the other end asks for it
+        if ends:
+            changed.append(line)
+    _measure(changed, radius)
 
 
 def _straight_end(points: Points, radius_px: float, shape: tuple[int, ...]) -> Points:
     trim = round(END_TRIM_RADII * radius_px / STEP_PX)
-    to_side = np.minimum(points, np.array([shape[1] - 1.0, shape[0] - 1.0]) - points).min(axis=1)
-    if to_side[-1] < 1.5 * radius_px:
-        trim = max(trim, int(np.argmax(to_side[::-1] >= BORDER_RADII * radius_px)))
+    right, bottom = shape[1] - 1.0, shape[0] - 1.0
+    x, y = points[-1].tolist()
+    if min(x, y, right - x, bottom - y) < 1.5 * radius_px:
+        to_side = np.minimum(points, (right, bottom) - points)
+        clear = np.minimum(to_side[::-1, 0], to_side[::-1, 1]) >= BORDER_RADII * radius_px
+        trim = max(trim, int(clear.argmax()))
     kept = points[: len(points) - min(trim, 2 * len(points) // 3)]
-    chord = kept[-1] - kept[max(len(kept) - 1 - round(max(radius_px, 10.0) / STEP_PX), 0)]
-    direction = chord / max(float(np.hypot(chord[0], chord[1])), 1e-9)
-    to_border = border_distance(kept[-1], direction, shape)
-    reach = to_border if to_border < 3.0 * radius_px else float(np.hypot(*(points[-1] - kept[-1])))
+    x, y = kept[-1].tolist()
+    from_x, from_y = kept[max(len(kept) - 1 - round(max(radius_px, 10.0) / STEP_PX), 0)].tolist()
+    length = max(math.hypot(x - from_x, y - from_y), 1e-9)
+    direction = (x - from_x) / length, (y - from_y) / length
+    to_border = border_distance((x, y), direction, shape)
+    reach = to_border if to_border < 3.0 * radius_px else math.dist(points[-1], (x, y))
     if reach < 0.5:
         return kept
     steps = np.append(np.arange(STEP_PX, reach, STEP_PX), reach)
-    return np.concatenate([kept, kept[-1] + steps[:, None] * direction])
+    return np.concatenate([kept, (x, y) + steps[:, None] * direction])
 
 
-def border_distance(place: Points, direction: Points, shape: tuple[int, ...]) -> float:
-    """How far it is from a place (2,) along a unit direction to the image's last row or column of pixels."""
+def border_distance(place: Point, direction: Point, shape: tuple[int, ...]) -> float:
+    """How far it is from a place along a unit direction to the image's last row or column of pixels."""
     limits = (shape[1] - 1.0, shape[0] - 1.0)
     reaches = [
         ((limit if step > 0 else 0.0) - start) / step
-        for start, step, limit in zip(place.tolist(), direction.tolist(), limits, strict=True)
+        for start, step, limit in zip(place, direction, limits, strict=True)
         if abs(step) > 1e-9
     ]
     return max(0.0, min(reaches, default=0.0))
@@ -211,11 +225,24 @@ def _merged(lines: list[_Line]) -> list[_Line]:
     return merged
 
 
-def _centred(points: Points, radius: _RadiusMap) -> Points:
-    even = polyline.smooth(polyline.resample(points, STEP_PX), SMOOTHING_PX / STEP_PX)
-    if len(even) < 3:
-        return even
-    normal = polyline.normals(even)
-    probe = 0.5 * radius.at(even)[:, None] * normal
-    shift = 0.5 * (radius.at(even + probe) - radius.at(even - probe))
-    return polyline.smooth(even + shift[:, None] * normal, SMOOTHING_PX / STEP_PX)
+def _centre(lines: list[_Line], radius: _RadiusMap) -> None:
+    """All lines made even, smooth and centred in the lumen, with the radius along them."""
+    even = bundle.smooth(bundle.resample(Bundle.of([line.points for line in lines]), STEP_PX), SMOOTHING_PX / STEP_PX)
+    normal = bundle.normals(even)
+    probe = 0.5 * radius.at(even.points)[:, None] * normal
+    wider, narrower = np.split(radius.at(np.concatenate([even.points + probe, even.points - probe])), 2)
+    counts = np.diff(even.starts)
+    # A line of one or two points has no inner point to centre.
+    shift = np.where(np.repeat(counts, counts) < 3, 0.0, 0.5 * (wider - narrower))
+    centred = bundle.smooth(Bundle(even.points + shift[:, None] * normal, even.starts), SMOOTHING_PX / STEP_PX)
+    for line, points in zip(lines, centred.split(centred.points), strict=True):
+        line.points = points
+    _measure(lines, radius)
+
+
+def _measure(lines: list[_Line], radius: _RadiusMap) -> None:
+    """The radius along some lines as they are now."""
+    if lines:
+        whole = Bundle.of([line.points for line in lines])
+        for line, values in zip(lines, whole.split(radius.at(whole.points)), strict=True):
+            line.radius = values

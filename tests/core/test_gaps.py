@@ -103,3 +103,9 @@ def test_the_input_is_not_written_to() -> None:
     before = broken.copy()
     assert len(repaired(broken, GapConfig()).bridges) == 1
     assert (broken == before).all()
+
+
+def test_noise_with_hundreds_of_ends_is_left_as_it_is() -> None:
+    many = rows(*((row, first, first + 9) for row in range(2, 60, 6) for first in range(0, 150, 15)))
+    assert repaired(many, GapConfig()).bridges == ()
+    assert repaired(many[:30], GapConfig()).bridges != ()

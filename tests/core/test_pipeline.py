@@ -6,7 +6,8 @@ import pytest
 
 from core.config import PerceptionConfig, TrackingConfig
 from core.learning.model_file import ModelInfo
-from core.perception.pipeline import NoPerception, Pipeline
+from core.perception.pipeline import NoPerception, Pipeline, Sight, open_pipeline
+from core.perception.segmentation import Mirrored, open_segmenter
 from core.types import Frame, Image, Points, Reason, Scene
 from tests.core.drawing import SIZE, curve, depth, probability
 
@@ -99,6 +100,27 @@ def test_a_refusal_keeps_what_was_found_before_it(pipeline: Pipeline, network: D
 
 STEM = [(-20.0, 240.0), (120.0, 240.0), (200.0, 240.0)]
 UP, DOWN = curve(*STEM, (260, 215), (330, 180)), curve(*STEM, (260, 265), (330, 300))
+
+
+@pytest.mark.parametrize(
+    ("which", "pitch_px", "expected", "reached"),
+    [
+        ("vessel", 4, Reason.NO_VESSEL, "masks"),
+        ("robot", 4, Reason.NO_ROBOT, "masks"),
+        ("vessel", 40, Reason.NO_VESSEL, "graph"),
+        ("robot", 40, Reason.AMBIGUOUS_PATH, "path"),
+    ],
+)
+def test_a_hopeless_mask_is_refused_by_name_and_early(
+    pipeline: Pipeline, network: DrawnNetwork, which: str, pitch_px: int, expected: Reason, reached: str
+) -> None:
+    net = np.zeros((SIZE[1], SIZE[0]), np.float32)
+    for width in range(max(1, pitch_px // 8)):
+        net[width::pitch_px] = net[:, width::pitch_px] = 1.0
+    setattr(network, which, net)
+    scene = pipeline.perceive_single(frame())
+    assert reason(scene) is expected
+    assert list(scene.latency_ms)[-2] == reached
 
 
 def test_the_last_frame_decides_in_a_stream_and_not_in_a_single_image(pipeline: Pipeline, network: DrawnNetwork) -> None:
@@ -205,3 +227,53 @@ def test_without_a_model_every_frame_is_refused_with_what_to_do() -> None:
     assert str(scene.refusal) == "no model: no model 'x'; known: default"
     assert reason(scene) is Reason.NO_MODEL
     assert (scene.source_size, scene.captured_s, scene.latency_ms) == ((800, 600), 1.0, {"total": 0.0})
+
+
+class _LooksLeft:
+    """A network with a bias: it sees the vessel in the left half of whatever it is shown."""
+
+    engine = "biased"
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        self.calls += 1
+        vessel = np.zeros(image.shape[:2], np.float32)
+        vessel[:, : image.shape[1] // 2] = 1.0
+        return vessel, np.zeros_like(vessel)
+
+
+def test_a_picture_and_its_mirror_image_are_averaged() -> None:
+    vessel, robot = Mirrored(_LooksLeft())(np.zeros((4, 6, 3), np.uint8))
+    assert np.array_equal(vessel, np.full((4, 6), 0.5, np.float32))
+    assert vessel.dtype == robot.dtype == np.float32
+
+
+def test_single_pictures_may_be_looked_at_twice_while_a_stream_is_not() -> None:
+    network = _LooksLeft()
+    pipeline = Pipeline(network, CONFIG, None, Sight(Mirrored(network)))
+    pipeline(frame())
+    assert network.calls == 1
+    pipeline.perceive_single(frame())
+    assert network.calls == 3
+
+
+@pytest.mark.parametrize(("mirrored", "stream", "single"), [("pictures", 1, 2), ("always", 2, 2), ("never", 1, 1)])
+def test_the_configuration_says_what_is_mirrored(mirrored: str, stream: int, single: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = PerceptionConfig.model_validate({"segmentation": {"mirrored": mirrored}})
+    pipeline = open_pipeline(config)
+    seen: list[tuple[int, ...]] = []
+    segmenter = type(open_segmenter(config.segmentation))
+    call = segmenter.__call__
+
+    def counted(self: object, image: np.ndarray) -> object:
+        seen.append(image.shape)
+        return call(self, image)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(segmenter, "__call__", counted)
+    image = np.random.default_rng(0).integers(60, 200, (120, 160, 3), dtype=np.uint8)
+    pipeline(Frame(0, 0.0, image))
+    assert len(seen) == stream
+    pipeline.perceive_single(Frame(0, 0.0, image))
+    assert len(seen) - stream == single

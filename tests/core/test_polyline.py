@@ -49,3 +49,14 @@ def test_more_places_than_opencv_takes_at_once_are_sampled_too() -> None:
     places = np.zeros((700, 100, 2))
     places[..., 0] = np.linspace(0.0, 7.0, 70_000).reshape(700, 100)
     np.testing.assert_allclose(polyline.sample(ramp, places), places[..., 0], atol=0.02)
+
+
+@pytest.mark.parametrize("values", [[3.0], [4.0, 1.0], [5.0, 2.0, 9.0], [1.0, 8.0, 2.0, 4.0]])
+def test_the_median_of_a_few_numbers(values: list[float]) -> None:
+    assert polyline.median(np.array(values)) == np.median(values)
+
+
+def test_a_known_arc_length_need_not_be_given_again_and_changes_nothing() -> None:
+    along = polyline.arc_length(CORNER)
+    assert polyline.cut(CORNER, 20.0, 35.0, along).tolist() == polyline.cut(CORNER, 20.0, 35.0).tolist()
+    assert polyline.nearest(CORNER, (33.0, 44.0), along) == polyline.nearest(CORNER, (33.0, 44.0))

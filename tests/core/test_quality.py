@@ -5,7 +5,7 @@ import pytest
 from core.config import PerceptionConfig, QualityConfig
 from core.perception import quality
 from core.perception.tracking import Memory, check_jump, recall
-from core.types import Centerline, Masks, Points, Reason, Refusal, RobotPath
+from core.types import Centerline, GraphEdge, Masks, Points, Reason, Refusal, RobotPath, VesselGraph
 
 CONFIG = PerceptionConfig()
 LIMITS = CONFIG.quality
@@ -89,6 +89,29 @@ def test_empty_masks_say_which() -> None:
     no_robot = quality.check_masks(Masks(found.vessel, nothing, found.vessel_probability, found.robot_probability * 0.3))
     assert str(no_vessel) == "no vessel: highest vessel probability 0.40"
     assert str(no_robot) == "no robot: highest robot probability 0.30"
+
+
+def test_a_mask_of_which_cleaning_left_nothing_is_called_specks() -> None:
+    found, nothing = masks(), np.zeros(SHAPE, bool)
+    refusal = quality.check_masks(Masks(nothing, found.robot, found.vessel_probability, found.robot_probability))
+    assert str(refusal) == "no vessel: highest vessel probability 1.00, but only in specks"
+
+
+def test_what_covers_half_of_the_image_is_no_robot() -> None:
+    found, everywhere = masks(), np.ones(SHAPE, bool)
+    everywhere[: SHAPE[0] // 2] = False
+    refusal = quality.check_masks(Masks(found.vessel, everywhere, found.vessel_probability, found.robot_probability))
+    assert str(refusal) == "no robot: what looks like it covers 50 % of the image (at most 30 %)"
+
+
+def test_no_graph_is_no_vessel_where_the_graph_is_asked() -> None:
+    nothing = VesselGraph(np.empty((0, 2)), ())
+    some = VesselGraph(LINE[[0, -1]], (GraphEdge(0, 1, LINE, np.full(len(LINE), 20.0)),))
+    refusal = quality.check_graph(nothing, CONFIG.vectors)
+    assert refusal is not None
+    assert refusal.reason is Reason.NO_VESSEL
+    assert quality.check_graph(some, CONFIG.vectors) is None
+    assert quality.check_graph(nothing, CONFIG.vectors.model_copy(update={"vessel_rule": "window"})) is None
 
 
 @pytest.mark.parametrize(

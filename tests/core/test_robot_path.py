@@ -180,6 +180,17 @@ def test_without_port_the_end_at_the_end_of_the_vessel_is_the_tail() -> None:
     assert path_of(backwards, vessel=probability(depth(vessel, 20.0))).head == pytest.approx(tuple(vessel[-260]), abs=1.0)
 
 
+def test_a_head_that_stops_short_of_the_border_is_the_head_of_a_robot_from_outside_the_vessel() -> None:
+    vessel = probability(depth(curve((180, 240), (300, 240), (700, 240)), 22.0))
+    for head_x in (610.0, 634.0):  # far from the border, and 5 px from it
+        path = path_of(probability(depth(curve((60, 240), (300, 243), (head_x, 240)), 4.0)), vessel=vessel)
+        assert path.head[0] == pytest.approx(head_x, abs=2.0)
+        assert not path.entry_on_border
+    # A robot that meets the border comes from there, even if the vessel was not seen around its other end.
+    robot = probability(depth(curve((60, 240), (300, 243), (660, 240)), 4.0))
+    assert path_of(robot, vessel=vessel).tail[0] > 630.0
+
+
 def test_the_end_outside_the_vessel_is_the_tail() -> None:
     vessel = curve((200, 240), (300, 230), (400, 250), (560, 300))
     robot = probability(depth(np.concatenate([[[120.0, 300.0]], vessel[:180]]), 4.0))
@@ -247,6 +258,18 @@ def mesh(pitch_px: int, until_px: int = 640) -> np.ndarray:
 def test_a_mesh_is_not_searched_for_a_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot_path.trails, "explore", lambda *_: pytest.fail("searched"))
     refusal = perceive(mesh(60))
+    assert isinstance(refusal, Refusal)
+    assert refusal.reason is Reason.AMBIGUOUS_PATH
+    assert "mesh" in refusal.detail
+
+
+def test_hundreds_of_pieces_are_not_even_sorted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_path, "find_pieces", lambda *_: pytest.fail("sorted"))
+    specks = np.zeros((SIZE[1], SIZE[0]), np.float32)
+    for x in range(20, 620, 36):
+        for y in range(20, 460, 36):
+            cv2.line(specks, (x, y), (x + 14, y + 3 * (x % 5)), 1.0, 5)
+    refusal = perceive(specks)
     assert isinstance(refusal, Refusal)
     assert refusal.reason is Reason.AMBIGUOUS_PATH
     assert "mesh" in refusal.detail

@@ -5,16 +5,8 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter, label
 
 from core.config import CleaningConfig, PerceptionConfig
-from core.perception.skeleton import (
-    end_direction,
-    end_pixels,
-    extend_ends,
-    thin,
-    thin_half_size,
-    thin_masks,
-    walk_back,
-    without_spurs,
-)
+from core.perception.skeleton import end_direction, end_pixels, extend_ends, thin_masks, walk_back, without_spurs
+from core.perception.thinning import thin, thin_half_size, thin_parts
 from core.types import Mask
 from tests.core.drawing import art, curve, depth, everywhere, masks_of, picture, probability
 
@@ -60,6 +52,22 @@ def test_half_size_thinning_keeps_loops_and_narrow_walls(shape: tuple[int, int])
     assert skeleton.shape == mask.shape
     assert topology(skeleton) == topology(mask) == (2, 1)
     assert not (skeleton & ~mask).any()
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10**6), sigma=st.floats(3.0, 9.0), share=st.floats(0.6, 0.99))
+def test_thinning_part_by_part_is_thinning_all_at_once(seed: int, sigma: float, share: float) -> None:
+    noise = gaussian_filter(np.random.default_rng(seed).random((160, 240)), sigma)
+    mask = noise > np.quantile(noise, share)
+    assert np.array_equal(thin_parts(mask), thin(mask))
+
+
+def test_a_tangle_of_noise_is_thinned_and_no_more() -> None:
+    comb = np.zeros((480, 640), np.float32)
+    comb[200:206] = 1.0
+    comb[180:226, 10::6] = 1.0  # some hundred teeth to each side
+    masks = masks_of(everywhere(), comb)
+    assert picture(thin_masks(masks, PerceptionConfig()).robot) == picture(thin(masks.robot))
 
 
 def test_half_size_thinning_finds_the_same_middle() -> None:
