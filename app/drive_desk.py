@@ -76,9 +76,16 @@ class DriveDesk(QObject):
         self._timer.start()
 
     def reset(self) -> None:
-        """Let go of everything, for a rig that is being opened."""
+        """Let go of everything, and let nobody drive, for a rig that is being opened."""
+        self.halt()
         self.jog.release_all()
         self.deadman.release()
+
+    def halt(self) -> None:
+        """Nobody drives any more: the rig is about to be closed."""
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.halt()
 
     def detach(self) -> None:
         """Let go, look and listen no more."""
@@ -101,40 +108,42 @@ class DriveDesk(QObject):
         if pilot is not None:
             pilot.ask(act)
             self._panels.log(EventKind.OPERATOR, act.value)
+        elif act is Act.STOP:
+            self._panels.log(EventKind.OPERATOR, "stop: no rig is open, so nothing moves")
 
     @Slot()
     def stop(self) -> None:
-        """STOP, from any thread's point of view at once."""
+        """STOP, before anything else."""
+        self.ask(Act.STOP)
         self.jog.release_all()
         self.deadman.release()
-        self.ask(Act.STOP)
 
     @Slot()
     def switch_on(self) -> None:
         pilot = self._thread.pilot
         if pilot is not None:
-            pilot.requests.switch_on()
+            pilot.switch_on()
             self._panels.log(EventKind.OPERATOR, "servos on")
 
     @Slot(int)
     def reboot(self, servo_id: int) -> None:
         pilot = self._thread.pilot
         if pilot is not None:
-            pilot.requests.reboot(servo_id)
+            pilot.reboot(servo_id)
             self._panels.log(EventKind.OPERATOR, f"restart servo {servo_id}")
 
     @Slot(object)
     def zero(self, names: Sequence[JointName] | None) -> None:
         pilot = self._thread.pilot
         if pilot is not None:
-            pilot.requests.zero(names)
+            pilot.zero(names)
             self._panels.log(EventKind.OPERATOR, f"zero {', '.join(names) if names else 'all servos'}")
 
     @Slot()
     def torque_off(self) -> None:
         pilot = self._thread.pilot
         if pilot is not None:
-            pilot.requests.torque_off()
+            pilot.torque_off()
             self._panels.log(EventKind.OPERATOR, "torque off")
 
     def drive(self, jog: Jog) -> None:

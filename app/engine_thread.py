@@ -28,6 +28,8 @@ class EngineLike(Protocol):
     @property
     def pilot(self) -> Pilot | None: ...
     def step(self, timeout_s: float) -> Tick | None: ...
+    @property
+    def problem(self) -> str | None: ...
     def bus_status(self) -> BusStatus | None: ...
     def set_target(self, target_px: Point | None) -> None: ...
     def close(self) -> None: ...
@@ -94,6 +96,12 @@ class EngineThread(QThread):
         engine = self._engine
         return engine.pilot if engine is not None else None
 
+    @property
+    def problem(self) -> str | None:
+        """Why there are no pictures although the rig is open; None when nothing is known to be wrong."""
+        engine = self._engine
+        return engine.problem if engine is not None else None
+
     def bus_status(self) -> BusStatus | None:
         """The newest status of the servo bus; None where there is none."""
         engine = self._engine
@@ -138,8 +146,10 @@ class EngineThread(QThread):
                 self._report(EngineStatus(Phase.RUNNING))
                 self._turn(engine)
         finally:
-            self._engine = None
-            engine.close()
+            try:
+                engine.close()  # STOP still finds its way meanwhile
+            finally:
+                self._engine = None
 
     def _turn(self, engine: EngineLike) -> None:
         while not self._changed.is_set():

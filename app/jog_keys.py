@@ -130,14 +130,16 @@ class JogKeys(QObject):
         return False
 
     def _on_press(self, watched: QObject, event: QKeyEvent) -> bool:
-        if not isinstance(watched, QWidget) or watched.window() is not self._window or event.modifiers() & _OTHER_MODIFIERS:
+        if not isinstance(watched, QWidget):
             return False
         key = Qt.Key(event.key())
-        if key == _STOP_KEY:
+        if key == _STOP_KEY:  # wherever it goes to: menus, lists and dialogs too, and with whatever is held beside it
             if not event.isAutoRepeat():
-                self.release_all()
                 self.stop_pressed.emit()
+                self.release_all()
             return True
+        if watched.window() is not self._window or event.modifiers() & _OTHER_MODIFIERS:
+            return False
         motion = _MOTION_OF_KEY.get(key)
         # A field keeps its letters and arrows, and what it does not use must not reach the robot by way of its parent.
         if motion is None or isinstance(self._window.focusWidget(), QAbstractSpinBox | QLineEdit):

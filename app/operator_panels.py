@@ -55,7 +55,7 @@ class OperatorPanels(QWidget):
         super().__init__()
         limits, pixels_per_mm = config.perception.pose, config.policy.pursuit.pixels_per_mm
         self._servo_config = config.servos
-        self.banner = SimBanner(kind)
+        self.banner = SimBanner(kind, has_servos=config.rig.robot != "none")
         self.mode = ModeBadge()
         self.picker = PhantomPicker(phantoms, config.twin.phantom) if phantoms else None
         self.live = LiveView(pixels_per_mm)

@@ -292,9 +292,11 @@ class OperatorWindow(QMainWindow):
         age_s = time.monotonic() - self._shown_s
         if self._phase is Phase.RUNNING and self._tick is not None and age_s > self._stale_after_s:
             self._is_stale = True
-            self._panels.blank("No new picture", "Check the camera; F5 starts the rig again")
+            problem = self._thread.problem
+            self._panels.blank("No new picture", problem or "Check the camera; F5 starts the rig again")
             notice = f"No new picture for {age_s:.0f} s"
-            self._panels.notice.show_notice(NoticeKind.WARNING, notice, "The camera or the program is behind")
+            detail = problem or "The camera or the program is behind"
+            self._panels.notice.show_notice(NoticeKind.WARNING, notice, detail, restartable=problem is not None)
 
     # ---- the operator
 
@@ -387,6 +389,7 @@ class OperatorWindow(QMainWindow):
         if self._is_shut:
             return
         self._is_shut = True
+        self._desk.halt()
         self._desk.detach()
         for timer in (self._check, self._show_later):
             timer.stop()
@@ -403,7 +406,7 @@ class OperatorWindow(QMainWindow):
         if not has_ended:
             _log.error("the rig's driver did not return within %g s; leaving without it", _STOP_WITHIN_MS / 1000)
         if not (has_ended and has_saved):
-            os._exit(1)  # Qt would abort on a thread that still runs, or wait for it for ever; the robot was told to stop above
+            os._exit(1)  # Qt would abort on a thread that still runs, or wait for it for ever; nobody drives it since the first line above
 
 
 def _keys_of(step: Step) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ class RigEngine(Engine):
         super().__init__(rig.camera, perceive, policy, rig.close, pilot, rig.robot)
         self._servos = rig.robot if isinstance(rig.robot, ServoRobot) else None
         if pilot is not None and rig.kind is RigKind.SIM:
-            pilot.requests.switch_on()  # there is nobody whom the twin could hurt
+            pilot.switch_on()  # there is nobody whom the twin could hurt
 
     def bus_status(self) -> BusStatus | None:
         """None where there is no servo bus, and before its first status."""

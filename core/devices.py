@@ -28,6 +28,10 @@ class Camera(Protocol):
     def close(self) -> None: ...
 
 
+class CameraLost(DeviceError):
+    """A camera gives no more frames, and looks for itself: ``read`` raises this until it is back, and then gives frames again."""
+
+
 class EndOfStream(DeviceError):
     """A recorded source has no more frames."""
 

@@ -24,11 +24,15 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One camera image. ``captured_s`` is ``time.monotonic()`` at capture (or simulated time in lock-step)."""
+    """One camera image. ``captured_s`` is ``time.monotonic()`` at capture (or simulated time in lock-step).
+
+    ``index`` counts the frames that the camera gave; ``lost`` those that it took but that never arrived, since it was opened.
+    """
 
     index: int
     captured_s: float
     image: Image
+    lost: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

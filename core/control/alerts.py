@@ -110,7 +110,7 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Note.AT_END: ("A joint is at the end of its travel", "drive the other way"),
     Hindrance.IS_STOPPED: ("Stopped", "acknowledge the stop first"),
     Hindrance.UNACKNOWLEDGED: ("A fault is not acknowledged", "read it and acknowledge it"),
-    Hindrance.ALREADY_ARMED: ("Already armed", "choose a destination and hand over"),
+    Hindrance.ALREADY_ARMED: ("Armed", "hand over to a destination; disarm first for anything else"),
     Hindrance.CAMERA_SETTLING: ("The camera is not well for long enough", "wait a second"),
     Hindrance.PERCEPTION_SETTLING: ("Perception is not well for long enough", "wait until the pose is steady for a second"),
     Hindrance.SERVOS_UNCHECKED: ("The servos are off", "switch them on; that checks them, too"),

@@ -16,7 +16,8 @@ class BusReport:
     """One cycle of the bus; tuples are per joint, in the order of JOINT_NAMES, and empty when not read in this cycle.
 
     ``misses`` are answers missed in a row by now; ``errors`` the bad packets (CRC, garbage, short) since the last report, after the
-    retry; ``hardware_errors`` the servos' register 70; ``tracking_mm`` goal minus measured position.
+    retry; ``hardware_errors`` the servos' register 70; ``tracking_mm`` goal minus measured position; ``armed`` whether the bus
+    process follows orders, and ``ended`` why it does not any more.
     """
 
     port_open: bool = True
@@ -28,11 +29,13 @@ class BusReport:
     tracking_mm: Sequence[float] = ()
     rebooted: bool = False
     watchdog_tripped: bool = False
+    armed: bool = True
+    ended: Fault | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class BusWatch:
-    """What is remembered of the bus. What a report leaves out keeps its last reading."""
+    """What is remembered of the bus. What a report leaves out keeps its last reading. ``disarmed_run`` counts reports in a row."""
 
     seen_s: float | None = None
     newest: BusReport = BusReport()
@@ -40,6 +43,7 @@ class BusWatch:
     astray_since_s: float | None = None
     astray: str = ""
     rebooted: bool = False
+    disarmed_run: int = 0
 
 
 def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConfig, safety: SafetyConfig) -> BusWatch:
@@ -57,12 +61,18 @@ def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConf
         temperatures_c=report.temperatures_c or old.temperatures_c,
         voltages_v=report.voltages_v or old.voltages_v,
     )
-    return BusWatch(now_s, newest, errors, since_s, astray, watch.rebooted or report.rebooted)
+    disarmed_run = 0 if report.armed else watch.disarmed_run + 1
+    return BusWatch(now_s, newest, errors, since_s, astray, watch.rebooted or report.rebooted, disarmed_run)
+
+
+def excused(watch: BusWatch, now_s: float) -> BusWatch:
+    """The watch of a bus that is busy with a request: it counts as heard."""
+    return replace(watch, seen_s=now_s)
 
 
 def checked(watch: BusWatch) -> BusWatch:
     """The watch after all servos were found, checked and, if restarted, zeroed."""
-    return replace(watch, rebooted=False)
+    return replace(watch, rebooted=False, disarmed_run=0)
 
 
 def _beyond(tracking_mm: Sequence[float], limit_mm: float) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from core.policy_config import DriveConfig
 from core.types import Advice, Command
 
@@ -18,9 +20,10 @@ class Drive:
         self._config = config
         self.take_over(bend)
 
-    def take_over(self, bend: float) -> None:
+    def take_over(self, bend: float, pitch: float = 0.0) -> None:
         """Start from the bend (-1..1) that the robot has now, at rest; the first command moves nothing."""
         self._bend = self._integral = _limited(bend, 1.0)
+        self._pitch = _limited(pitch, 1.0)
         self._advance_mm_s = 0.0
         self._last_s: float | None = None
 
@@ -29,9 +32,9 @@ class Drive:
         config = self._config
         elapsed_s = 0.0 if self._last_s is None else min(max(0.0, now_s - self._last_s), config.max_gap_s)
         self._last_s = now_s
-        if advice is None:
+        if advice is None or not math.isfinite(advice.steer_deg + advice.advance_mm_s):
             self._advance_mm_s, self._integral = 0.0, self._bend
-            return Command(bend=self._bend)
+            return Command(bend=self._bend, pitch=self._pitch)
         turn = advice.steer_deg / config.turn_deg
         integral = self._integral + turn * elapsed_s / config.integral_s
         wanted = integral + config.proportional * turn
@@ -42,7 +45,7 @@ class Drive:
         self._integral = self._integral if held_back else _limited(integral, 1.0)
         self._bend = bend
         self._advance_mm_s = self._feed(advice.advance_mm_s, elapsed_s)
-        return Command(bend=bend, advance_mm_s=self._advance_mm_s)
+        return Command(bend=bend, pitch=self._pitch, advance_mm_s=self._advance_mm_s)
 
     def _feed(self, wanted_mm_s: float, elapsed_s: float) -> float:
         """Speeding up is gradual; slowing down, and stopping before a reversal, is not."""

@@ -10,7 +10,6 @@ from core.control.gate_checks import Source
 from core.control.modes import Hindrance, Mode
 from core.types import Advice, Command
 
-
 _REST = Command()
 
 

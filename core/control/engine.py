@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
+from core.control.faults import Cause, Fault
 from core.control.pilot import Pilot
 from core.control.pilot_loop import PilotLoop
-from core.devices import Camera, DeviceError, Robot
+from core.devices import Camera, CameraLost, DeviceError, EndOfStream, Robot
 from core.types import Advice, Frame, Point, RobotStatus, Scene, Tick
 
 
@@ -47,6 +49,7 @@ class Engine:
         self._on_close = on_close
         self._robot = robot
         self.pilot = pilot
+        self.problem: str | None = None
         self._loop = PilotLoop(pilot) if pilot is not None else None
         self._lock = threading.Lock()
         self._target: Point | None = None
@@ -55,10 +58,21 @@ class Engine:
         self._times: deque[float] = deque(maxlen=30)
 
     def step(self, timeout_s: float) -> Tick | None:
-        """One turn; None when no new frame came in time. Raises DeviceError when a device is lost or driving failed."""
+        """One turn; None when no new frame came in time.
+
+        A camera that is lost and looks for itself does not end the turns, and one that is lost for good only where there is nobody
+        to drive: who has a robot in a vessel must be able to bring it back by hand. ``problem`` then says what is the matter.
+
+        Raises
+        ------
+        EndOfStream
+            A recording is over.
+        DeviceError
+            The camera is lost for good and there is no pilot, or driving failed.
+        """
         if self._loop is not None and self._loop.failure is not None:
             raise DeviceError(self._loop.failure)
-        frame = self._camera.read(timeout_s)
+        frame = self._read(timeout_s)
         if frame is None:
             if self.pilot is not None:
                 self.pilot.worker_alive()
@@ -76,6 +90,24 @@ class Engine:
             advice = self.pilot.see(frame, scene, status, has_target=target is not None)
             sent = self.pilot.view.sent
         return Tick(frame, scene, advice, sent, status, self._dropped, self._rate())
+
+    def _read(self, timeout_s: float) -> Frame | None:
+        before_s = time.monotonic()
+        try:
+            frame = self._camera.read(timeout_s)
+        except EndOfStream:
+            raise
+        except DeviceError as error:
+            if self.pilot is None and not isinstance(error, CameraLost):
+                raise
+            self.problem = str(error)
+            if self.pilot is not None:
+                self.pilot.report(Fault(Cause.CAMERA_LOST, self.problem))
+            time.sleep(max(0.0, timeout_s - (time.monotonic() - before_s)))
+            return None
+        if frame is not None:
+            self.problem = None
+        return frame
 
     def _status(self) -> RobotStatus | None:
         """None also when the robot was lost: pictures go on, and the pilot says what happened."""

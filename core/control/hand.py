@@ -10,6 +10,7 @@ from core.policy_config import HandConfig
 from core.types import Command
 
 _LONGEST_STEP_S = 0.1
+_AHEAD = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,10 @@ def combined(jogs: Iterable[Jog]) -> Jog:
 
 
 class Hand:
-    """Bend and pitch move while they are held and stay when let go; advance and delivery are speeds, zero when nothing is held."""
+    """Bend and pitch move while they are held and stay when let go; advance and delivery are speeds, zero when nothing is held.
+
+    What is asked for runs ahead of the robot by ``_AHEAD`` at most, so that letting go of a robot that does not follow ends it.
+    """
 
     def __init__(self, config: HandConfig) -> None:
         self._config = config
@@ -58,8 +62,8 @@ class Hand:
         self._bend, self._pitch = _limited(bend, 1.0), _limited(pitch, 1.0)
         self._last_s: float | None = None
 
-    def command(self, jog: Jog, now_s: float) -> Command:
-        """The motion for this moment; `now_s` is monotonic."""
+    def command(self, jog: Jog, now_s: float, at: Command | None = None) -> Command:
+        """The motion for this moment; `now_s` is monotonic, `at` where the robot was told to be last (None: not known)."""
         config = self._config
         elapsed_s = 0.0 if self._last_s is None else min(max(0.0, now_s - self._last_s), _LONGEST_STEP_S)
         self._last_s = now_s
@@ -67,8 +71,12 @@ class Hand:
         if jog.straighten:
             self._bend -= _limited(self._bend, step)
             self._pitch -= _limited(self._pitch, step)
-        self._bend = _limited(self._bend + step * _limited(jog.bend, 1.0), 1.0)
-        self._pitch = _limited(self._pitch + step * _limited(jog.pitch, 1.0), 1.0)
+        else:
+            self._bend = _limited(self._bend + step * _limited(jog.bend, 1.0), 1.0)
+            self._pitch = _limited(self._pitch + step * _limited(jog.pitch, 1.0), 1.0)
+        if at is not None:
+            self._bend = at.bend + _limited(self._bend - at.bend, _AHEAD)
+            self._pitch = at.pitch + _limited(self._pitch - at.pitch, _AHEAD)
         return Command(
             bend=self._bend,
             pitch=self._pitch,

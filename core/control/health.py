@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from core.control.bus_watch import BusReport, BusWatch, bus_faults, checked, see_bus
-from core.control.faults import Cause, Fault
+from core.control.bus_watch import BusReport, BusWatch, bus_faults, checked, excused, see_bus
+from core.control.faults import AREA, Area, Cause, Fault
 from core.control.frame_watch import FrameArrived, FrameReport, FrameWatch, RouteState, frame_faults, see_arrival, see_frame
 from core.control.gate_checks import RejectReason
 from core.safety_config import SafetyConfig
@@ -50,13 +50,35 @@ class ServosChecked:
 
 
 @dataclass(frozen=True, slots=True)
+class ServosOff:
+    """The operator has something done to the servos that takes them time; nobody drives until they were checked again."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServosBusy:
+    """The bus does what it was asked for and tells nothing meanwhile; its silence is none. Said again and again."""
+
+
+@dataclass(frozen=True, slots=True)
 class GateReport:
     """What the gate said to the program's last request; None: it went through."""
 
     rejection: RejectReason | None
 
 
-Report = FrameReport | FrameArrived | BusReport | Beat | DeadmanReport | ModelReport | ServosChecked | GateReport | Fault
+Report = (
+    FrameReport
+    | FrameArrived
+    | BusReport
+    | Beat
+    | DeadmanReport
+    | ModelReport
+    | ServosChecked
+    | ServosOff
+    | ServosBusy
+    | GateReport
+    | Fault
+)
 
 _NOT_THE_PROGRAMS_FAULT = frozenset({RejectReason.NOT_ARMED, RejectReason.WRONG_SOURCE})
 _BROKEN = frozenset(
@@ -107,7 +129,7 @@ def take(health: Health, report: Report, *, armed: bool, now_s: float, servos: S
         case FrameArrived(captured_s):
             return replace(health, frames=see_arrival(health.frames, captured_s, now_s))
         case BusReport():
-            return replace(health, bus=see_bus(health.bus, report, now_s, servos, safety))
+            return _see_bus(replace(health, bus=see_bus(health.bus, report, now_s, servos, safety)), safety)
         case Beat(Part.WINDOW):
             return replace(health, window_s=now_s)
         case Beat():
@@ -119,10 +141,24 @@ def take(health: Health, report: Report, *, armed: bool, now_s: float, servos: S
         case ServosChecked(problems):
             bus = health.bus if problems else checked(health.bus)
             return replace(health, servo_problems=problems, bus=bus)
+        case ServosOff():
+            return replace(health, servo_problems=None, bus=checked(health.bus))
+        case ServosBusy():
+            return health if health.servos_ready else replace(health, bus=excused(health.bus, now_s))
         case GateReport(rejection):
             return _see_gate(health, rejection) if armed else health
         case Fault():
             return replace(health, reported=(*health.reported, report))
+
+
+def _see_bus(health: Health, safety: SafetyConfig) -> Health:
+    """Servos that were on, and that the bus process has disarmed by itself, are off: with its reason."""
+    if not health.servos_ready or health.bus.disarmed_run < safety.missed_answers:
+        return health
+    ended = health.bus.newest.ended or Fault(Cause.SERVOS_WRONG, "the servo process is not armed")
+    if AREA[ended.cause] not in {Area.SERVOS, Area.OPERATOR}:
+        ended = Fault(Cause.WATCHDOG, f"{ended.cause.value}, {ended.detail}" if ended.detail else ended.cause.value)
+    return replace(health, servo_problems=None, reported=(*health.reported, ended))
 
 
 def _see_deadman(deadman: Deadman, pressed: bool, armed: bool, now_s: float, safety: SafetyConfig) -> Deadman:

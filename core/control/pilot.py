@@ -9,28 +9,29 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
 
 from core.config import Config
-from core.control.alerts import Alert, AlertKey, AlertQueue, Note, raise_alerts
+from core.control.alerts import ALERTS, Alert, AlertKey, AlertQueue, Note, raise_alerts
 from core.control.command_latency import CommandLatency
 from core.control.drive import Drive
 from core.control.drive_view import DriveNews, DriveView
 from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
 from core.control.follow import Follow
-from core.control.frame_reports import FrameReports
+from core.control.frame_reports import FrameReports, is_finite
 from core.control.frame_watch import FrameArrived, RouteState
 from core.control.gate_checks import RejectReason, Source
 from core.control.guarded_robot import GuardedRobot, SentMotion
-from core.control.hand import Hand, Jog
-from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Part
-from core.control.inbox import Inbox, Inputs
+from core.control.hand import AT_REST, Hand, Jog
+from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Part, ServosBusy
+from core.control.inbox import Inbox, Inputs, Seen
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Hindrance, Mode, SupervisorState
 from core.control.policies import Policy
 from core.control.servo_requests import ServoRequests
 from core.control.supervisor import hindrances, supervise
 from core.devices import DeviceError
+from core.servo_config import JointName
 from core.types import Advice, Command, Frame, RobotStatus, Scene
 
 PERIOD_S = 0.02
@@ -39,15 +40,6 @@ _MOST_ALERTS = 200
 _NOT_WORTH_A_WORD = frozenset(
     {RejectReason.NOT_ARMED, RejectReason.WRONG_SOURCE, RejectReason.NO_COMMAND, RejectReason.OUT_OF_ORDER}
 )
-
-
-@dataclass(frozen=True, slots=True)
-class _Seen:
-    """The newest frame that was understood."""
-
-    captured_s: float
-    advice: Advice | None
-    arrived: bool
 
 
 class Pilot:
@@ -67,19 +59,21 @@ class Pilot:
     ) -> None:
         self._robot, self._policy, self._config, self._clock = robot, policy, config, clock
         self._inbox = Inbox(config.safety, [model])
-        self.requests = ServoRequests(robot, self._inbox.post)
+        self._requests = ServoRequests(robot, self._inbox.post)
         self._reports = FrameReports(config.policy.pursuit)
         self._state = SupervisorState()
         self._permitted: Source | None = None
         self._hand, self._drive, self._follow = Hand(config.hand), Drive(config.policy.drive), Follow()
         self._latency = CommandLatency()
+        self._must_rest = False
+        self._asked = Command()
         self._told_cycle = -1
         self._asked_s: float | None = None
         self._arrived_since_s: float | None = None
         self._queue = AlertQueue()
         self._lock = threading.Lock()  # of what follows: other threads read or write it
-        self._seen: _Seen | None = None
         self._forget = False
+        self._halted = False
         self._alerts: list[Alert] = []
         self._view = DriveView(clock())
 
@@ -88,10 +82,36 @@ class Pilot:
     def ask(self, act: Act) -> None:
         """A request of the operator. STOP goes to the robot at once, by its own way."""
         if act is Act.STOP:
+            self._requests.stopped()
             self._robot.stop()
         elif act is Act.ACKNOWLEDGE:
-            self.requests.acknowledge()
+            self._requests.acknowledge()
         self._inbox.post(act)
+
+    def switch_on(self) -> None:
+        """Check the servos and switch their torque on. Refused, with an alert, unless in ADVISORY with nothing to acknowledge."""
+        if self._may_request():
+            self._requests.switch_on()
+
+    def zero(self, names: Sequence[JointName] | None = None) -> None:
+        """Take the present positions, of all joints or of those named, for zero; refused like ``switch_on``."""
+        if self._may_request():
+            self._requests.zero(names)
+
+    def reboot(self, servo_id: int) -> None:
+        """Restart a servo, which clears its hardware error; also while a fault waits to be acknowledged."""
+        if self._may_request(although_latched=True):
+            self._requests.reboot(servo_id)
+
+    def torque_off(self) -> None:
+        """Let the wires go slack; also while a fault waits to be acknowledged."""
+        if self._may_request(although_latched=True):
+            self._requests.torque_off()
+
+    def halt(self) -> None:
+        """The program ends: from the next turn on nobody drives, and the robot holds."""
+        self._requests.stopped()
+        self._halted = True
 
     def jog(self, source: Hashable, jog: Jog) -> None:
         """How a control is held; to be repeated while it is, since its silence counts as let go."""
@@ -139,13 +159,12 @@ class Pilot:
         if forget:
             self._policy.reset()
         advice = self._policy(scene, status)
-        report = self._reports.report(frame, scene, has_target=has_target)
+        report = self._reports.report(frame, scene, advice, has_target=has_target)
+        advice = advice if is_finite(advice) else None
         if driving and report.route is RouteState.BEHIND:
             report = replace(report, route=RouteState.READY)  # a policy backs out of a branch that it missed by itself
         arrived = scene.route is not None and scene.route.length_px <= self._config.policy.pursuit.arrive_px
-        with self._lock:
-            self._seen = _Seen(frame.captured_s, advice, arrived)
-        self._inbox.post(report, Beat(Part.WORKER))
+        self._inbox.see(Seen(frame.captured_s, advice, arrived), report, Beat(Part.WORKER))
         return None if blanked else advice
 
     # ---- from the pilot's own thread
@@ -154,8 +173,7 @@ class Pilot:
         """One turn: hear, decide, send."""
         now_s = self._clock()
         inputs = self._inbox.take(now_s)
-        with self._lock:
-            seen = self._seen
+        seen = inputs.seen
         sent = self._robot.sent_motion()
         is_news = sent is not None and sent.cycle != self._told_cycle
         self._told_cycle = sent.cycle if sent is not None else -1
@@ -164,7 +182,10 @@ class Pilot:
         before = self._state
         self._state, decision = supervise(before, inputs.events, now_s, self._config.servos, self._config.safety)
         if decision.mode is Mode.STOPPED and before.mode is not Mode.STOPPED:
+            self._requests.stopped()
             self._robot.stop()
+        if self._halted:
+            decision = replace(decision, permitted=None)
         commanded = self._send(decision, inputs.jog, seen, sent, now_s)
         self._tell(before, decision, inputs.jog, sent if is_news else None, now_s)
         view = self._look(decision, inputs, seen, commanded, sent, now_s)
@@ -173,34 +194,49 @@ class Pilot:
         return view
 
     def close(self) -> None:
-        """Let nobody drive, and hold the robot."""
+        """Let nobody drive, and hold the robot. A request that is under way ends when the robot is closed."""
+        self._requests.close()
         self._robot.beat(None)
         self._robot.hold()
-        self.requests.close()
 
     # ---- parts of a turn
 
-    def _hear(self, inputs: Inputs, sent: SentMotion | None, seen: _Seen | None, now_s: float) -> None:
+    def _may_request(self, *, although_latched: bool = False) -> bool:
+        """Whether the servos are free for a request; if not, an alert says why. One at a time."""
+        view = self.view
+        reasons: list[Hindrance] = []
+        if view.mode in ARMED_MODES:
+            reasons.append(Hindrance.ALREADY_ARMED)
+        elif view.latched is not None and not although_latched:
+            reasons.append(Hindrance.IS_STOPPED if view.mode is Mode.STOPPED else Hindrance.UNACKNOWLEDGED)
+        for reason in reasons:
+            with self._lock:
+                self._alerts.append(Alert(reason, ALERTS[reason]))
+        return not reasons and not self._requests.busy
+
+    def _hear(self, inputs: Inputs, sent: SentMotion | None, seen: Seen | None, now_s: float) -> None:
         """Add to the events what servos, controls and the way say now."""
         events = inputs.events
         if (failure := self._robot.failure) is not None:
             events.append(Fault(Cause.BUS_DEAD, failure))
         elif (report := self._robot.report()) is not None:
             events.append(report)
-        if inputs.deadman is not None:
-            events.append(DeadmanReport(inputs.deadman))
+        if self._requests.busy:
+            events.append(ServosBusy())
+        if inputs.deadman_news is not None:
+            events.append(DeadmanReport(inputs.deadman_news))
         if not inputs.jog.is_rest:
             events.append(Act.INPUT)
             self._asked_s = now_s
-        if self._state.mode is Mode.HOLD:
+        if self._state.mode in {Mode.HOLD, Mode.ARMED}:
             events.append(GateReport(RejectReason.NOT_ARMED))  # nothing is asked for meanwhile, so nothing is wrong with it
-        elif sent is not None and self._permitted is Source.PROGRAM:
+        elif sent is not None and self._permitted is Source.PROGRAM and sent.rejection is not RejectReason.NO_COMMAND:
             events.append(GateReport(sent.rejection))
         if self._has_arrived(seen, now_s):
             events.append(Act.TAKE_BACK)
-            self._raise([(Note.REACHED, "")], now_s)
+            self._raise([(Note.REACHED, "")], now_s, armed=True)
 
-    def _has_arrived(self, seen: _Seen | None, now_s: float) -> bool:
+    def _has_arrived(self, seen: Seen | None, now_s: float) -> bool:
         """The program drove to the destination and has rested there for a moment."""
         if self._state.mode is not Mode.AUTONOMOUS or seen is None or not seen.arrived:
             self._arrived_since_s = None
@@ -208,16 +244,19 @@ class Pilot:
         self._arrived_since_s = self._arrived_since_s if self._arrived_since_s is not None else now_s
         return now_s - self._arrived_since_s >= _ARRIVED_S
 
-    def _send(self, decision: Decision, jog: Jog, seen: _Seen | None, sent: SentMotion | None, now_s: float) -> Command | None:
+    def _send(self, decision: Decision, jog: Jog, seen: Seen | None, sent: SentMotion | None, now_s: float) -> Command | None:
         """Ask the robot for the motion of whoever may drive; returns the program's."""
-        robot, permitted = self._robot, decision.permitted
+        robot = self._robot
+        # nobody drives before it is known where from
+        permitted = decision.permitted if sent is not None else None
         if permitted is not self._permitted:
             self._change(permitted, sent)
         robot.beat(permitted)
-        commanded = None
+        self._asked, commanded = Command(), None
         try:
             if permitted is Source.OPERATOR:
-                robot.send(self._hand.command(jog, now_s), source=Source.OPERATOR)
+                self._asked = self._hand.command(self._by_hand(decision, jog), now_s, sent.motion if sent is not None else None)
+                robot.send(self._asked, source=Source.OPERATOR)
             elif permitted is Source.PROGRAM and seen is not None:
                 commanded = self._drive.command(seen.advice, now_s)
                 robot.send(commanded, source=Source.PROGRAM, captured_s=seen.captured_s)
@@ -227,11 +266,18 @@ class Pilot:
             self._inbox.post(Fault(Cause.BUS_DEAD, str(error)))
         return commanded
 
+    def _by_hand(self, decision: Decision, jog: Jog) -> Jog:
+        """The controls as far as they may count: not when held since before, and not when the operator cannot see what he does."""
+        self._must_rest = self._must_rest and not jog.is_rest
+        is_blind = any(fault.cause is Cause.WINDOW_HUNG for fault in decision.active)
+        return AT_REST if self._must_rest or is_blind else jog
+
     def _change(self, permitted: Source | None, sent: SentMotion | None) -> None:
         """Another one drives from now on, from where the robot is."""
         at = sent.motion if sent is not None else Command()
         self._hand.take_over(at.bend, at.pitch)
-        self._drive.take_over(at.bend)
+        self._drive.take_over(at.bend, at.pitch)
+        self._must_rest = self._permitted is None and permitted is Source.OPERATOR
         self._permitted = permitted
         if permitted is Source.PROGRAM:
             with self._lock:
@@ -242,17 +288,17 @@ class Pilot:
         raised: list[tuple[AlertKey, str]] = [(f.cause, f.detail) for f in decision.raised if _matters(f, before)]
         raised += [(reason, "") for refused in decision.refused for reason in refused.reasons]
         if not jog.is_rest and decision.permitted is None:
-            raised.append((decision.latched.cause if decision.latched is not None else Hindrance.SERVOS_UNCHECKED, ""))
+            raised += [(reason, "") for reason in _why_not_by_hand(decision, self._state)]
         if sent is not None and decision.permitted is not None:
             if sent.rejection is not None and sent.rejection not in _NOT_WORTH_A_WORD:
                 raised.append((sent.rejection, ""))
             if sent.at_end and not jog.is_rest:
                 raised.append((Note.AT_END, ", ".join(sent.at_end)))
-        self._raise(raised, now_s)
+        self._raise(raised, now_s, armed=before.mode in ARMED_MODES)
 
-    def _raise(self, raised: list[tuple[AlertKey, str]], now_s: float) -> None:
+    def _raise(self, raised: list[tuple[AlertKey, str]], now_s: float, *, armed: bool) -> None:
         if raised:
-            self._queue, alerts = raise_alerts(self._queue, raised, now_s, armed=self._state.mode in ARMED_MODES)
+            self._queue, alerts = raise_alerts(self._queue, raised, now_s, armed=armed)
             with self._lock:
                 self._alerts = [*self._alerts, *alerts][-_MOST_ALERTS:]
 
@@ -260,12 +306,12 @@ class Pilot:
         self,
         decision: Decision,
         inputs: Inputs,
-        seen: _Seen | None,
+        seen: Seen | None,
         commanded: Command | None,
         sent: SentMotion | None,
         now_s: float,
     ) -> DriveView:
-        safety, rates, jog = self._config.safety, self._config.hand, inputs.jog
+        safety, jog = self._config.safety, inputs.jog
         is_fresh = seen is not None and now_s - seen.captured_s <= safety.pose_disarm_s
         advice = seen.advice if seen is not None and is_fresh and decision.blanked is None else None
         arming, hand_over = hindrances(self._state, now_s, safety)
@@ -280,8 +326,8 @@ class Pilot:
             against_hand_over=hand_over,
             deadman=inputs.deadman,
             servos_on=self._state.health.servos_ready,
-            busy=self.requests.busy,
-            asked=Command(jog.bend, jog.pitch, rates.advance_mm_s * jog.advance, rates.delivery_mm_s * jog.delivery),
+            busy=self._requests.busy,
+            asked=self._asked,
             asked_s=self._asked_s,
             advice=advice,
             blanked="" if decision.blanked is None else decision.blanked.cause.value,
@@ -292,6 +338,15 @@ class Pilot:
             latency_p95_s=self._latency.p95_s,
             follow_share=self._follow.update(jog, advice, now_s) if by_hand else None,
         )
+
+
+def _why_not_by_hand(decision: Decision, state: SupervisorState) -> tuple[Hindrance, ...]:
+    """What to tell the operator who moves the controls while nobody may drive."""
+    if decision.mode is Mode.STOPPED:
+        return (Hindrance.IS_STOPPED,)
+    if decision.latched is not None:
+        return (Hindrance.UNACKNOWLEDGED,)
+    return (Hindrance.SERVOS_UNCHECKED,) if not state.health.servos_ready else ()
 
 
 def _matters(fault: Fault, before: SupervisorState) -> bool:

@@ -46,7 +46,9 @@ def supervise(
     state, now_s, clock = _read_clock(state, now_s, safety)
     acts = {event for event in events if isinstance(event, Act)}
     if Act.ACKNOWLEDGE in acts:
-        state = replace(state, latched=None, mode=Mode.ADVISORY if state.mode is Mode.STOPPED else state.mode)
+        if state.mode is Mode.STOPPED:  # whatever was checked meanwhile: nothing moves by an acknowledgement
+            state = replace(state, mode=Mode.ADVISORY, health=replace(state.health, servo_problems=None))
+        state = replace(state, latched=None)
     reports = [event for event in events if not isinstance(event, Act)]
     before = state.active
     health, active = _listen(state, reports, now_s, servos, safety)

@@ -105,6 +105,7 @@ class BusGuard:
     def disarm(self) -> None:
         """No more goals; nothing is latched."""
         self.armed = False
+        self.sent = None  # a record from before tells nothing of where the next motion starts
         self._gate = GateState()
         self._jam.forget()
         self.rejection, self.clamps, self.at_end = None, (), ()

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 
 from core.control.bus_watch import BusReport
 from core.control.gate import Source
@@ -17,7 +18,7 @@ from core.types import Command, RobotStatus
 from hardware.servos.bus_guard import report_of
 from hardware.servos.bus_link import BusLink
 from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order
-from hardware.servos.errors import BusProcessLost, NotReady
+from hardware.servos.errors import BusProcessLost, NotReady, ServoError
 from hardware.servos.status_block import ServoReading, ServoState
 from hardware.servos.units import wire_force_mn
 
@@ -59,6 +60,7 @@ class ServoRobot:
         self._supervised = False
         self._states: tuple[ServoReading, ...] = ()
         self._reported = (0, 0, 0)  # cycle, bad packets and restarts of the last report
+        self._not_connected: str | None = None
 
     @property
     def name(self) -> str:
@@ -66,9 +68,9 @@ class ServoRobot:
 
     @property
     def failure(self) -> str | None:
-        """One line when the bus process is gone though nobody closed it."""
+        """One line when the bus process is gone though nobody closed it, or when it could not be started again."""
         link = self._link
-        return link.failure if link is not None else None
+        return link.failure if link is not None else self._not_connected
 
     def connect(self) -> None:
         """Start the bus process, open and lock the port, check all servos. Nothing moves, and nothing is armed.
@@ -81,11 +83,16 @@ class ServoRobot:
         self._disconnect()
         if self._servos.port is None:
             raise NotReady("no servo port is configured: set servos.port")
-        with ExitStack() as undo:
-            link = BusLink(self._servos, self._safety)
-            undo.callback(link.close)
-            link.request("open", _OPEN_S)
-            undo.pop_all()
+        try:
+            with ExitStack() as undo:
+                link = BusLink(self._servos, self._safety)
+                undo.callback(link.close)
+                link.request("open", _OPEN_S)
+                undo.pop_all()
+        except ServoError as error:
+            self._not_connected = str(error)
+            raise
+        self._not_connected = None
         self._reported = (0, 0, 0)
         self._states = ()
         self._supervised = False
@@ -231,12 +238,13 @@ class ServoRobot:
                 return None
             self._reported = status.cycle, status.bad_packets, status.restarts
         errors, rebooted = status.bad_packets - bad_packets, status.restarts > restarts
-        return report_of(status.servos, armed=status.armed, errors=errors, rebooted=rebooted)
+        report = report_of(status.servos, armed=status.armed, errors=errors, rebooted=rebooted)
+        return replace(report, armed=status.armed, ended=status.latched)
 
     def sent_motion(self) -> SentMotion | None:
-        """What left the gate in the newest cycle in which anything did; None before that. No heartbeat."""
+        """What left the gate in the newest cycle since it was armed; None before that, and when it is not armed. No heartbeat."""
         status = self.bus_status()
-        if status is None or status.sent is None:
+        if status is None or status.sent is None or not status.armed:
             return None
         sent, order = status.sent, status.sent.order
         return SentMotion(

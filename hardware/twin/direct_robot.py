@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 from core.control.bus_watch import BusReport
 from core.control.gate import RejectReason, Source
@@ -57,21 +58,21 @@ class DirectRobot:
         now_s = time.monotonic()
         with self._lock:
             fresh = now_s - self._beat_s <= self._safety.command_max_age_s
-            permitted = self._armed and fresh and source is self._permitted
-        if not permitted:
-            self._hold(RejectReason.NOT_ARMED)
-            return Command()
-        sent = self._robot.send(command)
-        self._note(SentMotion(0, now_s, sent, source, captured_s))
-        return sent
+            if not (self._armed and fresh and source is self._permitted):
+                self._hold(RejectReason.NOT_ARMED)
+                return Command()
+            sent = self._robot.send(command)
+            self._note(SentMotion(0, now_s, sent, source, captured_s))
+            return sent
 
     def hold(self) -> None:
-        self._hold(None)
+        with self._lock:
+            self._hold(None)
 
     def stop(self) -> None:
         with self._lock:
             self._armed = False
-        self._robot.hold()
+            self._robot.hold()
 
     def arm(self) -> None:
         with self._lock:
@@ -93,11 +94,12 @@ class DirectRobot:
         self.stop()
 
     def report(self) -> BusReport | None:
-        return _WELL
+        with self._lock:
+            return replace(_WELL, armed=self._armed)
 
     def sent_motion(self) -> SentMotion | None:
         with self._lock:
-            return self._sent
+            return self._sent if self._armed else None
 
     def status(self) -> RobotStatus:
         return self._robot.status()
@@ -107,10 +109,8 @@ class DirectRobot:
 
     def _hold(self, rejection: RejectReason | None) -> None:
         self._robot.hold()
-        motion = self._robot.current_command
-        self._note(SentMotion(0, time.monotonic(), motion, rejection=rejection))
+        self._note(SentMotion(0, time.monotonic(), self._robot.current_command, rejection=rejection))
 
     def _note(self, sent: SentMotion) -> None:
-        with self._lock:
-            self._cycle += 1
-            self._sent = SentMotion(self._cycle, sent.time_s, sent.motion, sent.source, sent.captured_s, sent.rejection)
+        self._cycle += 1
+        self._sent = SentMotion(self._cycle, sent.time_s, sent.motion, sent.source, sent.captured_s, sent.rejection)

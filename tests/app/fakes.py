@@ -206,11 +206,21 @@ def advise(scene: Scene) -> Advice | None:
     return Advice(speed, rate, steer, why)
 
 
-class FakeRequests:
-    """Keeps what was asked of the servos."""
+class FakePilot:
+    """A pilot that does nothing but keep what it was told; `view` and `alerts` are what the window sees next."""
 
     def __init__(self) -> None:
+        self.jogs: list[Jog] = []
+        self.acts: list[Act] = []
+        self.deadman_said: list[bool] = []
+        self.beats = 0
         self.asked: list[str] = []
+        self.halted = False
+        self.view = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, deadman=False)
+        self.alerts: list[Alert] = []
+
+    def jog(self, source: object, jog: Jog) -> None:
+        self.jogs.append(jog)
 
     def switch_on(self) -> None:
         self.asked.append("switch on")
@@ -224,21 +234,8 @@ class FakeRequests:
     def torque_off(self) -> None:
         self.asked.append("torque off")
 
-
-class FakePilot:
-    """A pilot that does nothing but keep what it was told; `view` and `alerts` are what the window sees next."""
-
-    def __init__(self) -> None:
-        self.jogs: list[Jog] = []
-        self.acts: list[Act] = []
-        self.deadman_said: list[bool] = []
-        self.beats = 0
-        self.requests = FakeRequests()
-        self.view = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, deadman=False)
-        self.alerts: list[Alert] = []
-
-    def jog(self, source: object, jog: Jog) -> None:
-        self.jogs.append(jog)
+    def halt(self) -> None:
+        self.halted = True
 
     def ask(self, act: Act) -> None:
         self.acts.append(act)
@@ -269,6 +266,7 @@ class FakeEngine:
         self._edit = edit
         self.refusal = refusal
         self.silent = False
+        self.problem: str | None = None
         self.fail_with: Exception | None = None
         self.pilot = FakePilot()
         self.targets: list[Point | None] = []

@@ -33,7 +33,7 @@ def test_the_keys_of_the_steps_reach_the_pilot(running: OperatorWindow, engine: 
     qtbot.keyClick(running, Key.Key_F6, Qt.KeyboardModifier.ShiftModifier)
     assert engine.pilot.acts[-1] is Act.DISARM
     qtbot.keyClick(running, Key.Key_F3)
-    assert engine.pilot.requests.asked == ["switch on"]
+    assert engine.pilot.asked == ["switch on"]
 
 
 def test_handing_over_is_heard_while_shift_is_held_as_deadman(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
@@ -89,4 +89,4 @@ def test_servo_requests_of_the_table_reach_the_servos(running: OperatorWindow, e
     running.panels.servos.zero_asked.emit(None)
     running.panels.servos.zero_asked.emit(["left"])
     running.panels.servos.torque_off_asked.emit()
-    assert engine.pilot.requests.asked == ["reboot 3", "zero None", "zero ['left']", "torque off"]
+    assert engine.pilot.asked == ["reboot 3", "zero None", "zero ['left']", "torque off"]

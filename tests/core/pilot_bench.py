@@ -170,11 +170,11 @@ class Bench:
 
     def done(self) -> Bench:
         """Wait for what the servos are doing."""
-        self.pilot.requests._worker.submit(lambda: None).result(5.0)
+        self.pilot._requests._worker.submit(lambda: None).result(5.0)
         return self
 
     def on(self) -> Bench:
-        self.seconds(0.2).pilot.requests.switch_on()
+        self.seconds(0.2).pilot.switch_on()
         return self.done().seconds(1.2)
 
     def armed(self) -> Bench:

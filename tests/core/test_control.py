@@ -7,6 +7,7 @@ import pytest
 
 from core.config import AdviceConfig
 from core.control.engine import Engine
+from core.control.faults import Cause, Fault
 from core.control.policy import table_policy
 from core.devices import DeviceError
 from core.types import Frame, Point, Pose, PoseState, Reason, Refusal, RobotStatus, Scene, Speed
@@ -152,3 +153,23 @@ def test_a_pilot_that_fails_is_a_device_error_with_its_reason(caplog: pytest.Log
         engine.step(0.0)
     engine.close()
     assert "Traceback" in caplog.text
+
+
+class _LostCamera(_Camera):
+    def read(self, timeout_s: float) -> Frame | None:
+        raise DeviceError("camera unplugged: plug it in")
+
+
+def test_a_lost_camera_leaves_the_operator_the_hand() -> None:
+    bench = Bench()
+    engine = Engine(_LostCamera([]), lambda *_: None, lambda _: None, lambda: None, bench.pilot, bench.robot)  # type: ignore[arg-type,return-value]
+    assert engine.step(0.0) is None
+    assert engine.problem == "camera unplugged: plug it in"
+    assert Fault(Cause.CAMERA_LOST, engine.problem) in bench.pilot._inbox.take(bench.now_s).events
+    engine.close()
+
+
+def test_a_lost_camera_without_a_robot_ends_the_turns() -> None:
+    engine = Engine(_LostCamera([]), lambda *_: None, lambda _: None, lambda: None)  # type: ignore[arg-type,return-value]
+    with pytest.raises(DeviceError, match="unplugged"):
+        engine.step(0.0)

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
 
 from core.control.alerts import Note
-from core.control.faults import Cause
+from core.control.faults import Cause, Fault
 from core.control.gate_checks import RejectReason, Source
 from core.control.hand import AT_REST, Jog
 from core.control.modes import Act, Hindrance, Mode
 from core.control.pilot import PERIOD_S
-from core.types import (
-    Reason,
-    Refusal,
-)
-from tests.core.pilot_bench import ADVICE, WELL, Bench, scene_at
+from core.types import Advice, Reason, Refusal, Speed
+from tests.core.pilot_bench import ADVICE, WELL, Bench, Policy, scene_at
 
 
 @pytest.fixture
@@ -176,7 +175,7 @@ def test_a_bus_process_that_is_gone_is_started_again_by_switching_on(bench: Benc
     assert bench.pilot.view.latched is not None
     bench.pilot.ask(Act.ACKNOWLEDGE)
     bench.done().turn(2)
-    bench.pilot.requests.switch_on()
+    bench.pilot.switch_on()
     bench.done().turn(2)
     assert "connect" in bench.robot.calls
     assert bench.pilot.view.servos_on
@@ -238,9 +237,9 @@ def test_a_joint_at_its_end_is_told_to_him_who_drives_it(bench: Bench) -> None:
 
 def test_zeroing_restarting_and_letting_go_need_switching_on_afterwards(bench: Bench) -> None:
     for request, call in (
-        (bench.pilot.requests.zero, "zero"),
-        (lambda: bench.pilot.requests.reboot(3), "reboot 3"),
-        (bench.pilot.requests.torque_off, "torque off"),
+        (bench.pilot.zero, "zero"),
+        (lambda: bench.pilot.reboot(3), "reboot 3"),
+        (bench.pilot.torque_off, "torque off"),
     ):
         bench.on()
         assert bench.pilot.view.servos_on
@@ -258,6 +257,207 @@ def test_following_the_advice_is_measured(bench: Bench) -> None:
     assert bench.seconds(1.0).pilot.view.follow_share == 1.0
     bench.jog = Jog(bend=-0.5, advance=-0.5)
     assert 0.0 < (bench.seconds(1.0).pilot.view.follow_share or 0.0) < 1.0
+
+
+def test_servos_that_the_bus_process_disarmed_by_itself_are_off_with_its_reason(bench: Bench) -> None:
+    bench.handed_over()
+    bench.robot.bus = replace(WELL, armed=False, ended=Fault(Cause.TRACKING, "advance pushes against something"))
+    bench.turn(4)
+    assert bench.mode is Mode.STOPPED
+    assert not bench.pilot.view.servos_on
+    assert bench.pilot.view.latched == Fault(Cause.TRACKING, "advance pushes against something")
+    assert Cause.TRACKING in bench.alerts()
+
+
+def test_a_bus_process_that_missed_the_program_is_a_watchdog(bench: Bench) -> None:
+    bench.on()
+    bench.robot.bus = replace(WELL, armed=False, ended=Fault(Cause.WORKER_DEAD, "no heartbeat"))
+    bench.turn(4)
+    assert not bench.pilot.view.servos_on
+    assert bench.pilot.view.latched == Fault(Cause.WATCHDOG, "worker stopped, no heartbeat")
+
+
+def test_one_report_from_before_arming_is_no_fault(bench: Bench) -> None:
+    bench.on().robot.bus = replace(WELL, armed=False)
+    bench.turn(2)
+    bench.robot.bus = WELL
+    bench.turn(5)
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.latched is None
+
+
+@pytest.mark.parametrize("call", ["disarm", "acknowledge", "arm"])
+def test_stop_while_the_servos_are_being_switched_on_is_not_undone(bench: Bench, call: str) -> None:
+    bench.seconds(0.2)
+    before = getattr(bench.robot, call)
+
+    def stopped_in_it() -> None:
+        before()
+        bench.pilot.ask(Act.STOP)
+
+    setattr(bench.robot, call, stopped_in_it)
+    bench.pilot.switch_on()
+    bench.done().turn(3)
+    assert bench.mode is Mode.STOPPED
+    assert bench.robot.calls[-1] == "stop" or "arm" not in bench.robot.calls
+    assert not bench.pilot.view.servos_on
+    setattr(bench.robot, call, before)
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.done().turn(3)
+    assert not bench.pilot.view.servos_on, "an acknowledgement moves nothing"
+    bench.pilot.switch_on()
+    bench.done().turn(3)
+    assert bench.pilot.view.servos_on
+
+
+def test_servo_requests_wait_until_nobody_may_be_driving(bench: Bench) -> None:
+    bench.armed()
+    count = len(bench.robot.calls)
+    for request in (bench.pilot.switch_on, bench.pilot.zero, bench.pilot.torque_off):
+        request()
+    bench.pilot.reboot(3)
+    bench.done().turn()
+    assert len(bench.robot.calls) == count
+    assert Hindrance.ALREADY_ARMED in bench.alerts()
+    assert bench.mode is Mode.ARMED
+
+
+def test_an_unexpected_error_of_a_request_is_told(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    def broken() -> None:
+        raise OSError(24, "Too many open files")
+
+    bench.robot.arm = broken  # type: ignore[method-assign]
+    bench.on()
+    assert not bench.pilot.view.servos_on
+    details = [alert.detail for alert in bench.pilot.news().alerts if alert.key is Cause.SERVOS_WRONG]
+    assert len(details) == 1
+    assert "Too many open files" in details[0]
+    assert "Traceback" in caplog.text
+
+
+def test_a_request_that_takes_long_is_no_silent_bus(bench: Bench) -> None:
+    bench.seconds(0.2)
+    go_on = threading.Event()
+    bench.robot.arm = lambda: go_on.wait(5.0)  # type: ignore[method-assign,assignment,return-value]
+    bench.robot.bus = None
+    bench.pilot.switch_on()
+    bench.seconds(2.0)
+    assert bench.pilot.view.busy == "checking the servos"
+    go_on.set()
+    bench.done().robot.bus = WELL
+    bench.turn(3)
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.latched is None
+
+
+def test_pitch_stays_where_it_was_when_the_program_takes_over(bench: Bench) -> None:
+    bench.on().jog = Jog(pitch=1.0)
+    bench.seconds(0.4)
+    bench.jog = AT_REST
+    bench.seconds(0.4)
+    pitch = bench.robot.sent[-1][1].pitch
+    assert pitch > 0.3
+    bench.pilot.ask(Act.ARM)
+    bench.turn().held = True
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn(5)
+    assert bench.mode is Mode.AUTONOMOUS
+    assert bench.robot.sent[-1][1].pitch == pitch
+
+
+def test_advice_that_is_no_number_is_neither_driven_nor_shown(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench.handed_over()
+    bend = bench.robot.sent[-1][1].bend
+    broken = Advice(Speed.SLOW, 2.0, math.nan, "broken")
+    monkeypatch.setattr(Policy, "__call__", lambda *_: broken)
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    assert bench.shown is None
+    bench.turn(20)
+    assert bench.mode is Mode.ADVISORY
+    assert bench.pilot.view.latched is not None
+    assert bench.pilot.view.latched.cause is Cause.NOT_FINITE_REPEATED
+    assert abs(bench.robot.motion.motion.bend - bend) < 0.1
+
+
+def test_a_deadman_held_since_before_arming_does_not_count_after_a_hiccup_either(bench: Bench) -> None:
+    bench.on().held = True
+    bench.turn(3).pilot.ask(Act.ARM)
+    bench.turn()
+    for _ in range(6):  # 120 ms in which the window says nothing
+        bench.now_s += PERIOD_S
+        bench.pilot.window_alive()
+        bench.pilot.tick()
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    assert Hindrance.DEADMAN_HELD_BEFORE in bench.alerts()
+
+
+def test_a_control_held_since_before_must_be_let_go_first(bench: Bench) -> None:
+    bench.jog = Jog(advance=1.0)
+    bench.on()
+    assert {command.advance_mm_s for _, command, _ in bench.robot.sent} == {0.0}
+    bench.jog = AT_REST
+    bench.seconds(0.2)
+    bench.jog = Jog(advance=1.0)
+    bench.turn()
+    assert bench.robot.sent[-1][1].advance_mm_s == 10.0
+
+
+def test_nobody_drives_by_hand_before_a_window_that_hangs(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench.on().jog = Jog(advance=1.0)
+    bench.turn(3)
+    assert bench.robot.sent[-1][1].advance_mm_s == 10.0
+    monkeypatch.setattr(bench.pilot, "window_alive", lambda: None)
+    bench.seconds(0.6)
+    assert bench.robot.sent[-1][1].advance_mm_s == 0.0
+
+
+def test_what_ends_autonomy_is_heard(bench: Bench) -> None:
+    bench.handed_over()
+    bench.scene = lambda scene: replace(scene, pose=None, refusal=Refusal(Reason.SEVERAL_ROBOTS), route=None)
+    bench.turn(3)
+    assert bench.mode is Mode.ADVISORY
+    assert "disarm" in {alert.sound for alert in bench.pilot.news().alerts}
+
+
+def test_a_rejection_in_the_turn_of_a_touch_does_not_stay(bench: Bench) -> None:
+    bench.handed_over()
+    bench.robot.edit = lambda sent: replace(sent, source=None, rejection=RejectReason.OVER_RATE)
+    bench.turn()
+    bench.robot.edit = lambda sent: sent
+    bench.pilot.jog("pad", Jog(bend=0.1))
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    bench.seconds(1.0)
+    assert bench.pilot.view.against_hand_over == ()
+
+
+def test_keys_while_stopped_remind_and_do_not_sound(bench: Bench) -> None:
+    bench.on().pilot.ask(Act.STOP)
+    bench.turn()
+    bench.pilot.news()
+    bench.jog = Jog(advance=1.0)
+    bench.seconds(8.0)
+    alerts = bench.pilot.news().alerts
+    assert {alert.key for alert in alerts} == {Hindrance.IS_STOPPED}
+    assert {alert.sound for alert in alerts} == {None}
+
+
+def test_halting_lets_nobody_drive(bench: Bench) -> None:
+    bench.handed_over().pilot.halt()
+    bench.turn()
+    assert bench.robot.permitted is None
+
+
+def test_straightening_and_steering_are_no_faster_than_either(bench: Bench) -> None:
+    bench.on().jog = Jog(bend=1.0)
+    bench.seconds(0.3)
+    before = bench.robot.sent[-1][1].bend
+    bench.jog = Jog(bend=-1.0, straighten=True)
+    bench.turn()
+    assert before - bench.robot.sent[-1][1].bend <= 1.2 * PERIOD_S + 1e-9
 
 
 def test_closing_holds_and_permits_nobody(bench: Bench) -> None:
