@@ -21,7 +21,9 @@ app = typer.Typer(
 
 ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file; keys that differ from the defaults are enough")]
 PresetOption = Annotated[str | None, typer.Option("--preset", help="'paper' takes the paper literally")]
-RigOption = Annotated[str, typer.Option("--rig", help="rig to open; 'twin' needs no hardware")]
+RigOption = Annotated[
+    str | None, typer.Option("--rig", help="twin (needs no hardware), realsense or webcam; default: the configured one, else twin")
+]
 SourceOption = Annotated[Path | None, typer.Option("--source", help="video, picture or folder to look at instead of a camera")]
 JsonOption = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
 
@@ -39,7 +41,7 @@ def main() -> None:
 
 
 @app.callback(invoke_without_command=True)
-def _window(context: typer.Context, rig: RigOption = "twin", config: ConfigOption = None, source: SourceOption = None) -> None:
+def _window(context: typer.Context, rig: RigOption = None, config: ConfigOption = None, source: SourceOption = None) -> None:
     """Without a command: the operator window."""
     if context.invoked_subcommand is None:
         _open_window(rig, config, source)
@@ -47,7 +49,7 @@ def _window(context: typer.Context, rig: RigOption = "twin", config: ConfigOptio
 
 @app.command()
 def gui(
-    rig: RigOption = "twin",
+    rig: RigOption = None,
     config: ConfigOption = None,
     source: SourceOption = None,
     until_first_frame: Annotated[bool, typer.Option("--until-first-frame", hidden=True)] = False,
@@ -56,7 +58,7 @@ def gui(
     _open_window(rig, config, source, until_first_frame)
 
 
-def _open_window(rig: str, config_path: Path | None, source: Path | None, until_first_frame: bool = False) -> None:
+def _open_window(rig: str | None, config_path: Path | None, source: Path | None, until_first_frame: bool = False) -> None:
     from app.window_command import run_window
 
     sys.exit(run_window(rig, config_path, source, until_first_frame=until_first_frame))
@@ -144,9 +146,52 @@ def calibrate(
 
 
 @app.command()
+def annotate(
+    paths: Annotated[list[Path] | None, typer.Argument(help="folders, pictures, videos or sessions; default: this folder")] = None,
+    store: Annotated[Path | None, typer.Option(help="annotation file; default: annotations.lumenpilot.sqlite there")] = None,
+    rater: Annotated[str | None, typer.Option(help="who annotates; default: the user's name")] = None,
+    study: Annotated[str, typer.Option(help="blind study of this name: begun at the first call, gone on with at later ones")] = "",
+    repeats: Annotated[int | None, typer.Option(min=1, max=20, help="how often a study shows each image; default: 2")] = None,
+    mirror: Annotated[bool, typer.Option("--mirror", help="repeats of a study are shown mirrored")] = False,
+    turn: Annotated[bool, typer.Option("--turn", help="repeats of a study are shown turned by 180 degrees")] = False,
+    order: Annotated[str | None, typer.Option(help="listed, random, worst (least sure first) or even (evenly over time)")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="of the shuffled order")] = None,
+    frames: Annotated[int, typer.Option(min=1, max=100_000, help="pictures taken of each video, evenly over time")] = 48,
+    report: Annotated[bool, typer.Option("--report", help="agreement within and between raters, instead of the window")] = False,
+    export: Annotated[str | None, typer.Option(help="dataset (for train), csv (for evaluate) or coco, to --out")] = None,
+    import_: Annotated[list[Path] | None, typer.Option("--import", help="labelme or COCO file or folder; may be repeated")] = None,
+    salvage: Annotated[bool, typer.Option("--salvage", help="copy what is readable of a damaged annotation file")] = False,
+    out: Annotated[Path | None, typer.Option(help="where report or export go")] = None,
+    json: JsonOption = False,
+    model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
+    config: ConfigOption = None,
+) -> None:
+    """Measure angles and states by hand, draw masks; as a study with several raters, blind and repeated."""
+    from app.annotate_command import AnnotateOptions, StudyOptions, run_annotate
+
+    options = AnnotateOptions(
+        paths=tuple(paths or ()),
+        store=store,
+        study=StudyOptions(study, rater, repeats, mirror, turn, seed, order),
+        frames=frames,
+        report=report,
+        export=export,
+        imports=tuple(import_ or ()),
+        salvage=salvage,
+        out=out,
+        as_json=json,
+        model=model,
+        config_path=config,
+    )
+    sys.exit(run_annotate(options))
+
+
+@app.command()
 def evaluate(
     out: Annotated[Path, typer.Option(help="folder for metrics.json, measurements.csv, figures and report.html")],
-    labelled: Annotated[Path | None, typer.Argument(metavar="DIR", help="labelled set as synth writes it")] = None,
+    labelled: Annotated[
+        Path | None, typer.Argument(metavar="DIR", help="labelled set as synth writes it, or images annotated by hand")
+    ] = None,
     csv: Annotated[
         Path | None,
         typer.Option(help="columns image, angle_1, angle_2, state, algorithm_angle, algorithm_state; blank where not measured"),
@@ -227,6 +272,59 @@ def benchmark(
 
 
 @app.command()
+def record(
+    seconds: Annotated[float, typer.Option(min=0.1, max=86_400.0, help="length of the recording; Ctrl-C ends it sooner")],
+    out: Annotated[Path | None, typer.Option(help="folder in which the session is made; default: the configured one")] = None,
+    rig: RigOption = None,
+    lossless: Annotated[bool, typer.Option("--lossless", help="keep every pixel as it is; a hundred times the size")] = False,
+    json: JsonOption = False,
+    config: ConfigOption = None,
+) -> None:
+    """Record a session without a window."""
+    from app.record_command import run_record
+
+    run_record(seconds, out, rig=rig, config_path=config, lossless=lossless, as_json=json)
+
+
+session_commands = typer.Typer(help="Recorded sessions: look at them, recover cut ones, export.", no_args_is_help=True)
+app.add_typer(session_commands, name="session")
+SessionArgument = Annotated[Path, typer.Argument(metavar="SESSION", help="folder of a recorded session")]
+
+
+@session_commands.command("info")
+def session_info(session: SessionArgument, json: JsonOption = False) -> None:
+    """What a session is, what is in it, and what is wrong with it."""
+    from app.session_command import run_info
+
+    run_info(session, as_json=json)
+
+
+@session_commands.command("recover")
+def session_recover(
+    session: SessionArgument,
+    into: Annotated[Path | None, typer.Option(help="folder of the copy; default: beside the session")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Repair a cut or damaged session into a copy; the original stays as it is."""
+    from app.session_command import run_recover
+
+    run_recover(session, into, as_json=json)
+
+
+@session_commands.command("export")
+def session_export(
+    session: SessionArgument,
+    out: Annotated[list[Path], typer.Option(help="file.mp4, file.csv or file.mcap; may be repeated")],
+    plain: Annotated[bool, typer.Option("--plain", help="MP4 without overlays")] = False,
+    json: JsonOption = False,
+) -> None:
+    """A session as video, table, or MCAP for Foxglove and PlotJuggler."""
+    from app.session_command import run_export
+
+    run_export(session, out, plain=plain, as_json=json)
+
+
+@app.command()
 def ablation(
     labelled: Annotated[Path | None, typer.Argument(metavar="SET", help="labelled set as synth writes it")] = None,
     json: JsonOption = False,
@@ -243,3 +341,15 @@ def ablation(
 
     plan = Plan(labelled, model, config, true_masks, sequence, tuple(phantom or ()), seed, out)
     run_ablation(plan, as_json=json)
+
+
+@app.command()
+def doctor(
+    json: JsonOption = False,
+    rig: RigOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Preflight: program, model, camera, servos, controls, disk, clock; what is wrong, and what to do. Nothing moves."""
+    from app.doctor_command import run_doctor
+
+    sys.exit(run_doctor(rig, config, as_json=json))

@@ -56,10 +56,16 @@ def run_evaluate(
         _make_folder(out)
     else:
         assert folder is not None
-        truth = _read_set(folder)
+        annotations = _annotation_file(folder)
+        truth = _read_set(folder) if annotations is None else []
+        if annotations is not None and like_paper is not None:
+            raise EvaluationError("--like-paper needs a labelled set with its truth, not annotations by hand")
         _make_folder(out)
         config = load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model else None)
-        study = _perceive_set(folder, truth, config, preset, like_paper, seed)
+        if annotations is not None:
+            study = _perceive_annotated(annotations, config, preset)
+        else:
+            study = _perceive_set(folder, truth, config, preset, like_paper, seed)
     metrics = {"source": study.source, "seed": seed} | evaluate(study.rows, seed)
     if csv is not None and not metrics["angle"]["n"] and not metrics["state"]["n"]:
         raise EvaluationError(f"{csv}: no row has both a manual and an algorithmic measure; nothing to compare")
@@ -104,6 +110,29 @@ def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
     (out / "report.html").write_text(render_report(metrics, figures), encoding="utf-8")
 
 
+def _annotation_file(given: Path) -> Path | None:
+    """The annotation file that is given, or that of a folder without a truth of its own."""
+    from core.study.annotation_store import DEFAULT_NAME
+
+    if given.suffix == ".sqlite" and given.is_file():
+        return given
+    own = given / DEFAULT_NAME
+    return own if own.is_file() and not (given / "truth.jsonl").is_file() else None
+
+
+def _perceive_annotated(annotations: Path, config: Config, preset: str | None) -> _Study:
+    """Images that were annotated by hand, against the algorithm."""
+    from app.annotate_command import read_annotated
+    from app.annotate_evaluation import compared_rows
+
+    answers, images = read_annotated(annotations, [annotations.parent])
+    rows, reasons, engine = compared_rows(answers, images, config, None, str(annotations))
+    source = {"kind": "annotated by hand", "name": annotations.parent.name, "model": config.perception.segmentation.model}
+    unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
+    notes = [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
+    return _Study(rows, source | {"preset": preset, "engine": engine, "refused": reasons}, notes)
+
+
 @dataclass(frozen=True, slots=True)
 class _Truth:
     """A labelled image; theta and state are None where it shows no pose."""
@@ -119,7 +148,11 @@ def _read_set(folder: Path) -> list[_Truth]:
     from core.learning.dataset import find_labelled
 
     if not (folder / "truth.jsonl").is_file() or not (folder / "images").is_dir():
-        what = "needs images/ and truth.jsonl, as synth writes them" if folder.is_dir() else "no such folder"
+        what = (
+            "needs images/ and truth.jsonl as synth writes them, or the annotation file of annotate"
+            if folder.is_dir()
+            else "no such folder"
+        )
         raise EvaluationError(f"{folder}: not a labelled set ({what}); for a table use --csv FILE")
     samples, truth = find_labelled(folder)
     found = []

@@ -54,14 +54,14 @@ def run_synth(
     _console.print(f"{count} labelled frames of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}", soft_wrap=True)
 
 
-class _Interrupt:
+class Interrupt:
     """Ctrl-C and a termination request ask the work to stop at the next good moment instead of tearing it down."""
 
     def __init__(self) -> None:
         self.asked = False
         self._old: dict[int, Any] = {}
 
-    def __enter__(self) -> _Interrupt:
+    def __enter__(self) -> Interrupt:
         for number in (signal.SIGINT, signal.SIGTERM):
             self._old[number] = signal.signal(number, self._on_signal)
         return self
@@ -106,7 +106,7 @@ def run_train(out: Path, data: list[Path], synthetic: int, init: str | None, bas
     plan = replace(plan, crop=tuple(-(-side // network.shape.stride) * network.shape.stride for side in plan.crop))
     notes = {"plan": plan.to_json(), "init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
     log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {notes}\n")
-    with log, _Interrupt() as interrupt, progress_bar() as bar:
+    with log, Interrupt() as interrupt, progress_bar() as bar:
         task = bar.add_task("steps", total=plan.steps)
 
         def report(now: Report) -> None:

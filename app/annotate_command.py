@@ -1,0 +1,365 @@
+"""``annotate``: ground truth by hand, alone or as a study of several raters; agreement, export, import."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.annotate_sources import default_store, image_files
+from app.learning_commands import progress_bar
+from core.config import Config, load_config
+from core.study.annotation_images import FoundImage, find_images
+from core.study.annotation_records import ItemKey, StoredAnnotation
+from core.study.annotation_store import AnnotationStore
+from core.study.annotations import Annotation, AnnotationError, View, measure_lines
+from core.study.study_plan import Order, StudySettings, Task, queue_order, repeat_views, settings_from, tasks
+from core.types import Frame
+
+EXPORTS = ("dataset", "csv", "coco")
+_NAMED_PROBLEMS = 20
+_DISAGREEMENT_DEG = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class StudyOptions:
+    """What the command line says about the study; None where it says nothing."""
+
+    name: str = ""
+    rater: str | None = None
+    repeats: int | None = None
+    mirror: bool = False
+    turn: bool = False
+    seed: int | None = None
+    order: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AnnotateOptions:
+    """The command line of ``annotate``."""
+
+    paths: tuple[Path, ...]
+    store: Path | None = None
+    study: StudyOptions = StudyOptions()
+    frames: int = 48
+    report: bool = False
+    export: str | None = None
+    imports: tuple[Path, ...] = ()
+    salvage: bool = False
+    out: Path | None = None
+    as_json: bool = False
+    model: str | None = None
+    config_path: Path | None = None
+
+
+def run_annotate(options: AnnotateOptions) -> int:
+    """Open the window, or report, export, import, salvage; returns the exit code. Raises UserError."""
+    if options.export is not None and options.export not in EXPORTS:
+        raise AnnotationError(f"--export {options.export}: must be one of {', '.join(EXPORTS)}")
+    if sum((options.report, options.export is not None, bool(options.imports), options.salvage)) > 1:
+        raise AnnotationError("--report, --export, --import and --salvage are different things: give one of them")
+    if options.export is not None and options.out is None:
+        raise AnnotationError("--export needs --out: a folder for dataset, a file for csv and coco")
+    config = _config(options)
+    given = options.paths or (Path(),)
+    store_path = options.store or _store_of(given)
+    paths = tuple(path.parent if path.suffix == ".sqlite" else path for path in given)
+    if options.salvage:
+        return _salvage(store_path, options.out)
+    if options.report:
+        return _report(store_path, options)
+    if options.export is not None:
+        return _export(store_path, paths, options, config)
+    if options.imports:
+        return _import(store_path, paths, options, config)
+    return _window(store_path, paths, options, config)
+
+
+def _config(options: AnnotateOptions) -> Config:
+    overrides = {"perception": {"segmentation": {"model": options.model}}} if options.model else None
+    return load_config(options.config_path, overrides=overrides)
+
+
+def _store_of(paths: Sequence[Path]) -> Path:
+    """A path that is an annotation file itself, or the file beside the images."""
+    return paths[0] if paths[0].suffix == ".sqlite" else default_store(paths)
+
+
+# ---- the window
+
+
+def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    from app.window_command import _check_display, _quit_on_signal, make_application
+
+    _check_display()
+    files = image_files(paths, options.frames)
+    with AnnotationStore(store_path) as store:
+        images = _listed(files, store)
+        rater = options.study.rater or _user()
+        items = _queue(store, images, rater, options.study, config)
+        application = make_application()
+
+        from app.annotation_desk import AnnotationDesk
+        from app.annotator_window import AnnotatorWindow
+
+        desk = AnnotationDesk(store, items, config.perception, blind=bool(options.study.name))
+        _tell(store.problems)
+        who = f"study {options.study.name}, rater {rater}, blind" if options.study.name else f"rater {rater}"
+        window = AnnotatorWindow(desk, who)
+        application.aboutToQuit.connect(window.shut_down)
+        timer = _quit_on_signal(application)
+        window.show()
+        window.start()
+        code = application.exec()
+        timer.stop()
+        return code
+
+
+def _listed(files: Sequence[Path], store: AnnotationStore) -> list[FoundImage]:
+    with progress_bar() as bar:
+        task = bar.add_task("looking at the images", total=len(files))
+        images, problems = find_images(files, store, lambda: bar.advance(task))
+    _tell(problems)
+    if not images:
+        raise AnnotationError(f"{files[0].parent}: no image that can be read")
+    return images
+
+
+def _tell(problems: Sequence[str]) -> None:
+    """One line each on standard error; many are counted."""
+    for line in problems[:_NAMED_PROBLEMS]:
+        sys.stderr.write(f"warning: {line}\n")
+    if len(problems) > _NAMED_PROBLEMS:
+        sys.stderr.write(f"warning: and {len(problems) - _NAMED_PROBLEMS} more\n")
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError, ImportError):  # no name for this user id
+        return "rater"
+
+
+def _queue(store: AnnotationStore, images: Sequence[FoundImage], rater: str, options: StudyOptions, config: Config) -> list[Any]:
+    """The items of the window: of the study, or every image once."""
+    from app.annotation_desk import Item
+
+    here = {image.sha256: image for image in images}
+    if options.name:
+        settings = _study(store, images, options, config)
+        missing = [sha256 for sha256 in settings.images if sha256 not in here]
+        others = len(set(here) - set(settings.images))
+        _tell([f"{others} images are here that do not belong to study {options.name!r}; left out"] if others else [])
+        if missing:
+            names = store.images()
+            _tell([f"{names[m].name if m in names else m[:12]}: belongs to the study, but is not here; left out" for m in missing])
+        queue = [task for task in tasks(settings, rater) if task.sha256 in here]
+        if not queue:
+            raise AnnotationError(f"study {options.name!r}: none of its {len(settings.images)} images is here")
+    else:
+        if options.repeats not in (None, 1) or options.mirror or options.turn:
+            raise AnnotationError("--repeats, --mirror and --turn belong to a study: give it a name with --study")
+        order = _order(options.order, Order.LISTED)
+        listed = [image.sha256 for image in images]
+        if order is Order.RANDOM:
+            queue = tasks(StudySettings(tuple(listed), seed=options.seed or 0), rater)
+        else:
+            queue = [Task(sha256) for sha256 in queue_order(listed, order, _sureness(store, images, order, config))]
+    return [Item(here[t.sha256], ItemKey(t.sha256, options.name, rater, t.repeat), t.view) for t in queue]
+
+
+def _order(name: str | None, default: Order) -> Order:
+    if name is None:
+        return default
+    try:
+        return Order(name)
+    except ValueError:
+        raise AnnotationError(f"--order {name}: must be one of {', '.join(Order)}") from None
+
+
+def _study(store: AnnotationStore, images: Sequence[FoundImage], options: StudyOptions, config: Config) -> StudySettings:
+    """The settings that the study was begun with; what the command line says must not contradict them."""
+    kept = store.study_settings(options.name)
+    if kept is None:
+        order = _order(options.order, Order.RANDOM)
+        views = repeat_views(options.repeats or 2, mirror=options.mirror, turn=options.turn)
+        listed = queue_order([image.sha256 for image in images], order, _sureness(store, images, order, config))
+        settings = StudySettings(listed, views, order, options.seed or 0)
+        store.begin_study(options.name, settings.to_json())
+        return settings
+    settings = settings_from(kept, f"study {options.name!r}")
+    repeats = settings.repeats if options.repeats is None else options.repeats
+    asked_views = repeat_views(repeats, mirror=options.mirror, turn=options.turn)
+    given = options.repeats is not None or options.mirror or options.turn
+    differs = (
+        (given and asked_views != settings.views)
+        or (options.seed is not None and options.seed != settings.seed)
+        or (options.order is not None and _order(options.order, settings.order) is not settings.order)
+    )
+    if differs:
+        views = ", ".join(view.value for view in settings.views)
+        was = f"shown {settings.repeats} times ({views}), order {settings.order.value}, seed {settings.seed}"
+        raise AnnotationError(f"study {options.name!r} was begun otherwise: {was}; leave these options out, or choose another name")
+    return settings
+
+
+def _sureness(store: AnnotationStore, images: Sequence[FoundImage], order: Order, config: Config) -> dict[str, float] | None:
+    """How sure the algorithm is of each image (0: refused), for the order "worst".
+
+    Where a rater has measured already, a disagreement takes away from it: half at 15 degrees, everything from 30 degrees on.
+    """
+    if order is not Order.WORST:
+        return None
+    from core.images import read_image
+    from core.perception.pipeline import open_pipeline
+
+    measured = {
+        one.key.sha256: one.theta_deg for one in store.annotations() if one.theta_deg is not None and not one.content.cannot_tell
+    }
+    pipeline = open_pipeline(config.perception)
+    sureness = {}
+    with progress_bar() as bar:
+        for image in bar.track(images, description="asking the algorithm"):
+            pose = pipeline.perceive_single(Frame(0, 0.0, read_image(image.path))).pose
+            sureness[image.sha256] = 0.0
+            if pose is not None:
+                differs_deg = abs(pose.theta_deg - measured.get(image.sha256, pose.theta_deg))
+                sureness[image.sha256] = pose.confidence * max(0.0, 1.0 - differs_deg / _DISAGREEMENT_DEG)
+    return sureness
+
+
+# ---- agreement
+
+
+def _report(store_path: Path, options: AnnotateOptions) -> int:
+    from core.study.annotation_report import agreement_report, choose_study, write_measures
+
+    with AnnotationStore(store_path, read_only=True) as store:
+        annotations = choose_study(store.annotations(), options.study.name or None, str(store_path))
+        names = {sha256: image.name for sha256, image in store.images().items()}
+        _tell(store.problems)
+    study = annotations[0].key.study
+    report = {"study": study} | agreement_report(annotations, names, options.study.seed or 0)
+    if options.out is not None:
+        try:
+            options.out.mkdir(parents=True, exist_ok=True)
+            text = json.dumps(report, indent=1, ensure_ascii=False, allow_nan=False)
+            (options.out / "agreement.json").write_text(text + "\n", encoding="utf-8")
+            write_measures(options.out / "measures.csv", report["measures"])
+        except OSError as error:
+            raise AnnotationError(
+                f"{error.filename or options.out}: cannot be written ({error.strerror}); choose another --out"
+            ) from None
+    if options.as_json:
+        sys.stdout.write(json.dumps(report, allow_nan=False) + "\n")
+    else:
+        from app.annotate_tables import print_agreement
+
+        print_agreement(report)
+        if options.out is not None:
+            sys.stderr.write(f"agreement.json and measures.csv are in {options.out}\n")
+    return 0
+
+
+# ---- export, import, salvage
+
+
+def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    from core.study.annotation_export import export_coco, export_training_set
+    from core.study.evaluation import write_measurements
+
+    assert options.out is not None
+    annotations, images = read_annotated(store_path, paths, options.frames)
+    if options.study.name:
+        annotations = [one for one in annotations if one.key.study == options.study.name]
+    if options.export == "dataset":
+        count, problems = export_training_set(annotations, images, options.out)
+        _tell(problems)
+        sys.stderr.write(f"{count} frames with both masks in {options.out}: train --data {options.out}\n")
+    elif options.export == "coco":
+        count = export_coco(annotations, images, options.out)
+        sys.stderr.write(f"masks of {count} images in {options.out}\n")
+    else:
+        from app.annotate_evaluation import compared_rows
+
+        rows, _, _ = compared_rows(annotations, images, config, options.study.name or None, str(store_path))
+        try:
+            write_measurements(options.out, rows)
+        except OSError as error:
+            raise AnnotationError(f"{options.out}: cannot be written ({error.strerror}); choose another --out") from None
+        sys.stderr.write(f"{len(rows)} images in {options.out}: evaluate --csv {options.out} --out DIR\n")
+    return 0
+
+
+def read_annotated(store_path: Path, paths: Sequence[Path], frames: int = 48) -> tuple[list[StoredAnnotation], list[FoundImage]]:
+    """All annotations of a file and those of its images that are here; nothing is written. Raises AnnotationError."""
+    files = image_files(paths, frames)
+    with AnnotationStore(store_path, read_only=True) as store:
+        annotations = store.annotations()
+        images, problems = known_images(files, store)
+        _tell([*store.problems, *problems])
+    return annotations, images
+
+
+def known_images(files: Sequence[Path], store: AnnotationStore) -> tuple[list[FoundImage], list[str]]:
+    """Those of the files that the store knows, by their content."""
+    from core.study.annotation_store import image_sha256
+
+    records = store.images()
+    found: dict[str, FoundImage] = {}
+    problems = []
+    for path in files:
+        try:
+            sha256 = image_sha256(path)
+        except AnnotationError as error:
+            problems.append(str(error))
+            continue
+        if sha256 in records:
+            found.setdefault(sha256, FoundImage(path, records[sha256]))
+    return list(found.values()), problems
+
+
+def _import(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    from core.study.annotation_import import merged, read_files
+
+    sources = [file for path in options.imports for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]
+    if not sources:
+        raise AnnotationError(f"{options.imports[0]}: no .json file in it")
+    rater = options.study.rater or _user()
+    counts: Counter[str] = Counter()
+    with AnnotationStore(store_path) as store:
+        images = _listed(image_files(paths, options.frames), store)
+        imported, problems = read_files(sources, images)
+        existing = {one.key: one.content for one in store.annotations(options.study.name, rater)}
+        for one in imported:
+            key = ItemKey(one.image.sha256, options.study.name, rater)
+            history = store.history(key)
+            old = existing.get(key, Annotation())
+            content = merged(old, one.content)
+            entry = history.edit(f"import {one.source.name}", content)
+            if entry is None or content == old:
+                problems.append(f"{one.source}: {one.image.path.name} has these annotations already; left as they are")
+                continue
+            store.save(key, View.AS_IS, entry, content, measure_lines(content, one.image.record.size, config.perception), 0.0)
+            existing[key] = content
+            counts[one.image.sha256] += 1
+    _tell(problems)
+    if not counts:
+        raise AnnotationError("nothing was imported")
+    sys.stderr.write(f"{len(counts)} images got annotations, for rater {rater}, in {store_path}\n")
+    return 0
+
+
+def _salvage(store_path: Path, out: Path | None) -> int:
+    from core.study.annotation_salvage import salvage
+
+    target = out or store_path.with_name(f"salvaged_{store_path.name}")
+    kept, problems = salvage(store_path, target)
+    _tell(problems)
+    sys.stderr.write(f"{kept} annotations saved into {target}; the damaged file is as it was\n")
+    return 0

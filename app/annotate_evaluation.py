@@ -1,0 +1,48 @@
+"""Manual against algorithm: the raters' common answer for each image beside what perception says of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+from app.learning_commands import progress_bar
+from core.config import Config
+from core.study.annotation_images import FoundImage
+from core.study.annotation_records import StoredAnnotation
+from core.study.annotation_report import choose_study, manual_measurements
+from core.study.annotations import AnnotationError
+from core.study.evaluation import Measurement
+from core.types import Frame
+
+
+def compared_rows(
+    annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], config: Config, study: str | None, where: str
+) -> tuple[list[Measurement], dict[str, int], str]:
+    """A row for each image that was answered by hand and is here.
+
+    Returns
+    -------
+    tuple
+        Rows, how often which reason was given on images with a manual state, and where the network ran.
+    """
+    from core.images import read_image
+    from core.perception.pipeline import open_pipeline
+
+    here = {image.sha256: image for image in images}
+    done = [one for one in choose_study(annotations, study, where) if one.key.sha256 in here]
+    if not done:
+        raise AnnotationError(f"{where}: none of its annotated images is here")
+    manual = manual_measurements(done, {image.sha256: image.sha256 for image in images})
+    pipeline = open_pipeline(config.perception)
+    rows: list[Measurement] = []
+    reasons: Counter[str] = Counter()
+    with progress_bar() as bar:
+        for row in bar.track(manual, description="images"):
+            image = here[row.image]
+            scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(image.path)))
+            angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
+            rows.append(replace(row, image=image.path.name, algorithm_angle=angle, algorithm_state=state))
+            if scene.refusal is not None and row.state is not None:
+                reasons[scene.refusal.reason.value] += 1
+    return rows, dict(sorted(reasons.items())), pipeline.engine

@@ -1,0 +1,96 @@
+"""The menus of the annotator window: everything that it can do, with its key."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from app.annotation_tool import Tool
+from app.menus import MenuEntry, add_menu
+from core.types import PoseState
+
+if TYPE_CHECKING:
+    from app.annotator_window import AnnotatorWindow
+
+_ZOOM_STEP = 1.3
+_BRUSH_STEP = 1.25
+
+
+def add_annotator_menus(window: AnnotatorWindow) -> None:
+    """Fill the window's menu bar; keys that step repeat while they are held."""
+    canvas, bar, light = window.canvas, window.bar, window.light
+    add_menu(
+        window,
+        "&File",
+        [
+            MenuEntry("Where is it &saved?", window.tell_saved, ("Ctrl+S",)),
+            None,
+            MenuEntry("&Quit", window.close, ("Ctrl+Q",)),
+        ],
+    )
+    states = [MenuEntry(f"State {s.value}", partial(window.set_state, s), (s.value,)) for s in PoseState]
+    edits = add_menu(
+        window,
+        "&Edit",
+        [
+            MenuEntry("&Undo", window.undo, ("Ctrl+Z",)),
+            MenuEntry("&Redo", window.redo, ("Ctrl+Shift+Z", "Ctrl+Y")),
+            None,
+            *states,
+            MenuEntry("Can't tell", window.toggle_cannot_tell, ("X",)),
+            MenuEntry("&Note", window.edit_note, ("F2",)),
+            None,
+            MenuEntry("Take the &algorithm's", window.take_proposal, ("G",)),
+            MenuEntry("&Simplify outlines", window.simplify, ("S",)),
+        ],
+    )
+    for action in edits[:2]:
+        action.setAutoRepeat(True)
+    tools = [MenuEntry(t.value.label, partial(window.take_tool, t), (t.value.key,)) for t in Tool]
+    add_menu(
+        window,
+        "&Tools",
+        [
+            *tools,
+            None,
+            MenuEntry("&Brush", partial(bar.toggle, "T"), ("T",)),
+            MenuEntry("Brush smaller", partial(canvas.resize_brush, 1 / _BRUSH_STEP), ("[",)),
+            MenuEntry("Brush larger", partial(canvas.resize_brush, _BRUSH_STEP), ("]",)),
+        ],
+    )
+    go = add_menu(
+        window,
+        "&Go",
+        [
+            MenuEntry("&Next", partial(window.step, 1), ("N", "PgDown")),
+            MenuEntry("&Previous", partial(window.step, -1), ("P", "PgUp")),
+            MenuEntry("Next &without an answer", window.go_open, ("U",)),
+            MenuEntry("&First", partial(window.open, 0), ("Home",)),
+            MenuEntry("&Last", partial(window.open, len(window.desk.items) - 1), ("End",)),
+            MenuEntry("&List", window.queue.take_focus, ("F6",)),
+        ],
+    )
+    view = add_menu(
+        window,
+        "&View",
+        [
+            MenuEntry("Zoom &in", partial(canvas.zoom, _ZOOM_STEP), ("+", "=")),
+            MenuEntry("Zoom &out", partial(canvas.zoom, 1 / _ZOOM_STEP), ("-",)),
+            MenuEntry("&Close-up of the head", canvas.close_up, ("Z",)),
+            MenuEntry("&Whole picture", canvas.fit, ("F", "0")),
+            None,
+            MenuEntry("More contrast", partial(light.step, 1), (".",)),
+            MenuEntry("Less contrast", partial(light.step, -1), (",",)),
+            MenuEntry("Brighter", partial(light.step, 0, 1), (">",)),
+            MenuEntry("Darker", partial(light.step, 0, -1), ("<",)),
+            MenuEntry("Picture as it is", light.reset, ("/",)),
+            None,
+            MenuEntry("&Loupe", partial(bar.toggle, "L"), ("L",)),
+            MenuEntry("&Masks", partial(bar.toggle, "K"), ("K",)),
+            MenuEntry("&Algorithm", window.toggle_proposal, ("H",)),
+            MenuEntry("&Full screen", window.toggle_full_screen, ("F11",)),
+        ],
+    )
+    for action in (*go[:2], *view[:2], *view[4:8]):
+        action.setAutoRepeat(True)
+    add_menu(window, "&Help", [MenuEntry("&Keys", window.help.toggle, ("F1",))])

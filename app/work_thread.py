@@ -1,0 +1,93 @@
+"""A thread that does one job after the other, so that the window never waits for a disk or a network."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Hashable
+
+from PySide6.QtCore import QObject, QThread, Signal
+
+_log = logging.getLogger(__name__)
+
+
+class WorkThread(QThread):
+    """Jobs in the order in which they come, urgent ones first. ``stop`` lets those be finished that must not be lost.
+
+    ``done`` carries a job's key and what it gave, ``failed`` its key and one line.
+    """
+
+    done = Signal(object, object)
+    failed = Signal(object, str)
+
+    def __init__(self, name: str, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName(name)
+        self._changed = threading.Condition()
+        self._jobs: deque[tuple[Hashable, Callable[[], object]]] = deque()
+        self._stopping = False
+        self._busy: Hashable | None = None
+
+    @property
+    def pending(self) -> int:
+        """Jobs that are not finished, the one in hand included."""
+        with self._changed:
+            return len(self._jobs) + (self._busy is not None)
+
+    def submit(self, key: Hashable, job: Callable[[], object], *, urgent: bool = False, once: bool = False) -> None:
+        """Queue a job; with `once` not beside a waiting one of the same key (an urgent call moves that to the front)."""
+        with self._changed:
+            if self._stopping:
+                return
+            if once and (key == self._busy or any(key == waiting for waiting, _ in self._jobs)):
+                if not urgent or key == self._busy:
+                    return
+                self._jobs = deque(waiting for waiting in self._jobs if waiting[0] != key)
+            if urgent:
+                self._jobs.appendleft((key, job))
+            else:
+                self._jobs.append((key, job))
+            self._changed.notify()
+        if not self.isRunning():
+            self.start()
+
+    def forget(self) -> None:
+        """Take back what has not begun."""
+        with self._changed:
+            self._jobs.clear()
+
+    def stop(self, *, finish: bool) -> None:
+        """Ask the thread to end, with `finish` after all jobs; returns at once."""
+        with self._changed:
+            self._stopping = True
+            if not finish:
+                self._jobs.clear()
+            self._changed.notify()
+
+    def run(self) -> None:
+        while True:
+            with self._changed:
+                self._busy = None
+                while not self._jobs and not self._stopping:
+                    self._changed.wait()
+                if not self._jobs:
+                    return
+                key, job = self._jobs.popleft()
+                self._busy = key
+            try:
+                result = job()
+            except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible fault
+                line = " ".join(str(error).split()) or type(error).__name__
+                if type(error).__module__.partition(".")[0] not in {"core", "hardware"}:
+                    _log.error("a job of %s failed", self.objectName(), exc_info=error)
+                    line = f"unexpected {type(error).__name__}: {line}"
+                self._finished(lambda k=key, text=line: self.failed.emit(k, text))
+            else:
+                self._finished(lambda k=key, given=result: self.done.emit(k, given))
+
+    def _finished(self, report: Callable[[], None]) -> None:
+        """Report after the job no longer counts as pending, so that "all saved" is true when it is heard."""
+        with self._changed:
+            self._busy = None
+        report()

@@ -1,0 +1,232 @@
+"""The files of one session while it is written. No thread of its own but the one that forces what is written to the disk."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import secrets
+import threading
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal
+
+from core.record_config import RecordConfig
+from core.session.events import Event, EventKind, event_to_json
+from core.session.lines import sealed
+from core.session.manifest import EVENTS, FRAMES, PREFIX, About, Counts, Manifest, SessionError, new_manifest, write_manifest
+from core.session.ring import EncodedFrame
+from core.session.video import FrameEncoder, VideoError, VideoTrack
+
+
+class LineFile:
+    """A file of JSON lines, each handed to the system at once. A line that cannot be written whole is taken back.
+
+    The lock on it lasts as long as this process: it tells a session that is being recorded from one that was cut.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("xb", buffering=0)
+        self._end = 0
+        fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def write(self, line: str) -> int:
+        """Append a line; returns its bytes. Raises OSError."""
+        data = memoryview(f"{line}\n".encode())
+        done = 0
+        try:
+            while done < len(data):
+                done += self._file.write(data[done:]) or 0
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file.fileno(), self._end)
+                self._file.seek(self._end)
+            raise
+        self._end += done
+        return done
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def is_being_written(folder: Path) -> bool:
+    """Does a living process hold this session?"""
+    try:
+        with (folder / FRAMES).open("rb") as file:
+            fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
+            return False
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+
+
+def add_event(session: Path, event: Event) -> None:
+    """Add an event (a note made while it is played) to a session that has ended. Raises SessionError; nothing else is changed."""
+    path = session / EVENTS
+    line = sealed(json.dumps(event_to_json(event), allow_nan=False)) + "\n"
+    if is_being_written(session):
+        raise SessionError(f"{session}: is being recorded; stop the recording first")
+    try:
+        with path.open("a+b") as file:
+            fcntl.flock(file.fileno(), fcntl.LOCK_EX)
+            end = file.seek(0, os.SEEK_END)
+            if end:
+                # a last line that was cut must not swallow the new one
+                file.seek(end - 1)
+                line = line if file.read(1) == b"\n" else "\n" + line
+            file.write(line.encode())
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be written ({error.strerror}); the note was not kept") from None
+
+
+def check_parent(folder: Path) -> None:
+    """Raises SessionError when no session could be made in `folder`; it is made if it is not there."""
+    probe = folder / f".write-probe-{os.getpid()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise SessionError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+
+
+class SessionFiles:
+    """A session folder being written by one thread.
+
+    Parameters
+    ----------
+    parent : where the folder is made.
+    first_s : time of the first frame on the frames' clock; `now_s` is the same clock now, by which it becomes a date.
+
+    Raises
+    ------
+    SessionError
+        When the folder cannot be made.
+    """
+
+    def __init__(
+        self,
+        parent: Path,
+        about: About,
+        config: RecordConfig,
+        *,
+        first_s: float,
+        now_s: float,
+        origin: Literal["recorded", "last seconds"] = "recorded",
+    ) -> None:
+        self._split_s = config.split_s
+        self.started_s = first_s
+        now = datetime.now(UTC)
+        age_s = now_s - first_s if 0.0 <= now_s - first_s < 86_400.0 else 0.0
+        started = datetime.fromtimestamp(now.timestamp() - age_s, UTC)
+        session_id = secrets.token_hex(4)
+        self.folder = parent / f"{PREFIX}{started:%Y%m%dT%H%M%SZ}_{session_id}"
+        self._manifest = new_manifest(about, session_id, started, first_s, config.codec).model_copy(update={"origin": origin})
+        self.counts = Counts()
+        try:
+            parent.mkdir(parents=True, exist_ok=True)
+            self.folder.mkdir()
+            self.counts.bytes += write_manifest(self.folder, self._manifest)
+            self._rows = LineFile(self.folder / FRAMES)
+            self._events = LineFile(self.folder / EVENTS)
+        except OSError as error:
+            raise SessionError(f"{parent}: cannot be written ({error.strerror}); choose another folder") from None
+        self._track: VideoTrack | None = None
+        self._encoder: FrameEncoder | None = None
+        self._track_from_s = 0.0
+        self._syncer = _Syncer(self.folder, config.sync_s) if config.sync_s > 0 else None
+
+    def wants_key(self, captured_s: float) -> bool:
+        """Must the next frame be a key picture, since a new file begins with it?"""
+        return self._track is None or captured_s - self._track_from_s >= self._split_s
+
+    def write_frame(self, frame: EncodedFrame) -> None:
+        """Append picture and row. Raises VideoError or OSError; the session must then be closed."""
+        if frame.encoder is not self._encoder or (frame.packet.is_key and self.wants_key(frame.captured_s)):
+            self._next_track(frame)
+        assert self._track is not None
+        pts_ms = self._track.write(frame.packet)
+        place = f'{{"row":{self.counts.frames},"video":{self.counts.videos - 1},"pts_ms":{pts_ms},'
+        place += f'"picture_crc":"{frame.packet.crc:08x}",'
+        self.counts.bytes += self._rows.write(sealed(place + frame.row[1:])) + len(frame.packet.data)
+        self.counts.frames += 1
+
+    def write_event(self, event: Event) -> None:
+        """Append an event. Raises OSError."""
+        self.counts.bytes += self._events.write(sealed(json.dumps(event_to_json(event), allow_nan=False)))
+        self.counts.events += 1
+
+    def _next_track(self, frame: EncodedFrame) -> None:
+        if not frame.packet.is_key:
+            raise VideoError("a video file must begin with a key picture")
+        if self._track is not None:
+            self._track.close()
+        name = f"video_{self.counts.videos:04d}.mkv"
+        self._track = VideoTrack(self.folder / name, frame.encoder.template)
+        self._encoder, self._track_from_s = frame.encoder, frame.captured_s
+        self.counts.videos += 1
+        width, height = frame.encoder.size
+        self.write_event(Event(frame.captured_s, EventKind.VIDEO, name, {"size": [width, height]}))
+
+    def close(self, ended: str, dropped: int) -> str:
+        """End the session: index of the video, then the manifest. Returns what went wrong, or nothing; never raises for the disk.
+
+        A session whose video cannot be closed stays marked as cut, so that it is recovered at the next start.
+        """
+        problem = ""
+        if self._syncer is not None:
+            self._syncer.stop()
+        if self._track is not None:
+            try:
+                self._track.close()
+            except VideoError as error:
+                problem = str(error)
+        # before the manifest says that all is well, all must be on the disk
+        _sync_files(self.folder)
+        self.counts.dropped = dropped
+        changes = {"closed": not problem, "ended": ended, "ended_utc": datetime.now(UTC), "counts": self.counts}
+        try:
+            write_manifest(self.folder, self._manifest.model_copy(update=changes))
+        except OSError as error:
+            problem = problem or f"{self.folder}: the manifest cannot be written ({error.strerror})"
+        with contextlib.suppress(OSError):
+            self._rows.close()
+            self._events.close()
+        return problem
+
+    @property
+    def manifest(self) -> Manifest:
+        return self._manifest
+
+
+class _Syncer:
+    """Forces the files to the disk now and then, for the day when the power goes. A slow disk delays only this thread."""
+
+    def __init__(self, folder: Path, every_s: float) -> None:
+        self._folder = folder
+        self._every_s = every_s
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="session sync", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._stop.wait(self._every_s):
+            _sync_files(self._folder)
+
+    def stop(self) -> None:
+        self._stop.set()
+
+
+def _sync_files(folder: Path) -> None:
+    """Only the newest video changes. What cannot be forced now is written by the system later."""
+    for path in (folder / FRAMES, folder / EVENTS, *sorted(folder.glob("video_*.mkv"))[-1:]):
+        with contextlib.suppress(OSError):
+            handle = os.open(path, os.O_RDONLY)
+            try:
+                os.fdatasync(handle)
+            finally:
+                os.close(handle)

@@ -1,0 +1,187 @@
+"""What the recorder's thread does: encode once, keep the last seconds, write the session. Not to be called from other threads."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from core.control.drive_view import DriveView
+from core.record_config import RecordConfig
+from core.session.events import Event, EventKind, events_between
+from core.session.files import SessionFiles
+from core.session.manifest import About
+from core.session.record_status import StatusBoard
+from core.session.ring import EncodedFrame, Ring
+from core.session.ring_saver import RingSaver
+from core.session.rows import row_of
+from core.session.video import FrameEncoder
+from core.types import Tick
+
+_TELL_DROPPED_S = 1.0
+_MAX_EARLY_EVENTS = 1000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A tick with who drives and the servo bus's status; ``dropped`` counts the frames dropped before it, ever."""
+
+    tick: Tick
+    drive: DriveView | None
+    bus: Any
+    dropped: int
+
+
+class Recording:
+    """The ring, and the session if there is one.
+
+    Parameters
+    ----------
+    parent : where sessions are made.
+    clock : the clock of the frames.
+    board : where the state is shown.
+    """
+
+    def __init__(self, config: RecordConfig, about: About, parent: Path, clock: Callable[[], float], board: StatusBoard) -> None:
+        self._config = config
+        self._about = about
+        self._parent = parent
+        self._clock = clock
+        self._board = board
+        self._ring = Ring(config.ring_s, round(config.ring_mb * 1e6)) if config.ring_s > 0 else None
+        self._encoder: FrameEncoder | None = None
+        self._files: SessionFiles | None = None
+        self._is_armed = False
+        self._early: list[Event] = []
+        self._drive: DriveView | None = None
+        self._dropped_told = 0
+        self._dropped_told_s = -math.inf
+        # read by other threads
+        self.dropped_before = 0
+        self.began_s = 0.0
+        self.saver = RingSaver(parent, config, board)
+
+    @property
+    def wants_pictures(self) -> bool:
+        """Is there anybody who would take them?"""
+        return self._ring is not None or self._files is not None or self._is_armed
+
+    @property
+    def is_on(self) -> bool:
+        """Is a session being recorded, or about to be?"""
+        return self._files is not None or self._is_armed
+
+    def take_picture(self, picture: Picture) -> None:
+        """Encode it, keep it, write it. Raises VideoError, SessionError or OSError, after which `fail` must be called."""
+        if not self.wants_pictures:
+            return
+        frame = picture.tick.frame
+        if not math.isfinite(frame.captured_s):
+            frame = replace(frame, captured_s=self._clock())
+            picture = replace(picture, tick=replace(picture.tick, frame=frame))
+        if self._is_armed:
+            self._open(picture)
+        if picture.drive is not None:
+            for event in events_between(self._drive, picture.drive):
+                self.take_event(event)
+            self._drive = picture.drive
+        encoded = self._encoded(picture)
+        if self._ring is not None:
+            self._ring.add(encoded)
+            self._board.show(ring_s=self._ring.seconds)
+        if self._files is not None:
+            self._files.write_frame(encoded)
+            self._tell_dropped(picture)
+            self._board.show(frames=self._files.counts.frames, bytes=self._files.counts.bytes)
+
+    def _encoded(self, picture: Picture) -> EncodedFrame:
+        frame = picture.tick.frame
+        size = frame.image.shape[1], frame.image.shape[0]
+        if self._encoder is None or self._encoder.size != size:
+            self.drop_encoder()
+            self._encoder = FrameEncoder(size, self._config)
+        force_key = self._files is not None and self._files.wants_key(frame.captured_s)
+        packet = self._encoder.encode(frame.image, frame.captured_s, force_key=force_key)
+        dropped = max(0, picture.dropped - self.dropped_before) if self._files is not None else 0
+        row = row_of(picture.tick, picture.drive, bus=picture.bus, dropped_rows=dropped, with_masks=self._config.masks)
+        return EncodedFrame(frame.captured_s, packet, self._encoder, json.dumps(row, allow_nan=False, separators=(",", ":")))
+
+    def take_event(self, event: Event) -> None:
+        """Keep it and write it; between start and the first frame it waits. Raises OSError."""
+        if self._ring is not None:
+            self._ring.add_event(event)
+        if self._files is not None:
+            self._files.write_event(event)
+        elif self._is_armed and len(self._early) < _MAX_EARLY_EVENTS:
+            self._early.append(event)
+
+    def _tell_dropped(self, picture: Picture) -> None:
+        """At most once a second: a recorder that is behind must not be kept busy with saying so."""
+        total, now_s = picture.dropped - self.dropped_before, picture.tick.frame.captured_s
+        if total > self._dropped_told and now_s - self._dropped_told_s >= _TELL_DROPPED_S:
+            count = total - self._dropped_told
+            self._dropped_told, self._dropped_told_s = total, now_s
+            self.take_event(Event(now_s, EventKind.DROPPED, f"{count} frames", {"count": count, "total": total}))
+
+    def begin(self) -> None:
+        """A session begins with the next frame; nothing happens when one is being recorded."""
+        if self._files is None:
+            self._is_armed = True
+            self._board.show(problem="")
+
+    def _open(self, picture: Picture) -> None:
+        self._is_armed = False
+        first_s = picture.tick.frame.captured_s
+        self._files = SessionFiles(self._parent, self._about, self._config, first_s=first_s, now_s=self._clock())
+        self.dropped_before, self._dropped_told, self._dropped_told_s = picture.dropped, 0, -math.inf
+        self.began_s = self._clock()
+        self._board.show(recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
+        drive = picture.drive or self._drive
+        if drive is not None:
+            # the session must tell by itself where it began
+            self._drive = replace(drive, time_s=first_s)
+            self._files.write_event(next(events_between(None, self._drive)))
+            for fault in drive.active:
+                self._files.write_event(Event(first_s, EventKind.FAULT, str(fault.cause), {"detail": fault.detail}))
+        early, self._early = self._early, []
+        for event in early:
+            self._files.write_event(event)
+
+    def end(self, ended: str, dropped: int) -> None:
+        """End the session if there is one; `dropped` frames were dropped until now, ever."""
+        self._is_armed, self._early = False, []
+        files, self._files = self._files, None
+        if files is None:
+            return
+        count, elapsed_s = dropped - self.dropped_before, max(0.0, self._clock() - self.began_s)
+        problem = files.close(ended, count)
+        changes: dict[str, Any] = {"problem": problem} if problem else {"saved": files.folder}
+        self._board.show(recording=False, elapsed_s=elapsed_s, dropped=count, bytes=files.counts.bytes, **changes)
+
+    def fail(self, problem: str, dropped: int) -> None:
+        """End the session, keeping what was written. The ring goes on, with a new encoder."""
+        was_on = self.is_on
+        self.end(problem, dropped)
+        self.drop_encoder()
+        self._board.show(problem=f"recording stopped: {problem}" if was_on else problem)
+
+    def change_rig(self, about: About, dropped: int) -> None:
+        """A session never mixes two rigs, and neither does the ring."""
+        self.end("another rig was opened", dropped)
+        self._about, self._drive = about, None
+        if self._ring is not None:
+            self._ring.clear()
+
+    def save_ring(self) -> None:
+        """Write what the ring holds, in the background."""
+        frames, events = self._ring.content() if self._ring is not None else ([], [])
+        self.saver.save(self._about, frames, events, self._clock())
+
+    def drop_encoder(self) -> None:
+        """With a ring it may still be needed as the template of what the ring holds."""
+        encoder, self._encoder = self._encoder, None
+        if encoder is not None and self._ring is None:
+            encoder.close()

@@ -1,0 +1,249 @@
+"""Sessions that were cut (kill, power, full disk): found, and repaired into a copy. The original is never touched."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from core.session.checked import Damaged
+from core.session.events import event_from_json
+from core.session.files import is_being_written
+from core.session.lines import Line, lines_of, parse_line
+from core.session.manifest import (
+    EVENTS,
+    FRAMES,
+    PREFIX,
+    RECOVERED,
+    Counts,
+    Loss,
+    Manifest,
+    SessionError,
+    read_manifest,
+    sync_folder,
+    write_manifest,
+)
+from core.session.reader import check_is_session
+from core.session.recorded import row_from_json
+from core.session.remux import Expected, remux
+from core.session.row_index import columns_of, quick_columns
+from core.session.video import VideoError
+
+_PROBLEMS_KEPT = 50
+
+
+@dataclass(frozen=True, slots=True)
+class CutSession:
+    """A session that did not end properly. ``why`` is one line."""
+
+    folder: Path
+    why: str
+    bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """A recovered copy. ``loss`` tells what it lacks, in seconds, rows and pictures; ``frames`` what it has."""
+
+    folder: Path
+    frames: int
+    pictures: int
+    loss: Loss
+
+
+def find_cut_sessions(folder: Path) -> tuple[CutSession, ...]:
+    """Sessions in `folder` that were cut, that nobody is writing, and that have not been recovered yet; oldest first."""
+    found = []
+    try:
+        candidates = sorted(path for path in folder.iterdir() if path.name.startswith(PREFIX) and path.is_dir())
+    except OSError:
+        return ()
+    for path in candidates:
+        if path.name.endswith(RECOVERED) or (folder / (path.name + RECOVERED)).exists():
+            continue
+        why = _why_cut(path)
+        if why and not is_being_written(path):
+            found.append(CutSession(path, why, payload_bytes(path)))
+    return tuple(found)
+
+
+def _why_cut(folder: Path) -> str:
+    """Empty when it is well, holds nothing, or is of a newer version."""
+    if not payload_bytes(folder):
+        return ""
+    try:
+        return "" if read_manifest(folder).closed else "it did not end properly"
+    except SessionError as error:
+        return "" if "newer version" in str(error) else str(error)
+
+
+def payload_bytes(folder: Path) -> int:
+    """Bytes of rows and videos."""
+    total = 0
+    for path in (folder / FRAMES, *folder.glob("video_*.mkv")):
+        try:
+            total += path.stat().st_size
+        except OSError:
+            continue
+    return total
+
+
+@dataclass(slots=True)
+class _Salvage:
+    """What was found so far. ``places`` are the video, time (ms) and capture time (s) of every good row, ``expected`` what that
+    means for each video file."""
+
+    problems: list[str] = field(default_factory=list)
+    rows: list[int] = field(default_factory=list)
+    places: list[tuple[int, int, float]] = field(default_factory=list)
+    expected: dict[int, list[Expected]] = field(default_factory=dict)
+    events: int = 0
+    last_event_s: float | None = None
+    kept: set[tuple[int, int]] = field(default_factory=set)
+    videos: int = 0
+
+
+_Take = Callable[[Line, _Salvage], None]
+OnBytes = Callable[[int], None]
+
+
+def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda _: None) -> Recovery:
+    """Repair a session into a copy beside it, or in `into`: ``<name>_recovered``. `on_bytes` hears how much was read.
+
+    Raises
+    ------
+    SessionError
+        Not a session, being recorded, recovered before, nothing left in it, or the copy cannot be written.
+    """
+    session = session.absolute()
+    check_is_session(session)
+    if is_being_written(session):
+        raise SessionError(f"{session}: is being recorded; stop the recording first")
+    parent = session.parent if into is None else into.absolute()
+    target, work = parent / (session.name + RECOVERED), parent / f".{session.name}.recovering"
+    if target.exists():
+        raise SessionError(f"{target}: is there already; remove it to recover again")
+    try:
+        shutil.rmtree(work, ignore_errors=True)
+        work.mkdir(parents=True)
+        recovery = _salvage(session, work, target, on_bytes)
+        work.rename(target)
+        sync_folder(parent)
+    except VideoError as error:
+        raise SessionError(f"{error}; make room or choose another folder") from None
+    except OSError as error:
+        raise SessionError(f"{error.filename or work}: {error.strerror or error}; make room or choose another folder") from None
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    return recovery
+
+
+def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Recovery:
+    found = _Salvage()
+    try:
+        manifest = read_manifest(session)
+    except SessionError as error:
+        if "newer version" in str(error):
+            raise
+        found.problems.append(str(error))
+        manifest = _unknown(session)
+    _copy_lines(session / FRAMES, work / FRAMES, found, _take_row, on_bytes)
+    _copy_lines(session / EVENTS, work / EVENTS, found, _take_event, lambda _: None)
+    for path in sorted(session.glob("video_*.mkv")):
+        _copy_video(path, work / path.name, found)
+        on_bytes(path.stat().st_size)
+    if not found.rows and not found.kept:
+        raise SessionError(f"{session}: nothing left to recover: neither rows nor pictures can be read")
+    loss = _loss(session, manifest, found)
+    counts = Counts(frames=len(found.rows), events=found.events, videos=found.videos, dropped=manifest.counts.dropped)
+    counts.bytes = sum(path.stat().st_size for path in work.iterdir())
+    ended = {"closed": True, "ended": manifest.ended or "cut", "counts": counts, "recovered": loss}
+    write_manifest(work, manifest.model_copy(update=ended))
+    return Recovery(target, len(found.rows), len(found.kept), loss)
+
+
+def _unknown(session: Path) -> Manifest:
+    """A manifest for a session whose own is lost: nothing is claimed."""
+    try:
+        started = datetime.strptime(session.name.removeprefix(PREFIX)[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
+    except ValueError:
+        started = datetime.fromtimestamp(0, UTC)
+    return Manifest(id=session.name.rpartition("_")[2][:64], kind="UNKNOWN", started_utc=started, started_monotonic_s=0.0)
+
+
+def _copy_lines(source: Path, target: Path, found: _Salvage, take: _Take, on_bytes: OnBytes) -> None:
+    """Copy the good lines as they are; name the others."""
+    with target.open("wb") as output:
+        try:
+            for line in lines_of(source):
+                on_bytes(len(line.data or b""))
+                try:
+                    take(line, found)
+                except Damaged as error:
+                    found.problems.append(f"{source.name}: line {line.number}: {error}; left out")
+                else:
+                    output.write((line.data or b"") + b"\n")
+        except FileNotFoundError:
+            found.problems.append(f"{source.name}: missing")
+
+
+def _take_row(line: Line, found: _Salvage) -> None:
+    columns = quick_columns(line)
+    if columns is None:
+        record = parse_line(line)
+        columns = columns_of(record)
+        row_from_json(record)
+    row, captured_s, video, pts_ms, *_, crc = columns
+    if found.rows and row <= found.rows[-1]:
+        raise Damaged(f"row {row} after row {found.rows[-1]}")
+    found.rows.append(row)
+    found.places.append((video, pts_ms, captured_s))
+    found.expected.setdefault(video, []).append(Expected(row, pts_ms, crc if crc >= 0 else None))
+
+
+def _take_event(line: Line, found: _Salvage) -> None:
+    event = event_from_json(parse_line(line))
+    found.events += 1
+    found.last_event_s = event.time_s
+
+
+def _copy_video(path: Path, target: Path, found: _Salvage) -> None:
+    digits = path.stem.rpartition("_")[2]
+    if not digits.isascii() or not digits.isdigit():
+        found.problems.append(f"{path.name}: not a name of ours; left out")
+        return
+    video = int(digits)
+    done = remux(path, target, found.expected.get(video, []))
+    found.problems += done.problems
+    found.kept |= {(video, pts_ms) for pts_ms in done.kept_ms}
+    found.videos += bool(done.kept_ms)
+
+
+def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:
+    """Rows that should be there and are not, pictures that rows tell of and that are not there, and how long all that lasted."""
+    told = {(video, pts_ms) for video, pts_ms, _ in found.places}
+    pictures = len(told - found.kept)
+    whole = max(found.rows[-1] + 1 if found.rows else 0, manifest.counts.frames)
+    rows = max(whole - len(found.rows), len(found.kept - told))
+    times = np.array([captured_s for *_, captured_s in found.places])
+    steps = np.diff(times)
+    period_s = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0 / 30.0
+    seconds = (pictures + rows) * period_s
+    if found.last_event_s is not None and len(times) and not manifest.closed:
+        # an event after the last row: at least until then it was recording
+        seconds = max(seconds, found.last_event_s - float(times[-1]))
+    problems = found.problems[:_PROBLEMS_KEPT]
+    if len(found.problems) > _PROBLEMS_KEPT:
+        problems.append(f"and {len(found.problems) - _PROBLEMS_KEPT} more")
+    return Loss(
+        origin=str(session),
+        recovered_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+        seconds=round(seconds, 3),
+        rows=rows,
+        pictures=pictures,
+        problems=tuple(problems),
+    )

@@ -1,0 +1,76 @@
+"""The last seconds, encoded, in memory: what "save the last 30 s" writes out. Bounded in time and in bytes."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+from core.session.events import Event
+from core.session.video import FrameEncoder, Packet
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EncodedFrame:
+    """A frame ready to be written: its packet, the encoder that made it, and its row's JSON without its place in a session."""
+
+    captured_s: float
+    packet: Packet
+    encoder: FrameEncoder
+    row: str
+
+    @property
+    def nbytes(self) -> int:
+        return len(self.packet.data) + len(self.row)
+
+
+class Ring:
+    """Keeps frames and events. What it holds always begins at a key picture, so it may reach up to a second further back."""
+
+    def __init__(self, seconds: float, max_bytes: int) -> None:
+        self._seconds = seconds
+        self._max_bytes = max_bytes
+        self._groups: deque[list[EncodedFrame]] = deque()
+        self._events: deque[Event] = deque(maxlen=2000)
+        self._bytes = 0
+
+    @property
+    def seconds(self) -> float:
+        """How much it holds now."""
+        if not self._groups:
+            return 0.0
+        return max(0.0, self._groups[-1][-1].captured_s - self._groups[0][0].captured_s)
+
+    @property
+    def nbytes(self) -> int:
+        return self._bytes
+
+    def add(self, frame: EncodedFrame) -> None:
+        """Take a frame in and let the oldest go. Frames before the first key picture are not kept."""
+        if frame.packet.is_key:
+            self._groups.append([])
+        if not self._groups:
+            return
+        self._groups[-1].append(frame)
+        self._bytes += frame.nbytes
+        while len(self._groups) > 1 and (self._is_old(frame.captured_s) or self._bytes > self._max_bytes):
+            self._bytes -= sum(old.nbytes for old in self._groups.popleft())
+
+    def _is_old(self, now_s: float) -> bool:
+        """Is the oldest group not needed, since the next one reaches back far enough? A clock that went back ages everything."""
+        age_s = now_s - self._groups[1][0].captured_s
+        return age_s >= self._seconds or age_s < 0.0
+
+    def add_event(self, event: Event) -> None:
+        self._events.append(event)
+
+    def content(self) -> tuple[list[EncodedFrame], list[Event]]:
+        """A copy: the frames in order, and the events since the first of them."""
+        frames = [frame for group in self._groups for frame in group]
+        if not frames:
+            return [], []
+        return frames, [event for event in self._events if event.time_s >= frames[0].captured_s]
+
+    def clear(self) -> None:
+        self._groups.clear()
+        self._events.clear()
+        self._bytes = 0

@@ -1,0 +1,65 @@
+"""Writes what the ring held as a session, in a thread of its own: a slow disk must not hold up the session that may be running."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+from core.record_config import RecordConfig
+from core.session.events import Event
+from core.session.files import SessionFiles
+from core.session.manifest import About, SessionError
+from core.session.record_status import StatusBoard
+from core.session.ring import EncodedFrame
+from core.session.video import VideoError
+
+
+class RingSaver:
+    """One saving at a time; how it went is on the board."""
+
+    def __init__(self, parent: Path, config: RecordConfig, board: StatusBoard) -> None:
+        self._parent = parent
+        self._config = config
+        self._board = board
+        self._thread: threading.Thread | None = None
+
+    def save(self, about: About, frames: list[EncodedFrame], events: list[Event], now_s: float) -> None:
+        """Start to write; `now_s` is the frames' clock now."""
+        if not frames:
+            self._board.show(problem="nothing to save: no frames in memory yet")
+        elif self._thread is not None and self._thread.is_alive():
+            self._board.show(problem="the last seconds are still being saved")
+        else:
+            self._board.show(saving=True, problem="")
+            arguments = (about, frames, events, now_s)
+            self._thread = threading.Thread(target=self._write, args=arguments, name="ring saver", daemon=True)
+            self._thread.start()
+
+    def finish(self, within_s: float) -> bool:
+        """Wait for it; False when the disk has not answered in time."""
+        if self._thread is not None:
+            self._thread.join(within_s)
+        return self._thread is None or not self._thread.is_alive()
+
+    def _write(self, about: About, frames: list[EncodedFrame], events: list[Event], now_s: float) -> None:
+        problem = ""
+        folder: Path | None = None
+        try:
+            first_s = frames[0].captured_s
+            files = SessionFiles(self._parent, about, self._config, first_s=first_s, now_s=now_s, origin="last seconds")
+            folder = files.folder
+            try:
+                for event in events:
+                    files.write_event(event)
+                for frame in frames:
+                    files.write_frame(frame)
+            finally:
+                problem = files.close("saved from memory", 0)
+        except (VideoError, SessionError) as error:
+            problem = str(error)
+        except OSError as error:
+            problem = f"{error.filename or self._parent}: {error.strerror or error}"
+        if problem:
+            self._board.show(saving=False, problem=f"the last seconds were not saved: {problem}")
+        else:
+            self._board.show(saving=False, saved=folder)

@@ -1,0 +1,80 @@
+"""What is readable of a damaged annotation file, written into a new one; the damaged file is never touched."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from core.study.annotation_store import AnnotationStore
+from core.study.annotations import AnnotationError
+
+_MAX_ROW = 1_000_000
+_MISSES = 2_000
+"""After so many rows in a row that cannot be read, nothing more is expected."""
+_TABLES = ("images", "studies", "annotations", "journal")
+
+
+def salvage(damaged: Path, target: Path) -> tuple[int, list[str]]:
+    """Copy all rows that can be read.
+
+    Returns
+    -------
+    tuple
+        Number of annotations in the new file, and one line for each table or record that is lost.
+
+    Raises
+    ------
+    AnnotationError
+        Nothing can be read, or the new file is there already or cannot be written.
+    """
+    if not damaged.is_file():
+        raise AnnotationError(f"{damaged}: no such annotation file")
+    if target.exists():
+        raise AnnotationError(f"{target}: is there already; choose another --out")
+    problems: list[str] = []
+    tables: dict[str, list[tuple[Any, ...]]] = {}
+    columns: dict[str, list[str]] = {}
+    try:
+        with closing(sqlite3.connect(f"{damaged.resolve().as_uri()}?mode=ro", uri=True, isolation_level=None)) as source:
+            source.execute("PRAGMA writable_schema = ON")  # without it a file that was cut short is not looked into at all
+            source.text_factory = lambda data: data.decode("utf-8", errors="replace")
+            for table in _TABLES:
+                columns[table], tables[table] = _readable(source, table, problems)
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        raise AnnotationError(f"{damaged}: nothing in it can be read ({error})") from None
+    if not tables["images"] and not tables["annotations"]:
+        raise AnnotationError(f"{damaged}: nothing in it can be read")
+    with AnnotationStore(target) as store:
+        store.take_rows(columns, tables, problems)
+    with AnnotationStore(target, read_only=True) as store:
+        kept = len(store.annotations())
+        problems += store.problems
+    return kept, problems
+
+
+def _readable(source: sqlite3.Connection, table: str, problems: list[str]) -> tuple[list[str], list[tuple[Any, ...]]]:
+    try:
+        names = [str(row[1]) for row in source.execute(f"PRAGMA table_info({table})")]
+        rows = list(_rows(source, table))
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        problems.append(f"table {table} is lost ({error})")
+        return [], []
+    return names, rows
+
+
+def _rows(source: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
+    """All rows by row number: where a page is damaged, the numbers on it are stepped over."""
+    number, misses = 0, 0
+    while number < _MAX_ROW and misses < _MISSES:
+        try:
+            for row in source.execute(f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid", (number,)):
+                if int(row[0]) <= number:  # damaged links between pages can lead in a circle
+                    raise sqlite3.DatabaseError("rows out of order")
+                number, misses = int(row[0]), 0
+                yield row[1:]
+            return
+        except (sqlite3.DatabaseError, UnicodeDecodeError):
+            number, misses = number + 1, misses + 1

@@ -1,0 +1,118 @@
+"""Masks as polygons: outlines through the centres of the border pixels, holes as polygons of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.study.annotations import Line, MaskPolygon, MaskTarget
+from core.types import Mask, Points
+
+TOLERANCE_PX = 0.7
+"""Outlines may miss the border pixels' centres by this much; it saves most of their points."""
+_MIN_AREA_PX = 12.0
+_SHIFT = 6
+_BRUSH_SIDE_PX = 2048
+"""The brush paints in no finer raster than this on the longer side: at 8k a stroke would take half a second."""
+
+
+def polygons_of(
+    mask: Mask, target: MaskTarget, tolerance_px: float = TOLERANCE_PX, offset: tuple[int, int] = (0, 0)
+) -> tuple[MaskPolygon, ...]:
+    """The outlines of a mask (H, W): outer ones first, each hole after its outer one.
+
+    Parameters
+    ----------
+    mask : binary mask.
+    target : what it covers.
+    tolerance_px : how far an outline may be off; 0 keeps the mask exactly.
+    offset : added to all points, (x, y).
+    """
+    contours, hierarchy = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE, offset=offset)
+    parents: list[int] = np.asarray(hierarchy).reshape(-1, 4)[:, 3].tolist() if len(contours) else []
+    outlines = [_outline(contour, target, tolerance_px, parent >= 0) for contour, parent in zip(contours, parents, strict=True)]
+    holes: dict[int, list[MaskPolygon]] = {}
+    for outline, parent in zip(outlines, parents, strict=True):
+        if parent >= 0:
+            holes.setdefault(parent, []).extend(outline)
+    outer = [(place, outline) for place, outline in enumerate(outlines) if parents[place] < 0 and outline]
+    return tuple(polygon for place, outline in outer for polygon in (*outline, *holes.get(place, [])))
+
+
+def _outline(contour: Any, target: MaskTarget, tolerance_px: float, is_hole: bool) -> list[MaskPolygon]:
+    if len(contour) < 3 or (tolerance_px > 0 and cv2.contourArea(contour) < _MIN_AREA_PX):
+        return []
+    points = cv2.approxPolyDP(contour, tolerance_px, True)[:, 0] if tolerance_px > 0 else contour[:, 0]
+    return [MaskPolygon(target, _line(points), is_hole)] if len(points) >= 3 else []
+
+
+def fill(polygons: Iterable[MaskPolygon], target: MaskTarget, size: tuple[int, int]) -> Mask:
+    """The mask (H, W) of all polygons of `target`; `size` is (width, height). Holes are cut in the order of the polygons."""
+    mask = np.zeros((size[1], size[0]), np.uint8)
+    for polygon in polygons:
+        if polygon.target is not target or len(polygon.points) < 3:
+            continue
+        outline = _fixed(polygon.points)
+        if not polygon.is_hole:
+            cv2.fillPoly(mask, [outline], 255, cv2.LINE_8, _SHIFT)
+            continue
+        # The outline of a hole runs through mask pixels around it: what it encloses is cut, itself it stays.
+        inside = np.zeros_like(mask)
+        cv2.fillPoly(inside, [outline], 255, cv2.LINE_8, _SHIFT)
+        cv2.polylines(inside, [outline], True, 0, 1, cv2.LINE_8, _SHIFT)
+        mask[inside > 0] = 0
+    return mask > 0
+
+
+def paint(
+    polygons: tuple[MaskPolygon, ...], target: MaskTarget, stroke: Points, radius_px: float, size: tuple[int, int], *, erase: bool
+) -> tuple[MaskPolygon, ...]:
+    """The polygons after a stroke of the brush: `stroke` (N, 2) is where its middle went, in image pixels of `size`."""
+    others = tuple(polygon for polygon in polygons if polygon.target is not target)
+    scale = min(1.0, _BRUSH_SIDE_PX / max(size))
+    if scale < 1.0:
+        polygons, stroke, radius_px = _scaled(polygons, scale), (stroke + 0.5) * scale - 0.5, radius_px * scale
+        size = (round(size[0] * scale), round(size[1] * scale))
+    mask = fill(polygons, target, size).astype(np.uint8)
+    ink = 0 if erase else 1
+    points = np.round(stroke * (1 << _SHIFT)).astype(np.int32)
+    for point in points[[0, -1]]:
+        cv2.circle(mask, point.tolist(), round(radius_px * (1 << _SHIFT)), ink, -1, cv2.LINE_8, _SHIFT)
+    if len(points) > 1:
+        cv2.polylines(mask, [points.reshape(-1, 1, 2)], False, ink, max(1, round(2 * radius_px)), cv2.LINE_8, _SHIFT)
+    painted = polygons_of(mask > 0, target)
+    return others + (_scaled(painted, 1.0 / scale) if scale < 1.0 else painted)
+
+
+def _scaled(polygons: tuple[MaskPolygon, ...], scale: float) -> tuple[MaskPolygon, ...]:
+    """The polygons in an image of another size; pixel centres are at integers in both."""
+    return tuple(
+        replace(mask, points=tuple(((x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5) for x, y in mask.points)) for mask in polygons
+    )
+
+
+def simplify(polygons: tuple[MaskPolygon, ...], target: MaskTarget, tolerance_px: float) -> tuple[MaskPolygon, ...]:
+    """Fewer points on the polygons of `target`: none moves the outline by more than `tolerance_px`."""
+    return tuple(
+        polygon if polygon.target is not target else MaskPolygon(target, _thinned(polygon.points, tolerance_px), polygon.is_hole)
+        for polygon in polygons
+    )
+
+
+def _thinned(points: Line, tolerance_px: float) -> Line:
+    outline = np.array(points, np.float32).reshape(-1, 1, 2)
+    fewer = cv2.approxPolyDP(outline, tolerance_px, True)[:, 0]
+    return _line(fewer) if len(fewer) >= 3 else points
+
+
+def _fixed(points: Line) -> NDArray[np.int32]:
+    return np.round(np.array(points) * (1 << _SHIFT)).astype(np.int32).reshape(-1, 1, 2)
+
+
+def _line(points: NDArray[np.generic]) -> Line:
+    return tuple((float(x), float(y)) for x, y in points.tolist())

@@ -1,0 +1,238 @@
+"""``annotate`` as a user calls it: studies, agreement, export, import, salvage, and the way on to ``evaluate``."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from app.annotate_command import AnnotateOptions, StudyOptions, _queue, run_annotate
+from app.annotate_sources import default_store, image_files
+from app.evaluate_command import run_evaluate
+from core.config import Config, TwinConfig
+from core.errors import UserError
+from core.learning.dataset import find_labelled, write_png
+from core.study.annotation_history import History
+from core.study.annotation_images import find_images
+from core.study.annotation_records import ItemKey
+from core.study.annotation_store import DEFAULT_NAME, AnnotationStore
+from core.study.annotations import Annotation, MaskPolygon, MaskTarget, View, measure_lines
+from core.study.evaluation import read_measurements
+from core.types import PoseState
+from hardware.twin.world import TwinWorld
+
+MAIN = Path(__file__).resolve().parents[2] / "main.py"
+BOXES = (
+    MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (200.0, 10.0), (200.0, 200.0), (10.0, 200.0))),
+    MaskPolygon(MaskTarget.ROBOT, ((10.0, 10.0), (200.0, 10.0), (200.0, 50.0), (10.0, 50.0))),
+)
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three pictures of the twin, as its camera sees them."""
+    folder = tmp_path_factory.mktemp("pictures")
+    world = TwinWorld(TwinConfig(phantom="tree"))
+    for k in range(3):
+        world.insert(50.0 + 8.0 * k)
+        write_png(folder / f"{k}.png", world.frame().image)
+    return folder
+
+
+@pytest.fixture
+def folder(pictures: Path, tmp_path: Path) -> Path:
+    for path in pictures.glob("*.png"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    return tmp_path
+
+
+def annotate(folder: Path, study: str = "", raters: tuple[str, ...] = ("ann", "bob")) -> None:
+    """Each rater answers each image twice (once outside a study); Bob turns the robot by a degree or so more."""
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        images, _ = find_images(sorted(folder.glob("*.png")), store)
+        for place, rater in enumerate(raters):
+            for repeat in (1, 2) if study else (1,):
+                for k, image in enumerate(images):
+                    bent = 190.0 + 12 * k + place + repeat
+                    content = Annotation(((250.0, 180.0), (300.0, bent)), ((200.0, 200.0), (400.0, 200.0)), masks=BOXES)
+                    measured = measure_lines(content, image.record.size, Config().perception)
+                    assert measured.pose is not None
+                    content = replace(content, state=measured.pose.state)
+                    entry = History().edit("draw", content)
+                    assert entry is not None
+                    store.save(ItemKey(image.sha256, study, rater, repeat), View.AS_IS, entry, content, measured, 9.0)
+
+
+def run(folder: Path, **more: object) -> int:
+    return run_annotate(AnnotateOptions(paths=(folder,), **more))  # type: ignore[arg-type]
+
+
+def queue(folder: Path, **more: object) -> list[tuple[str, int, View]]:
+    options = StudyOptions(**more)  # type: ignore[arg-type]
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        images, _ = find_images(sorted(folder.glob("*.png")), store)
+        return [(i.image.path.name, i.key.repeat, i.view) for i in _queue(store, images, options.rater or "ann", options, Config())]
+
+
+def test_the_agreement_is_printed_and_written(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    annotate(folder, "pilot")
+    assert run(folder, report=True, out=tmp_path / "report") == 0
+    printed = capsys.readouterr().out
+    assert "Study pilot: 12 answers on 3 images" in printed
+    assert "ann, bob" in printed
+    assert max(map(len, printed.splitlines())) <= 80
+    report = json.loads((tmp_path / "report" / "agreement.json").read_text())
+    assert set(report["raters"]) == {"ann", "bob"}
+    assert report["between"]["n"] == 3
+    assert len((tmp_path / "report" / "measures.csv").read_text().splitlines()) == 13
+    run(folder, report=True, as_json=True)
+    assert json.loads(capsys.readouterr().out)["study"] == "pilot"
+
+
+def test_annotations_become_a_training_set_a_coco_file_and_come_back(folder: Path, tmp_path: Path) -> None:
+    annotate(folder)
+    run(folder, export="dataset", out=tmp_path / "set")
+    samples, truth = find_labelled(tmp_path / "set")
+    assert [sample.stem for sample in samples] == ["0", "1", "2"]
+    assert truth["0"]["theta_deg"] is not None
+    run(folder, export="coco", out=tmp_path / "coco.json")
+    other = tmp_path / "other.sqlite"
+    run(folder, imports=(tmp_path / "coco.json",), store=other, study=StudyOptions(rater="eve"))
+    with AnnotationStore(other, read_only=True) as store:
+        assert [(one.key.rater, len(one.content.masks)) for one in store.annotations()] == [("eve", 2)] * 3
+    with pytest.raises(UserError, match="nothing was imported"):
+        run(folder, imports=(tmp_path / "coco.json",), store=other, study=StudyOptions(rater="eve"))
+
+
+def test_an_annotated_folder_is_evaluated_as_its_table_is(folder: Path, tmp_path: Path) -> None:
+    annotate(folder)
+    run(folder, export="csv", out=tmp_path / "table.csv")
+    rows = read_measurements(tmp_path / "table.csv")
+    assert [row.image for row in rows] == ["0.png", "1.png", "2.png"]
+    assert all(row.angle_1 is not None and row.angle_2 is not None and row.state is not None for row in rows)
+    nothing = {"as_json": False, "model": None, "preset": None, "config_path": None, "like_paper": None, "seed": 0}
+    run_evaluate(None, tmp_path / "table.csv", tmp_path / "by_table", **nothing)  # type: ignore[arg-type]
+    run_evaluate(folder, None, tmp_path / "by_folder", **nothing)  # type: ignore[arg-type]
+    first, second = (json.loads((tmp_path / name / "metrics.json").read_text()) for name in ("by_table", "by_folder"))
+    assert (first["angle"], first["state"], first["manual"]) == (second["angle"], second["state"], second["manual"])
+    assert second["source"]["kind"] == "annotated by hand"
+
+
+def test_a_study_is_gone_on_with_as_it_was_begun(folder: Path) -> None:
+    first = queue(folder, name="pilot", turn=True, seed=4)
+    assert len(first) == 6
+    assert {view for _, repeat, view in first if repeat == 2} == {View.TURNED}
+    assert queue(folder, name="pilot") == first
+    for other in ({"mirror": True}, {"repeats": 3}, {"seed": 5}, {"order": "even"}):
+        with pytest.raises(UserError, match=r"was begun otherwise: shown 2 times \(as is, turned\), order random, seed 4"):
+            queue(folder, name="pilot", **other)
+
+
+def test_a_study_goes_on_without_an_image_that_vanished(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    queue(folder, name="pilot")
+    (folder / "1.png").unlink()
+    assert {name for name, _, _ in queue(folder, name="pilot")} == {"0.png", "2.png"}
+    assert "1.png: belongs to the study, but is not here; left out" in capsys.readouterr().err
+
+
+def test_queues_outside_studies(folder: Path) -> None:
+    names = ["0.png", "1.png", "2.png"]
+    assert [name for name, _, _ in queue(folder)] == names
+    assert [name for name, _, _ in queue(folder, order="even")] == ["0.png", "2.png", "1.png"]
+    assert sorted(name for name, _, _ in queue(folder, order="worst")) == names
+    assert queue(folder, order="random", seed=1) == queue(folder, order="random", seed=1)
+    with pytest.raises(UserError, match="belong to a study: give it a name with --study"):
+        queue(folder, mirror=True)
+    with pytest.raises(UserError, match="--order bad: must be one of listed, random, worst, even"):
+        queue(folder, order="bad")
+
+
+def test_a_damaged_file_is_salvaged_into_a_new_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    annotate(folder)
+    path = folder / DEFAULT_NAME
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(UserError, match="damaged; annotate --salvage writes what is readable into a new file"):
+        run(folder, report=True)
+    run(folder, salvage=True)
+    assert "the damaged file is as it was" in capsys.readouterr().err
+    assert path.read_bytes() == data[: len(data) // 2]
+    with pytest.raises(UserError, match="is there already; choose another --out"):
+        run(folder, salvage=True)
+
+
+def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
+    video = tmp_path / "run.mkv"
+    with av.open(str(video), "w") as container:
+        stream = container.add_stream("libx264", rate=30)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for k in range(31):
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 8 * k, np.uint8), format="rgb24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    files = image_files([video], 4)
+    assert [path.name for path in files] == ["run_000000.png", "run_000010.png", "run_000020.png", "run_000030.png"]
+    assert image_files([video], 4) == files, "written once"
+    import cv2
+
+    assert [round(float(cv2.imread(str(path)).mean()) / 8) for path in files] == [0, 10, 20, 30]
+    assert default_store([video]) == tmp_path / DEFAULT_NAME
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"report": True}, "no such annotation file; annotate the images first"),
+        ({"export": "xml", "out": Path("x")}, "--export xml: must be one of dataset, csv, coco"),
+        ({"export": "csv"}, "--export needs --out"),
+        ({"report": True, "salvage": True}, "give one of them"),
+        ({"imports": (Path("nowhere.json"),)}, "nothing was imported"),
+    ],
+)
+def test_wrong_calls_end_in_one_line(folder: Path, options: dict[str, object], message: str) -> None:
+    with pytest.raises(UserError, match=message) as raised:
+        run(folder, **options)
+    assert "\n" not in str(raised.value)
+
+
+def test_the_command_ends_with_one_line_and_code_2(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, MAIN, "annotate", tmp_path / "nowhere"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"error: {tmp_path / 'nowhere'}: no such file or folder\n"
+
+
+def test_the_states_given_count_and_not_those_of_the_lines(folder: Path, tmp_path: Path) -> None:
+    annotate(folder, raters=("ann",))
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        (one, *_) = store.annotations()
+        history = store.history(one.key)
+        content = replace(one.content, state=PoseState.A)
+        entry = history.edit("state A", content)
+        assert entry is not None
+        store.save(one.key, one.view, entry, content, measure_lines(content, (640, 480), Config().perception), 9.0)
+    run(folder, export="csv", out=tmp_path / "table.csv")
+    assert read_measurements(tmp_path / "table.csv")[0].state == "A"
+
+
+def test_worst_first_looks_at_disagreement_too(folder: Path) -> None:
+    """An image whose manual angle is 60 degrees off the algorithm's comes before those that nobody has measured."""
+    first, *_, last = [name for name, _, _ in queue(folder, order="worst")]
+    assert first != last
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        images, _ = find_images([folder / last], store)
+        content = Annotation(((300.0, 100.0), (300.0, 200.0)), ((280.0, 190.0), (340.0, 215.0)), PoseState.D)
+        measured = measure_lines(content, images[0].record.size, Config().perception)
+        assert measured.pose is not None
+        assert measured.pose.theta_deg > 60
+        entry = History().edit("draw", content)
+        assert entry is not None
+        store.save(ItemKey(images[0].sha256, "", "ann"), View.AS_IS, entry, content, measured, 9.0)
+    assert [name for name, _, _ in queue(folder, order="worst")].index(last) < 2

@@ -1,0 +1,57 @@
+"""Jobs one after the other, urgent ones first, and those that must not be lost finished at the end."""
+
+from __future__ import annotations
+
+import threading
+
+from pytestqt.qtbot import QtBot
+
+from app.work_thread import WorkThread
+from core.errors import UserError
+
+
+def test_in_order_urgent_first_once_per_key(qtbot: QtBot) -> None:
+    thread, done = WorkThread("test"), []
+    begun, gate = threading.Event(), threading.Event()
+    thread.done.connect(lambda key, result: done.append((key, result)))
+    thread.submit("first", lambda: (begun.set(), gate.wait(5))[1])
+    assert begun.wait(5)
+    for key in ("a", "b", "a"):
+        thread.submit(key, lambda k=key: k.upper(), once=True)
+    thread.submit("now", lambda: "!", urgent=True)
+    assert thread.pending == 4
+    gate.set()
+    qtbot.waitUntil(lambda: len(done) == 4)
+    assert done == [("first", True), ("now", "!"), ("a", "A"), ("b", "B")]
+    thread.stop(finish=False)
+    assert thread.wait(2000)
+
+
+def test_a_failure_is_one_line_and_the_next_job_runs(qtbot: QtBot) -> None:
+    thread, heard = WorkThread("test"), []
+    thread.failed.connect(lambda key, line: heard.append((key, line)))
+    thread.done.connect(lambda key, _result: heard.append((key, "done")))
+
+    def fail() -> None:
+        raise UserError("the disk\nis full")
+
+    thread.submit("bad", fail)
+    thread.submit("good", lambda: None)
+    qtbot.waitUntil(lambda: len(heard) == 2)
+    assert heard == [("bad", "the disk is full"), ("good", "done")]
+    thread.stop(finish=False)
+    assert thread.wait(2000)
+
+
+def test_stopping_finishes_what_must_not_be_lost(qtbot: QtBot) -> None:
+    for finish in (True, False):
+        thread, ran = WorkThread("test"), []
+        gate = threading.Event()
+        thread.submit("gate", lambda gate=gate: gate.wait(5))
+        for number in range(5):
+            thread.submit(number, lambda n=number, ran=ran: ran.append(n))
+        thread.stop(finish=finish)
+        thread.submit("late", lambda ran=ran: ran.append("late"))
+        gate.set()
+        assert thread.wait(2000)
+        assert ran == ([0, 1, 2, 3, 4] if finish else [])

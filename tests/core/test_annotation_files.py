@@ -1,0 +1,185 @@
+"""Export and import: training sets that training reads, COCO both ways, labelme, and one line for each damaged thing."""
+
+from __future__ import annotations
+
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.learning.dataset import find_labelled, write_png
+from core.study.annotation_edits import ROBOT, VESSEL, Touch, line_of, move, put, remove, touched
+from core.study.annotation_export import export_coco, export_training_set, run_lengths
+from core.study.annotation_images import FoundImage
+from core.study.annotation_import import merged, read_files
+from core.study.annotation_records import ImageRecord, ItemKey, StoredAnnotation
+from core.study.annotations import Annotation, AnnotationError, MaskPolygon, MaskTarget, View
+from core.study.mask_polygons import fill, polygons_of
+from core.types import PoseState
+
+SIZE = (64, 48)
+VESSEL_BOX = MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (50.0, 10.0), (50.0, 30.0), (10.0, 30.0)))
+ROBOT_BOX = MaskPolygon(MaskTarget.ROBOT, ((20.0, 18.0), (40.0, 18.0), (40.0, 22.0), (20.0, 22.0)))
+LINES = Annotation(((10.0, 20.0), (50.0, 20.0)), ((12.0, 24.0), (60.0, 24.0)), PoseState.B)
+
+
+@pytest.fixture
+def image(tmp_path: Path) -> FoundImage:
+    path = tmp_path / "frame.png"
+    write_png(path, np.full((48, 64, 3), 90, np.uint8))
+    return FoundImage(path, ImageRecord("ab" * 32, "frame.png", *SIZE))
+
+
+def stored(content: Annotation, rater: str = "ann", changed: str = "2026-01-01", theta: float | None = None) -> StoredAnnotation:
+    key = ItemKey("ab" * 32, "", rater)
+    return StoredAnnotation(key, View.AS_IS, content, theta, theta, 4.0, 4.0, False, 1.0, changed)
+
+
+def with_masks(*masks: MaskPolygon) -> Annotation:
+    return Annotation(LINES.robot, LINES.vessel, LINES.state, masks=masks)
+
+
+def test_a_training_set_is_what_training_reads(image: FoundImage, tmp_path: Path) -> None:
+    out = tmp_path / "set"
+    older, newer = (
+        stored(with_masks(VESSEL_BOX), changed="2026-01-01"),
+        stored(with_masks(VESSEL_BOX, ROBOT_BOX), "bob", "2026-01-02", 3.0),
+    )
+    assert export_training_set([older, newer], [image], out) == (1, [])
+    (sample,), truth = find_labelled(out)
+    pixels, vessel, robot = sample.load()
+    assert pixels.shape == (48, 64, 3)
+    assert np.array_equal(vessel, fill([VESSEL_BOX], MaskTarget.VESSEL, SIZE)), "the newest masks count"
+    assert robot.sum() == 21 * 5
+    row = truth["frame"]
+    assert (row["theta_deg"], row["state"], row["head_xy"]) == (3.0, "B", [50.0, 20.0])
+    with pytest.raises(AnnotationError, match="is not empty; choose another --out"):
+        export_training_set([newer], [image], out)
+
+
+def test_a_training_set_leaves_out_half_done_images_by_name(image: FoundImage, tmp_path: Path) -> None:
+    with pytest.raises(AnnotationError, match="no image has both a vessel and a robot mask"):
+        export_training_set([stored(with_masks(VESSEL_BOX))], [image], tmp_path / "set")
+    with pytest.raises(AnnotationError, match="no image has both"):
+        export_training_set([stored(with_masks(VESSEL_BOX, ROBOT_BOX))], [], tmp_path / "set")
+
+
+def test_an_image_without_angle_trains_but_has_no_truth_of_it(image: FoundImage, tmp_path: Path) -> None:
+    unsure = Annotation(cannot_tell=True, masks=(VESSEL_BOX, ROBOT_BOX))
+    export_training_set([stored(unsure)], [image], tmp_path / "set")
+    _, truth = find_labelled(tmp_path / "set")
+    assert (truth["frame"]["theta_deg"], truth["frame"]["state"], truth["frame"]["reason"]) == (None, None, "not measured by hand")
+
+
+def test_coco_goes_out_and_comes_back(image: FoundImage, tmp_path: Path) -> None:
+    hole = np.zeros((48, 64), bool)
+    hole[5:40, 5:60] = True
+    hole[15:25, 20:40] = False
+    masks = (*polygons_of(hole, MaskTarget.VESSEL, 0.0), ROBOT_BOX)
+    out = tmp_path / "coco.json"
+    assert export_coco([stored(with_masks(*masks))], [image], out) == 1
+    content = json.loads(out.read_text())
+    first, second = content["annotations"]
+    assert (first["bbox"], first["area"]) == ([5, 5, 55, 35], int(hole.sum()))
+    assert second["segmentation"] == [[20.5, 18.5, 40.5, 18.5, 40.5, 22.5, 20.5, 22.5]]
+    (back,), problems = read_files([out], [image])
+    assert problems == []
+    for target in MaskTarget:
+        assert np.array_equal(fill(back.content.masks, target, SIZE), fill(masks, target, SIZE))
+    with pytest.raises(AnnotationError, match="is there already"):
+        export_coco([stored(with_masks(*masks))], [image], out)
+
+
+def test_run_lengths_by_hand() -> None:
+    mask = np.array([[0, 1, 1], [0, 1, 0]], bool)  # by columns: 00 11 10
+    assert run_lengths(mask) == [2, 3, 1]
+    assert run_lengths(np.ones((2, 2), bool)) == [0, 4]
+    assert run_lengths(np.zeros((2, 2), bool)) == [4]
+
+
+def labelme(**more: Any) -> dict[str, Any]:
+    shape = {"label": "Vessel", "shape_type": "polygon", "points": [[10.5, 10.5], [50.5, 10.5], [50.5, 30.5], [10.5, 30.5]]}
+    line = {"label": "robot", "shape_type": "linestrip", "points": [[1.5, 1.5], [9.5, 1.5]]}
+    return {"imagePath": "..\\frames\\frame.png", "imageWidth": 64, "imageHeight": 48, "shapes": [shape, line]} | more
+
+
+def read(tmp_path: Path, image: FoundImage, content: object) -> tuple[list[Annotation], list[str]]:
+    path = tmp_path / "in.json"
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    found, problems = read_files([path], [image])
+    return [one.content for one in found], [line.removeprefix(f"{path}: ") for line in problems]
+
+
+def test_labelme_polygons_and_lines(tmp_path: Path, image: FoundImage) -> None:
+    (content,), problems = read(tmp_path, image, labelme())
+    assert problems == []
+    assert content == Annotation(robot=((1.0, 1.0), (9.0, 1.0)), masks=(VESSEL_BOX,))
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [
+        ("{", "damaged, not valid JSON; left out"),
+        ("[" * 100_000, "damaged, not valid JSON; left out"),
+        ("[]", "neither labelme nor COCO; left out"),
+        ({"version": 3}, "neither labelme (shapes) nor COCO (images, annotations); left out"),
+        (labelme(imagePath="other.png"), "its image 'other.png' is not among the given ones; left out"),
+        (labelme(imageWidth=640), "says that frame.png is 640x48, but it is 64x48; left out"),
+        (labelme(shapes=5), "its shapes are damaged; left out"),
+        (labelme(shapes=[{"label": "bone", "points": []}]), "shape 1: unknown label 'bone'"),
+        (labelme(shapes=[{"label": "robot", "points": [[1, "x"]]}]), "shape 1 is damaged; left out"),
+        (labelme(shapes=[{"label": "robot", "points": [[1, 1]]}]), "shape 1 is a polygon of 1 points"),
+        ({"images": [], "annotations": []}, "its images or categories are damaged; left out"),
+    ],
+)
+def test_what_is_damaged_or_unknown_is_named(tmp_path: Path, image: FoundImage, content: object, line: str) -> None:
+    found, problems = read(tmp_path, image, content)
+    assert found == []
+    assert problems[0].startswith(line)
+
+
+def test_one_bad_shape_leaves_the_others(tmp_path: Path, image: FoundImage) -> None:
+    content = labelme()
+    content["shapes"].insert(0, {"label": "robot", "points": None})
+    (found,), problems = read(tmp_path, image, content)
+    assert found.masks == (VESSEL_BOX,)
+    assert problems == ["shape 1 is damaged; left out"]
+
+
+def test_files_damaged_at_random_never_raise(tmp_path: Path, image: FoundImage) -> None:
+    coco = tmp_path / "coco.json"
+    export_coco([stored(with_masks(VESSEL_BOX, ROBOT_BOX))], [image], coco)
+    rng, path = random.Random(4), tmp_path / "damaged.json"
+    for text in (coco.read_text(), json.dumps(labelme())):
+        for _ in range(300):
+            place = rng.randrange(len(text))
+            piece = rng.choice(("", "null", "-1e999", '"x"', "[]", "{}", "}", "9"))
+            path.write_text(text[:place] + piece + text[place + rng.randrange(4) :])
+            read_files([path], [image])
+
+
+def test_an_import_never_takes_the_place_of_work_by_hand() -> None:
+    new = Annotation(((1.0, 1.0), (2.0, 2.0)), masks=(ROBOT_BOX,))
+    assert merged(with_masks(VESSEL_BOX), new) == with_masks(VESSEL_BOX)
+    assert merged(Annotation(note="mine"), new) == Annotation(new.robot, masks=new.masks, note="mine")
+
+
+def test_edits_of_points() -> None:
+    drawn = with_masks(VESSEL_BOX)
+    assert line_of(put(drawn, ROBOT, 1, (30.0, 20.0)), ROBOT) == ((10.0, 20.0), (30.0, 20.0), (50.0, 20.0))
+    assert line_of(move(drawn, VESSEL, 0, (1.0, 2.0)), VESSEL)[0] == (1.0, 2.0)
+    assert len(line_of(remove(drawn, 0, 3), 0)) == 3
+    assert remove(remove(drawn, 0, 3), 0, 0).masks == (), "two points are no outline"
+    assert not put(Annotation(cannot_tell=True), ROBOT, 0, (1.0, 1.0)).cannot_tell
+
+
+def test_what_a_place_touches() -> None:
+    drawn = with_masks(VESSEL_BOX)
+    assert touched(drawn, [ROBOT, VESSEL], (49.0, 21.0), 3.0, 2.0) == Touch(ROBOT, 1)
+    assert touched(drawn, [ROBOT, VESSEL], (30.0, 21.0), 3.0, 2.0) == Touch(ROBOT, 1, is_edge=True)
+    assert touched(drawn, [VESSEL], (30.0, 21.0), 3.0, 2.0) is None
+    assert touched(drawn, [0], (10.0, 20.0), 3.0, 2.0) == Touch(0, 4, is_edge=True), "an outline is closed"
+    assert touched(drawn, [], (10.0, 10.0), 3.0, 2.0) is None

@@ -1,0 +1,136 @@
+"""Agreement of simulated raters whose errors are known, and the common answer of several."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from core.config import PerceptionConfig
+from core.study.annotation_records import ItemKey, StoredAnnotation
+from core.study.annotation_report import agreement_report, choose_study, manual_measurements, write_measures
+from core.study.annotations import Annotation, AnnotationError, View, measure_lines
+from core.types import PoseState
+
+TRUE_DEG = np.linspace(0.0, 60.0, 200)
+
+
+def answer(
+    image: str, rater: str, repeat: int, theta_deg: float | None, state: PoseState | None, study: str = "s"
+) -> StoredAnnotation:
+    content = Annotation(((0.0, 0.0), (50.0, 0.0)), ((0.0, 5.0), (90.0, 5.0)), state, cannot_tell=theta_deg is None)
+    measured = (theta_deg, theta_deg, 1.0, 2.0) if theta_deg is not None else (None,) * 4
+    return StoredAnnotation(ItemKey(image, study, rater, repeat), View.AS_IS, content, *measured, False, 20.0, "2026")
+
+
+def state_of(theta_deg: float) -> PoseState:
+    return PoseState.B if theta_deg < 30 else PoseState.C
+
+
+def simulated(rater: str, sd_deg: float, bias_deg: float, seed: int) -> list[StoredAnnotation]:
+    rng = np.random.default_rng(seed)
+    angles = [(k, repeat, true + bias_deg + rng.normal(0, sd_deg)) for repeat in (1, 2) for k, true in enumerate(TRUE_DEG)]
+    return [answer(str(k), rater, repeat, theta, state_of(theta)) for k, repeat, theta in angles]
+
+
+def test_known_errors_come_out() -> None:
+    """Ann errs by 1 degree (SD), Bob by 2 and he reads 3 degrees more; their difference has the SD sqrt(1 + 4)."""
+    report = agreement_report(simulated("ann", 1.0, 0.0, 1) + simulated("bob", 2.0, 3.0, 2), {})
+    ann, bob = report["raters"]["ann"], report["raters"]["bob"]
+    assert ann["sd_deg"] == pytest.approx(1.0, rel=0.15)
+    assert bob["sd_deg"] == pytest.approx(2.0, rel=0.15)
+    assert bob["angle"]["repeatability_sd_deg"] == pytest.approx(bob["sd_deg"], rel=0.05)
+    assert ann["angle"]["icc"] > 0.99
+    (pair,) = report["pairs"]
+    assert pair["angle"]["mean_difference_deg"] == pytest.approx(3.0, abs=0.5)
+    reach = 1.96 * math.sqrt(5.0)
+    assert pair["angle"]["loa_high_deg"] - pair["angle"]["loa_low_deg"] == pytest.approx(2 * reach, rel=0.15)
+    # within an image: half the variance of the difference, with its bias of 3: (9 + 5) / 2
+    assert report["between"]["sd_deg"] == pytest.approx(math.sqrt(7.0), rel=0.1)
+    assert 0.9 < report["between"]["icc"] < ann["angle"]["icc"]
+    assert 0.7 < pair["state"]["kappa"] < 1.0
+    assert report["raters"]["ann"]["median_time_s"] == 20.0
+    assert (report["images"], report["annotations"]) == (200, 800)
+
+
+def test_kappa_by_hand() -> None:
+    """Two raters, four images, three alike: p = 3/4; B 3 and 2 times, C 1 and 2 times: chance 1/2; kappa = 1/2."""
+    first = [answer(str(k), "ann", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 3 + [PoseState.C])]
+    second = [answer(str(k), "bob", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 2 + [PoseState.C] * 2)]
+    (pair,) = agreement_report(first + second, {})["pairs"]
+    assert (pair["state"]["n"], pair["state"]["equal"], pair["state"]["kappa"]) == (4, 0.75, pytest.approx(0.5))
+
+
+def test_cant_tell_is_an_answer_without_an_angle() -> None:
+    both = [answer("1", "ann", 1, None, None), answer("1", "ann", 2, 4.0, PoseState.B), answer("2", "ann", 1, 3.0, PoseState.B)]
+    ann = agreement_report(both, {})["raters"]["ann"]
+    assert (ann["cannot_tell"], ann["angle"]["n"], ann["state"]["n"], ann["state"]["equal"]) == (1, 0, 1, 0.0)
+    assert ann["sd_deg"] is None
+
+
+def test_one_rater_alone_has_no_pairs(tmp_path) -> None:
+    report = agreement_report([answer("1", "ann", 1, 4.0, PoseState.B)], {"1": "one.png"})
+    assert report["pairs"] == []
+    assert report["between"] == {"raters": 1, "n": 0, "sd_deg": None, "icc": None}
+    write_measures(tmp_path / "m.csv", report["measures"])
+    header, row = (tmp_path / "m.csv").read_text().splitlines()
+    assert dict(zip(header.split(","), row.split(","), strict=True))["image"] == "one.png"
+
+
+def test_the_common_answer() -> None:
+    def common(*answers: StoredAnnotation) -> tuple[float | None, float | None, str | None]:
+        (row,) = manual_measurements(answers, {})
+        return row.angle_1, row.angle_2, row.state
+
+    b, c = PoseState.B, PoseState.C
+    assert common(answer("i", "ann", 1, 4.0, b)) == (4.0, None, "B")
+    assert common(answer("i", "ann", 1, 4.0, b), answer("i", "ann", 2, 6.0, c)) == (4.0, 6.0, "B")
+    assert common(answer("i", "bob", 1, 8.0, c), answer("i", "ann", 1, 4.0, b)) == (4.0, 8.0, "B")
+    twice = [answer("i", who, k, 4.0 * k + shift, c) for who, shift in (("ann", 0.0), ("bob", 2.0)) for k in (1, 2)]
+    assert common(*twice) == (5.0, 9.0, "C")
+    assert common(answer("i", "ann", 1, None, None), answer("i", "bob", 1, 3.0, c)) == (3.0, None, "C")
+    assert common(answer("i", "ann", 1, None, None)) == (None, None, None)
+
+
+def test_several_studies_ask_for_a_choice() -> None:
+    rows = [answer("1", "ann", 1, 4.0, PoseState.B, "pilot"), answer("1", "ann", 1, 5.0, PoseState.B, "main")]
+    with pytest.raises(AnnotationError, match=r"holds several studies \('main', 'pilot'\); choose one with annotate --study NAME"):
+        choose_study(rows, None, "here")
+    assert [one.key.study for one in choose_study(rows, "main", "here")] == ["main"]
+    with pytest.raises(AnnotationError, match="no finished annotation of study 'other'"):
+        choose_study(rows, "other", "here")
+
+
+def test_the_round_trip_of_a_rater_with_a_pixel_of_noise() -> None:
+    """48 known poses, drawn twice with 1 px of noise on every point: angles come back without bias, within what the noise explains.
+
+    Noise of 1 px on both ends of a line of 80 px turns it by sqrt(2) / 80 = 1.01 degrees, two lines by 1.43 degrees.
+    """
+    rng = np.random.default_rng(3)
+    config, answers, true = PerceptionConfig(), [], {}
+    for k in range(48):
+        theta, turn = rng.uniform(5, 60), rng.uniform(-180, 180)
+        true[str(k)] = theta
+        robot, vessel = _pose(theta, turn)
+        for repeat in (1, 2):
+            noisy = [tuple(tuple(p) for p in (np.array(line) + rng.normal(0, 1, (2, 2))).tolist()) for line in (robot, vessel)]
+            pose = measure_lines(Annotation(noisy[0], noisy[1]), (640, 480), config).pose
+            assert pose is not None
+            answers.append(answer(str(k), "ann", repeat, pose.theta_deg, pose.state))
+    ann = agreement_report(answers, {})["raters"]["ann"]
+    assert ann["sd_deg"] == pytest.approx(1.43, rel=0.25)
+    errors = [
+        row.manual_angle_deg - true[row.image] for row in manual_measurements(answers, {}) if row.manual_angle_deg is not None
+    ]
+    assert len(errors) == 48
+    assert np.mean(errors) == pytest.approx(0.0, abs=0.45)
+    assert np.std(errors, ddof=1) == pytest.approx(1.43 / math.sqrt(2), rel=0.3)
+
+
+def _pose(theta_deg: float, turn_deg: float) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+    """A robot of 80 px whose head lies in the middle of a vessel line of 80 px, at an angle to it."""
+    vessel, robot = (math.radians(turn_deg), math.radians(turn_deg + theta_deg))
+    along, back = np.array([math.cos(vessel), math.sin(vessel)]), np.array([math.cos(robot), math.sin(robot)])
+    head = np.array([320.0, 240.0])
+    return [tuple(head - 80 * back), tuple(head)], [tuple(head - 40 * along), tuple(head + 40 * along)]

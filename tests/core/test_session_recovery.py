@@ -1,0 +1,432 @@
+"""Sessions that were cut or damaged: read as far as they go, told what is wrong, recovered into a copy, the original untouched."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import random
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from core.session.events import Event, EventKind
+from core.session.files import SessionFiles, add_event
+from core.session.lines import lines_of, sealed
+from core.session.manifest import SessionError, read_manifest
+from core.session.reader import SessionReader
+from core.session.recovery import Recovery, find_cut_sessions, recover
+from core.session.writer import SessionWriter
+from tests.core.session_data import ABOUT, QUICK, number_in, record, tick_of, wait_for
+
+CHILD = Path(__file__).with_name("recording_child.py")
+FPS = 30.0
+COUNT = 75
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session of 75 frames at 30 fps in one file."""
+    return record(tmp_path_factory.mktemp("whole"), (tick_of(i, 1000.0 + i / FPS, full=True) for i in range(COUNT)))
+
+
+@pytest.fixture
+def session(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / whole.name))
+
+
+def set_open(session: Path) -> None:
+    """As a kill leaves the manifest."""
+    content = json.loads((session / "manifest.json").read_text())
+    content |= {"closed": False, "ended": "", "ended_utc": None, "counts": {}}
+    (session / "manifest.json").write_text(json.dumps(content))
+
+
+def fingerprint(folder: Path) -> dict[str, str]:
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.iterdir())}
+
+
+def read_all(session: Path) -> tuple[list[int], list[int], tuple[str, ...]]:
+    """Indices of the rows, those whose picture is there, and the problems. No picture may be another row's."""
+    with SessionReader(session) as reader:
+        assert reader.wait(20.0)
+        rows = [reader.row(place) for place in range(len(reader))]
+        frames = [reader.frame(place) for place in range(len(reader))]
+        assert [number_in(frame.image) for frame in frames if frame is not None] == [f.index for f in frames if f is not None]
+        _ = reader.events
+        return (
+            [row.index for row in rows if row is not None],
+            [frame.index for frame in frames if frame is not None],
+            reader.problems,
+        )
+
+
+def cut(path: Path, share: float) -> None:
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * share)])
+
+
+# --- damaged sessions, read as they are
+
+
+def test_a_cut_last_row_is_named_and_the_others_are_read(session: Path) -> None:
+    path = session / "frames.jsonl"
+    path.write_bytes(path.read_bytes()[:-40])
+    rows, pictures, problems = read_all(session)
+    assert rows == pictures == list(range(COUNT - 1))
+    assert problems == (f"frames.jsonl: line {COUNT}: cut off; skipped",)
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        (b"{", "not valid JSON"),
+        (b'{"row": NaN}', "NaN is no number"),
+        (b'{"row": Infinity}', "Infinity is no number"),
+        (b"[" * 200_000, "nested too deeply"),
+        (b'{"a":' * 100_000, "nested too deeply"),
+        (b"[1, 2]", "not an object"),
+        (b"7", "not an object"),
+        (b"\xff\xfe\x00", "not valid JSON"),
+        (b"\x00" * 512, "not valid JSON"),
+        (b"x" * 4_100_000, "longer than"),
+        (b'{"row": 1e400}', "row: not a count"),
+        (b'{"row": -5, "captured_s": 1.0, "video": 0, "pts_ms": 0}', "row: not a count"),
+        (b'{"row": 900, "captured_s": "x"}', "captured_s: not a number"),
+        (b'{"row": ' + b"9" * 5000 + b"}", "not valid JSON"),
+    ],
+)
+def test_a_bad_row_is_named_by_its_line_and_skipped(session: Path, line: bytes, why: str) -> None:
+    path = session / "frames.jsonl"
+    lines = path.read_bytes().splitlines()
+    lines[10] = line
+    path.write_bytes(b"\n".join(lines) + b"\n")
+    rows, _, problems = read_all(session)
+    assert rows == [i for i in range(COUNT) if i != 10]
+    assert problems[0].startswith("frames.jsonl: line 11: ")
+    assert why in problems[0]
+
+
+def test_a_flipped_digit_is_found_by_the_checksum(session: Path) -> None:
+    path = session / "frames.jsonl"
+    data = path.read_bytes()
+    place = data.index(b'"theta_signed_deg":-5.5') + len(b'"theta_signed_deg":-')
+    path.write_bytes(data[:place] + b"7" + data[place + 1 :])
+    rows, _, problems = read_all(session)
+    assert rows == list(range(1, COUNT))
+    assert problems == ("frames.jsonl: line 1: checksum wrong; skipped",)
+
+
+def test_a_row_made_by_hand_needs_no_checksum(session: Path) -> None:
+    path = session / "frames.jsonl"
+    lines = path.read_text().splitlines()
+    record = json.loads(lines[3])
+    del record["crc"]
+    lines[3] = json.dumps(record)
+    path.write_text("\n".join(lines) + "\n")
+    assert read_all(session)[0] == list(range(COUNT))
+
+
+def test_rows_that_lack_values_only_the_player_needs_are_named_when_they_are_read(session: Path) -> None:
+    path = session / "frames.jsonl"
+    lines = path.read_text().splitlines()
+    record = json.loads(lines[3])
+    del record["crc"]
+    record["sent"] = "nobody"
+    lines[3] = sealed(json.dumps(record))
+    path.write_text("\n".join(lines) + "\n")
+    with SessionReader(session) as reader:
+        reader.wait(20.0)
+        assert reader.row(3) is None
+        assert reader.tick(3) is None
+        assert any("row 3: sent" in problem for problem in reader.problems)
+
+
+def test_rows_without_their_video_keep_their_values(session: Path) -> None:
+    (session / "video_0000.mkv").unlink()
+    rows, pictures, problems = read_all(session)
+    assert (len(rows), pictures) == (COUNT, [])
+    assert len(problems) == 1, "one line for the file, not one a picture"
+    assert problems[0].startswith("video_0000.mkv: cannot be read as a video")
+
+
+def test_a_video_without_rows_still_shows_its_pictures(session: Path) -> None:
+    (session / "frames.jsonl").unlink()
+    with SessionReader(session) as reader:
+        reader.wait(20.0)
+        assert len(reader) == 0
+        assert reader.problems == ("frames.jsonl: missing",)
+        assert len(reader.loose_pictures) == COUNT
+        image = reader.loose_picture(*reader.loose_pictures[40])
+        assert image is not None
+        assert number_in(image) == 40
+
+
+def test_a_hole_in_the_video_never_shows_a_wrong_picture(session: Path) -> None:
+    path = session / "video_0000.mkv"
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 512] = bytes(512)
+    path.write_bytes(data)
+    rows, pictures, _ = read_all(session)
+    assert rows == list(range(COUNT))
+    assert COUNT - 40 <= len(pictures) < COUNT
+
+
+def test_a_damaged_manifest_is_named_and_the_rest_is_read(session: Path) -> None:
+    (session / "manifest.json").write_text('{"format": 1, "kind": "SIM"')
+    rows, _, problems = read_all(session)
+    assert len(rows) == COUNT
+    assert "manifest.json: damaged" in problems[0]
+
+
+@pytest.mark.parametrize(
+    "change", [{"kind": "REAL"}, {"started_utc": 5e300}, {"counts": 3}, {"format": 0}, {"started_monotonic_s": None}]
+)
+def test_a_manifest_with_a_wrong_value_names_it(session: Path, change: dict[str, object]) -> None:
+    content = json.loads((session / "manifest.json").read_text()) | change
+    (session / "manifest.json").write_text(json.dumps(content))
+    with pytest.raises(SessionError, match=next(iter(change))):
+        read_manifest(session)
+
+
+def test_a_session_of_a_newer_version_is_refused_and_left_alone(session: Path) -> None:
+    content = json.loads((session / "manifest.json").read_text()) | {"format": 2, "closed": False}
+    (session / "manifest.json").write_text(json.dumps(content))
+    for use in (SessionReader, recover):
+        with pytest.raises(SessionError, match="newer version"):
+            use(session)
+    assert find_cut_sessions(session.parent) == ()
+
+
+@pytest.mark.parametrize(("make", "why"), [("folder", "not a session"), ("file", "not a file"), ("nothing", "no such session")])
+def test_what_is_no_session_is_refused(tmp_path: Path, make: str, why: str) -> None:
+    path = tmp_path / "x"
+    if make == "folder":
+        path.mkdir()
+    elif make == "file":
+        path.write_text("")
+    for use in (SessionReader, recover):
+        with pytest.raises(SessionError, match=why):
+            use(path)
+
+
+# --- recovery
+
+
+def checked(session: Path, done: Recovery) -> tuple[list[int], list[int]]:
+    """The copy is whole: closed, nothing wrong with it, as many rows and pictures as it says."""
+    rows, pictures, problems = read_all(done.folder)
+    # only lost pictures are left to tell of: one by one, or the whole file when it held none
+    assert all("no picture at" in problem or "cannot be read as a video" in problem for problem in problems), problems
+    manifest = read_manifest(done.folder)
+    assert manifest.closed
+    assert manifest.recovered == done.loss
+    assert manifest.counts.frames == len(rows) == done.frames
+    assert done.loss.origin == str(session)
+    return rows, pictures
+
+
+def test_a_cut_session_is_found_recovered_and_not_found_again(session: Path) -> None:
+    set_open(session)
+    for name in ("frames.jsonl", "video_0000.mkv"):
+        cut(session / name, 0.6)
+    before = fingerprint(session)
+    (found,) = find_cut_sessions(session.parent)
+    assert (found.folder, found.why) == (session, "it did not end properly")
+    done = recover(found.folder)
+    rows, pictures = checked(session, done)
+    assert fingerprint(session) == before
+    assert len(rows) == pytest.approx(0.6 * COUNT, abs=3)
+    assert len(pictures) >= len(rows) - 20
+    assert done.loss.seconds == pytest.approx((len(rows) - len(pictures)) / FPS, abs=0.04)
+    assert done.folder == session.with_name(session.name + "_recovered")
+    assert find_cut_sessions(session.parent) == ()
+    with pytest.raises(SessionError, match="there already"):
+        recover(session)
+
+
+def test_a_whole_session_loses_nothing_when_it_is_recovered(session: Path, tmp_path: Path) -> None:
+    done = recover(session, tmp_path / "into")
+    assert (done.loss.seconds, done.loss.rows, done.loss.pictures, done.loss.problems) == (0.0, 0, 0, ())
+    assert checked(session, done) == (list(range(COUNT)), list(range(COUNT)))
+
+
+def test_lost_rows_are_counted_by_the_gaps_they_leave(session: Path) -> None:
+    path = session / "frames.jsonl"
+    lines = path.read_bytes().splitlines()
+    path.write_bytes(b"\n".join([*lines[:20], b"garbage", *lines[25:70]]) + b"\n")
+    done = recover(session)
+    assert done.loss.rows == 10, "five in the middle, five at the end that the manifest had counted"
+    assert done.loss.seconds == pytest.approx(10 / FPS, abs=0.01)
+    assert any("line 21" in problem for problem in done.loss.problems)
+
+
+def test_after_a_lost_picture_none_is_kept_that_builds_on_it(session: Path) -> None:
+    path = session / "video_0000.mkv"
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 512] = bytes(512)
+    path.write_bytes(data)
+    done = recover(session)
+    rows, pictures = checked(session, done)
+    assert len(rows) == COUNT
+    # what is there is right: each picture is the row's own
+    assert len(pictures) == done.pictures == COUNT - done.loss.pictures
+
+
+def test_a_session_whose_manifest_is_lost_claims_nothing(session: Path) -> None:
+    (session / "manifest.json").unlink()
+    (found,) = find_cut_sessions(session.parent)
+    assert "manifest.json: missing" in found.why
+    done = recover(found.folder)
+    manifest = read_manifest(done.folder)
+    assert manifest.kind == "UNKNOWN"
+    assert len(read_all(done.folder)[1]) == COUNT
+
+
+def test_a_session_that_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
+    writer = SessionWriter(QUICK, ABOUT, folder=tmp_path)
+    writer.start()
+    writer.put(tick_of(0, time.monotonic()))
+    wait_for(lambda: writer.status().frames == 1)
+    folder = writer.status().folder
+    assert folder is not None
+    assert find_cut_sessions(tmp_path) == ()
+    with pytest.raises(SessionError, match="being recorded"):
+        recover(folder)
+    assert writer.close()
+
+
+def test_a_session_with_nothing_left_says_so_and_leaves_no_half_copy(session: Path) -> None:
+    (session / "frames.jsonl").write_bytes(b"\x00" * 100)
+    (session / "video_0000.mkv").write_bytes(b"\x00" * 1000)
+    with pytest.raises(SessionError, match="nothing left to recover"):
+        recover(session)
+    assert [path.name for path in session.parent.iterdir()] == [session.name]
+
+
+def test_a_copy_that_cannot_be_written_is_one_line(session: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(SessionError, match=r"make room or choose another folder"):
+        recover(session, tmp_path / "file")
+
+
+def test_an_empty_session_is_not_offered(tmp_path: Path) -> None:
+    files = SessionFiles(tmp_path, ABOUT, QUICK, first_s=0.0, now_s=0.0)
+    files.close("never began", 0)
+    set_open(files.folder)
+    assert find_cut_sessions(tmp_path) == ()
+    assert find_cut_sessions(tmp_path / "no folder") == ()
+
+
+# --- damage at random
+
+
+def damaged(session: Path, dice: random.Random) -> str:
+    """Cut, flip, zero or scramble a random file of the session; says what was done."""
+    path = dice.choice(sorted(session.iterdir()))
+    data = bytearray(path.read_bytes())
+    kind = dice.choice(("cut", "flip", "zero", "scramble", "repeat"))
+    at = dice.randrange(len(data))
+    span = min(len(data) - at, dice.choice((1, 16, 512, 4096)))
+    if kind == "cut":
+        del data[at:]
+    elif kind == "flip":
+        for _ in range(dice.choice((1, 4, 40))):
+            data[dice.randrange(len(data))] ^= 1 << dice.randrange(8)
+    elif kind == "zero":
+        data[at : at + span] = bytes(span)
+    elif kind == "scramble":
+        data[at : at + span] = dice.randbytes(span)
+    else:
+        data[at:at] = data[at : at + span]
+    path.write_bytes(data)
+    return f"{kind} {path.name} at {at}"
+
+
+def run_case(whole: Path, folder: Path, seed: int) -> None:
+    session = Path(shutil.copytree(whole, folder / whole.name))
+    dice = random.Random(seed)
+    what = [damaged(session, dice) for _ in range(dice.choice((1, 1, 2)))]
+    before = fingerprint(session)
+    try:
+        rows, pictures, _ = read_all(session)
+        done = recover(session)
+    except SessionError as error:
+        assert "\n" not in str(error), what
+        assert "nothing left" in str(error) or "newer version" in str(error), (what, error)
+    else:
+        again, whole_pictures = checked(session, done)
+        assert set(again) <= set(range(COUNT)), what
+        assert set(rows) >= set(again), what
+        assert len(whole_pictures) >= len(pictures) - 30, what
+    assert fingerprint(session) == before, what
+    shutil.rmtree(folder)
+
+
+def test_damage_at_random_is_survived(whole: Path, tmp_path: Path) -> None:
+    for seed in range(40):
+        run_case(whole, tmp_path / str(seed), seed)
+
+
+# --- a process that is killed
+
+
+def record_and_kill(folder: Path, after_s: float, fps: float = 60.0) -> int:
+    """Record in another process and kill it; returns the last frame that it handed over."""
+    child = subprocess.Popen([sys.executable, str(CHILD), str(folder), str(fps)], stdout=subprocess.PIPE, text=True)
+    assert child.stdout is not None
+    assert child.stdout.readline() == "0\n"
+    time.sleep(after_s)
+    child.kill()
+    rest = child.stdout.read()
+    child.wait()
+    child.stdout.close()
+    whole_lines = rest[: rest.rfind("\n") + 1].splitlines()
+    return int(whole_lines[-1]) if whole_lines else 0
+
+
+def test_a_recording_that_is_killed_loses_a_row_and_half_a_second_at_most(tmp_path: Path) -> None:
+    dice = random.Random(4)
+    earlier = record(tmp_path, (tick_of(i, 1000.0 + i / FPS) for i in range(5)))
+    before = fingerprint(earlier)
+    for _ in range(3):
+        last = record_and_kill(tmp_path, dice.uniform(0.3, 1.2))
+        (found,) = find_cut_sessions(tmp_path)
+        done = recover(found.folder)
+        rows, pictures = checked(found.folder, done)
+        assert rows == list(range(len(rows)))
+        # what waits in the queue at that moment is a frame or two; the machine may be busy
+        assert len(rows) >= last - 3
+        assert pictures == rows[: len(pictures)]
+        assert (len(rows) - len(pictures)) / 60.0 <= 0.5
+        assert done.loss.seconds <= 0.5
+    assert fingerprint(earlier) == before
+
+
+def test_a_note_is_added_to_a_session_that_has_ended(session: Path) -> None:
+    path = session / "events.jsonl"
+    path.write_bytes(path.read_bytes()[:-5])
+    add_event(session, Event(1001.5, EventKind.NOTE, "kink here"))
+    with SessionReader(session) as reader:
+        assert [event.text for event in reader.events if event.kind is EventKind.NOTE] == ["kink here"]
+        assert [problem for problem in reader.problems if "events" in problem] == ["events.jsonl: line 1: not valid JSON; skipped"]
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(SessionError, match="not kept"):
+        add_event(session, Event(1001.5, EventKind.NOTE, "kink here"))
+
+
+def test_lines_of_gives_places_by_which_a_line_can_be_read_again(tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    path.write_bytes(b'{"a":1}\n\n   \n{"b":2}\n{"c"')
+    found = list(lines_of(path))
+    assert [(line.number, line.offset, line.data, line.is_cut) for line in found] == [
+        (1, 0, b'{"a":1}', False),
+        (4, 13, b'{"b":2}', False),
+        (5, 21, b'{"c"', True),
+    ]
