@@ -13,6 +13,7 @@ from app.deadman_key import DeadmanKey
 from app.engine_thread import EngineThread
 from app.jog_keys import JogKeys, Motion
 from app.next_step import Step
+from app.recorder import Recorder
 from app.widgets.event_log import EventKind
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
@@ -48,11 +49,12 @@ class DriveDesk(QObject):
     window : whose keys are listened to.
     thread : runs the rig.
     panels : what to show the pilot's view on.
+    recorder : keeps alerts and destinations with the session.
     """
 
-    def __init__(self, window: QWidget, thread: EngineThread, panels: DrivePanels) -> None:
+    def __init__(self, window: QWidget, thread: EngineThread, panels: DrivePanels, recorder: Recorder) -> None:
         super().__init__(window)
-        self._thread, self._panels = thread, panels
+        self._thread, self._panels, self._recorder = thread, panels, recorder
         self.jog = JogKeys(window)
         self.deadman = DeadmanKey(window)
         self.sounds = AlertSounds(self)
@@ -151,6 +153,7 @@ class DriveDesk(QObject):
         self._on_jog(jog)
 
     def log_target(self, target: Point | None) -> None:
+        self._recorder.target(target)
         self._panels.log(EventKind.TARGET, "cleared" if target is None else f"set to {target[0]:.0f}, {target[1]:.0f} px")
 
     @Slot(object)
@@ -198,6 +201,7 @@ class DriveDesk(QObject):
         for alert in news.alerts:
             detail = f": {alert.detail}" if alert.detail else ""
             self._panels.log(EventKind.ALERT, f"{alert.spec.text}{detail}")
+            self._recorder.alert(alert, news.view.time_s)
             if alert.sound is not None:
                 self.sounds.play(alert.sound)
         self._panels.show_drive(news.view, self._thread.bus_status())

@@ -70,6 +70,8 @@ class EngineThread(QThread):
         super().__init__(parent)
         self.setObjectName("engine")
         self.ticks: Latest[Tick] = Latest()
+        self.on_tick: Callable[[Tick], None] | None = None
+        """Gets every tick, in this thread; it must return at once."""
         self._lock = threading.Lock()
         self._changed = threading.Event()
         self._stopping = False
@@ -154,7 +156,11 @@ class EngineThread(QThread):
     def _turn(self, engine: EngineLike) -> None:
         while not self._changed.is_set():
             tick = engine.step(STEP_TIMEOUT_S)
-            if tick is not None and self.ticks.put(tick):
+            if tick is None:
+                continue
+            if (on_tick := self.on_tick) is not None:
+                on_tick(tick)
+            if self.ticks.put(tick):
                 self.tick_ready.emit()
 
     def _report(self, status: EngineStatus) -> None:

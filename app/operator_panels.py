@@ -26,6 +26,7 @@ from app.widgets.notice import Notice
 from app.widgets.overlay_bar import OverlayBar
 from app.widgets.performance_panel import PerformancePanel
 from app.widgets.phantom_picker import PhantomPicker
+from app.widgets.record_bar import RecordBar
 from app.widgets.servo_table import ServoTable
 from app.widgets.sim_banner import SimBanner
 from app.widgets.state_badge import StateBadge
@@ -57,6 +58,7 @@ class OperatorPanels(QWidget):
         self._servo_config = config.servos
         self.banner = SimBanner(kind, has_servos=config.rig.robot != "none")
         self.mode = ModeBadge()
+        self.record_bar = RecordBar()
         self.picker = PhantomPicker(phantoms, config.twin.phantom) if phantoms else None
         self.live = LiveView(pixels_per_mm)
         self.notice = Notice(self.live)
@@ -141,6 +143,7 @@ class OperatorPanels(QWidget):
         header.addWidget(self.banner, 1)
         if self.picker is not None:
             header.addWidget(self.picker)
+        header.addWidget(self.record_bar)
         header.addWidget(self.mode)
         columns = QHBoxLayout(stage)
         columns.setContentsMargins(0, 0, 0, 0)

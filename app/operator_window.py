@@ -19,6 +19,7 @@ from app.heartbeat import Heartbeat
 from app.menus import MenuEntry, add_menu
 from app.next_step import Step
 from app.operator_panels import OperatorPanels
+from app.recorder import Recorder
 from app.snapshot import Origin, SnapshotWriter, pictures_folder
 from app.widgets.event_log import EventKind
 from app.widgets.notice import NoticeKind
@@ -73,7 +74,8 @@ class OperatorWindow(QMainWindow):
         self._check = QTimer(self)
         self._check.setInterval(_CHECK_EVERY_MS)
         self._panels = OperatorPanels(config, kind, phantoms)
-        self._desk = DriveDesk(self, self._thread, self._panels)
+        self._recorder = Recorder(config, kind, self._thread, self)
+        self._desk = DriveDesk(self, self._thread, self._panels, self._recorder)
         self.setCentralWidget(self._panels)
         self._make_menus()
         self._wire()
@@ -123,6 +125,9 @@ class OperatorWindow(QMainWindow):
         file_entries = [
             MenuEntry("&Snapshot", self._take_snapshot, ("P", "Ctrl+S")),
             MenuEntry("&Open pictures folder", self._open_pictures),
+            None,
+            MenuEntry("&Record, or end the recording", self._recorder.toggle, ("F9",)),
+            MenuEntry("Save the &last seconds", self._recorder.save_last, ("F10",)),
             None,
             MenuEntry("&Quit", self.close, ("Ctrl+Q",)),
         ]
@@ -189,6 +194,9 @@ class OperatorWindow(QMainWindow):
         panels.servos.reboot_asked.connect(desk.reboot)
         panels.servos.zero_asked.connect(desk.zero)
         panels.servos.torque_off_asked.connect(desk.torque_off)
+        self._recorder.changed.connect(panels.record_bar.show_status)
+        self._recorder.said.connect(self.say)
+        panels.record_bar.clicked.connect(self._recorder.toggle)
         self._snapshots.saved.connect(panels.toast.show_message)
         self._snapshots.failed.connect(self._on_snapshot_failed)
         if panels.picker is not None:
@@ -207,6 +215,7 @@ class OperatorWindow(QMainWindow):
     def _start_rig(self) -> None:
         self._desk.reset()
         self._clear_target()
+        self._recorder.open_rig(self._config)
         self._show_phase(Phase.STARTING)
         self._thread.start_engine(partial(self._open_engine, self._config))
 
@@ -401,12 +410,15 @@ class OperatorWindow(QMainWindow):
         self._thread.stop()
         has_ended = self._thread.wait(_STOP_WITHIN_MS)
         has_saved = self._snapshots.finish()
+        if not self._recorder.close():
+            _log.error("the disk did not take the recording in time; what was written is safe, and is found at the next start")
         if not has_saved:
             _log.error("the disk did not take a snapshot in time; leaving without it")
         if not has_ended:
             _log.error("the rig's driver did not return within %g s; leaving without it", _STOP_WITHIN_MS / 1000)
         if not (has_ended and has_saved):
-            os._exit(1)  # Qt would abort on a thread that still runs, or wait for it for ever; nobody drives it since the first line above
+            # Qt would abort on a thread that still runs, or wait for it for ever; nobody drives any more
+            os._exit(1)
 
 
 def _keys_of(step: Step) -> tuple[str, ...]:

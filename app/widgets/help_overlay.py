@@ -40,6 +40,8 @@ KEY_TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("Click", "destination"),
             ("Right click, Esc", "clear it"),
             ("P   or   Ctrl+S", "snapshot into your pictures"),
+            ("F9", "record, end the recording"),
+            ("F10", "save the last 30 s"),
             ("R", "another random phantom"),
             ("F5", "start the rig again"),
             ("Wheel, drag, F", "zoom, move, whole picture"),

@@ -60,7 +60,9 @@ def make_window(qtbot: QtBot, bench: FakeBench) -> Iterator[MakeWindow]:
         kind: RigKind = RigKind.SIM,
     ) -> OperatorWindow:
         opener = open_engine or (lambda _config: FakeEngine(bench))
-        window = OperatorWindow(config or Config(), opener, kind, PHANTOMS if kind is RigKind.SIM else ())
+        window = OperatorWindow(
+            config or Config.model_validate({"record": {"ring_s": 0}}), opener, kind, PHANTOMS if kind is RigKind.SIM else ()
+        )
         qtbot.addWidget(window)
         windows.append(window)
         window.show()
@@ -80,7 +82,9 @@ def engine(bench: FakeBench) -> FakeEngine:
 @pytest.fixture
 def running(make_window: MakeWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path) -> OperatorWindow:
     """A window that shows pictures of `engine`; its snapshots go to the test's folder."""
-    config = Config.model_validate({"window": {"pictures_folder": str(tmp_path / "shots")}})
+    config = Config.model_validate(
+        {"window": {"pictures_folder": str(tmp_path / "shots")}, "record": {"folder": str(tmp_path / "sessions"), "ring_s": 0}}
+    )
     window = make_window(lambda _config: engine, config)
     window.start()
     qtbot.waitUntil(lambda: window.shown_tick is not None)

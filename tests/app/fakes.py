@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from core.config import PoseConfig
 from core.control.alerts import Alert
 from core.control.drive_view import DriveNews, DriveView
+from core.control.faults import Fault
 from core.control.gate_checks import Source
 from core.control.hand import Jog
 from core.control.modes import Act
@@ -216,6 +217,7 @@ class FakePilot:
         self.beats = 0
         self.asked: list[str] = []
         self.halted = False
+        self.faults: list[Fault] = []
         self.view = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, deadman=False)
         self.alerts: list[Alert] = []
 
@@ -245,6 +247,9 @@ class FakePilot:
 
     def window_alive(self) -> None:
         self.beats += 1
+
+    def report(self, fault: Fault) -> None:
+        self.faults.append(fault)
 
     def news(self) -> DriveNews:
         alerts, self.alerts = tuple(self.alerts), []

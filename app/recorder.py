@@ -1,0 +1,127 @@
+"""Recording from the window: the writer of sessions beside the engine's thread, and what the bar shows of it."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, QTimer, Signal, Slot
+
+from app.engine_thread import EngineThread
+from core.config import Config
+from core.control.alerts import Alert
+from core.control.faults import Cause, Fault
+from core.session.events import EventKind, event_of_alert
+from core.session.manifest import about_rig
+from core.session.record_status import RecordStatus
+from core.session.writer import SessionWriter
+from core.types import Point, Tick
+from hardware.rig import RigKind
+
+_LOOK_EVERY_MS = 250
+_CLOSE_WITHIN_S = 10.0
+
+
+class Recorder(QObject):
+    """Keeps every tick of the running rig, as a session while one is being recorded, else in memory for "save the last seconds".
+
+    ``changed`` carries the ``RecordStatus``, ``said`` a line for people and whether it is a fault.
+
+    Parameters
+    ----------
+    thread : whose ticks are recorded; they come in its own thread, and nothing here makes it wait.
+    """
+
+    changed = Signal(object)
+    said = Signal(str, bool)
+
+    def __init__(self, config: Config, kind: RigKind, thread: EngineThread, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._kind, self._thread = kind, thread
+        self._writer: SessionWriter | None = None
+        self._config = config
+        self._shown = RecordStatus()
+        self._timer = QTimer(self)
+        self._timer.setInterval(_LOOK_EVERY_MS)
+        self._timer.timeout.connect(self._look)
+        thread.on_tick = self._put
+
+    @property
+    def status(self) -> RecordStatus:
+        """How it is going."""
+        return self._writer.status() if self._writer is not None else RecordStatus()
+
+    def open_rig(self, config: Config) -> None:
+        """Another rig is being opened: what is being recorded ends, for a session never mixes two rigs."""
+        about = about_rig(config, self._kind.value, config.rig.name)
+        if self._writer is None:
+            self._writer = SessionWriter(config.record, about)
+            self._timer.start()
+        else:
+            self._writer.set_about(about)
+
+    @Slot()
+    def toggle(self) -> None:
+        """Begin a session, or end it."""
+        if self._writer is None:
+            return
+        if self._writer.status().recording:
+            self._writer.stop()
+        else:
+            self._writer.start()
+
+    @Slot()
+    def save_last(self) -> None:
+        """Make a session of the last seconds, without having recorded."""
+        if self._writer is None:
+            return
+        if self._writer.status().ring_s <= 0.0:
+            self.said.emit("Nothing to save yet: record.ring_s is 0, or the rig has just been opened", True)
+            return
+        self._writer.save_last()
+
+    def note(self, text: str) -> None:
+        """Keep a note with the session."""
+        self._event(EventKind.NOTE, text)
+
+    def target(self, target: Point | None) -> None:
+        """Keep the operator's destination, source pixels."""
+        self._event(EventKind.TARGET, "" if target is None else f"{target[0]:.1f}, {target[1]:.1f}")
+
+    def alert(self, alert: Alert, time_s: float) -> None:
+        """Keep an alert that was shown."""
+        if self._writer is not None:
+            self._writer.add_event(event_of_alert(alert, time_s))
+
+    def close(self) -> bool:
+        """End the session; False when the disk has not answered in time."""
+        self._timer.stop()
+        self._thread.on_tick = None
+        return self._writer.close(_CLOSE_WITHIN_S) if self._writer is not None else True
+
+    def _put(self, tick: Tick) -> None:
+        """A tick, in the engine's thread."""
+        writer, pilot = self._writer, self._thread.pilot
+        if writer is not None:
+            writer.put(tick, pilot.view if pilot is not None else None, self._thread.bus_status())
+
+    def _event(self, kind: EventKind, text: str) -> None:
+        if self._writer is not None:
+            self._writer.event(kind, text)
+
+    @Slot()
+    def _look(self) -> None:
+        before, self._shown = self._shown, self.status
+        self.changed.emit(self._shown)
+        self._tell(before, self._shown)
+
+    def _tell(self, before: RecordStatus, now: RecordStatus) -> None:
+        """What the operator and the pilot's alerts must know."""
+        pilot = self._thread.pilot
+        if now.problem and now.problem != before.problem:
+            self.said.emit(f"Recording stopped: {now.problem}", True)
+            if pilot is not None:
+                pilot.report(Fault(Cause.DISK_FULL, now.problem))
+        elif now.warning and pilot is not None:
+            pilot.report(Fault(Cause.DISK_LOW, now.warning))
+        if now.dropped > before.dropped and pilot is not None:
+            pilot.report(Fault(Cause.RECORDER_BEHIND, f"{now.dropped} frames"))
+        if now.saved is not None and now.saved != before.saved:
+            self.said.emit(f"Session saved: {now.saved}", False)

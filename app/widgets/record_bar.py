@@ -1,0 +1,88 @@
+"""Whether a session is being recorded, for how long, and how it goes."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app import palette, theme
+from core.session.record_status import RecordStatus
+
+_SIZE = QSize(196, 34)
+
+
+class RecordBar(QWidget):
+    """A button that begins and ends a recording; while it records it is filled and counts. ``clicked`` asks for the other state."""
+
+    clicked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._status = RecordStatus()
+        self._lines = ("Record", "F9")
+        self.setFixedSize(_SIZE)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self._describe()
+
+    @property
+    def text(self) -> str:
+        """Both lines as shown."""
+        return " ".join(self._lines)
+
+    def show_status(self, status: RecordStatus) -> None:
+        """Show how it is going; repaints only when something that is shown has changed."""
+        self._status = status
+        lines = _lines_of(status)
+        if lines != self._lines:
+            self._lines = lines
+            self._describe()
+            self.update()
+
+    def _describe(self) -> None:
+        self.setAccessibleName("Recording" if self._status.recording else "Record")
+        self.setAccessibleDescription(self.text)
+        free = f"{self._status.disk_free / 1e9:.1f} GB free on the disk" if self._status.disk_free is not None else ""
+        where = str(self._status.folder) if self._status.folder is not None else ""
+        tip = ["F9 begins or ends a session", "F10 saves the last seconds without having recorded", where, free]
+        self.setToolTip("\n".join(line for line in (*tip, self._status.warning, self._status.problem) if line))
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.clicked.emit()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+        is_bad = bool(self._status.problem)
+        edge = palette.VERMILLION if self._status.recording or is_bad else palette.LINE
+        painter.setPen(QPen(QColor(edge), 1.5))
+        painter.setBrush(QColor(palette.RAISED if self._status.recording else palette.PANEL))
+        painter.drawRoundedRect(frame, 6, 6)
+        painter.setPen(QPen(QColor(palette.VERMILLION), 1.5))
+        painter.setBrush(QColor(palette.VERMILLION) if self._status.recording else Qt.BrushStyle.NoBrush)
+        painter.drawEllipse(QRectF(frame.left() + 12, frame.center().y() - 6, 12, 12))
+        first, second = self._lines
+        left = frame.left() + 34
+        painter.setFont(theme.semi_bold(13))
+        painter.setPen(QColor(palette.TEXT))
+        width = painter.fontMetrics().horizontalAdvance(first)
+        painter.drawText(QRectF(left, frame.top(), frame.width(), frame.height()), Qt.AlignmentFlag.AlignVCenter, first)
+        painter.setFont(theme.font(12))
+        painter.setPen(QColor(palette.VERMILLION if is_bad or self._status.dropped else palette.TEXT_DIM))
+        room = QRectF(left + width + 10, frame.top(), frame.right() - left - width - 16, frame.height())
+        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, theme.elide(painter.font(), second, int(room.width())))
+        painter.end()
+
+
+def _lines_of(status: RecordStatus) -> tuple[str, str]:
+    """What is written, large and small."""
+    if status.recording:
+        minutes, seconds = divmod(int(status.elapsed_s), 60)
+        size = f"{status.bytes / 1e6:.0f} MB" if status.bytes < 1e9 else f"{status.bytes / 1e9:.1f} GB"
+        return f"{minutes}:{seconds:02d}", f"{status.dropped} dropped" if status.dropped else size
+    if status.problem:
+        return "Record", "stopped: disk?"
+    return "Record", "saving" if status.saving else "F9"

@@ -1,0 +1,92 @@
+"""Recording from the window: one key begins and ends a session, the last seconds can be saved, nothing is lost at the end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.operator_window import OperatorWindow
+from core.config import Config
+from core.control.alerts import ALERTS, Alert
+from core.control.faults import Cause
+from core.session.reader import SessionReader
+from tests.app.conftest import MakeWindow
+from tests.app.fakes import FakeBench, FakeEngine, until
+
+Key = Qt.Key
+
+
+def sessions(folder: Path) -> list[Path]:
+    return sorted(folder.glob("session_*")) if folder.is_dir() else []
+
+
+def test_one_key_begins_and_ends_a_session(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path) -> None:
+    bar = running.panels.record_bar
+    assert bar.text == "Record F9"
+    qtbot.keyClick(running, Key.Key_F9)
+    until(qtbot, lambda: running._recorder.status.frames >= 5)
+    until(qtbot, lambda: bar.accessibleName() == "Recording")
+    running.panels.live.clicked.emit(500.0, 280.0)
+    engine.pilot.alerts = [Alert(Cause.DEADMAN, ALERTS[Cause.DEADMAN])]
+    until(qtbot, lambda: not engine.pilot.alerts)
+    qtbot.keyClick(running, Key.Key_F9)
+    until(qtbot, lambda: running._recorder.status.saved is not None and bar.accessibleName() == "Record")
+    (session,) = sessions(tmp_path / "sessions")
+    reader = SessionReader(session)
+    assert reader.wait(10.0)
+    assert len(reader) >= 5
+    assert reader.manifest is not None
+    assert reader.manifest.closed
+    assert reader.manifest.kind == "SIM"
+    kinds = [event.kind.value for event in reader.events]
+    assert "target" in kinds
+    assert "alert" in kinds
+    assert not reader.problems
+    reader.close()
+    assert any(str(session) in line for line in running.panels.events.lines)
+
+
+def test_closing_the_window_ends_the_session_properly(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    running.panels.record_bar.clicked.emit()
+    until(qtbot, lambda: running._recorder.status.frames >= 3)
+    running.close()
+    (session,) = sessions(tmp_path / "sessions")
+    reader = SessionReader(session)
+    assert reader.wait(10.0)
+    assert reader.manifest is not None
+    assert reader.manifest.closed
+    assert len(reader) >= 3
+    reader.close()
+
+
+def test_the_last_seconds_are_there_without_having_recorded(
+    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot, tmp_path: Path
+) -> None:
+    config = Config.model_validate({"record": {"folder": str(tmp_path / "sessions"), "ring_s": 5.0}})
+    window = make_window(lambda _config: FakeEngine(bench), config)
+    window.start()
+    until(qtbot, lambda: window._recorder.status.ring_s > 0.3)
+    qtbot.keyClick(window, Key.Key_F10)
+    until(qtbot, lambda: window._recorder.status.saved is not None)
+    (session,) = sessions(tmp_path / "sessions")
+    reader = SessionReader(session)
+    assert reader.wait(10.0)
+    assert len(reader) >= 3
+    reader.close()
+
+
+def test_nothing_to_save_is_said(running: OperatorWindow, qtbot: QtBot) -> None:
+    qtbot.keyClick(running, Key.Key_F10)
+    assert "Nothing to save yet" in running.panels.toast.text()
+
+
+def test_a_folder_that_cannot_be_written_stops_the_recording_visibly(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "sessions").write_text("a file where the folder should be")
+    qtbot.keyClick(running, Key.Key_F9)
+    until(qtbot, lambda: running._recorder.status.problem != "")
+    until(qtbot, lambda: "stopped" in running.panels.record_bar.text)
+    assert "Recording stopped" in running.panels.toast.text()
+    assert engine.pilot.faults[-1].cause is Cause.DISK_FULL
+    assert running.shown_tick is not None, "the rig goes on"
