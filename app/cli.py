@@ -286,6 +286,33 @@ def record(
     run_record(seconds, out, rig=rig, config_path=config, lossless=lossless, as_json=json)
 
 
+@app.command()
+def replay(
+    session: Annotated[Path, typer.Argument(metavar="SESSION", help="folder of a recorded session")],
+    model: Annotated[str | None, typer.Option(help="model name or folder; default: the recorded configuration's")] = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+    jsonl: Annotated[Path | None, typer.Option(help="the new results, one JSON object per frame, as perceive writes them")] = None,
+    diff: Annotated[bool, typer.Option("--diff", help="also the frames that changed most")] = False,
+    out: Annotated[Path | None, typer.Option(help="folder for replay.json, frames.jsonl and the figure as SVG and PDF")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Perceive a recorded session again and compare; without --config or --preset in the recorded configuration."""
+    from app.replay_command import ReplayOptions, run_replay
+
+    run_replay(ReplayOptions(session, model, preset, config, jsonl, out, diff, json))
+
+
+@app.command()
+def play(
+    session: Annotated[Path, typer.Argument(metavar="SESSION", help="folder of a recorded session")],
+) -> None:
+    """The player: a recorded session with everything that was understood, frame by frame."""
+    from app.play_command import run_play
+
+    sys.exit(run_play(session))
+
+
 session_commands = typer.Typer(help="Recorded sessions: look at them, recover cut ones, export.", no_args_is_help=True)
 app.add_typer(session_commands, name="session")
 SessionArgument = Annotated[Path, typer.Argument(metavar="SESSION", help="folder of a recorded session")]

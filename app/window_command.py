@@ -16,7 +16,7 @@ from core.config import Config, load_config
 from core.devices import DeviceError
 from core.errors import UserError
 from core.types import Reason
-from hardware.rig import RigKind
+from hardware.rig import RigKind, kind_of
 from hardware.twin.phantom import PHANTOM_TITLES
 
 if TYPE_CHECKING:
@@ -24,15 +24,21 @@ if TYPE_CHECKING:
 
     from app.operator_window import OperatorWindow
 
-RIGS = ("twin",)
+RIGS = ("twin", "realsense", "webcam")
+_REALSENSE_ENDING = ".bag"
 
 
-def window_config(rig: str, config_path: Path | None, source: Path | None) -> tuple[Config, RigKind]:
-    """The configuration of a rig or of a recorded source, and what the banner says. Raises ConfigError, DeviceError."""
+def window_config(rig: str | None, config_path: Path | None, source: Path | None) -> tuple[Config, RigKind]:
+    """The configuration of a rig or of a recorded source, and what the banner says. Raises ConfigError, DeviceError.
+
+    Without `rig` it is the one that the configuration names; with it, the configuration says how that rig is set.
+    """
     if source is None:
-        if rig not in RIGS:
+        if rig is not None and rig not in RIGS:
             raise DeviceError(f"unknown rig {rig!r}; known: {', '.join(RIGS)}")
         config = load_config(config_path)
+        if rig is not None:
+            config = _choose(config, rig)
     else:
         try:
             found = source.exists()
@@ -41,8 +47,22 @@ def window_config(rig: str, config_path: Path | None, source: Path | None) -> tu
         if not found:
             raise DeviceError(f"{source}: no such file or folder")
         camera = "video_file" if source.suffix.lower() in VIDEO_ENDINGS else "image_folder"
+        camera = "realsense" if source.suffix.lower() == _REALSENSE_ENDING else camera
         config = load_config(config_path, overrides={"rig": {"camera": camera, "robot": "none", "source": str(source)}})
-    return config, RigKind.SIM if config.rig.camera == "twin" else RigKind.PLAYBACK
+    return config, kind_of(config.rig)
+
+
+def _choose(config: Config, rig: str) -> Config:
+    """Another rig than the configuration's own: a real camera drives real servos when their port is known."""
+    if config.rig.camera == rig and config.rig.source is None:
+        return config
+    servos = config.servos
+    if rig == "twin":
+        robot, servos = "twin", servos.model_copy(update={"port": None})
+    else:
+        robot = "servos" if servos.port is not None else "none"
+    chosen = config.rig.model_copy(update={"name": rig, "camera": rig, "robot": robot, "source": None})
+    return config.model_copy(update={"rig": chosen, "servos": servos})
 
 
 def make_window(config: Config, kind: RigKind) -> OperatorWindow:
@@ -65,7 +85,7 @@ def make_application() -> QApplication:
     return application
 
 
-def run_window(rig: str, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False) -> int:
+def run_window(rig: str | None, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False) -> int:
     """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
     from app.operator_devices import OperatorDevices
 

@@ -26,7 +26,8 @@ Point = tuple[float, float]
 class Frame:
     """One camera image. ``captured_s`` is ``time.monotonic()`` at capture (or simulated time in lock-step).
 
-    ``index`` counts the frames that the camera gave; ``lost`` those that it took but that never arrived, since it was opened.
+    ``index`` counts the frames that the camera gave; ``lost`` those that should have come, by its own count or by its rate, and
+    never did, since it was opened.
     """
 
     index: int

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from core.config import Config
+from core.config import Config, RigConfig
 from core.control.guarded_robot import GuardedRobot
 from core.devices import Camera, DeviceError
 
@@ -49,6 +50,13 @@ class Rig:
 _START_INSERTION_MM = 70.0
 
 
+def kind_of(rig: RigConfig) -> RigKind:
+    """What a configured rig is, without opening it."""
+    if rig.camera == "twin":
+        return RigKind.SIM
+    return RigKind.LIVE if rig.camera in {"realsense", "webcam"} and rig.source is None else RigKind.PLAYBACK
+
+
 def open_rig(config: Config) -> Rig:
     """Open camera and robot; what was opened is closed again when the rest fails.
 
@@ -57,20 +65,78 @@ def open_rig(config: Config) -> Rig:
     DeviceError
         With one line that says what to do.
     """
-    if config.rig.camera == "twin":
+    kind = kind_of(config.rig)
+    if kind is RigKind.SIM:
         return _open_twin(config)
+    return _open_live(config) if kind is RigKind.LIVE else _open_playback(config)
+
+
+def _open_playback(config: Config) -> Rig:
+    """Pictures that were taken before; nobody drives."""
     if config.rig.source is None:
         raise DeviceError(f"rig {config.rig.name}: camera {config.rig.camera} needs rig.source, the path of the video or folder")
     source = Path(config.rig.source)
-    from hardware.cameras.image_folder import ImageFolder
-    from hardware.cameras.video_file import VideoFile
+    camera: Camera
+    if config.rig.camera == "realsense":
+        from hardware.cameras.realsense_recording import RealSenseRecording
 
-    camera: Camera = VideoFile(source) if config.rig.camera == "video_file" else ImageFolder(source)
+        camera = RealSenseRecording(source)
+    elif config.rig.camera == "video_file":
+        from hardware.cameras.video_file import VideoFile
+
+        camera = VideoFile(source)
+    elif config.rig.camera == "image_folder":
+        from hardware.cameras.image_folder import ImageFolder
+
+        camera = ImageFolder(source, watch=config.rig.watch_folder)
+    else:
+        raise DeviceError(f"rig {config.rig.name}: a webcam plays no files: leave rig.source out, or set rig.camera to video_file")
     camera.open()
     return Rig(source.name, RigKind.PLAYBACK, camera, None)
 
 
+def _open_live(config: Config) -> Rig:
+    """A real camera, with the servos when the rig has some. They are checked, but neither zeroed nor armed."""
+    rig = config.rig
+    if rig.robot == "twin":
+        raise DeviceError(f'rig {rig.name}: a real camera does not see the twin\'s robot: set rig.robot to "servos" or "none"')
+    if rig.robot == "servos" and (config.servos.port is None or config.servos.driver != "dynamixel"):
+        raise DeviceError(
+            f'rig {rig.name}: set servos.port (ls /dev/serial/by-id) and leave servos.driver out, or rig.robot = "none"'
+        )
+    camera = real_camera(config)
+    with ExitStack() as undo:
+        camera.open()
+        undo.callback(camera.close)
+        robot = _real_servos(config) if rig.robot == "servos" else None
+        undo.pop_all()
+    return Rig(rig.name, RigKind.LIVE, camera, robot)
+
+
+def real_camera(config: Config) -> Camera:
+    """The camera of a live rig, not open yet."""
+    if config.rig.camera == "realsense":
+        from hardware.cameras.realsense import realsense_camera
+
+        return realsense_camera(config.camera)
+    from hardware.cameras.webcam import webcam_camera
+
+    return webcam_camera(config.camera)
+
+
+def _real_servos(config: Config) -> ServoRobot:
+    from hardware.servos.servo_robot import ServoRobot
+
+    robot = ServoRobot(config.servos, config.safety, name=config.rig.name)
+    robot.connect()
+    return robot
+
+
 def _open_twin(config: Config) -> Rig:
+    if config.rig.robot == "servos":
+        raise DeviceError(
+            f'rig {config.rig.name}: the twin has servos of its own: set rig.robot = "twin", or rig.camera to a real one'
+        )
     from hardware.twin.camera import TwinCamera
     from hardware.twin.world import TwinWorld
 

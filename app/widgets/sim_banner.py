@@ -27,14 +27,15 @@ BANNERS = {
     RigKind.LIVE: BannerText("LIVE", palette.LIVE, "real servos move", "Commands move real servos. Keep the power cut in reach"),
     RigKind.PLAYBACK: BannerText("PLAYBACK", palette.PLAYBACK, "recorded, not live", "Nothing here is happening now"),
 }
+_LOOK_ONLY = BannerText("LIVE", palette.LIVE, "real camera, no servos", "A real camera looks; no servos that could move")
 
 
 class SimBanner(QWidget):
     """A striped word that is always visible, and what it means."""
 
-    def __init__(self, kind: RigKind) -> None:
+    def __init__(self, kind: RigKind, *, has_servos: bool = True) -> None:
         super().__init__()
-        self._text = BANNERS[kind]
+        self._text = BANNERS[kind] if has_servos or kind is not RigKind.LIVE else _LOOK_ONLY
         self.setFixedHeight(34)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(f"{self._text.word}: {self._text.meaning}")

@@ -1,4 +1,4 @@
-"""A picture, or a folder of pictures, as a camera: each is shown for a moment, the last one stays."""
+"""A picture, or a folder of pictures, as a camera: each is shown for a moment, the last one stays. Or a folder that is watched."""
 
 from __future__ import annotations
 
@@ -9,14 +9,19 @@ from core.devices import DeviceError
 from core.images import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS
 from core.types import Frame, Image
+from hardware.cameras.folder_watch import FolderWatch
 
 
 class ImageFolder:
-    """A ``Camera`` over pictures, in name order. Unreadable ones are skipped; none readable is an error at ``open``."""
+    """A ``Camera`` over pictures, in name order. Unreadable ones are skipped; none readable is an error at ``open``.
 
-    def __init__(self, path: Path, *, period_s: float = 0.5) -> None:
+    With `watch` only pictures that come later are shown, the newest first in line and each once; there need not be any at ``open``.
+    """
+
+    def __init__(self, path: Path, *, period_s: float = 0.5, watch: bool = False) -> None:
         self._path = path
         self._period_s = period_s
+        self._watch = FolderWatch(path) if watch else None
         self._files: list[Path] = []
         self._image: Image | None = None
         self._next = 0
@@ -32,6 +37,9 @@ class ImageFolder:
         return False
 
     def open(self) -> None:
+        if self._watch is not None:
+            self._watch.begin()
+            return
         if self._path.is_dir():
             self._files = sorted(p for p in self._path.iterdir() if p.suffix.lower() in IMAGE_ENDINGS)
         elif self._path.exists():
@@ -43,6 +51,10 @@ class ImageFolder:
             raise DeviceError(f"{self._path}: none of {len(self._files)} pictures can be read")
 
     def read(self, timeout_s: float) -> Frame | None:
+        if self._watch is not None:
+            image = self._watch.next(timeout_s)
+            self._index += image is not None
+            return None if image is None else Frame(self._index, time.monotonic(), image)
         wait = self._due_s - time.monotonic()
         if wait > timeout_s:
             time.sleep(timeout_s)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,9 +11,7 @@ import numpy as np
 
 from core.devices import DamagedStream, DeviceError, EndOfStream
 from core.types import Frame, Image
-
-LATE_S = 0.1
-"""A paced frame that is this late is skipped."""
+from hardware.cameras.pacing import Pacer
 
 
 def _rgb(frame: av.VideoFrame) -> Image:
@@ -35,9 +32,8 @@ class VideoFile:
         self._frames: Iterator[av.VideoFrame] | None = None
         self._container: av.container.InputContainer | None = None
         self._index = -1
-        self._start_s = 0.0
         self._first_s: float | None = None
-        self._pending: tuple[av.VideoFrame, float] | None = None
+        self._pacer: Pacer[av.VideoFrame] = Pacer()
 
     @property
     def name(self) -> str:
@@ -48,7 +44,7 @@ class VideoFile:
         return False
 
     def open(self) -> None:
-        self._first_s, self._pending = None, None
+        self._first_s, self._pacer = None, Pacer()
         try:
             container = av.open(str(self._path))
         except (av.error.FFmpegError, OSError) as error:
@@ -61,26 +57,11 @@ class VideoFile:
         self._container, self._frames = container, container.decode(stream)
 
     def read(self, timeout_s: float) -> Frame | None:
-        entered_s = time.monotonic()
-        while True:
-            frame, at_s = self._pending or self._decode()
-            self._pending = None
-            if not self._paced:
-                return Frame(self._index, at_s, _rgb(frame))
-            now_s = time.monotonic()
-            late_s = now_s - (self._start_s + at_s)
-            left_s = entered_s + timeout_s - now_s
-            if -late_s > max(left_s, 0.0):
-                self._pending = frame, at_s
-                time.sleep(max(left_s, 0.0))
-                return None
-            if late_s >= LATE_S:
-                if left_s > 0.0:
-                    continue
-                # Decoding is slower than the recording: it is played as fast as it goes, instead of never.
-                self._start_s += late_s
-            time.sleep(max(-late_s, 0.0))
-            return Frame(self._index, time.monotonic(), _rgb(frame))
+        if not self._paced:
+            frame, at_s = self._decode()
+            return Frame(self._index, at_s, _rgb(frame))
+        due = self._pacer.next(self._decode, timeout_s)
+        return None if due is None else Frame(self._index, due[1], _rgb(due[0]))
 
     def _decode(self) -> tuple[av.VideoFrame, float]:
         if self._frames is None:
@@ -95,11 +76,10 @@ class VideoFile:
         at = frame.time if frame.time is not None and np.isfinite(frame.time) else self._index / 30.0
         if self._first_s is None:
             self._first_s = at
-            self._start_s = time.monotonic()
         return frame, at - self._first_s
 
     def close(self) -> None:
-        self._frames, self._pending = None, None
+        self._frames, self._pacer = None, Pacer()
         if self._container is not None:
             self._container.close()
             self._container = None

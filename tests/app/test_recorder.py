@@ -82,7 +82,9 @@ def test_nothing_to_save_is_said(running: OperatorWindow, qtbot: QtBot) -> None:
     assert "Nothing to save yet" in running.panels.toast.text()
 
 
-def test_a_folder_that_cannot_be_written_stops_the_recording_visibly(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_stops_the_recording_visibly(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path
+) -> None:
     (tmp_path / "sessions").write_text("a file where the folder should be")
     qtbot.keyClick(running, Key.Key_F9)
     until(qtbot, lambda: running._recorder.status.problem != "")

@@ -224,6 +224,13 @@ def test_banner_says_what_the_picture_is(qtbot: QtBot, kind: RigKind) -> None:
     assert banner.accessibleName().startswith(kind.value)
 
 
+def test_a_live_rig_without_servos_does_not_claim_that_they_move(qtbot: QtBot) -> None:
+    banner = SimBanner(RigKind.LIVE, has_servos=False)
+    qtbot.addWidget(banner)
+    assert banner.word == "LIVE"
+    assert "no servos" in banner.accessibleName()
+
+
 def test_mode_badge_says_advisory(qtbot: QtBot) -> None:
     badge = ModeBadge()
     qtbot.addWidget(badge)

@@ -1,6 +1,9 @@
 """One contract for every camera that needs no device, and what is special to each."""
 
+import itertools
+import os
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import av
@@ -10,11 +13,18 @@ import pytest
 
 from core.config import TwinConfig
 from core.devices import Camera, DamagedStream, DeviceError, EndOfStream
-from hardware.cameras import video_file
+from core.types import Frame
+from hardware.cameras import pacing
 from hardware.cameras.image_folder import ImageFolder
+from hardware.cameras.live_camera import LiveCamera
+from hardware.cameras.realsense import realsense_camera
+from hardware.cameras.realsense_recording import RealSenseRecording
 from hardware.cameras.video_file import VideoFile
+from hardware.cameras.webcam import WebcamSensor
 from hardware.twin.camera import TwinCamera
 from hardware.twin.world import TwinWorld
+from tests.hardware.soft_cameras import CONFIG as SOFT
+from tests.hardware.soft_cameras import SoftRealSense, SoftWebcam, write_bag
 
 
 def _video(path: Path, frames: int = 12, rate: int = 30) -> Path:
@@ -37,32 +47,61 @@ def _pictures(folder: Path) -> Path:
     return folder
 
 
-def _twin(_: Path) -> Camera:
+def _twin(_: Path, __: ExitStack) -> Camera:
     return TwinCamera(TwinWorld(TwinConfig(phantom="s_curve", image_width_px=160, image_height_px=120)), lock_step=True)
 
 
-MAKERS: dict[str, Callable[[Path], Camera]] = {
-    "video paced": lambda folder: VideoFile(_video(folder / "v.mp4")),
-    "video unpaced": lambda folder: VideoFile(_video(folder / "v.mp4"), paced=False),
-    "image folder": lambda folder: ImageFolder(_pictures(folder / "pictures"), period_s=0.01),
+def _watched(folder: Path, _: ExitStack) -> Camera:
+    """A watched folder that a new picture comes into all the time."""
+    camera = ImageFolder(_pictures(folder / "pictures"), watch=True)
+    read, numbers = camera.read, itertools.count(10)
+
+    def read_after_writing(timeout_s: float) -> Frame | None:
+        cv2.imwrite(str(folder / "pictures" / f"{next(numbers)}.png"), np.zeros((48, 64, 3), np.uint8))
+        return read(timeout_s)
+
+    camera.read = read_after_writing  # type: ignore[method-assign]
+    return camera
+
+
+def _realsense(_: Path, undo: ExitStack) -> Camera:
+    return realsense_camera(SOFT, undo.enter_context(SoftRealSense()).context)
+
+
+def _webcam(folder: Path, _: ExitStack) -> Camera:
+    soft = SoftWebcam(folder)
+    return LiveCamera(WebcamSensor(SOFT, soft.open_capture, soft.dev, soft.sys), SOFT)
+
+
+MAKERS: dict[str, Callable[[Path, ExitStack], Camera]] = {
+    "video paced": lambda folder, _: VideoFile(_video(folder / "v.mp4")),
+    "video unpaced": lambda folder, _: VideoFile(_video(folder / "v.mp4"), paced=False),
+    "image folder": lambda folder, _: ImageFolder(_pictures(folder / "pictures"), period_s=0.01),
+    "watched folder": _watched,
+    "RealSense": _realsense,
+    "RealSense recording paced": lambda folder, _: RealSenseRecording(write_bag(folder / "r.bag", list(range(12)))),
+    "RealSense recording unpaced": lambda folder, _: RealSenseRecording(write_bag(folder / "r.bag", list(range(12))), paced=False),
+    "webcam": _webcam,
     "twin": _twin,
 }
 
 
 @pytest.mark.parametrize("kind", MAKERS)
 def test_contract(kind: str, tmp_path: Path) -> None:
-    camera = MAKERS[kind](tmp_path)
-    assert camera.name
-    assert isinstance(camera.is_live, bool)
-    camera.open()
-    try:
-        frames = []
-        while len(frames) < 3:
-            frame = camera.read(1.0)
-            if frame is not None:
-                frames.append(frame)
-    finally:
-        camera.close()
+    with ExitStack() as undo:
+        camera = MAKERS[kind](tmp_path, undo)
+        assert camera.name
+        assert camera.is_live == (kind in {"RealSense", "webcam"})
+        camera.open()
+        try:
+            frames = []
+            while len(frames) < 3:
+                frame = camera.read(1.0)
+                if frame is not None:
+                    frames.append(frame)
+        finally:
+            camera.close()
+        camera.close()  # closing twice does no harm
     for before, after in zip(frames, frames[1:], strict=False):
         assert after.index > before.index
         assert after.captured_s >= before.captured_s
@@ -70,7 +109,9 @@ def test_contract(kind: str, tmp_path: Path) -> None:
         assert frame.image.dtype == np.uint8
         assert frame.image.ndim == 3
         assert frame.image.shape[2] == 3
-    camera.close()  # closing twice does no harm
+        assert frame.image.flags.c_contiguous
+        assert frame.lost == 0 or camera.is_live  # a machine that stands still for a moment loses some
+    assert len({frame.image.ctypes.data for frame in frames}) == 3  # nobody writes to a picture once it was given
 
 
 def test_an_unpaced_video_gives_every_frame_and_then_its_end(tmp_path: Path) -> None:
@@ -116,7 +157,7 @@ class _Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> _Clock:
     clock = _Clock()
-    monkeypatch.setattr(video_file, "time", clock)
+    monkeypatch.setattr(pacing, "time", clock)
     return clock
 
 
@@ -224,3 +265,25 @@ def test_a_folder_without_pictures_says_so(tmp_path: Path) -> None:
     (tmp_path / "x.png").write_bytes(b"broken")
     with pytest.raises(DeviceError, match="none of 1 pictures can be read"):
         ImageFolder(tmp_path).open()
+
+
+def test_a_watched_folder_shows_new_pictures_only_the_newest_first_in_line(tmp_path: Path) -> None:
+    folder = _pictures(tmp_path / "pictures")
+    camera = ImageFolder(folder, watch=True)
+    camera.open()
+    assert camera.read(0.15) is None
+    cv2.imwrite(str(folder / "z.png"), np.full((48, 64, 3), 10, np.uint8))
+    os.utime(folder / "z.png", (1e9, 1e9))
+    cv2.imwrite(str(folder / "a.png"), np.full((48, 64, 3), 20, np.uint8))
+    frame = camera.read(1.0)
+    assert frame is not None
+    assert (frame.index, int(frame.image[0, 0, 0])) == (0, 20)
+    assert camera.read(0.15) is None  # the older one was passed over, and nothing is shown twice
+    cv2.imwrite(str(folder / "0.png"), np.full((48, 64, 3), 30, np.uint8))  # written anew
+    (folder / "half.png").write_bytes(b"broken")
+    frame = camera.read(1.0)
+    assert frame is not None
+    assert (frame.index, int(frame.image[0, 0, 0])) == (1, 30)
+    camera.close()
+    with pytest.raises(DeviceError, match="cannot be watched"):
+        ImageFolder(tmp_path / "gone", watch=True).open()
