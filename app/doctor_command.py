@@ -1,0 +1,58 @@
+"""``doctor``: the preflight as a table or as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from app.window_command import window_config
+from hardware.preflight import Check, run_checks
+
+_NAME_COLUMNS = 18
+
+
+def run_doctor(rig: str | None, config_path: Path | None, *, as_json: bool) -> int:
+    """Check everything and tell; returns 0 when all is well, 1 when something is not. Raises UserError for bad input."""
+    config, _ = window_config(rig, config_path, None)
+    checks = list(_with_progress(run_checks(config)))
+    if as_json:
+        sys.stdout.write(json.dumps({"checks": [check.to_json() for check in checks]}) + "\n")
+    else:
+        _print(checks)
+    return 0 if all(check.ok for check in checks) else 1
+
+
+def _with_progress(checks: Iterator[Check]) -> Iterator[Check]:
+    """The slowest take seconds: say on standard error that something happens."""
+    with Console(stderr=True).status("checking ...") as status:
+        for check in checks:
+            status.update(f"checking ... {check.name}: {'ok' if check.ok else 'not ok'}")
+            yield check
+
+
+def _print(checks: list[Check]) -> None:
+    console = Console(highlight=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, expand=False)
+    table.add_column("", no_wrap=True)
+    table.add_column("check", no_wrap=True, min_width=_NAME_COLUMNS)
+    table.add_column("found", overflow="fold")
+    for check in checks:
+        # A word beside the colour: colour alone says nothing to some, and to a file.
+        mark = Text("ok", style="green") if check.ok else Text("NOT OK", style="bold red")
+        table.add_row(mark, Text(check.name), Text(check.detail))
+    console.print(table)
+    wrong = [check for check in checks if not check.ok]
+    if not wrong:
+        sys.stdout.write("All is well.\n")
+        return
+    sys.stdout.write("What to do:\n")
+    for check in wrong:
+        # Not through the console: a command must stay on one line, so that it can be copied.
+        sys.stdout.write(f"  {check.name}: {check.fix}\n")

@@ -1,0 +1,160 @@
+"""Webcams and industrial UVC cameras through OpenCV and V4L2, found by their stable path."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import logging
+import os
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from core.camera_config import CameraConfig
+from core.devices import DeviceError
+from hardware.cameras.capture_clock import CaptureClock
+from hardware.cameras.live_camera import LiveCamera, Shot
+from hardware.usb import DEV, SYS, video_devices
+
+_log = logging.getLogger(__name__)
+
+_SELECT_TIMEOUT = "OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT"
+"""Seconds that OpenCV waits for a frame; its own 10 would keep a lost camera from being found again."""
+_MANUAL, _AUTOMATIC = 1.0, 3.0
+"""Exposure modes of V4L2."""
+_EXPOSURE_STEPS_PER_MS = 10.0
+_SET_CONTROL, _EXPOSURE_PRIORITY = 0xC008561C, 0x009A0903
+"""VIDIOC_S_CTRL, and the control by which a camera may lower its rate in dim light (linux/videodev2.h)."""
+_QUEUE_FRAMES = 2
+
+
+def _open_v4l2(node: str) -> Any:
+    return cv2.VideoCapture(node, cv2.CAP_V4L2)
+
+
+class WebcamSensor:
+    """A V4L2 camera.
+
+    Parameters
+    ----------
+    config : which one, and how it takes its pictures.
+    open_capture : makes OpenCV's capture object of a device node.
+    dev, sys : where devices are looked up.
+    """
+
+    def __init__(
+        self, config: CameraConfig, open_capture: Callable[[str], Any] = _open_v4l2, dev: Path = DEV, sys: Path = SYS
+    ) -> None:
+        self._config, self._open_capture = config, open_capture
+        self._dev, self._sys = dev, sys
+        self._capture: Any = None
+        self._clock = CaptureClock()
+        self._title = config.device or "webcam"
+
+    @property
+    def name(self) -> str:
+        return self._title
+
+    def start(self) -> None:
+        node = self._find()
+        os.environ.setdefault(_SELECT_TIMEOUT, "1")
+        capture = self._open_capture(str(node))
+        try:
+            if not capture.isOpened():
+                raise DeviceError(
+                    f"{self.name} ({node}) cannot be opened: close other programs that use it, or join the group video"
+                )
+            self._set_up(capture, node)
+        except DeviceError:
+            capture.release()
+            raise
+        self._capture = capture
+        self._clock = CaptureClock()
+
+    def shoot(self, timeout_s: float) -> Shot | None:
+        """The next picture; V4L2 has its own time limit of a second, and a queue that ``LiveCamera``'s thread keeps empty."""
+        if not self._capture.grab():
+            raise DeviceError(f"{self.name} is lost: check its cable")
+        arrived_s = time.monotonic()
+        # V4L2 stamps frames on the monotonic clock. Some drivers do not, and say 0, or use another one.
+        stamp_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        came, image = self._capture.retrieve()
+        if not came or image is None:
+            return None  # a damaged picture
+        if image.ndim == 2:
+            image = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+        captured_s = self._clock.captured_s(arrived_s, stamp_s if stamp_s > 0.0 else None, arrived_s)
+        return Shot(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8), captured_s)
+
+    def stop(self) -> None:
+        capture, self._capture = self._capture, None
+        if capture is not None:
+            capture.release()
+
+    def revive(self) -> float:
+        """Nothing resets a V4L2 device but opening it again."""
+        return 0.0
+
+    def _find(self) -> Path:
+        wanted = self._config.device
+        devices = video_devices(self._dev, self._sys)
+        if wanted is None:
+            if not devices:
+                raise DeviceError("no webcam: plug it in; main.py doctor --rig webcam says more")
+            node = devices[0].node
+        else:
+            node = self._dev / f"video{wanted}" if wanted.isdigit() else Path(wanted)
+            if not node.exists():
+                paths = ", ".join(str(device.stable or device.node) for device in devices) or "none"
+                raise DeviceError(f"webcam {wanted} is not there; webcams: {paths}: plug it in, or set camera.device")
+        # Resolved at every start: behind the stable path there may be another number after it was plugged in again.
+        node = node.resolve()
+        self._title = next((device.title for device in devices if device.node.resolve() == node), self._title)
+        return node
+
+    def _set_up(self, capture: Any, node: Path) -> None:
+        config = self._config
+        # The pixel format first: it decides which sizes and rates there are.
+        self._set(capture, cv2.CAP_PROP_FOURCC, float(cv2.VideoWriter.fourcc(*config.pixel_format)), "camera.pixel_format")
+        self._set(capture, cv2.CAP_PROP_FRAME_WIDTH, config.width_px, "camera.width_px")
+        self._set(capture, cv2.CAP_PROP_FRAME_HEIGHT, config.height_px, "camera.height_px")
+        self._set(capture, cv2.CAP_PROP_FPS, config.frames_per_second, "camera.frames_per_second")
+        self._set(capture, cv2.CAP_PROP_BUFFERSIZE, _QUEUE_FRAMES, "the length of the queue")
+        size = (int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)))
+        if size != (config.width_px, config.height_px):
+            asked = f"{config.width_px}x{config.height_px}"
+            raise DeviceError(f"{self.name} gives {size[0]}x{size[1]} instead of {asked}: set camera.width_px and camera.height_px")
+        _keep_rate(node)
+        automatic = config.exposure_ms is None
+        self._set(capture, cv2.CAP_PROP_AUTO_EXPOSURE, _AUTOMATIC if automatic else _MANUAL, "automatic exposure")
+        if config.exposure_ms is not None:
+            self._set(capture, cv2.CAP_PROP_EXPOSURE, config.exposure_ms * _EXPOSURE_STEPS_PER_MS, "camera.exposure_ms")
+        if config.gain is not None:
+            self._set(capture, cv2.CAP_PROP_GAIN, config.gain, "camera.gain")
+        self._set(capture, cv2.CAP_PROP_AUTO_WB, float(config.white_balance_k is None), "automatic white balance")
+        if config.white_balance_k is not None:
+            self._set(capture, cv2.CAP_PROP_WB_TEMPERATURE, config.white_balance_k, "camera.white_balance_k")
+
+    def _set(self, capture: Any, what: int, value: float, title: str) -> None:
+        if not capture.set(what, value):
+            _log.info("%s does not take %s = %g", self.name, title, value)
+
+
+def _keep_rate(node: Path) -> None:
+    """Forbid the camera to give fewer frames in dim light; OpenCV knows no such setting. Many cameras have none."""
+    with contextlib.suppress(OSError):
+        handle = os.open(node, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            fcntl.ioctl(handle, _SET_CONTROL, struct.pack("Ii", _EXPOSURE_PRIORITY, 0))
+        finally:
+            os.close(handle)
+
+
+def webcam_camera(config: CameraConfig) -> LiveCamera:
+    """A V4L2 camera as a ``Camera``."""
+    return LiveCamera(WebcamSensor(config), config)

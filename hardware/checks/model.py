@@ -1,0 +1,98 @@
+"""The network: its files are whole, and on a picture whose truth is known it sees what is there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from core.config import PerceptionConfig, TwinConfig
+from core.learning.model_file import INFO, ONNX, ONNX_INT8, WEIGHTS, ModelError, ModelInfo, model_folder, read_model_info
+from core.types import Mask, Scene
+from hardware.checks.check import Check, one_line
+
+if TYPE_CHECKING:
+    from hardware.twin.truth import Truth
+
+SHIPPED = "default"
+GOLDEN = TwinConfig(phantom="s_curve", appearance_seed=0, image_width_px=640, image_height_px=480)
+"""Rendered, never filmed: the same phantom, look, noise and robot on every computer, and the truth with it."""
+_GOLDEN_MM = 70.0
+_THETA_DEG, _HEAD_PX = 8.0, 8.0
+_OVERLAP = 0.5
+_RESTORE = "git checkout -- resources/models   (or unpack the program again)"
+
+
+def check_model(name: str) -> Check:
+    """The hashes of all files of a model."""
+    try:
+        folder = model_folder(name)
+        info = read_model_info(folder)
+        files = (WEIGHTS, ONNX, *((ONNX_INT8,) if info.onnx_int8_sha256 is not None else ()))
+        read_model_info(folder, verify=files)
+    except ModelError as error:
+        return Check("model", False, one_line(error), _advice(name))
+    return Check("model", True, f"{info.name}: {', '.join((INFO, *files))} are whole (SHA-256)")
+
+
+def check_self_test(config: PerceptionConfig) -> Check:
+    """Perceive the golden picture and compare with its truth.
+
+    The shipped model must find state, theta and head. A model of the user's own, which may never have seen such a phantom, must not
+    take the vessel for the robot.
+    """
+    name = "self-test"
+    try:
+        from core.perception.pipeline import open_pipeline
+        from hardware.twin.world import TwinWorld
+
+        info = read_model_info(model_folder(config.segmentation.model), verify=())
+        plain = PerceptionConfig(segmentation=config.segmentation)
+        pipeline = open_pipeline(plain)
+        world = TwinWorld(GOLDEN, perception=plain, seed=0)
+        world.insert(_GOLDEN_MM)
+        frame, truth = world.frame(), world.truth()
+        masks = world.picture(world.physics.robot_points_mm())
+        scene = pipeline.perceive_single(frame)
+    except ModelError as error:
+        return Check(name, False, f"not run: {one_line(error)}", _advice(config.segmentation.model))
+    except (ImportError, RuntimeError, ValueError, OSError) as error:
+        return Check(name, False, f"{type(error).__name__}: {one_line(error)}", "rm -f .venv/.ready && make setup")
+    return judge(name, info, pipeline.engine, scene, truth, (masks.vessel, masks.robot))
+
+
+def judge(name: str, info: ModelInfo, engine: str, scene: Scene, truth: Truth, true_masks: tuple[Mask, Mask]) -> Check:
+    """What was seen against what is there; `true_masks` are vessel and robot."""
+    milliseconds = f"first frame in {scene.latency_ms.get('total', 0.0):.0f} ms"
+    advice = _advice(info.name) if info.name == SHIPPED else "train it with the twin's frames too, or choose another model"
+    if scene.masks is not None:
+        seen = (scene.masks.vessel, scene.masks.robot)
+        overlaps = [[_overlap(mask, there) for there in true_masks] for mask in seen]
+        if overlaps[0][1] > overlaps[0][0] or overlaps[1][0] > overlaps[1][1]:
+            return Check(name, False, f"{info.name} takes the vessel for the robot: its outputs are swapped", advice)
+        if info.name != SHIPPED:
+            found = f"vessel {overlaps[0][0]:.2f}, robot {overlaps[1][1]:.2f} overlap on the golden picture"
+            return Check(name, True, f"{engine}, {milliseconds}; a model of your own: {found}")
+        if min(overlaps[0][0], overlaps[1][1]) < _OVERLAP:
+            detail = f"{info.name} finds only {overlaps[0][0]:.0%} of the vessel and {overlaps[1][1]:.0%} of the robot"
+            return Check(name, False, detail, advice)
+    if scene.pose is None or scene.path is None or truth.pose is None or truth.head_xy is None:
+        return Check(name, False, f"{info.name} gives no pose on the golden picture: {scene.refusal}", advice)
+    theta_off = abs(scene.pose.theta_signed_deg - truth.pose.theta_signed_deg)
+    head_off = float(np.hypot(*np.subtract(scene.path.head, truth.head_xy)))
+    detail = (
+        f"{engine}, {milliseconds}: state {scene.pose.state.value} (true {truth.pose.state.value}), "
+        f"theta off by {theta_off:.1f} deg, head by {head_off:.1f} px"
+    )
+    good = scene.pose.state is truth.pose.state and theta_off <= _THETA_DEG and head_off <= _HEAD_PX
+    return Check(name, good, detail, "" if good else advice)
+
+
+def _overlap(mask: Mask, there: Mask) -> float:
+    """Dice coefficient."""
+    total = int(mask.sum()) + int(there.sum())
+    return 2.0 * int((mask & there).sum()) / total if total else 0.0
+
+
+def _advice(model: str) -> str:
+    return _RESTORE if model == SHIPPED else "restore the model folder, or set perception.segmentation.model to another one"

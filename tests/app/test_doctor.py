@@ -1,0 +1,114 @@
+"""``doctor`` as a script and as a person call it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.doctor_command import run_doctor
+from app.window_command import window_config
+from core.config import Config
+from core.devices import DeviceError
+from hardware.preflight import Check
+from hardware.rig import RigKind
+
+MAIN = Path(__file__).resolve().parents[2] / "main.py"
+
+
+def _doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"QT_QPA_PLATFORM": "offscreen"}
+    command = [sys.executable, str(MAIN), "doctor", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    path = tmp_path / "bench.toml"
+    path.write_text(
+        "[gamepad]\nenabled = false\n"
+        f'[record]\nfolder = "{tmp_path}"\nwarn_free_mb = 0\nwarn_free_share = 0\n'
+        '[perception.segmentation]\ndevice = "openvino"\nthreads = 1\n'
+    )
+    return path
+
+
+def test_a_script_gets_one_json_object_and_the_exit_code(config: Path) -> None:
+    done = _doctor("--json", "--config", config)
+    checks = json.loads(done.stdout)["checks"]
+    assert all(check.keys() == {"name", "ok", "detail", "fix"} for check in checks)
+    assert done.returncode == (0 if all(check["ok"] for check in checks) else 1)
+    found = {check["name"]: check for check in checks}
+    assert found["self-test"]["ok"], found["self-test"]
+    assert found["servos"] == {"name": "servos", "ok": True, "detail": "not configured", "fix": ""}
+
+
+@pytest.mark.parametrize("arguments", [("--rig", "moon"), ("--config", "gone.toml")])
+def test_bad_input_is_one_line_and_exit_code_2(arguments: tuple[str, ...]) -> None:
+    done = _doctor("--json", *arguments)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_people_get_a_table_and_what_to_do(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    long = "echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer   # and so on, far beyond the width of a terminal"
+    checks = [Check("clock", True, "monotonic"), Check("adapter latency", False, "16 ms", long)]
+    monkeypatch.setattr("app.doctor_command.run_checks", lambda _config: iter(checks))
+    assert run_doctor(None, None, as_json=False) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.split() == ["NOT", "OK", "adapter", "latency", "16", "ms"] for line in lines)
+    assert any(line.split() == ["ok", "clock", "monotonic"] for line in lines)
+    assert lines[-2:] == ["What to do:", f"  adapter latency: {long}"]
+    checks.pop()
+    assert run_doctor(None, None, as_json=False) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "All is well."
+
+
+# --- which rig a command means ---------------------------------------------------------------------------------------------------
+
+
+def _bench(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "rig.toml"
+    path.write_text(text)
+    return path
+
+
+def test_without_a_name_the_configured_rig_is_meant(tmp_path: Path) -> None:
+    config, kind = window_config(None, None, None)
+    assert (config.rig.camera, kind) == ("twin", RigKind.SIM)
+    path = _bench(tmp_path, '[rig]\nname = "bench 2"\ncamera = "webcam"\nrobot = "none"\n')
+    config, kind = window_config(None, path, None)
+    assert (config.rig.name, kind) == ("bench 2", RigKind.LIVE)
+    assert window_config("webcam", path, None)[0] == config
+
+
+@pytest.mark.parametrize("name", ["realsense", "webcam"])
+def test_a_real_camera_drives_servos_only_when_their_port_is_known(name: str, tmp_path: Path) -> None:
+    config, kind = window_config(name, None, None)
+    assert (config.rig.name, config.rig.camera, config.rig.robot, kind) == (name, name, "none", RigKind.LIVE)
+    config, kind = window_config(name, _bench(tmp_path, '[servos]\nport = "/dev/ttyUSB7"\n'), None)
+    assert (config.rig.robot, config.servos.port, kind) == ("servos", "/dev/ttyUSB7", RigKind.LIVE)
+
+
+def test_the_twin_never_touches_the_bench(tmp_path: Path) -> None:
+    path = _bench(tmp_path, '[rig]\ncamera = "realsense"\nrobot = "servos"\n[servos]\nport = "/dev/ttyUSB7"\n')
+    config, kind = window_config("twin", path, None)
+    assert (config.rig.camera, config.rig.robot, config.servos.port, kind) == ("twin", "twin", None, RigKind.SIM)
+
+
+def test_a_realsense_recording_is_played(tmp_path: Path) -> None:
+    (tmp_path / "run.bag").touch()
+    config, kind = window_config(None, None, tmp_path / "run.bag")
+    assert (config.rig.camera, config.rig.robot, kind) == ("realsense", "none", RigKind.PLAYBACK)
+
+
+def test_an_unknown_rig_names_the_known_ones() -> None:
+    with pytest.raises(DeviceError, match="unknown rig 'moon'; known: twin, realsense, webcam"):
+        window_config("moon", None, None)
+    assert Config().rig.camera == "twin"
