@@ -42,6 +42,7 @@ from hardware.rig import RigKind
 from hardware.servos.bus_messages import BusStatus
 
 TEXT_EVERY_S = 0.2
+_NEEDLE_EVERY_S = 0.08
 _RIGHT_WIDTH = (470, 660)
 _TALL_PX = 780
 
@@ -79,6 +80,7 @@ class OperatorPanels(QWidget):
         self.events = EventLog()
         self._limits = limits
         self._text_pace = Pace(TEXT_EVERY_S)
+        self._needle_pace = Pace(_NEEDLE_EVERY_S)
         self._state: PoseState | None = None
         self._blanked = ""
         stage = QWidget()
@@ -112,16 +114,17 @@ class OperatorPanels(QWidget):
         self._state = state
         self.live.show_frame(tick.frame, scene, tick.advice)
         self.badge.show_scene(scene, renew_text=renew_text)
-        self.gauge.show_pose(pose, renew_text=renew_text)
-        self.bars.show_pose(pose, renew_text=renew_text)
+        if self._needle_pace.due() or renew_text:
+            self.gauge.show_pose(pose, renew_text=renew_text)
+            self.bars.show_pose(pose, renew_text=renew_text)
+            self.jog.show_status(tick.status)
+            self.clearance.show_scene(scene, tick.status)
         why_none = self._blanked or "the pose is not steady yet"
         if scene.refusal is not None:
             why_none = REASON_TEXT[scene.refusal.reason].title.lower()
         self.advice.show_advice(tick.advice, state, why_none, renew_text=renew_text)
         self.trends.add(scene)
         self.performance.add(tick, max_block_ms)
-        self.jog.show_status(tick.status)
-        self.clearance.show_scene(scene, tick.status)
 
     def blank(self, title: str, why: str) -> None:
         """Show nothing that was understood of an older picture, and say why."""

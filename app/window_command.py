@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from app.operator_window import OperatorWindow
 
+_SWITCH_S = 0.001
+"""How long a thread may keep the interpreter while another waits. At Python's 5 ms the window stands still up to 200 ms, so 120."""
 RIGS = ("twin", "realsense", "webcam")
 _REALSENSE_ENDING = ".bag"
 
@@ -78,6 +80,7 @@ def make_application() -> QApplication:
 
     from app import theme
 
+    sys.setswitchinterval(_SWITCH_S)
     application = QApplication.instance() or QApplication([sys.argv[0]])
     assert isinstance(application, QApplication)
     application.setApplicationName("LumenPilot")

@@ -167,7 +167,9 @@ class TwinConfig(_Section):
     appearance_seed: int = Field(0, ge=0, le=2**31 - 1)
     image_width_px: int = Field(640, ge=160, le=4096)
     image_height_px: int = Field(480, ge=120, le=4096)
-    frames_per_second: float = Field(30.0, gt=0.0, le=240.0)
+    frames_per_second: float = Field(30.0, gt=0.0, le=240.0, description="in lock-step: trials, data sets")
+    live_frames_per_second: float = Field(20.0, gt=0.0, le=240.0, description="of the running twin, which shares the computer")
+    own_process: bool = Field(True, description="with servos: the simulation takes no time from the program")
 
 
 class RigConfig(_Section):

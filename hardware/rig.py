@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import StrEnum
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 from core.config import Config, RigConfig
 from core.control.guarded_robot import GuardedRobot
 from core.devices import Camera, DeviceError
+from core.types import RobotStatus
 
 if TYPE_CHECKING:
     from hardware.servos.servo_robot import ServoRobot
@@ -137,6 +139,8 @@ def _open_twin(config: Config) -> Rig:
         raise DeviceError(
             f'rig {config.rig.name}: the twin has servos of its own: set rig.robot = "twin", or rig.camera to a real one'
         )
+    if config.twin.own_process and config.rig.robot == "twin" and config.servos.driver == "dynamixel":
+        return _open_remote_twin(config)
     from hardware.twin.camera import TwinCamera
     from hardware.twin.world import TwinWorld
 
@@ -167,19 +171,42 @@ def _direct_robot(config: Config, world: TwinWorld) -> GuardedRobot:
     return robot
 
 
+def _open_remote_twin(config: Config) -> Rig:
+    """The twin and its seven software servos in a process of their own."""
+    from hardware.twin.remote_twin import RemoteCamera, RemoteTwin
+
+    _check_servos(config)
+    with ExitStack() as undo:
+        twin = RemoteTwin(config, _START_INSERTION_MM)
+        undo.callback(twin.close)
+        robot = _twin_servos(config, twin.port, twin.status, None)
+        undo.pop_all()
+    return Rig(config.rig.name, RigKind.SIM, RemoteCamera(twin), robot)
+
+
+def _check_servos(config: Config) -> None:
+    if config.servos.port is not None:
+        raise DeviceError(f"rig {config.rig.name} has servos of its own: leave servos.port ({config.servos.port}) out")
+
+
 def _servo_robot(config: Config, world: TwinWorld) -> ServoRobot:
-    """The twin's robot moved by seven software servos, through the real driver in its own process; zeroed, not armed."""
-    from hardware.servos.servo_robot import ServoRobot
+    """The twin's robot moved by seven software servos in this process."""
     from hardware.twin.servo_bus import SoftServoBus
     from hardware.twin.servo_joints import drive_world
 
-    if config.servos.port is not None:
-        raise DeviceError(f"rig {config.rig.name} has servos of its own: leave servos.port ({config.servos.port}) out")
+    _check_servos(config)
     servos = SoftServoBus(config.servos, wire_time=True)
     servos.start()
     drive_world(world, servos, config.servos)
-    settings = config.servos.model_copy(update={"port": servos.port})
-    robot = ServoRobot(settings, config.safety, name="bench twin with servos", truth=world.physics.status, on_close=servos.stop)
+    return _twin_servos(config, servos.port, world.physics.status, servos.stop)
+
+
+def _twin_servos(config: Config, port: str, truth: Callable[[], RobotStatus], on_close: Callable[[], None] | None) -> ServoRobot:
+    """The real driver in its own process on the software servos' port; zeroed, not armed."""
+    from hardware.servos.servo_robot import ServoRobot
+
+    settings = config.servos.model_copy(update={"port": port})
+    robot = ServoRobot(settings, config.safety, name="bench twin with servos", truth=truth, on_close=on_close)
     try:
         robot.connect()
         robot.zero()  # its wires are slack, as nothing has pulled yet

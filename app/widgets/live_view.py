@@ -11,6 +11,7 @@ from PySide6.QtGui import QImage, QPainter, QTransform
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette
+from app.pace import Pace
 from app.scene_shapes import scene_shapes
 from app.widgets.head_loupe import HeadLoupe
 from app.widgets.overlays import Layer, Overlay, OverlayItem
@@ -22,6 +23,7 @@ from core.types import Advice, Frame, Image, Point, Points, Scene
 _VESSEL, _ROBOT, _VESSEL_SKELETON, _ROBOT_SKELETON = 1, 2, 4, 8
 _ZOOM_MAX = 12.0
 _GHOST_S = 2.0
+_LOUPE_EVERY_S = 0.09
 _PIXELS_PER_MM = PursuitConfig().pixels_per_mm
 
 
@@ -65,6 +67,7 @@ class LiveView(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self._view)
         self._loupe = HeadLoupe(self, self._marks)
+        self._loupe_pace = Pace(_LOUPE_EVERY_S)
 
     @property
     def scene(self) -> Scene | None:
@@ -78,7 +81,8 @@ class LiveView(QWidget):
         self._image = frame.image
         self._show_labels()
         self._show_marks()
-        self._show_loupe()
+        if scene.path is None or self._loupe_pace.due():
+            self._show_loupe()
 
     def blank_overlays(self) -> None:
         """Take everything away that was understood: it is not true any more. The last picture and the target stay."""

@@ -84,7 +84,7 @@ class OpenVinoSegmenter:
         name = ONNX_INT8 if self._int8 else ONNX
         check_files(self.info, folder, (name,))
         self._core = openvino.Core()
-        self._threads = threads or _cores()
+        self._threads = threads or cores()
         try:
             self._model = self._core.read_model(folder / name)
         except RuntimeError as error:
@@ -129,7 +129,7 @@ class TorchSegmenter:
         self._torch = torch
         self._device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         if self._device.type == "cpu":
-            torch.set_num_threads(threads or _cores())
+            torch.set_num_threads(threads or cores())
         self._network = Probabilities(network).to(self._device, memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     @property
@@ -154,7 +154,7 @@ def cuda_present() -> bool:
     return torch.cuda.is_available()
 
 
-def _cores() -> int:
+def cores() -> int:
     """Cores that this process may use; in a container fewer than the machine has."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

@@ -56,14 +56,22 @@ class SharedSlot:
 
     def newest(self) -> tuple[int, bytes] | None:
         """Number and bytes of the newest whole value; None before the first."""
+        known = self._read[0] if self._read is not None else 0
         for _ in range(_TRIES):
-            found = [value for half in (0, 1) if (value := self._whole(half)) is not None]
-            if found:
-                best = max(found)
-                if self._read is None or best[0] >= self._read[0]:
-                    self._read = best
-                    break
+            numbers = sorted(((self._number(half), half) for half in (0, 1)), reverse=True)
+            if numbers[0][0] == known:
+                break
+            found = next((value for _, half in numbers if (value := self._whole(half)) is not None), None)
+            if found is not None and found[0] >= known:
+                self._read = found
+                break
         return self._read
+
+    def _number(self, half: int) -> int:
+        """What a half says it holds; 0 while it is being written."""
+        at = self._half(half)
+        number: int = _HEAD.unpack(self._memory[at : at + _HEAD.size])[0]
+        return number
 
     def _half(self, number: int) -> int:
         return self._offset + (number % 2) * (_HEAD.size + self._capacity)

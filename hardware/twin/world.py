@@ -144,7 +144,7 @@ class TwinWorld:
             self.failure = f"the bench twin stopped ({type(error).__name__}: {error}); start the rig again"
 
     def _follow_clock(self) -> None:
-        period = 1.0 / self.config.frames_per_second
+        period = 1.0 / self.config.live_frames_per_second
         clock = next_frame = time.monotonic()
         while not self._stop.is_set():
             now = time.monotonic()

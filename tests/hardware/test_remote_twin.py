@@ -1,0 +1,105 @@
+"""The twin in a process of its own: pictures, truth and servos come through, and neither side outlives the other unnoticed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import psutil
+import pytest
+
+from core.config import Config
+from core.control.gate import Source
+from core.devices import DeviceError
+from core.types import Command, Frame, RobotStatus
+from hardware.rig import RigKind, open_rig
+from hardware.twin.remote_twin import RemoteTwin, pack_frame, pack_status, unpack_frame, unpack_status
+
+CONFIG = Config.model_validate({"twin": {"image_width_px": 160, "image_height_px": 120}})
+
+
+@pytest.fixture
+def twin() -> Iterator[RemoteTwin]:
+    made = RemoteTwin(CONFIG, 40.0)
+    yield made
+    made.close()
+
+
+def next_frame(twin: RemoteTwin) -> Frame:
+    until_s = time.monotonic() + 20.0
+    while time.monotonic() < until_s:
+        frame = twin.read(0.5)
+        if frame is not None:
+            return frame
+    raise AssertionError("no frame")
+
+
+def test_what_is_packed_is_unpacked() -> None:
+    image = np.random.default_rng(0).integers(0, 255, (12, 16, 3), dtype=np.uint8)
+    frame = unpack_frame(pack_frame(Frame(7, 1.25, image)))
+    assert (frame.index, frame.captured_s) == (7, 1.25)
+    assert np.array_equal(frame.image, image)
+    for contact_n in (None, 0.25):
+        status = RobotStatus(1.0, 2.0, 3.0, (0.1, 0.2, 0.3, 0.4), (1.0, 2.0, 3.0, 4.0), contact_n)
+        assert unpack_status(pack_status(status)) == status
+
+
+def test_frames_come_in_order_and_each_once(twin: RemoteTwin) -> None:
+    frames = [next_frame(twin) for _ in range(4)]
+    indices = [frame.index for frame in frames]
+    assert indices == sorted(set(indices))
+    assert frames[0].image.shape == (120, 160, 3)
+    assert all(0.0 <= time.monotonic() - frame.captured_s < 60.0 for frame in frames)
+    assert not np.array_equal(frames[0].image, frames[-1].image), "noise of a camera"
+
+
+def test_the_truth_comes_through(twin: RemoteTwin) -> None:
+    next_frame(twin)
+    assert twin.status().insertion_mm == pytest.approx(40.0, abs=2.0)
+    assert twin.status().wall_contact_n is not None
+
+
+def test_a_process_that_is_gone_is_a_device_error(twin: RemoteTwin) -> None:
+    next_frame(twin)
+    os.kill(twin._process.pid, signal.SIGKILL)
+    with pytest.raises(DeviceError, match=r"the bench twin stopped.*F5"):
+        for _ in range(200):
+            twin.read(0.05)
+
+
+def test_closing_ends_the_process(twin: RemoteTwin) -> None:
+    pid = twin._process.pid
+    twin.close()
+    assert not psutil.pid_exists(pid)
+    twin.close()
+
+
+def test_what_is_wrong_is_said_in_one_line() -> None:
+    config = Config.model_validate({"twin": {"phantom": "no such phantom"}})
+    before = {child.pid for child in psutil.Process().children()}
+    with pytest.raises(DeviceError, match="no such phantom"):
+        RemoteTwin(config, 40.0)
+    assert {child.pid for child in psutil.Process().children()} <= before
+
+
+@pytest.mark.real_time
+def test_the_rig_on_it_is_driven_by_the_real_driver() -> None:
+    rig = open_rig(CONFIG)
+    try:
+        assert rig.kind is RigKind.SIM
+        assert rig.robot is not None
+        assert rig.camera.name.startswith("bench twin: ")
+        rig.robot.arm()
+        start_mm = rig.robot.status().insertion_mm
+        until_s = time.monotonic() + 5.0
+        while rig.robot.status().insertion_mm < start_mm + 2.0 and time.monotonic() < until_s:
+            rig.robot.beat(Source.OPERATOR)
+            rig.robot.send(Command(advance_mm_s=8.0))
+            time.sleep(0.02)
+        assert rig.robot.status().insertion_mm > start_mm + 1.0
+        assert rig.robot.status().tendon_pull_mm is not None
+    finally:
+        rig.close()
