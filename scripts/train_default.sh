@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some 25 minutes of data and two hours of
-# training on two quiet cores. The data can be interrupted and gone on with by the same call.
+# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some 25 minutes of data and three
+# hours of training on two quiet cores. The data can be interrupted and gone on with by the same call.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-out/default_model}
@@ -13,7 +13,9 @@ export OMP_WAIT_POLICY=passive
 sets=(--data "$out/frames1" --data "$out/frames2" --look-share 0.35)
 # First many small crops at a high rate, then fewer and larger ones, which show the network more of what lies around.
 $python main.py train "${sets[@]}" --steps 11000 --stop-after 4114 --seed 10 --out "$out/stage1"
-$python main.py train "${sets[@]}" --init "$out/stage1" --crop 384 --batch 6 --rate 5e-3 --steps 2800 --seed 11 --out "$out/default"
+larger=(--crop 384 --batch 6)
+$python main.py train "${sets[@]}" --init "$out/stage1" "${larger[@]}" --rate 5e-3 --steps 2800 --seed 11 --out "$out/stage2"
+$python main.py train "${sets[@]}" --init "$out/stage2" "${larger[@]}" --rate 5e-3 --steps 5200 --seed 12 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 480 --seed 950000 --workers 2
 $python main.py calibrate "$out/calibration" --model "$out/default"

@@ -25,14 +25,11 @@ from hardware.twin.servo_joints import drive_world
 from hardware.twin.world import TwinWorld
 
 _WAIT_S = 0.2
-_NICE = 5
-"""The pictures' understanding comes before their making: it is what the operator waits for."""
 
 
 def main(arguments: list[str]) -> int:
     """Run until standard input ends. Arguments: file descriptors of the shared memory and of the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the application decides what Ctrl-C means
-    os.nice(_NICE)
     memory_fd, wake = map(int, arguments)
     message = json.loads(sys.stdin.readline())
     config = Config.model_validate(message["config"])
