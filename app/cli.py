@@ -306,11 +306,12 @@ def replay(
 @app.command()
 def play(
     session: Annotated[Path, typer.Argument(metavar="SESSION", help="folder of a recorded session")],
+    against: Annotated[Path | None, typer.Option(help="results of replay --jsonl, shown beside the recording")] = None,
 ) -> None:
     """The player: a recorded session with everything that was understood, frame by frame."""
     from app.play_command import run_play
 
-    sys.exit(run_play(session))
+    sys.exit(run_play(session, against))
 
 
 session_commands = typer.Typer(help="Recorded sessions: look at them, recover cut ones, export.", no_args_is_help=True)

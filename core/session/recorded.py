@@ -229,8 +229,8 @@ def _masks(value: Any) -> Masks | None:
         return None
     masks = group(value, "masks")
     size = _size(masks.get("size"), "masks.size")
-    if max(size) > _MAX_MASK_PX:
-        raise Damaged("masks.size: too large")
+    if not 0 < min(size) <= max(size) <= _MAX_MASK_PX:
+        raise Damaged("masks.size: empty or too large")
     vessel, robot = (_filled(masks.get(name), size, f"masks.{name}") for name in ("vessel", "robot"))
     return Masks(vessel, robot, vessel.astype(np.float32), robot.astype(np.float32))
 
@@ -240,7 +240,7 @@ def _filled(value: Any, size: tuple[int, int], name: str) -> Mask:
     outlines = []
     for outline in items(value, name):
         flat = items(outline, name)
-        if len(flat) % 2 or not all(type(v) is int and abs(v) <= _MAX_SIDE_PX for v in flat):
+        if not flat or len(flat) % 2 or not all(type(v) is int and abs(v) <= _MAX_SIDE_PX for v in flat):
             raise Damaged(f"{name}: not an outline")
         corners = np.array(flat, np.int64).reshape(-1, 2).cumsum(axis=0)
         outlines.append(np.clip(corners, -1, _MAX_SIDE_PX).astype(np.int32))

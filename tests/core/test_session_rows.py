@@ -137,6 +137,8 @@ def test_a_damaged_value_is_named(key: str, value: object, named: str) -> None:
         ("path", {"points": []}),
         ("path", {"points": [[1.0, 2.0, 3.0]]}),
         ("masks", {"size": [96, 64], "vessel": [[1, 2, 3]], "robot": []}),
+        ("masks", {"size": [96, 64], "vessel": [[]], "robot": []}),
+        ("masks", {"size": [0, 64], "vessel": [[1, 1, 2, 2]], "robot": []}),
         ("graph", {"nodes": [[0.0, 0.0]], "edges": [[0, 5, [[0.0, 0.0]], 1.0]]}),
         ("robot_vector", [[1.0, 1.0], [1.0, 1.0], [1.0, 1.0]]),
         ("scale", 0.0),

@@ -1,0 +1,51 @@
+"""``play``: opens the player on a session."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from core.config import Config, load_config
+from core.errors import UserError
+from core.session.manifest import Manifest
+from core.session.reader import SessionReader
+
+
+def run_play(session: Path, against: Path | None = None) -> int:
+    """Show the player until it is closed; returns the exit code. Raises SessionError for what is no session, UserError."""
+    from app.window_command import _check_display, _quit_on_signal, make_application
+
+    _check_display()
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    if against is not None and not against.is_file():
+        raise UserError(f"{against}: no such file; write one with: replay SESSION --jsonl FILE")
+    reader = SessionReader(session)
+    try:
+        config = recorded_config(reader.manifest)
+        application = make_application()
+
+        from app.player_window import PlayerWindow
+
+        window = PlayerWindow(reader, config, against)
+        application.aboutToQuit.connect(window.shut_down)
+        timer = _quit_on_signal(application)
+        window.show()
+        window.start()
+        code = application.exec()
+        timer.stop()
+        return code
+    finally:
+        reader.close()
+
+
+def recorded_config(manifest: Manifest | None) -> Config:
+    """The user's own configuration, with the limits and the scale of the recording where its manifest tells them."""
+    own = load_config()
+    recorded = manifest.config if manifest is not None else {}
+    try:
+        told = Config.model_validate({key: recorded[key] for key in ("perception", "policy") if key in recorded})
+    except ValidationError:  # of another version; its limits are only lines on the dials
+        return own
+    return own.model_copy(update={"perception": told.perception, "policy": told.policy})

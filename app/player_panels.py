@@ -1,0 +1,309 @@
+"""All that is to be seen of the player below its menus: the widgets of the operator window that fit, and the timeline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QPlainTextEdit, QTabWidget, QVBoxLayout, QWidget
+
+from app import palette, theme
+from app.pace import Pace
+from app.provenance import Provenance
+from app.recorded_values import value_lines
+from app.replayed import compared_line
+from app.widgets.advice_line import AdviceLine
+from app.widgets.card import Card
+from app.widgets.clearance_bar import ClearanceBar
+from app.widgets.distance_bars import DistanceBars
+from app.widgets.head_loupe import HeadLoupe
+from app.widgets.live_view import LiveView
+from app.widgets.mode_badge import ModeBadge
+from app.widgets.notice import Notice, NoticeKind
+from app.widgets.overlay_bar import OverlayBar
+from app.widgets.overlays import Layer
+from app.widgets.player_bar import PlayerBar
+from app.widgets.player_help import PlayerHelp
+from app.widgets.provenance_table import ProvenanceTable
+from app.widgets.recorded_plate import RecordedPlate
+from app.widgets.session_events import SessionEvents
+from app.widgets.sim_banner import SimBanner
+from app.widgets.state_badge import StateBadge
+from app.widgets.theta_gauge import ThetaGauge
+from app.widgets.timeline import TimelineView
+from app.widgets.toast import Toast
+from app.wording import REASON_TEXT
+from core.config import Config
+from core.session.manifest import Manifest
+from core.session.recorded import RecordedRow
+from core.types import Point, PoseState, Scene, Tick
+from hardware.rig import RigKind
+
+_TEXT_EVERY_S = 0.1
+_RIGHT_WIDTH = (470, 660)
+_BANNER_WIDTH = 330
+
+
+class PlayerPanels(QWidget):
+    """Makes the widgets, lays them out, and shows one recorded row on all of them."""
+
+    def __init__(self, config: Config, manifest: Manifest | None, name: str, *, with_other: bool = False) -> None:
+        super().__init__()
+        limits, pixels_per_mm = config.perception.pose, config.policy.pursuit.pixels_per_mm
+        self.banner = SimBanner(RigKind.PLAYBACK)
+        self.banner.setFixedWidth(_BANNER_WIDTH)
+        self.plate = RecordedPlate(manifest, name)
+        self.mode = ModeBadge()
+        self.live = LiveView(pixels_per_mm)
+        self.live.setAccessibleName("Recorded picture")
+        self.live.setAccessibleDescription("Played back, not live")
+        self.live.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.other = LiveView(pixels_per_mm) if with_other else None
+        self.compared = QLabel("", self)
+        self.compared.setVisible(with_other)
+        self.overlay_bar = OverlayBar()
+        self.advice = AdviceLine()
+        self.badge = StateBadge(limits)
+        self.gauge = ThetaGauge(limits.theta_allow_deg)
+        self.bars = DistanceBars(limits.d_allow_px)
+        self.clearance = ClearanceBar(pixels_per_mm)
+        self.commands = ProvenanceTable()
+        self.events = SessionEvents()
+        self.values = QPlainTextEdit()
+        self.problems = QPlainTextEdit()
+        self.timeline = TimelineView()
+        self.bar = PlayerBar()
+        self.note = QLineEdit()
+        self._limits = limits
+        self._provenance = Provenance()
+        self._text_pace = Pace(_TEXT_EVERY_S)
+        self._state: PoseState | None = None
+        stage = QWidget()
+        self._style()
+        self._lay_out(stage)
+        self.notice = Notice(self.live)
+        self.toast = Toast(self.live)
+        self.help = PlayerHelp(stage)
+
+    def show_row(self, row: RecordedRow, tick: Tick, target: Point | None, *, renew_text: bool) -> None:
+        """Everything as it was recorded; `target` in source pixels."""
+        scene, pose = tick.scene, tick.scene.pose
+        state = pose.state if pose is not None else None
+        renew_text = renew_text or self._text_pace.due() or state is not self._state
+        self._state = state
+        self.notice.clear()
+        self.live.show_frame(tick.frame, scene, tick.advice)
+        self.live.show_target(target)
+        self.badge.show_scene(scene, renew_text=renew_text)
+        self.gauge.show_pose(pose, renew_text=renew_text)
+        self.bars.show_pose(pose, renew_text=renew_text)
+        why_none = row.drive.blanked if row.drive is not None and row.drive.blanked else "none was recorded"
+        if scene.refusal is not None:
+            why_none = REASON_TEXT[scene.refusal.reason].title.lower()
+        self.advice.show_advice(tick.advice, state, why_none, renew_text=renew_text)
+        self.clearance.show_scene(scene, tick.status)
+        self._show_drive(row)
+        if renew_text:
+            self._show_values(row)
+
+    def show_lost(self, row: RecordedRow | None, place: int) -> None:
+        """A row that cannot be read, or whose picture is lost."""
+        title = "This picture is lost" if row is not None else "This row is damaged"
+        self._blank(title, f"Row {place + 1}; the problems page names it")
+        self.notice.show_notice(NoticeKind.WARNING, title, "Go on with the arrow keys")
+        if row is not None:
+            self._show_drive(row)
+
+    def show_nothing(self, title: str, detail: str, kind: NoticeKind = NoticeKind.PROGRESS) -> None:
+        """No row at all, or not yet."""
+        self._blank(title, detail)
+        self.notice.show_notice(kind, title, detail)
+
+    def _blank(self, title: str, why: str) -> None:
+        self.live.clear()
+        self.live.show_target(None)
+        if self.other is not None:
+            self.other.clear()
+            self.compared.setText("")
+        self.badge.show_nothing(title, why)
+        self.gauge.show_pose(None)
+        self.bars.show_pose(None)
+        self.advice.show_advice(None, None, title[0].lower() + title[1:])
+        self.clearance.show_scene(None, None)
+
+    def _show_drive(self, row: RecordedRow) -> None:
+        view = row.drive
+        for widget in (self._mode_note, self.mode):
+            widget.setVisible(view is not None)
+        if view is not None:
+            self.mode.show_view(view)
+        latency_ms = 1000.0 * view.latency_s if view is not None and view.latency_s is not None else None
+        self.commands.show_rows(self._provenance.rows(view), latency_ms, view.follow_share if view is not None else None)
+
+    def _show_values(self, row: RecordedRow) -> None:
+        bar = self.values.verticalScrollBar()
+        at = bar.value()
+        self.values.setPlainText("\n".join(value_lines(row)))
+        bar.setValue(at)
+
+    def show_problems(self, problems: Sequence[str]) -> None:
+        """All that was found to be wrong; the page's name counts them."""
+        self.problems.setPlainText("\n".join(problems) or "Nothing was found to be wrong.")
+        count = len(problems)
+        self.pages.setTabText(self.pages.indexOf(self.problems), f"\N{WARNING SIGN} Problems {count}" if count else "Problems")
+
+    def _style(self) -> None:
+        # a frame in the banner's colour and its word in the corner: also a part of the screen must not look live
+        for view in (self.live, self.other):
+            if view is not None:
+                view.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+                view.setStyleSheet(f"LiveView {{ border: 2px solid {palette.PLAYBACK}; background: {palette.INK}; }}")
+                room = view.layout()
+                assert room is not None
+                room.setContentsMargins(2, 2, 2, 2)
+        mark, loupe = _CornerMark("PLAYBACK", self.live), self.live.findChild(HeadLoupe)
+        if isinstance(loupe, HeadLoupe):
+            mark.stackUnder(loupe)
+        for page, name in ((self.values, "Recorded values"), (self.problems, "Problems of the session")):
+            page.setReadOnly(True)
+            page.setTabChangesFocus(True)
+            page.setAccessibleName(name)
+            page.setStyleSheet(
+                f"QPlainTextEdit {{ background: {palette.PANEL}; color: {palette.TEXT_DIM}; border: none; font-size: 13px; }}"
+            )
+        self.note.setPlaceholderText("Note at this time; Enter keeps it, Esc does not")
+        self.note.setAccessibleName("Note")
+        self.note.setMaxLength(2000)
+        self.note.setStyleSheet(
+            f"QLineEdit {{ background: {palette.PANEL}; color: {palette.TEXT}; border: 1px solid {palette.SKY};"
+            " border-radius: 6px; padding: 5px 10px; }"
+        )
+        self.note.hide()
+
+    def _lay_out(self, stage: QWidget) -> None:
+        header = QHBoxLayout()
+        header.setSpacing(14)
+        header.addWidget(self.banner)
+        header.addWidget(self.plate, 1)
+        self._mode_note = QLabel("mode then")
+        self._mode_note.setObjectName("card_note")
+        header.addWidget(self._mode_note)
+        header.addWidget(self.mode)
+        left = QVBoxLayout()
+        left.setSpacing(8)
+        left.addWidget(self._pictures(), 5)
+        left.addWidget(self.overlay_bar)
+        left.addWidget(self.note)
+        left.addWidget(_framed(self.timeline), 1)
+        left.addWidget(self.bar)
+        columns = QHBoxLayout(stage)
+        columns.setContentsMargins(0, 0, 0, 0)
+        columns.setSpacing(theme.GAP)
+        columns.addLayout(left, 62)
+        columns.addWidget(self._right_side(), 38)
+        rows = QVBoxLayout(self)
+        rows.setContentsMargins(theme.GAP, 4, theme.GAP, theme.GAP)
+        rows.setSpacing(theme.GAP)
+        rows.addLayout(header)
+        rows.addWidget(stage, 1)
+
+    def _pictures(self) -> QWidget:
+        """The recorded picture, and beside it what a replay saw in it."""
+        if self.other is None:
+            return self.live
+        self.other.setAccessibleName("The same picture perceived again")
+        self.other.setAccessibleDescription("Played back, not live")
+        for view in (self.live, self.other):
+            view.setMinimumSize(300, 225)
+        _CornerMark("PERCEIVED AGAIN", self.other)
+        self.compared.setStyleSheet(f"color: {palette.TEXT}; font-size: 14px;")
+        self.compared.setAccessibleName("Recorded against perceived again")
+        holder = QWidget()
+        column = QVBoxLayout(holder)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        row.addWidget(self.live, 1)
+        row.addWidget(self.other, 1)
+        column.addLayout(row, 1)
+        column.addWidget(self.compared)
+        return holder
+
+    def show_other(self, tick: Tick, other: Scene | None) -> None:
+        """What a replay saw in the same picture."""
+        if self.other is None:
+            return
+        blank = Scene(tick.frame.index, tick.frame.captured_s, tick.scene.source_size, 1.0)
+        self.other.show_frame(tick.frame, other or blank)
+        line = compared_line(tick.scene, other) if other is not None else "this row was not"
+        again = f'<span style="color:{palette.SKY}">\N{HORIZONTAL BAR} perceived again:</span>'
+        self.compared.setText(f"{again} {escape(line)}")
+
+    def set_layer(self, layer: Layer, on: bool) -> None:
+        for view in (self.live, self.other):
+            if view is not None:
+                view.set_layer(layer, on)
+
+    def fit(self) -> None:
+        """The whole picture."""
+        for view in (self.live, self.other):
+            if view is not None:
+                view.fit()
+
+    def _right_side(self) -> QWidget:
+        limits = self._limits
+        dials = QWidget()
+        row = QHBoxLayout(dials)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(theme.GAP)
+        row.addWidget(Card("Angle to the vessel", self.gauge, f"allowed {limits.theta_allow_deg:g}°"), 1)
+        row.addWidget(Card("Distances", self.bars, f"allowed {limits.d_allow_px:g} px"), 1)
+        self.pages = QTabWidget()
+        self.pages.setDocumentMode(True)
+        self.pages.tabBar().setDrawBase(False)
+        for page, name in (
+            (self.events, "Events"),
+            (self.commands, "Commands"),
+            (self.values, "Values"),
+            (self.problems, "Problems"),
+        ):
+            self.pages.addTab(page, name)
+        side = QWidget()
+        column = QVBoxLayout(side)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(theme.GAP)
+        for widget, stretch in ((Card("", self.badge), 0), (self.advice, 0), (dials, 3), (self.clearance, 0), (self.pages, 3)):
+            column.addWidget(widget, stretch)
+        side.setMinimumWidth(_RIGHT_WIDTH[0])
+        side.setMaximumWidth(_RIGHT_WIDTH[1])
+        return side
+
+
+class _CornerMark(QLabel):
+    """A word in the lower left corner of its parent."""
+
+    def __init__(self, text: str, parent: QWidget) -> None:
+        super().__init__(text, parent)
+        self._parent = parent
+        self.setStyleSheet(
+            f"background: {palette.PLAYBACK}; color: {palette.INK}; font-weight: 700; font-size: 12px; padding: 2px 8px;"
+        )
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.adjustSize()
+        parent.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize:
+            self.move(2, self._parent.height() - self.height() - 2)
+        return False
+
+
+def _framed(timeline: TimelineView) -> Card:
+    """As high as it can be: a card's usual margins are for text."""
+    card = Card("", timeline)
+    room = card.layout()
+    assert room is not None
+    room.setContentsMargins(6, 3, 4, 3)
+    return card

@@ -1,0 +1,522 @@
+"""The player: a recorded session with everything that was understood, frame by frame; never to be mistaken for a live picture."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import QEvent, Qt, QTimer, Slot
+from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import QAbstractButton, QLabel, QMainWindow
+
+from app import theme
+from app.decode_thread import Decoded, DecodeThread
+from app.heartbeat import Heartbeat
+from app.play_clock import PlayClock
+from app.player_keeper import PlayerKeeper
+from app.player_menus import add_player_menus
+from app.player_panels import PlayerPanels
+from app.replayed import Replayed
+from app.session_marks import Course, JumpKind, course_of, neighbour, places_of, target_at
+from app.snapshot import pictures_folder
+from app.widgets.notice import NoticeKind
+from app.widgets.overlays import Layer
+from core.config import Config
+from core.session.events import Event, EventKind
+from core.session.reader import SessionReader
+
+_TURN_MS = 15
+_LOOK_MS = 200
+_GROWN = 1.2
+_STOP_WITHIN_MS = 10_000
+
+_log = logging.getLogger(__name__)
+
+
+class PlayerWindow(QMainWindow):
+    """Plays an open session. All reading, decoding and writing is done by other threads; the newest wish wins.
+
+    Parameters
+    ----------
+    reader : closed by the window.
+    config : limits, scale and folders, best those of the recording.
+    against : results of a replay, to be shown beside the recording.
+    """
+
+    def __init__(self, reader: SessionReader, config: Config, against: Path | None = None) -> None:
+        super().__init__()
+        self._reader = reader
+        manifest = reader.manifest
+        self._events: tuple[Event, ...] = ()
+        self._course = course_of(reader.timeline())
+        self._clock = PlayClock()
+        self._jump_kind = JumpKind.STATE
+        self._selection: tuple[float, float] | None = None
+        self._place = -1
+        self._asked = -1
+        self._asked_s = 0.0
+        self._shown: Decoded | None = None
+        self._is_shut = False
+        self._problem_count = -1
+        self._is_empty = False
+        self.seek_ms = 0.0
+        self._decode = DecodeThread(reader, self)
+        self._keeper = PlayerKeeper(reader, pictures_folder(config.window.pictures_folder), self)
+        self._heartbeat = Heartbeat(parent=self)
+        self._turn = QTimer(self)
+        self._turn.setInterval(_TURN_MS)
+        self._turn.setTimerType(Qt.TimerType.PreciseTimer)
+        self._look = QTimer(self)
+        self._look.setInterval(_LOOK_MS)
+        self._against = against
+        self._replayed: Replayed | None = None
+        self.panels = PlayerPanels(config, manifest, reader.folder.name, with_other=against is not None)
+        self.setCentralWidget(self.panels)
+        self._layer_actions = add_player_menus(self)
+        escape = QAction(self)
+        escape.setShortcut(QKeySequence(Qt.Key.Key_Escape))
+        escape.triggered.connect(self._on_escape)
+        self.addAction(escape)
+        hint = QLabel("F1  keys")
+        hint.setObjectName("card_note")
+        hint.setContentsMargins(0, 0, 14, 0)
+        self.menuBar().setCornerWidget(hint)
+        self._wire()
+        self.setWindowTitle(f"LumenPilot \N{EM DASH} PLAYBACK of {reader.folder.name}")
+        self.setMinimumSize(*theme.MIN_WINDOW)
+        self.resize(theme.start_size(self.screen()))
+
+    # ---- what can be asked
+
+    @property
+    def place(self) -> int:
+        """The row that is on the screen; -1 before the first."""
+        return self._place
+
+    @property
+    def rows(self) -> int:
+        """Rows known so far."""
+        return len(self._course)
+
+    @property
+    def time_s(self) -> float:
+        """Where playing is, from the first row."""
+        return self._clock.position_s
+
+    @property
+    def is_playing(self) -> bool:
+        return self._clock.is_playing
+
+    @property
+    def speed(self) -> float:
+        return self._clock.speed
+
+    @property
+    def jump_kind(self) -> JumpKind:
+        return self._jump_kind
+
+    @property
+    def selection(self) -> tuple[float, float] | None:
+        """First and last second of the selection."""
+        return self._selection
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        return self._events
+
+    @property
+    def max_block_ms(self) -> float:
+        """The longest time that the GUI thread was blocked in the last ten seconds."""
+        return self._heartbeat.max_block_ms
+
+    # ---- composition
+
+    def _wire(self) -> None:
+        panels, bar = self.panels, self.panels.bar
+        self._decode.decoded.connect(self._on_decoded)
+        self._decode.failed.connect(lambda line: panels.show_nothing("Playing ended", line, NoticeKind.FAULT))
+        self._keeper.said.connect(self.say)
+        self._keeper.events_read.connect(self._on_events)
+        self._keeper.noted.connect(self._on_noted)
+        self._keeper.replayed_read.connect(self._on_replayed)
+        self._keeper.progressed.connect(bar.show_progress)
+        self._turn.timeout.connect(self._on_turn)
+        self._look.timeout.connect(self._look_again)
+        panels.overlay_bar.toggled.connect(self._on_layer)
+        panels.timeline.sought.connect(self.seek)
+        panels.timeline.selected.connect(lambda first, last: self.select((first, last)))
+        panels.events.chosen.connect(self._go_to_event)
+        panels.note.returnPressed.connect(self._keep_note)
+        bar.play_asked.connect(self.toggle_play)
+        bar.step_asked.connect(self.step)
+        bar.jump_asked.connect(self.jump)
+        bar.sought_ms.connect(lambda ms: self.seek(ms / 1000.0))
+        bar.speed_chosen.connect(self.set_speed)
+        bar.jump_kind_chosen.connect(self.set_jump_kind)
+        bar.clip_asked.connect(self.export_clip)
+        bar.cancel_asked.connect(self._keeper.cancel_clip)
+        bar.note_asked.connect(self.begin_note)
+        bar.snapshot_asked.connect(self.take_snapshot)
+        bar.show_speed(1.0)
+        bar.show_kind(self._jump_kind)
+        if self._against is not None:
+            panels.overlay_bar.toggle(Layer.LOUPE)  # two pictures leave no room for it
+
+    def start(self) -> None:
+        """Show the first row as soon as it is known."""
+        self.panels.live.setFocus()
+        self._heartbeat.start()
+        self.panels.show_nothing("Opening", self._reader.folder.name)
+        self._keeper.read_events()
+        if self._against is not None:
+            self._keeper.read_replayed(self._against)
+        self._look.start()
+        self._look_again()
+
+    # ---- what is known of the session
+
+    @Slot()
+    def _look_again(self) -> None:
+        """Rows become known while an hour-long session is being read; problems as they are met."""
+        is_all = self._reader.wait(0.0)
+        known, shown = len(self._reader), len(self._course)
+        # every look costs more the longer the session is: a few of them are enough while it is read
+        if known != shown and (is_all or known > _GROWN * shown):
+            self._course = self._compared(course_of(self._reader.timeline()))
+            self._show_course()
+        if is_all and not len(self._course) and not self._is_empty:
+            self._is_empty = True
+            loose = "there are pictures, but no rows: repair it with: session recover" if self._reader.videos else "it is empty"
+            self.panels.show_nothing("Nothing to play", loose, NoticeKind.WARNING)
+        elif self._asked < 0 and len(self._course):
+            self._ask(0)
+        self._show_problems()
+
+    def _show_course(self) -> None:
+        self.panels.timeline.show_course(self._course, self._events)
+        self.panels.bar.show_length(round(self._course.duration_s * 1000), len(self._course))
+        self.panels.events.show_events(self._events, self._course.first_s)
+        if self._shown is not None and self._shown.row is not None:
+            self.panels.events.show_time(self._shown.row.captured_s)
+        self._show_position()
+
+    def _show_problems(self) -> None:
+        problems = list(self._reader.problems)
+        missing = self._reader.missing_rows
+        if missing:
+            problems.append(f"{missing} rows are missing between those that are there")
+        manifest = self._reader.manifest
+        if manifest is not None and manifest.counts.dropped:
+            problems.append(f"{manifest.counts.dropped} frames could not be recorded: the recorder was behind")
+        if manifest is not None and not manifest.closed:
+            problems.append("the session did not end properly; session recover makes a repaired copy")
+        if len(problems) != self._problem_count:
+            self._problem_count = len(problems)
+            self.panels.show_problems(problems)
+
+    @Slot(object, bool)
+    def _on_events(self, events: tuple[Event, ...], is_written: bool) -> None:
+        self._events = events
+        if is_written:
+            self.say("This session is still being recorded: what came later is not shown")
+        self._show_course()
+
+    @Slot(object)
+    def _on_noted(self, event: Event) -> None:
+        self._events = tuple(sorted((*self._events, event), key=lambda one: one.time_s))
+        self.say("Note kept")
+        self._show_course()
+
+    @Slot(object)
+    def _on_replayed(self, replayed: Replayed) -> None:
+        self._replayed = replayed
+        if replayed.skipped:
+            self.say(f"{replayed.skipped} results of the replay cannot be read", is_fault=True)
+        self._course = self._compared(self._course)
+        self.set_jump_kind(JumpKind.REPLAY)
+        self._show_course()
+        self._decode.replayed = replayed.scene
+        self._decode.ask_again()
+
+    def _compared(self, course: Course) -> Course:
+        """With what a replay saw, as far as it is known."""
+        replayed = self._replayed
+        if replayed is None:
+            return course
+        differs = replayed.changed(course.rows, course.theta_deg, course.states)
+        return replace(course, other_theta_deg=replayed.theta_deg(course.rows), differs=differs)
+
+    # ---- playing
+
+    @Slot()
+    def toggle_play(self) -> None:
+        """Play or pause; at the end play from the beginning."""
+        if self._clock.is_playing:
+            self.pause()
+        elif len(self._course):
+            if self._clock.position_s >= self._course.duration_s:
+                self._clock.seek(0.0)
+            self._clock.play()
+            self._turn.start()
+            self.panels.bar.show_playing(True)
+
+    def pause(self) -> None:
+        """Stop at the frame that is shown."""
+        was_playing = self._turn.isActive()
+        self._clock.pause()
+        self._turn.stop()
+        self.panels.bar.show_playing(False)
+        if was_playing and self._shown is not None:
+            self._show(self._shown)  # while it plays, texts are renewed now and then only
+
+    @Slot()
+    def _on_turn(self) -> None:
+        goes_on = self._clock.turn(self._course, self._course.duration_s)
+        if self._clock.passed_s > 0.0:
+            self.say(f"Passed over a gap: {self._clock.passed_s:.1f} s without frames")
+        self._ask(self._course.place_at(self._clock.position_s))
+        self._show_position()
+        if not goes_on:
+            self.pause()
+
+    @Slot(float)
+    def seek(self, time_s: float) -> None:
+        """To a time from the first row."""
+        if len(self._course):
+            self._clock.seek(min(time_s, self._course.duration_s))
+            self._ask(self._course.place_at(self._clock.position_s))
+            self._show_position()
+
+    def go(self, place: int) -> None:
+        """To a row; playing goes on from there."""
+        if len(self._course):
+            place = max(0, min(len(self._course) - 1, place))
+            self._clock.seek(float(self._course.times_s[place]))
+            self._ask(place)
+            self._show_position()
+
+    @Slot(int)
+    def step(self, step: int) -> None:
+        """So many frames on or back, paused."""
+        self.pause()
+        self.go(max(0, self._asked) + step)
+
+    def skip(self, seconds: float) -> None:
+        """So many seconds on or back."""
+        self.seek(max(0.0, self._clock.position_s + seconds))
+
+    @Slot(int)
+    def jump(self, step: int) -> None:
+        """To the next (1) or previous (-1) of the chosen kind, paused."""
+        self.pause()
+        found = neighbour(places_of(self._jump_kind, self._course, self._events), max(0, self._asked), step)
+        if found is None:
+            self.say(f"No {self._jump_kind.value.lower()} {'after' if step > 0 else 'before'} this frame")
+        else:
+            self.go(found)
+
+    @Slot(object)
+    def set_jump_kind(self, kind: JumpKind) -> None:
+        self._jump_kind = kind
+        self.panels.bar.show_kind(kind)
+
+    def next_jump_kind(self) -> None:
+        kinds = list(JumpKind)
+        self.set_jump_kind(kinds[(kinds.index(self._jump_kind) + 1) % len(kinds)])
+        self.say(f"N and P: {self._jump_kind.value.lower()}")
+
+    @Slot(float)
+    def set_speed(self, speed: float) -> None:
+        self._clock.speed = speed
+        self.panels.bar.show_speed(speed)
+
+    def faster(self, step: int) -> None:
+        """One speed up or down."""
+        self.set_speed(self._clock.faster(step))
+
+    def _go_to_event(self, event: Event) -> None:
+        self.pause()
+        if len(self._course):
+            time_s = event.time_s - self._course.first_s
+            self.go(int(self._course.times_s.searchsorted(time_s - 1e-6)))
+
+    # ---- rows on the screen
+
+    def _ask(self, place: int) -> None:
+        if place == self._asked:
+            return
+        apart = place - self._asked
+        # what comes next: the same step again, or after a jump the frames that follow
+        step = apart if self._clock.is_playing or abs(apart) == 1 else 1
+        self._asked, self._asked_s = place, time.monotonic()
+        self._decode.ask(place, step)
+
+    @Slot()
+    def _on_decoded(self) -> None:
+        found = self._decode.take()
+        if found is None or self._is_shut:
+            return
+        self._shown, self._place = found, found.place
+        self._show(found)
+        if found.place == self._asked:
+            self.seek_ms = 1000.0 * (time.monotonic() - self._asked_s)
+
+    def _show(self, found: Decoded) -> None:
+        if found.row is not None and found.tick is not None:
+            target = target_at(self._events, found.tick.scene, found.row.captured_s)
+            self.panels.show_row(found.row, found.tick, target, renew_text=not self._clock.is_playing)
+            self.panels.show_other(found.tick, found.other)
+        else:
+            self.panels.show_lost(found.row, found.place)
+        if found.row is not None:
+            self.panels.events.show_time(found.row.captured_s)
+
+    def _show_position(self) -> None:
+        time_s = self._clock.position_s
+        self.panels.timeline.show_time(time_s, follow=self._clock.is_playing)
+        self.panels.bar.show_position(round(time_s * 1000), max(0, self._asked))
+
+    # ---- keeping
+
+    def select(self, selection: tuple[float, float] | None) -> None:
+        """First and last second of the clip; None: the whole session."""
+        self._selection = selection
+        self.panels.timeline.show_selection(selection)
+        self.panels.bar.show_selection(selection[1] - selection[0] if selection is not None else None)
+
+    def select_from_here(self) -> None:
+        """The selection begins here."""
+        here = self._clock.position_s
+        last = self._selection[1] if self._selection is not None and self._selection[1] > here else self._course.duration_s
+        self.select((here, last))
+
+    def select_to_here(self) -> None:
+        """The selection ends here."""
+        here = self._clock.position_s
+        self.select((self._selection[0] if self._selection is not None and self._selection[0] < here else 0.0, here))
+
+    @Slot()
+    def export_clip(self) -> None:
+        """The selection as a video with overlays, into the pictures' folder; playing goes on."""
+        if not len(self._course):
+            self.say("No clip: there are no frames", is_fault=True)
+            return
+        first_s, last_s = self._selection or (0.0, self._course.duration_s)
+        self._keeper.write_clip((self._course.place_at(first_s), self._course.place_at(last_s)), (first_s, last_s))
+
+    @Slot()
+    def take_snapshot(self) -> None:
+        """The picture that is shown, plain, with overlays, and its values."""
+        tick = self._shown.tick if self._shown is not None else None
+        if tick is None:
+            self.say("No snapshot: there is no picture", is_fault=True)
+        else:
+            self._keeper.take_snapshot(tick)
+
+    @Slot()
+    def begin_note(self) -> None:
+        """Write a note at this time."""
+        self.pause()
+        self.panels.note.clear()
+        self.panels.note.show()
+        self.panels.note.setFocus()
+
+    def _end_note(self) -> None:
+        self.panels.note.hide()
+        self.panels.live.setFocus()
+
+    def _keep_note(self) -> None:
+        # what no file can hold (half of a surrogate pair, pasted) becomes a question mark
+        text = self.panels.note.text().encode("utf-8", errors="replace").decode("utf-8").strip()
+        self._end_note()
+        if text and len(self._course):
+            event = Event(self._course.first_s + self._clock.position_s, EventKind.NOTE, text)
+            self._keeper.add_note(event)
+
+    # ---- the window
+
+    @Slot(str, bool)
+    def say(self, message: str, is_fault: bool = False) -> None:
+        """A line for the person at the screen."""
+        self.panels.toast.show_message(message, is_fault=is_fault)
+
+    @Slot(object, bool)
+    def _on_layer(self, layer: Layer, on: bool) -> None:
+        self.panels.set_layer(layer, on)
+        self._layer_actions[layer].setChecked(on)
+
+    def toggle_all_layers(self) -> None:
+        bar = self.panels.overlay_bar
+        bar.set_all(not any(bar.is_on(layer) for layer in Layer))
+
+    def go_to_time(self) -> None:
+        """Type a time in ms."""
+        self.panels.bar.position.setFocus()
+        self.panels.bar.position.selectAll()
+
+    def show_events(self) -> None:
+        """The list of events, by keyboard."""
+        self.panels.pages.setCurrentWidget(self.panels.events)
+        self.panels.events.setFocus()
+
+    @Slot()
+    def _on_escape(self) -> None:
+        panels = self.panels
+        if panels.help.isVisible():
+            panels.help.hide()
+        elif panels.note.isVisible():
+            self._end_note()
+        elif self.focusWidget() is not panels.live:
+            panels.live.setFocus()
+        elif self._keeper.has_clip:
+            self._keeper.cancel_clip()
+        elif self._selection is not None:
+            self.select(None)
+        elif self.isFullScreen():
+            self.toggle_full_screen()
+
+    def toggle_full_screen(self) -> None:
+        """Full screen, without the menu bar, and back."""
+        self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.WindowStateChange:
+            self.menuBar().setVisible(not self.isFullScreen())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Enter presses the button that has the focus: Space, which does it elsewhere, plays here."""
+        button = self.focusWidget()
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            if isinstance(button, QAbstractButton) and not event.isAutoRepeat():
+                button.click()
+            elif button is self.panels.bar.position:
+                self.panels.live.setFocus()
+            return
+        super().keyPressEvent(event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.shut_down()
+        event.accept()
+
+    @Slot()
+    def shut_down(self) -> None:
+        """End the threads; notes and snapshots are finished, a clip is given up."""
+        if self._is_shut:
+            return
+        self._is_shut = True
+        for timer in (self._turn, self._look):
+            timer.stop()
+        self._heartbeat.stop()
+        self.panels.notice.clear()
+        self.setUpdatesEnabled(False)
+        self.hide()
+        self._decode.stop()
+        has_saved = self._keeper.shut_down()
+        if not (self._decode.wait(_STOP_WITHIN_MS) and has_saved):
+            _log.error("the disk did not answer in time; leaving without it")
+            os._exit(1)  # Qt would abort on a thread that still runs
+        self._reader.close()

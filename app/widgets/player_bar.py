@@ -1,0 +1,181 @@
+"""Playing: a slider in milliseconds, buttons for play and single frames, jumps with their chooser, speed, selection and clip."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QFontMetrics
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSlider, QSpinBox, QVBoxLayout, QWidget
+
+from app import palette, theme
+from app.play_clock import SPEEDS
+from app.session_marks import JumpKind, clock_text
+
+_BUTTON = 34
+_STYLE = f"""
+QPushButton {{ padding: 3px 6px; }}
+QPushButton#play {{ background: {palette.PLAYBACK}; color: {palette.INK}; font-weight: 700; font-size: 16px; }}
+QPushButton#play:focus {{ border: 2px solid {palette.TEXT}; }}
+QSlider::groove:horizontal {{ height: 6px; background: {palette.RAISED}; border-radius: 3px; }}
+QSlider::sub-page:horizontal {{ background: {palette.PLAYBACK}; border-radius: 3px; }}
+QSlider::handle:horizontal {{ background: {palette.TEXT}; width: 14px; margin: -5px 0; border-radius: 7px; }}
+QSlider::handle:horizontal:focus {{ background: {palette.SKY}; }}
+QProgressBar {{ background: {palette.RAISED}; border: 1px solid {palette.LINE}; border-radius: 5px; text-align: center;
+    color: {palette.TEXT}; font-size: 12px; }}
+QProgressBar::chunk {{ background: {palette.LINE}; border-radius: 4px; }}
+"""
+
+
+class PlayerBar(QWidget):
+    """Shows and asks; it decides nothing. Times are milliseconds from the first row."""
+
+    play_asked = Signal()
+    step_asked = Signal(int)
+    jump_asked = Signal(int)
+    sought_ms = Signal(int)
+    speed_chosen = Signal(float)
+    jump_kind_chosen = Signal(object)
+    clip_asked = Signal()
+    cancel_asked = Signal()
+    note_asked = Signal()
+    snapshot_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setStyleSheet(_STYLE)
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setAccessibleName("Position in milliseconds")
+        self.slider.setSingleStep(100)
+        self.slider.setPageStep(1000)
+        self.position = QSpinBox()
+        self.position.setSuffix(" ms")
+        self.position.setGroupSeparatorShown(True)
+        self.position.setKeyboardTracking(False)
+        self.position.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
+        self.position.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.position.setFixedWidth(124)
+        self.position.setAccessibleName("Go to, in milliseconds")
+        self.position.setToolTip("Position from the first frame; type one and press Enter  (key T)")
+        self.length = _label("of 0:00.000")
+        self.frame = _label("")
+        self.frame.setObjectName("card_note")
+        self.play = self._button("\N{BLACK RIGHT-POINTING TRIANGLE}", "Play or pause  (Space)", self.play_asked.emit, "Play")
+        self.play.setObjectName("play")
+        self.play.setFixedWidth(56)
+        self.kind = QComboBox()
+        for kind in JumpKind:
+            self.kind.addItem(kind.value, kind)
+        self.kind.setAccessibleName("What N and P jump to")
+        self.kind.setToolTip("What N and P jump to  (K: the next kind)")
+        self.kind.setFixedWidth(142)
+        self.speed = QComboBox()
+        for speed in SPEEDS:
+            self.speed.addItem(f"{speed:g}\N{MULTIPLICATION SIGN}", speed)
+        self.speed.setAccessibleName("Speed")
+        self.speed.setToolTip("Speed  ([ slower, ] faster)")
+        self.speed.setFixedWidth(78)
+        self.clip = self._button("Clip", "Save the selection as a video, without one the session  (E)", self.clip_asked.emit)
+        self.note = self._button("Note", "Add a note at this time  (M)", self.note_asked.emit)
+        self.snapshot = self._button("Snapshot", "Save this picture  (S)", self.snapshot_asked.emit)
+        self.progress = QProgressBar()
+        self.progress.setFixedHeight(24)
+        self.progress.setAccessibleName("Clip being written")
+        self.cancel = self._button("Cancel", "Stop writing the clip  (Esc)", self.cancel_asked.emit, "Cancel the clip")
+        self._lay_out()
+        self._wire()
+        self.show_progress(None)
+        self.show_length(0, 0)
+
+    def show_length(self, duration_ms: int, rows: int) -> None:
+        """How long the session is, as far as it is known."""
+        for field in (self.slider, self.position):
+            with QSignalBlocker(field):
+                field.setRange(0, max(0, duration_ms))
+        self._rows = rows
+        self.length.setText(f"of {clock_text(duration_ms / 1000)}")
+
+    def show_position(self, time_ms: int, place: int) -> None:
+        """Where playing is. A number that is being typed stays."""
+        with QSignalBlocker(self.slider):
+            self.slider.setValue(time_ms)
+        if not self.position.hasFocus():
+            with QSignalBlocker(self.position):
+                self.position.setValue(time_ms)
+        self.frame.setText(f"frame {place + 1} of {self._rows}" if self._rows else "no frames")
+
+    def show_playing(self, on: bool) -> None:
+        self.play.setText("\N{DOUBLE VERTICAL BAR}" if on else "\N{BLACK RIGHT-POINTING TRIANGLE}")
+        self.play.setAccessibleName("Pause" if on else "Play")
+
+    def show_speed(self, speed: float) -> None:
+        with QSignalBlocker(self.speed):
+            self.speed.setCurrentIndex(self.speed.findData(speed))
+
+    def show_kind(self, kind: JumpKind) -> None:
+        with QSignalBlocker(self.kind):
+            self.kind.setCurrentIndex(self.kind.findData(kind))
+
+    def show_selection(self, length_s: float | None) -> None:
+        """How long the clip will be."""
+        self.clip.setText("Clip" if length_s is None else f"Clip {length_s:.1f} s")
+
+    def show_progress(self, share: float | None) -> None:
+        """Of the clip that is being written; None: none is."""
+        for widget in (self.progress, self.cancel):
+            widget.setVisible(share is not None)
+        self.clip.setVisible(share is None)
+        if share is not None:
+            self.progress.setValue(round(100 * share))
+
+    def _button(self, text: str, tip: str, slot: object, name: str = "") -> QPushButton:
+        button = QPushButton(text)
+        button.setToolTip(tip)
+        button.setAccessibleName(name or tip.partition("  (")[0])
+        button.setFixedWidth(max(_BUTTON, QFontMetrics(theme.font(14)).horizontalAdvance(text) + 18))
+        button.clicked.connect(slot)
+        return button
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout()
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(5)
+        before = self._button("\N{LEFTWARDS ARROW}", "One frame back  (\N{LEFTWARDS ARROW})", lambda: self.step_asked.emit(-1))
+        after = self._button("\N{RIGHTWARDS ARROW}", "One frame on  (\N{RIGHTWARDS ARROW})", lambda: self.step_asked.emit(1))
+        previous = self._button("P", "Previous of the kind beside  (P)", lambda: self.jump_asked.emit(-1))
+        following = self._button("N", "Next of the kind beside  (N)", lambda: self.jump_asked.emit(1))
+        for widget in (before, self.play, after):
+            row.addWidget(widget)
+        row.addSpacing(6)
+        for widget in (previous, self.kind, following):
+            row.addWidget(widget)
+        row.addSpacing(6)
+        row.addWidget(self.speed)
+        row.addStretch(1)
+        for widget in (self.progress, self.cancel, self.clip, self.note, self.snapshot):
+            row.addWidget(widget)
+        top = QHBoxLayout()
+        top.setContentsMargins(0, 0, 0, 0)
+        top.setSpacing(8)
+        top.addWidget(self.slider, 1)
+        top.addWidget(self.position)
+        top.addWidget(self.length)
+        top.addWidget(self.frame)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(5)
+        column.addLayout(top)
+        column.addLayout(row)
+        self.clip.setFixedWidth(QFontMetrics(theme.font(14)).horizontalAdvance("Clip 0000.0 s") + 18)
+        self.frame.setMinimumWidth(150)
+        self.frame.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+
+    def _wire(self) -> None:
+        self.slider.valueChanged.connect(self.sought_ms)
+        self.position.valueChanged.connect(self.sought_ms)
+        self.speed.activated.connect(lambda _index: self.speed_chosen.emit(self.speed.currentData()))
+        self.kind.activated.connect(lambda _index: self.jump_kind_chosen.emit(self.kind.currentData()))
+
+
+def _label(text: str) -> QLabel:
+    label = QLabel(text)
+    label.setStyleSheet(f"color: {palette.TEXT_DIM};")
+    return label

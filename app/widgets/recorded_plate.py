@@ -1,0 +1,64 @@
+"""Beside the PLAYBACK banner: what was recorded, SIM or LIVE, on which rig, when."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app import palette, theme
+from core.session.manifest import Manifest
+
+_COLOUR = {"SIM": palette.SIM, "LIVE": palette.LIVE, "PLAYBACK": palette.PLAYBACK}
+_HEIGHT = 34
+
+
+class RecordedPlate(QWidget):
+    """An outlined word, never filled as the banner of something that happens now."""
+
+    def __init__(self, manifest: Manifest | None, name: str) -> None:
+        super().__init__()
+        self._kind = manifest.kind if manifest is not None else "UNKNOWN"
+        self._note = _note(manifest, name)
+        self.setFixedHeight(_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(self.text)
+        self.setToolTip(self.text)
+
+    @property
+    def text(self) -> str:
+        """All that is said."""
+        return f"recorded {self._kind}, {self._note}"
+
+    def sizeHint(self) -> QSize:
+        return QSize(420, _HEIGHT)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colour = QColor(_COLOUR.get(self._kind, palette.FAULT))
+        word, word_font = f"recorded {self._kind}", theme.bold(14)
+        plate = QRectF(1, 3, QFontMetrics(word_font).horizontalAdvance(word) + 24, _HEIGHT - 6)
+        pen = QPen(colour, 2, Qt.PenStyle.DashLine)
+        painter.setPen(pen)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawRoundedRect(plate, 6, 6)
+        painter.setFont(word_font)
+        painter.setPen(colour)
+        painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, word)
+        note_font = theme.font(theme.Size.BODY)
+        painter.setFont(note_font)
+        painter.setPen(QColor(palette.TEXT_DIM))
+        left = plate.right() + 12
+        room = QRectF(left, 0, max(0.0, self.width() - left), self.height())
+        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, theme.elide(note_font, self._note, int(room.width())))
+        painter.end()
+
+
+def _note(manifest: Manifest | None, name: str) -> str:
+    if manifest is None:
+        return f"{name}: its manifest is damaged"
+    started = manifest.started_utc.astimezone()
+    how = "" if manifest.closed else ", cut off"
+    how += ", recovered" if manifest.recovered is not None else ""
+    return f"{started:%Y-%m-%d %H:%M:%S}, rig {manifest.rig or 'unknown'}{how}"
