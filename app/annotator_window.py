@@ -16,7 +16,7 @@ from app.heartbeat import Heartbeat
 from app.widgets.annotation_bar import AnnotationBar
 from app.widgets.annotation_canvas import AnnotationCanvas
 from app.widgets.annotation_header import AnnotationHeader
-from app.widgets.annotation_help import AnnotationHelp
+from app.widgets.annotation_help import annotation_help
 from app.widgets.annotation_list import QueueList, QueueModel
 from app.widgets.annotation_readout import AnnotationReadout
 from app.widgets.card import Card
@@ -112,7 +112,7 @@ class AnnotatorWindow(QMainWindow):
         row.addLayout(left, 74)
         row.addWidget(side, 26)
         self.setCentralWidget(stage)
-        self.help = AnnotationHelp(stage)
+        self.help = annotation_help(stage)
 
     def _make_menus(self) -> None:
         add_annotator_menus(self)

@@ -17,7 +17,7 @@ from app.widgets.clearance_bar import ClearanceBar
 from app.widgets.command_panel import CommandPanel
 from app.widgets.distance_bars import DistanceBars
 from app.widgets.event_log import EventKind, EventLog
-from app.widgets.help_overlay import HelpOverlay
+from app.widgets.help_overlay import operator_help
 from app.widgets.jog_panel import JogPanel
 from app.widgets.live_view import LiveView
 from app.widgets.mode_badge import ModeBadge
@@ -85,7 +85,7 @@ class OperatorPanels(QWidget):
         self._blanked = ""
         stage = QWidget()
         self._lay_out(stage)
-        self.help = HelpOverlay(stage)  # the banner stays in sight
+        self.help = operator_help(stage)  # the banner stays in sight
 
     def show_drive(self, view: DriveView | None, bus: BusStatus | None) -> None:
         """Show who drives, and what the servos say; None: there is nothing to drive."""

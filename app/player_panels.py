@@ -24,7 +24,7 @@ from app.widgets.notice import Notice, NoticeKind
 from app.widgets.overlay_bar import OverlayBar
 from app.widgets.overlays import Layer
 from app.widgets.player_bar import PlayerBar
-from app.widgets.player_help import PlayerHelp
+from app.widgets.player_help import player_help
 from app.widgets.provenance_table import ProvenanceTable
 from app.widgets.recorded_plate import RecordedPlate
 from app.widgets.session_events import SessionEvents
@@ -84,7 +84,7 @@ class PlayerPanels(QWidget):
         self._lay_out(stage)
         self.notice = Notice(self.live)
         self.toast = Toast(self.live)
-        self.help = PlayerHelp(stage)
+        self.help = player_help(stage)
 
     def show_row(self, row: RecordedRow, tick: Tick, target: Point | None, *, renew_text: bool) -> None:
         """Everything as it was recorded; `target` in source pixels."""
