@@ -37,6 +37,8 @@ from core.types import Advice, Command, Frame, RobotStatus, Scene
 PERIOD_S = 0.02
 _ARRIVED_S = 0.5
 _MOST_ALERTS = 200
+_OVER_WITH_A_FRAME = frozenset(cause.value for cause in (Cause.POSE_STALE, Cause.POSE_LOST, Cause.CAMERA_SILENT, Cause.CAMERA_LOST))
+"""What blanks the advice of the frame before says nothing against that of the frame that has come."""
 _NOT_WORTH_A_WORD = frozenset(
     {RejectReason.NOT_ARMED, RejectReason.WRONG_SOURCE, RejectReason.NO_COMMAND, RejectReason.OUT_OF_ORDER}
 )
@@ -165,7 +167,7 @@ class Pilot:
             report = replace(report, route=RouteState.READY)  # a policy backs out of a branch that it missed by itself
         arrived = scene.route is not None and scene.route.length_px <= self._config.policy.pursuit.arrive_px
         self._inbox.see(Seen(frame.captured_s, advice, arrived), report, Beat(Part.WORKER))
-        return None if blanked else advice
+        return advice if not blanked or blanked in _OVER_WITH_A_FRAME else None
 
     # ---- from the pilot's own thread
 

@@ -193,6 +193,15 @@ def test_no_advice_is_shown_while_a_fault_blanks_it(bench: Bench) -> None:
     assert bench.alerts() == set(), "in ADVISORY the screen says it, and nothing beeps"
 
 
+def test_the_frame_that_ends_a_silence_brings_its_advice(bench: Bench) -> None:
+    bench.on().seeing = False
+    bench.seconds(0.2)
+    assert bench.pilot.view.blanked == Cause.CAMERA_SILENT.value
+    bench.shown, bench.seeing = None, True
+    bench.turn(2)
+    assert bench.shown is ADVICE
+
+
 def test_no_advice_survives_a_silent_camera(bench: Bench) -> None:
     bench.on().seeing = False
     bench.seconds(0.6)
