@@ -20,6 +20,10 @@ from core.types import Advice, Point, Points, RobotStatus, Scene, Speed, VesselG
 _BEHIND_DEG = 100.0
 """The way lies behind the head when it leaves it at more than this angle."""
 _ON_ROUTE_PX = 2.0
+_UNFOLLOWED_S = 1.0
+"""Who does not take the robot back for so long meant something else; if the reason is gone, the advice is, too."""
+_STILL_MM_S = 0.3
+"""Servos at rest measure a little motion, too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,9 +91,11 @@ class Pursuit:
         self._contact = ContactLimit(self._config)
         self._back: BackOff | None = None
         self._behind_s = 0.0
+        self._unfollowed_s = 0.0
+        self._insertion_mm: float | None = None
 
     def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
-        """Advice for a scene; `status` adds the contact force. None when there is no pose."""
+        """Advice for a scene; `status` adds the contact force and how fast the robot is really fed. None when there is no pose."""
         config = self._config
         ahead_px = config.look_ahead_px + config.look_ahead_s * max(0.0, self._speed_mm_s) * config.pixels_per_mm
         way = look_ahead(scene, ahead_px, config)
@@ -100,11 +106,23 @@ class Pursuit:
         contact_n = status.wall_contact_n if status is not None else None
         self._behind_s = self._behind_s + elapsed_s if way.behind else 0.0
         self._smooth(way.error_deg, elapsed_s)
-        stuck = self._stall.update(way.left_px, self._speed_mm_s, elapsed_s)
-        return self._backing(way, contact_n, stuck, elapsed_s) or self._forward(way, contact_n)
+        fed_mm_s = self._fed(status, elapsed_s)
+        stuck = self._stall.update(way.left_px, fed_mm_s, elapsed_s)
+        self._unfollowed_s = self._unfollowed_s + elapsed_s if self._back is not None and fed_mm_s >= 0.0 else 0.0
+        return self._backing(way, contact_n, stuck, fed_mm_s * elapsed_s) or self._forward(way, contact_n)
 
-    def _backing(self, way: Way, contact_n: float | None, stuck: bool, elapsed_s: float) -> Advice | None:
-        """Backwards while there is a reason to, which one picture alone never is; None to go on."""
+    def _fed(self, status: RobotStatus | None, elapsed_s: float) -> float:
+        """The robot's feed in mm/s: as measured, since who is advised may do otherwise; as advised where nothing is measured."""
+        before_mm, self._insertion_mm = self._insertion_mm, status.insertion_mm if status is not None else None
+        if self._insertion_mm is None:
+            return self._speed_mm_s
+        if before_mm is None or elapsed_s <= 0.0:
+            return 0.0
+        fed_mm_s = (self._insertion_mm - before_mm) / elapsed_s
+        return fed_mm_s if abs(fed_mm_s) > _STILL_MM_S else 0.0
+
+    def _backing(self, way: Way, contact_n: float | None, stuck: bool, fed_mm: float) -> Advice | None:
+        """Backwards while there is a reason to, which one picture alone never is; None to go on. `fed_mm` since the last frame."""
         config = self._config
         if self._back is None:
             if way.behind and self._behind_s < config.behind_s:
@@ -117,8 +135,9 @@ class Pursuit:
                 self._back = BackOff("the robot is fed but its head does not move", config.back_off_mm)
             else:
                 return None
-        if self._back.done(way.behind, -self._speed_mm_s * elapsed_s):
-            self._back = None
+        is_unfollowed = self._unfollowed_s > _UNFOLLOWED_S and not way.behind
+        if is_unfollowed or self._back.done(way.behind, -fed_mm):
+            self._back, self._unfollowed_s = None, 0.0
             return None
         steer_deg = 0.0 if way.behind else self._steer_deg
         return self._advise(-self._words.slow_mm_s, steer_deg, f"backing off: {self._back.why}")

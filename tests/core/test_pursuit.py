@@ -66,8 +66,8 @@ def _scene(
     )  # fmt: skip
 
 
-def _status(contact_n: float | None) -> RobotStatus:
-    return RobotStatus(0.0, 50.0, 0.0, (0, 0, 0, 0), (0, 0, 0, 0), contact_n)
+def _status(contact_n: float | None, insertion_mm: float = 50.0) -> RobotStatus:
+    return RobotStatus(0.0, insertion_mm, 0.0, (0, 0, 0, 0), (0, 0, 0, 0), contact_n)
 
 
 def test_in_the_middle_and_along_it_goes_fast_and_straight() -> None:
@@ -142,10 +142,13 @@ def test_contact_slows_and_then_backs_off_for_a_while() -> None:
     leaning = pursuit(scene, _status(0.15))
     assert leaning is not None
     assert leaning.advance_mm_s == WORDS.slow_mm_s
-    back = [
-        pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), _status(0.3 if k == 1 else 0.0)) for k in range(1, 20)
-    ]
-    speeds = [advice.advance_mm_s for advice in back if advice is not None]
+    speeds, insertion_mm = [], 50.0
+    for k in range(1, 20):  # he who is advised does so
+        scene = _scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)
+        advice = pursuit(scene, _status(0.3 if k == 1 else 0.0, insertion_mm))
+        assert advice is not None
+        speeds.append(advice.advance_mm_s)
+        insertion_mm += 0.1 * advice.advance_mm_s
     assert speeds[0] == -WORDS.slow_mm_s
     assert speeds[-1] > 0
     backwards_mm = 0.1 * sum(-v for v in speeds if v < 0)
@@ -162,6 +165,22 @@ def test_a_head_that_is_fed_and_does_not_move_is_taken_back() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
     advised = [pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)) for k in range(20)]
     assert [a for a in advised if a is not None and a.advance_mm_s < 0 and "does not move" in a.why]
+
+
+def test_advice_that_nobody_follows_is_no_stall() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    advised = [pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), _status(0.0)) for k in range(60)]
+    assert all(a is not None and a.advance_mm_s > 0 for a in advised)
+
+
+def test_backing_off_that_nobody_follows_is_dropped_when_its_reason_is_gone() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    advised = [
+        pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), _status(0.3 if k == 0 else 0.0)) for k in range(20)
+    ]
+    backwards = [a is not None and a.advance_mm_s < 0 for a in advised]
+    assert backwards[:10] == [True] * 10
+    assert backwards[-5:] == [False] * 5
 
 
 def test_a_missed_branch_is_backed_out_of_until_it_lies_well_ahead() -> None:
