@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QGuiApplication, QKeyEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QWidget
+
+from app.held_input import HeldInput
 
 REPEAT_MS = 25
 """Silence of 80 ms counts as let go, so it is said three times in that time."""
 _KEY = Qt.Key.Key_Shift
 
 
-class DeadmanKey(QObject):
+class DeadmanKey(HeldInput):
     """``reported`` comes with True every 25 ms while it is held, and with False at once when it is let go or the focus is lost.
 
     A key that was down when the window got the focus does not count: only a press does.
@@ -20,18 +22,8 @@ class DeadmanKey(QObject):
     reported = Signal(bool)
 
     def __init__(self, window: QWidget) -> None:
-        super().__init__(window)
-        self._window = window
+        super().__init__(window, REPEAT_MS)
         self._holders: set[str] = set()
-        self._timer = QTimer(self)
-        self._timer.setInterval(REPEAT_MS)
-        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
-        self._timer.timeout.connect(self._repeat)
-        application = QApplication.instance()
-        if application is not None:
-            application.installEventFilter(self)
-        if isinstance(application, QGuiApplication):
-            application.applicationStateChanged.connect(self._on_application_state)
 
     @property
     def is_held(self) -> bool:
@@ -51,35 +43,21 @@ class DeadmanKey(QObject):
                 self._timer.stop()
             self.reported.emit(self.is_held)
 
-    def release(self) -> None:
+    def release_all(self) -> None:
         """Nobody holds it."""
         for holder in tuple(self._holders):
             self.hold(holder, False)
 
-    def detach(self) -> None:
-        """Let go and listen no more."""
-        self.release()
-        application = QApplication.instance()
-        if application is not None:
-            application.removeEventFilter(self)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        kind = event.type()
-        if kind == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() == _KEY:
-            if isinstance(watched, QWidget) and watched.window() is self._window and not event.isAutoRepeat():
-                self.hold("key", True)
-        elif kind == QEvent.Type.KeyRelease and isinstance(event, QKeyEvent) and event.key() == _KEY:
-            if not event.isAutoRepeat():
-                self.hold("key", False)
-        elif kind == QEvent.Type.WindowDeactivate and watched is self._window:
-            self.release()
+    def _on_press(self, watched: QObject, event: QKeyEvent) -> bool:
+        is_ours = isinstance(watched, QWidget) and watched.window() is self._window
+        if event.key() == _KEY and is_ours and not event.isAutoRepeat():
+            self.hold("key", True)
         return False
 
-    @Slot(Qt.ApplicationState)
-    def _on_application_state(self, state: Qt.ApplicationState) -> None:
-        if state != Qt.ApplicationState.ApplicationActive:
-            self.release()
+    def _on_release(self, event: QKeyEvent) -> bool:
+        if event.key() == _KEY and not event.isAutoRepeat():
+            self.hold("key", False)
+        return False
 
-    @Slot()
     def _repeat(self) -> None:
         self.reported.emit(True)

@@ -81,7 +81,7 @@ class DriveDesk(QObject):
         """Let go of everything, and let nobody drive, for a rig that is being opened."""
         self.halt()
         self.jog.release_all()
-        self.deadman.release()
+        self.deadman.release_all()
 
     def halt(self) -> None:
         """Nobody drives any more: the rig is about to be closed."""
@@ -118,7 +118,7 @@ class DriveDesk(QObject):
         """STOP, before anything else."""
         self.ask(Act.STOP)
         self.jog.release_all()
-        self.deadman.release()
+        self.deadman.release_all()
 
     @Slot()
     def switch_on(self) -> None:

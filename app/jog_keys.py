@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from enum import Enum
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QGuiApplication, QKeyEvent
-from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QWidget
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QAbstractSpinBox, QLineEdit, QWidget
 
+from app.held_input import HeldInput
 from core.control.hand import AT_REST, Jog
 
 PERIOD_MS = 33
@@ -43,7 +44,7 @@ _STOP_KEY = Qt.Key.Key_Space
 _OTHER_MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 
 
-class JogKeys(QObject):
+class JogKeys(HeldInput):
     """Turns held keys and held buttons into a ``Jog``.
 
     Everything held is released when the window loses the focus, so nothing moves unattended. ``changed`` carries the jog; it comes
@@ -56,19 +57,9 @@ class JogKeys(QObject):
     stop_pressed = Signal()
 
     def __init__(self, window: QWidget) -> None:
-        super().__init__(window)
-        self._window = window
+        super().__init__(window, PERIOD_MS)
         self._held: dict[object, Motion] = {}
         self._speed = 1.0
-        self._timer = QTimer(self)
-        self._timer.setInterval(PERIOD_MS)
-        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
-        self._timer.timeout.connect(self._repeat)
-        application = QApplication.instance()
-        if application is not None:
-            application.installEventFilter(self)
-        if isinstance(application, QGuiApplication):
-            application.applicationStateChanged.connect(self._on_application_state)
 
     @property
     def held(self) -> frozenset[Motion]:
@@ -112,23 +103,6 @@ class JogKeys(QObject):
             self._timer.stop()
             self._announce()
 
-    def detach(self) -> None:
-        """Release everything and listen no more."""
-        self.release_all()
-        application = QApplication.instance()
-        if application is not None:
-            application.removeEventFilter(self)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        kind = event.type()
-        if kind == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
-            return self._on_press(watched, event)
-        if kind == QEvent.Type.KeyRelease and isinstance(event, QKeyEvent):
-            return self._on_release(event)
-        if kind == QEvent.Type.WindowDeactivate and watched is self._window:
-            self.release_all()
-        return False
-
     def _on_press(self, watched: QObject, event: QKeyEvent) -> bool:
         if not isinstance(watched, QWidget):
             return False
@@ -158,12 +132,6 @@ class JogKeys(QObject):
             return True
         return False
 
-    @Slot(Qt.ApplicationState)
-    def _on_application_state(self, state: Qt.ApplicationState) -> None:
-        if state != Qt.ApplicationState.ApplicationActive:
-            self.release_all()
-
-    @Slot()
     def _repeat(self) -> None:
         self.changed.emit(self.jog)
 

@@ -279,10 +279,9 @@ class AnnotationStore:
             try:
                 yield self._database
                 self._database.execute("COMMIT")
-            except BaseException:
+            finally:  # whatever ended it before the commit
                 if self._database.in_transaction:
                     self._database.execute("ROLLBACK")
-                raise
 
     def _rows(self, query: str, values: Sequence[Any] = ()) -> list[Any]:
         with self._lock, self._named_errors(), closing(self._database.execute(query, values)) as cursor:
