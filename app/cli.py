@@ -104,12 +104,16 @@ def train(
     data: Annotated[list[Path] | None, typer.Option(help="labelled folder as synth writes it; may be repeated")] = None,
     synthetic: Annotated[int, typer.Option(min=0, help="also make this many frames with the twin")] = 0,
     init: Annotated[str | None, typer.Option(help="start from this model instead of from nothing")] = None,
+    deepen: Annotated[bool, typer.Option("--deepen", help="give the --init network the default's depth before training")] = False,
     steps: Annotated[int, typer.Option(min=1)] = 6000,
     stop_after: Annotated[int | None, typer.Option(min=1, help="end after so many of the steps, to go on with --init")] = None,
     batch: Annotated[int, typer.Option(min=1, max=512)] = 12,
     rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 1e-2,
     crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 256,
     look_share: Annotated[float, typer.Option(min=0, max=1, help="share of the crops whose look is changed at random")] = 1.0,
+    focus: Annotated[
+        float, typer.Option(min=0, max=0.9, help="share of the crops from frames that the --init model finds hard")
+    ] = 0.0,
     base: Annotated[
         int | None, typer.Option(min=4, max=128, help="plain U-Net of this base width instead of the folded one")
     ] = None,
@@ -126,11 +130,12 @@ def train(
         learning_rate=rate,
         crop=(crop, crop),
         look_share=look_share,
+        focus_share=focus,
         stop_after=stop_after,
         seed=seed,
         threads=threads,
     )
-    run_train(out, data or [], synthetic, init, base, plan)
+    run_train(out, data or [], synthetic, init, base, plan, deepen=deepen)
 
 
 @app.command()

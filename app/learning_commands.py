@@ -74,11 +74,16 @@ class Interrupt:
         self.asked = True
 
 
-def run_train(out: Path, data: list[Path], synthetic: int, init: str | None, base: int | None, plan: Any) -> None:
-    """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log."""
+def run_train(
+    out: Path, data: list[Path], synthetic: int, init: str | None, base: int | None, plan: Any, *, deepen: bool = False
+) -> None:
+    """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log.
+
+    With `deepen`, the network of `init` first gets the convolutions that today's default shape has more than it.
+    """
     import torch
 
-    from core.learning.dataset import WORKING_SIZE_PX, DatasetError, find_samples
+    from core.learning.dataset import DatasetError, find_samples
     from core.learning.model_file import check_can_write, load_network, model_folder, save_model
     from core.learning.training import Progress as Report
     from core.learning.training import train
@@ -101,12 +106,17 @@ def run_train(out: Path, data: list[Path], synthetic: int, init: str | None, bas
     torch.manual_seed(plan.seed)
     if init is not None:
         network = load_network(model_folder(init))[0]
+        if deepen:
+            from core.learning.growing import deepened
+
+            network = deepened(network, default_shape().encoder_convolutions, _examples(samples))
     else:
         network = DualUNet(UNetShape.of_base(base) if base else default_shape())
     plan = replace(plan, crop=tuple(-(-side // network.shape.stride) * network.shape.stride for side in plan.crop))
     notes = {"plan": plan.to_json(), "init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
     log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {notes}\n")
     with log, Interrupt() as interrupt, progress_bar() as bar:
+        difficulty = _difficulty(init, samples, bar, interrupt) if init is not None and plan.focus_share > 0 else None
         task = bar.add_task("steps", total=plan.steps)
 
         def report(now: Report) -> None:
@@ -118,19 +128,46 @@ def run_train(out: Path, data: list[Path], synthetic: int, init: str | None, bas
             save_model(average, out, training=notes | {"steps_done": step}, figures={})
 
         network, done = train(
-            network, samples, plan, on_progress=report, on_checkpoint=checkpoint, should_stop=lambda: interrupt.asked
+            network,
+            samples,
+            plan,
+            difficulty=difficulty,
+            on_progress=report,
+            on_checkpoint=checkpoint,
+            should_stop=lambda: interrupt.asked,
         )
-    examples = [sample.load(WORKING_SIZE_PX)[0] for sample in samples[:: max(1, len(samples) // _EXAMPLES)]]
-    save_model(network, out, training=notes | {"steps_done": done}, figures={}, examples=examples)
+    save_model(network, out, training=notes | {"steps_done": done}, figures={}, examples=_examples(samples))
     ending = "" if done == plan.steps else f" (interrupted after {done} of {plan.steps} steps; go on with --init {out})"
     _console.print(f"model written to {out}{ending}", soft_wrap=True)
 
 
 def default_shape() -> Any:
-    """The shipped network: chosen in docs/method.md for 27 ms a frame at 640x480 on two cores without bf16."""
+    """The shipped network: chosen in docs/method.md by accuracy against time on two cores without bf16."""
     from core.perception.unet import UNetShape
 
-    return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2)
+    return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2, (2, 2, 3, 4, 4))
+
+
+def _difficulty(init: str, samples: list[Any], bar: Any, interrupt: Interrupt) -> Any:
+    """How hard the model `init` finds every frame; None when interrupted, as then no training follows."""
+    from core.config import SegmentationConfig
+    from core.perception.segmentation import open_segmenter
+    from core.study.difficulty import difficulty
+
+    segment = open_segmenter(SegmentationConfig(model=init))
+    found = []
+    for sample in bar.track(samples, description="finding hard frames"):
+        if interrupt.asked:
+            return None
+        found.append(difficulty(sample, segment))
+    return np.array(found)
+
+
+def _examples(samples: list[Any]) -> list[Any]:
+    """Some frames from all over the sets, at working size."""
+    from core.learning.dataset import WORKING_SIZE_PX
+
+    return [sample.load(WORKING_SIZE_PX)[0] for sample in samples[:: max(1, len(samples) // _EXAMPLES)]]
 
 
 def _described(folder: Path) -> dict[str, Any]:

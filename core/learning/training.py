@@ -22,13 +22,15 @@ from core.types import Image, Mask
 
 _MAX_KEPT_BYTES = 4_000_000_000
 """Frames kept in memory by the loader: 2600 of 640x480."""
+_SMALL_AREA_PX = 50.0
+"""Of a crop whose robot is smaller than this, a few pixels more or less do not decide the Dice."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrainingPlan:
     """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours, and
     ``look_share`` of them are changed in exposure, colour, sharpness and noise. ``stop_after`` ends before the learning rate has
-    come down: for a run that another one goes on from."""
+    come down: for a run that another one goes on from. ``focus_share`` of the samples are drawn by difficulty, the others evenly."""
 
     steps: int = 6000
     batch: int = 12
@@ -40,6 +42,7 @@ class TrainingPlan:
     average_decay: float = 0.998
     robot_weight: float = 1.5
     look_share: float = 1.0
+    focus_share: float = 0.0
     stop_after: int | None = None
     seed: int = 0
     workers: int = 1
@@ -64,9 +67,10 @@ class Progress:
 class _Crops(Dataset[tuple[Tensor, Tensor]]):
     """Sample `i` of the stream depends on the seed and `i` alone, so that a run can be repeated with any number of workers."""
 
-    def __init__(self, samples: list[Sample], plan: TrainingPlan) -> None:
+    def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
         self._samples = samples
         self._plan = plan
+        self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
         self._kept: dict[int, tuple[Image, Mask, Mask]] = {}
         self._kept_bytes = 0
         self._order: tuple[int, NDArray[np.int64]] | None = None
@@ -80,7 +84,10 @@ class _Crops(Dataset[tuple[Tensor, Tensor]]):
         if rng.random() < self._plan.clutter_share:
             image, vessel, robot = random_clutter(size, rng), np.zeros(size, bool), np.zeros(size, bool)
         else:
-            image, vessel, robot = random_crop(*self._frame(self._place(index)), size, rng)
+            place = self._place(index)
+            if self._chances is not None and rng.random() < self._plan.focus_share:
+                place = int(np.searchsorted(self._chances, rng.random(), side="right"))
+            image, vessel, robot = random_crop(*self._frame(place), size, rng)
         if rng.random() < self._plan.look_share:
             image = random_look(image, rng)
         target = np.stack([vessel, robot]).astype(np.uint8)
@@ -106,15 +113,20 @@ class _Crops(Dataset[tuple[Tensor, Tensor]]):
 
 
 def loss_of(logits: Tensor, target: Tensor, robot_weight: float) -> tuple[Tensor, Tensor]:
-    """Cross entropy + Dice of both tasks, and the soft Dice (2,) of vessel and robot over the batch."""
+    """Cross entropy + Dice of both tasks, and the soft Dice (2,) of vessel and robot over the batch.
+
+    Half of the Dice is taken over the batch, half over every crop by itself: over the batch alone, a crop whose robot is short or
+    faint weighs next to nothing, and those are the crops in which a tip gets lost.
+    """
     weights = logits.new_tensor([1.0, robot_weight])
     entropy = torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction="none").mean(dim=(0, 2, 3))
     probability = torch.sigmoid(logits)
-    overlap = (probability * target).sum(dim=(0, 2, 3))
-    dice = (2 * overlap + 1) / (probability.sum(dim=(0, 2, 3)) + target.sum(dim=(0, 2, 3)) + 1)
+    overlap, size = (probability * target).sum(dim=(2, 3)), (probability + target).sum(dim=(2, 3))
+    dice = (2 * overlap.sum(dim=0) + 1) / (size.sum(dim=0) + 1)
+    each = ((2 * overlap + _SMALL_AREA_PX) / (size + _SMALL_AREA_PX)).mean(dim=0)
     # The robot is some 2 % of the pixels: unweighted, its entropy would drown in the background's.
     entropy = entropy * logits.new_tensor([1.0, 5.0])
-    return ((entropy + 1 - dice) * weights).sum(), dice.detach()
+    return ((entropy + 1 - 0.5 * (dice + each)) * weights).sum(), dice.detach()
 
 
 def _learning_rate(plan: TrainingPlan, step: int) -> float:
@@ -124,9 +136,9 @@ def _learning_rate(plan: TrainingPlan, step: int) -> float:
     return plan.learning_rate * max(0.01, 1.0 - share)
 
 
-def _batches(samples: list[Sample], plan: TrainingPlan) -> Iterator[tuple[Tensor, Tensor]]:
-    loader = DataLoader(_Crops(samples, plan), plan.batch, num_workers=plan.workers, prefetch_factor=4 if plan.workers else None)
-    yield from loader
+def _batches(samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None) -> Iterator[tuple[Tensor, Tensor]]:
+    crops = _Crops(samples, plan, difficulty)
+    yield from DataLoader(crops, plan.batch, num_workers=plan.workers, prefetch_factor=4 if plan.workers else None)
 
 
 def train(
@@ -134,6 +146,7 @@ def train(
     samples: list[Sample],
     plan: TrainingPlan,
     *,
+    difficulty: NDArray[np.float64] | None = None,
     on_progress: Callable[[Progress], None] = lambda _: None,
     on_checkpoint: Callable[[DualUNet, int], None] = lambda _network, _step: None,
     should_stop: Callable[[], bool] = lambda: False,
@@ -142,6 +155,7 @@ def train(
 ) -> tuple[DualUNet, int]:
     """Train `network` in place; returns the network with averaged weights and the number of steps done.
 
+    `difficulty` (one weight > 0 per sample, ``difficulties``) says where ``plan.focus_share`` of the samples come from.
     `should_stop` is asked after every step; what was learnt until then is returned. On a CUDA device bf16 autocast is used.
     """
     torch.manual_seed(plan.seed)
@@ -154,7 +168,7 @@ def train(
     shares = [[group["lr"] / plan.learning_rate for group in optimizer.param_groups] for optimizer in optimizers]
     smooth_loss, smooth_dice = 0.0, np.zeros(2)
     done, mark, marked = 0, time.monotonic(), 0
-    for image, target in _batches(samples, plan):
+    for image, target in _batches(samples, plan, difficulty):
         for optimizer, parts in zip(optimizers, shares, strict=True):
             for group, part in zip(optimizer.param_groups, parts, strict=True):
                 group["lr"] = part * _learning_rate(plan, done)

@@ -20,13 +20,15 @@ class UNetShape:
     """Size of the network.
 
     ``widths`` are the channels of the five encoder levels, ``decoder_widths`` those of the four decoder levels from fine to coarse,
-    ``fold`` the block of pixels folded into channels (1 = none), ``decoder_convolutions`` the 3x3 convolutions per decoder level.
+    ``fold`` the block of pixels folded into channels (1 = none). ``encoder_convolutions`` are the 3x3 convolutions of each encoder
+    level (the paper has two everywhere), ``decoder_convolutions`` those of every decoder level.
     """
 
     widths: tuple[int, int, int, int, int] = (16, 32, 64, 128, 256)
     decoder_widths: tuple[int, int, int, int] = (16, 32, 64, 128)
     decoder_convolutions: int = 2
     fold: int = 1
+    encoder_convolutions: tuple[int, int, int, int, int] = (2, 2, 2, 2, 2)
 
     @classmethod
     def of_base(cls, base: int) -> UNetShape:
@@ -51,7 +53,11 @@ class UNetShape:
         fold, convolutions = int(data["fold"]), int(data["decoder_convolutions"])
         if fold not in (1, 2, 4) or convolutions not in (1, 2):
             raise ValueError("fold is 1, 2 or 4 and decoder_convolutions 1 or 2")
-        return cls(widths, decoder, convolutions, fold)
+        # Models from before the levels could differ do not say.
+        depths = tuple(int(count) for count in data.get("encoder_convolutions", (2, 2, 2, 2, 2)))
+        if len(depths) != 5 or min(depths) < 1 or max(depths) > 8:
+            raise ValueError("encoder_convolutions are five counts between 1 and 8")
+        return cls(widths, decoder, convolutions, fold, depths)
 
 
 def _convolutions(inputs: int, outputs: int, count: int) -> nn.Sequential:
@@ -95,8 +101,8 @@ class DualUNet(nn.Module):
         self.shape = shape
         channels = 3 * shape.fold**2
         encoder = []
-        for width in shape.widths:
-            encoder.append(_convolutions(channels, width, 2))
+        for width, count in zip(shape.widths, shape.encoder_convolutions, strict=True):
+            encoder.append(_convolutions(channels, width, count))
             channels = width
         self.encoder = nn.ModuleList(encoder)
         self.vessel = _Decoder(shape)

@@ -162,3 +162,34 @@ def test_frames_are_trained_on_at_working_size(tmp_path: Path) -> None:
     assert image.shape == (480, 640, 3)
     assert vessel.shape == robot.shape == (480, 640)
     assert vessel.sum() == pytest.approx(96 * 24 * 25, rel=0.03)
+
+
+def test_hard_frames_are_shown_more_often(tmp_path: Path) -> None:
+    from core.learning.training import _Crops
+
+    samples = find_samples([_toy_set(tmp_path / "set", 4)])
+    plan = TrainingPlan(steps=100, batch=4, crop=(64, 64), clutter_share=0.0, look_share=0.0, focus_share=0.5)
+    crops = _Crops(samples, plan, np.array([0.01, 0.01, 0.01, 0.97]))
+    drawn: list[int] = []
+    frame = crops._frame
+    crops._frame = lambda place: (drawn.append(place), frame(place))[1]  # type: ignore[method-assign]
+    for index in range(400):
+        crops[index]
+    # Half evenly over four frames, half nearly always the hard one: 1/8 + 0.49.
+    assert drawn.count(3) / 400 == pytest.approx(0.61, abs=0.06)
+
+
+def test_difficulty_is_what_a_model_loses(tmp_path: Path) -> None:
+    from core.study.difficulty import difficulty
+
+    sample = find_samples([_toy_set(tmp_path / "set", 1)])[0]
+    _, vessel, robot = sample.load(640)
+
+    def perfect(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return vessel.astype(np.float32), robot.astype(np.float32)
+
+    def blind(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return vessel.astype(np.float32), np.zeros(robot.shape, np.float32)
+
+    assert difficulty(sample, perfect) == pytest.approx(0.02)  # type: ignore[arg-type]
+    assert difficulty(sample, blind) == pytest.approx(1.0)  # type: ignore[arg-type]

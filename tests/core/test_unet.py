@@ -32,7 +32,16 @@ def test_decoders_share_nothing_but_the_encoder() -> None:
     torch.testing.assert_close(before[:, 1] + 1.0, after[:, 1])
 
 
-@pytest.mark.parametrize("change", [{"widths": [1, 2, 3]}, {"fold": 3}, {"decoder_convolutions": 0}, {"widths": [0, 4, 4, 4, 4]}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"widths": [1, 2, 3]},
+        {"encoder_convolutions": [2, 2, 2, 0, 2]},
+        {"fold": 3},
+        {"decoder_convolutions": 0},
+        {"widths": [0, 4, 4, 4, 4]},
+    ],
+)
 def test_a_senseless_shape_is_refused(change: dict[str, object]) -> None:
     with pytest.raises(ValueError):
         UNetShape.from_json(UNetShape().to_json() | change)

@@ -1,0 +1,78 @@
+"""A trained network made deeper without forgetting: the convolutions added to its encoder begin as identities.
+
+T. Chen et al., "Net2Net: accelerating learning via knowledge transfer", ICLR 2016: as every level ends in a rectifier, a
+convolution that copies its input changes nothing, and training goes on from where the shallower network stood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from core.perception.unet import DualUNet, UNetShape
+from core.types import Image
+
+
+def deepened(network: DualUNet, encoder_convolutions: tuple[int, int, int, int, int], images: Iterable[Image]) -> DualUNet:
+    """A copy of `network` with this many convolutions per encoder level, which in evaluation mode computes the same.
+
+    Parameters
+    ----------
+    network : the trained network.
+    encoder_convolutions : counts per level; none may be smaller than the network's.
+    images : typical RGB images (h, w, 3) uint8. The normalisation of a new convolution is set to the mean and variance of what it
+        meets on them, so that it is an identity in training, too.
+
+    Raises
+    ------
+    ValueError
+        A level would lose convolutions, or there is no image.
+    """
+    old = network.shape.encoder_convolutions
+    if any(new < before for new, before in zip(encoder_convolutions, old, strict=True)):
+        raise ValueError(f"the network has {old} convolutions per level and cannot be cut down to {encoder_convolutions}")
+    shape: UNetShape = replace(network.shape, encoder_convolutions=encoder_convolutions)
+    deeper = DualUNet(shape).eval()
+    deeper.load_state_dict(network.state_dict(), strict=False)
+    for block, before, met in zip(deeper.encoder, old, _level_statistics(network, images), strict=True):
+        layers: list[nn.Module] = list(block.children())[3 * before :]
+        for conv, norm in zip(layers[0::3], layers[1::3], strict=True):
+            assert isinstance(conv, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d)
+            _make_identity(conv, norm, *met)
+    return deeper
+
+
+def _level_statistics(network: DualUNet, images: Iterable[Image]) -> list[tuple[Tensor, Tensor]]:
+    """Mean and variance per channel of what leaves each encoder level."""
+    kept: list[list[Tensor]] = [[] for _ in network.encoder]
+    hooks = [
+        block.register_forward_hook(lambda _module, _inputs, output, at=at: kept[at].append(output.transpose(0, 1).flatten(1)))
+        for at, block in enumerate(network.encoder)
+    ]
+    stride = network.shape.stride
+    try:
+        with torch.no_grad():
+            for image in images:
+                cut = image[: image.shape[0] // stride * stride, : image.shape[1] // stride * stride]
+                network.eval()(torch.from_numpy(np.ascontiguousarray(cut.transpose(2, 0, 1)))[None].float() / 255)
+    finally:
+        for hook in hooks:
+            hook.remove()
+    if not kept[0]:
+        raise ValueError("without an image nobody knows what the new convolutions will meet")
+    flat = [torch.cat(outputs, dim=1) for outputs in kept]
+    return [(values.mean(dim=1), values.var(dim=1)) for values in flat]
+
+
+@torch.no_grad()
+def _make_identity(conv: nn.Conv2d, norm: nn.BatchNorm2d, mean: Tensor, variance: Tensor) -> None:
+    nn.init.dirac_(conv.weight)
+    assert norm.running_mean is not None and norm.running_var is not None
+    norm.running_mean.copy_(mean)
+    norm.running_var.copy_(variance)
+    norm.bias.copy_(mean)
+    norm.weight.copy_((variance + norm.eps).sqrt())

@@ -1,0 +1,43 @@
+"""A deepened network computes what the shallower one did, and learns on."""
+
+import numpy as np
+import pytest
+import torch
+
+from core.learning.growing import deepened
+from core.perception.unet import DualUNet, UNetShape
+
+SMALL = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
+IMAGES = [np.random.default_rng(seed).integers(0, 256, (70, 96, 3)).astype(np.uint8) for seed in range(3)]
+
+
+def test_the_deeper_network_says_the_same() -> None:
+    torch.manual_seed(1)
+    network = DualUNet(SMALL)
+    batch = torch.stack([torch.from_numpy(image[:64, :96].transpose(2, 0, 1).copy()) for image in IMAGES]).float() / 255
+    for _ in range(40):  # until the normalisation knows what it meets, as a trained network's does
+        network.train()(batch)
+    network.eval()
+    deeper = deepened(network, (2, 2, 3, 4, 2), IMAGES)
+    assert [len(block) // 3 for block in deeper.encoder] == [2, 2, 3, 4, 2]
+    picture = torch.rand(1, 3, 64, 64)
+    with torch.no_grad():
+        torch.testing.assert_close(deeper(picture), network(picture), rtol=1e-4, atol=1e-4)
+        # In training the normalisation sees the batch and not its memory, and on like images says nearly the same.
+        kept = network.train()(batch)
+        assert float((deeper.train()(batch) - kept).abs().mean()) < 0.05 * float(kept.std())
+
+
+def test_what_is_added_can_learn() -> None:
+    deeper = deepened(DualUNet(SMALL), (2, 2, 3, 2, 2), IMAGES).train()
+    deeper(torch.rand(2, 3, 64, 64)).square().mean().backward()
+    gradient = deeper.encoder[2][6].weight.grad
+    assert gradient is not None
+    assert float(gradient.abs().sum()) > 0
+
+
+def test_nothing_is_cut_away() -> None:
+    with pytest.raises(ValueError, match="cut down"):
+        deepened(DualUNet(SMALL), (1, 2, 2, 2, 2), IMAGES)
+    with pytest.raises(ValueError, match="without an image"):
+        deepened(DualUNet(SMALL), (2, 2, 3, 2, 2), [])
