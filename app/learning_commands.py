@@ -150,6 +150,8 @@ def default_shape() -> Any:
 
 def _difficulty(init: str, samples: list[Any], bar: Any, interrupt: Interrupt) -> Any:
     """How hard the model `init` finds every frame; None when interrupted, as then no training follows."""
+    import numpy as np
+
     from core.config import SegmentationConfig
     from core.perception.segmentation import open_segmenter
     from core.study.difficulty import difficulty

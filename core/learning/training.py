@@ -30,7 +30,7 @@ _SMALL_AREA_PX = 50.0
 class TrainingPlan:
     """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours, and
     ``look_share`` of them are changed in exposure, colour, sharpness and noise. ``stop_after`` ends before the learning rate has
-    come down: for a run that another one goes on from. ``focus_share`` of the samples are drawn by difficulty, the others evenly."""
+    come down: for a run that another one goes on from. ``focus_share`` of the samples are drawn by difficulty."""
 
     steps: int = 6000
     batch: int = 12
