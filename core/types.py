@@ -20,6 +20,8 @@ Mask = NDArray[np.bool_]
 Points = NDArray[np.float64]
 """Polyline or point set, shape (N, 2), columns x, y."""
 Point = tuple[float, float]
+Window = tuple[int, int, int, int]
+"""Part of an image: x, y of its upper left pixel, width, height."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,6 +214,7 @@ class Scene:
     ``scale`` is working pixels per source pixel along the longer side, and ``scale_xy`` in x and y, which differ by the rounding to
     whole pixels (None: both are ``scale``); ``source_size`` is (width, height) of the frame. Stages that were not reached are None.
     ``latency_ms`` maps stage name to milliseconds, with "total". ``route_problem`` says why there is no way to the target.
+    ``window`` is the part of the working image that was looked at anew in a stream; None: all of it.
     """
 
     frame_index: int
@@ -232,6 +235,7 @@ class Scene:
     evidence: tuple[float, ...] | None = None
     route_problem: str = ""
     scale_xy: tuple[float, float] | None = None
+    window: Window | None = None
 
     def points_to_source(self, points: Points) -> Points:
         """Working pixels (N, 2) -> source pixels (N, 2); pixel centres are at integers in both."""

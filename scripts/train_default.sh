@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some 25 minutes of data and three
-# hours of training on two quiet cores. The data can be interrupted and gone on with by the same call.
+# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some 25 minutes of data and five
+# hours of training on two cores. The data can be interrupted and gone on with by the same call.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-out/default_model}
@@ -12,10 +12,14 @@ OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames2" --count 2400 --seed
 export OMP_WAIT_POLICY=passive
 sets=(--data "$out/frames1" --data "$out/frames2" --look-share 0.35)
 # First many small crops at a high rate, then fewer and larger ones, which show the network more of what lies around.
-$python main.py train "${sets[@]}" --steps 11000 --stop-after 4114 --seed 10 --out "$out/stage1"
+$python main.py train "${sets[@]}" --shallow --steps 11000 --stop-after 4114 --seed 10 --out "$out/stage1"
 larger=(--crop 384 --batch 6)
 $python main.py train "${sets[@]}" --init "$out/stage1" "${larger[@]}" --rate 5e-3 --steps 2800 --seed 11 --out "$out/stage2"
-$python main.py train "${sets[@]}" --init "$out/stage2" "${larger[@]}" --rate 5e-3 --steps 5200 --seed 12 --out "$out/default"
+$python main.py train "${sets[@]}" --init "$out/stage2" "${larger[@]}" --rate 5e-3 --steps 5200 --seed 12 --out "$out/stage3"
+# Five more convolutions, and at first more of the frames that the model finds hard.
+$python main.py train "${sets[@]}" --init "$out/stage3" --deepen --focus 0.3 "${larger[@]}" --rate 6e-3 --steps 14000 --stop-after 4000 \
+    --seed 13 --out "$out/stage4"
+$python main.py train "${sets[@]}" --init "$out/stage4" "${larger[@]}" --rate 4.3e-3 --steps 2600 --seed 14 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 480 --seed 950000 --workers 2
 $python main.py calibrate "$out/calibration" --model "$out/default"

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import platformdirs
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.config import RESOURCES
@@ -58,15 +59,20 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def own_models() -> Path:
+    """Where the user's own models are; they are called by their names as the shipped ones are."""
+    return Path(platformdirs.user_data_dir("LumenPilot")) / "models"
+
+
 def model_folder(name: str) -> Path:
-    """The folder of a model: a name in resources/models, or a path. Raises ModelError with the known names."""
-    for folder in (MODELS / name, Path(name)):
+    """The folder of a model: the name of a shipped or of the user's own, or a path. Raises ModelError with the known names."""
+    for folder in (MODELS / name, own_models() / name, Path(name)):
         try:
             if (folder / INFO).is_file():
                 return folder
         except OSError as error:
             raise ModelError(f"{folder}: cannot be read ({error.strerror})") from None
-    known = ", ".join(sorted(p.parent.name for p in MODELS.glob(f"*/{INFO}"))) or "none"
+    known = ", ".join(sorted(p.parent.name for place in (MODELS, own_models()) for p in place.glob(f"*/{INFO}"))) or "none"
     raise ModelError(f"no model {name!r} (looked for {INFO} in {MODELS / name} and {Path(name)}); installed models: {known}")
 
 

@@ -24,13 +24,19 @@ def clean(vessel_probability: NDArray[np.float32], robot_probability: NDArray[np
     config : thresholds (``segmentation``) and limits of area (``cleaning``).
     """
     cleaning, thresholds = config.cleaning, config.segmentation
-    vessel, robot = vessel_probability >= thresholds.vessel_threshold, robot_probability >= thresholds.robot_threshold
+    vessel = vessel_probability >= thresholds.vessel_threshold
     return Masks(
         vessel=clean_mask(vessel, cleaning.min_vessel_area_px, cleaning.max_hole_area_px),
-        robot=clean_mask(robot, cleaning.min_robot_area_px, cleaning.max_hole_area_px),
+        robot=clean_robot(robot_probability, config),
         vessel_probability=vessel_probability,
         robot_probability=robot_probability,
     )
+
+
+def clean_robot(robot_probability: NDArray[np.float32], config: PerceptionConfig) -> Mask:
+    """The robot's mask alone."""
+    robot = robot_probability >= config.segmentation.robot_threshold
+    return clean_mask(robot, config.cleaning.min_robot_area_px, config.cleaning.max_hole_area_px)
 
 
 def clean_mask(mask: Mask, min_area_px: int, max_hole_area_px: int) -> Mask:

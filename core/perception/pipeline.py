@@ -11,13 +11,14 @@ from core.config import PerceptionConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton
 from core.perception.centerline import find as find_centerline
 from core.perception.evidence import Calibration, collect
+from core.perception.glance import Background, Glances, look
 from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
 from core.perception.segmentation import Mirrored, Segmenter, open_segmenter, to_working
 from core.perception.tracking import Memory, check_jump, recall
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
-from core.types import Frame, Masks, Point, Reason, Refusal, RobotPath, Scene
+from core.types import Frame, Image, Masks, Point, Reason, Refusal, RobotPath, Scene, Skeletons, Window
 
 
 class _Stopwatch:
@@ -53,7 +54,8 @@ class Pipeline:
 
     A call perceives a frame of a stream: the last frames decide between near-equal paths, an impossible jump of the head is
     refused, and the state is steadied. ``perceive_single`` knows nothing of other frames and leaves the stream's memory alone;
-    it may look with another `single` sight, which takes its time.
+    it may look with another `single` sight, which takes its time. With a `glance`, a sight that may be shown a part of a picture,
+    most frames of a stream are looked at around the robot's head only (``glance.py``).
     """
 
     def __init__(
@@ -62,9 +64,13 @@ class Pipeline:
         config: PerceptionConfig,
         calibration: Calibration | None = None,
         single: Sight | None = None,
+        glance: Sight | None = None,
     ) -> None:
         self._stream = Sight(segmenter, calibration)
         self._single = single or self._stream
+        self._offered = glance
+        self._glance = glance if config.tracking.window_px else None
+        self._glances = Glances(config.tracking)
         self._config = config
         self._states = StateFilter(config.pose)
         self._memory: Memory | None = None
@@ -75,9 +81,14 @@ class Pipeline:
         """Where the network runs, in words."""
         return self._stream.segment.engine
 
+    def with_config(self, config: PerceptionConfig) -> Pipeline:
+        """The same networks under other thresholds, with no memory; what is set of the networks themselves is not looked at."""
+        return Pipeline(self._stream.segment, config, self._stream.calibration, self._single, self._offered)
+
     def reset(self) -> None:
         """Forget the stream's past."""
         self._memory = None
+        self._glances.forget()
         self._states.update(None)
 
     def perceive_single(self, frame: Frame, target: Point | None = None) -> Scene:
@@ -95,48 +106,86 @@ class Pipeline:
             self.reset()
             self._shape = frame.image.shape
         watch = _Stopwatch()
-        scene = self._perceive(frame, target, recall(self._memory, frame.captured_s, tracking), watch, self._stream)
+        previous = recall(self._memory, frame.captured_s, tracking)
+        scene = self._perceive(frame, target, previous, watch, self._stream, self._glance)
         if scene.pose is not None and scene.path is not None:
             jump = check_jump(scene.path, self._memory, frame.captured_s, tracking)
             if jump is None:
                 self._memory = Memory(scene.path, frame.captured_s)
             else:
                 scene = replace(scene, pose=None, refusal=jump)
+        if self._glance is not None:
+            self._glances.remember(scene)
         return watch.finish(replace(scene, pose=self._states.update(scene.pose)))
 
-    def _perceive(self, frame: Frame, target: Point | None, previous: RobotPath | None, watch: _Stopwatch, sight: Sight) -> Scene:
+    def _perceive(
+        self,
+        frame: Frame,
+        target: Point | None,
+        previous: RobotPath | None,
+        watch: _Stopwatch,
+        sight: Sight,
+        glance: Sight | None = None,
+    ) -> Scene:
         config = self._config
         height, width = frame.image.shape[:2]
         with watch.stage("prepare"):
             image, scale_xy = to_working(frame.image, config.working_size_px)
             refusal = quality.check_image(image, config.quality)
+            chosen = self._glances.choose(image, frame.captured_s) if glance is not None and refusal is None else None
         scene = Scene(frame.index, frame.captured_s, (width, height), scale_xy[0 if width >= height else 1], scale_xy=scale_xy)
         if refusal is not None:
             return replace(scene, refusal=refusal)
-        with watch.stage("network"):
-            vessel_probability, robot_probability = sight.segment(image)
-        with watch.stage("masks"):
-            found = masks.clean(vessel_probability, robot_probability, config)
-        scene = replace(scene, masks=found)
-        refusal = quality.check_masks(found)
-        if refusal is not None:
-            return replace(scene, refusal=refusal)
-        with watch.stage("skeletons"):
-            skeletons = skeleton.thin_masks(found, config)
-        with watch.stage("gaps"):
-            skeletons = gaps.repair(skeletons, config.gaps)
-        with watch.stage("graph"):
-            graph = build_graph(skeletons.vessel, found.vessel, config.cleaning)
-        scene = replace(scene, skeletons=skeletons, vessel_graph=graph)
-        refusal = quality.check_graph(graph, config.vectors)
-        if refusal is not None:
-            return replace(scene, refusal=refusal)
+        if chosen is not None and glance is not None:
+            sight = glance
+            scene = self._see_window(scene, image, *chosen, sight, watch)
+        else:
+            scene = self._see_all(scene, image, sight, watch)
+        if scene.refusal is not None:
+            return scene
+        found, skeletons, graph = scene.masks, scene.skeletons, scene.vessel_graph
+        assert found is not None and skeletons is not None and graph is not None
         with watch.stage("path"):
             path = robot_path.find(skeletons, found, config, previous, graph)
         if isinstance(path, Refusal):
             return replace(scene, refusal=path)
         with watch.stage("pose"):
             return self._pose(replace(scene, path=path), path, found, target, sight.calibration)
+
+    def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch) -> Scene:
+        """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
+        config = self._config
+        with watch.stage("network"):
+            vessel_probability, robot_probability = sight.segment(image)
+        with watch.stage("masks"):
+            found = masks.clean(vessel_probability, robot_probability, config)
+        scene = replace(scene, masks=found, refusal=quality.check_masks(found))
+        if scene.refusal is not None:
+            return scene
+        with watch.stage("skeletons"):
+            skeletons = skeleton.thin_masks(found, config)
+        with watch.stage("gaps"):
+            skeletons = gaps.repair(skeletons, config.gaps)
+        with watch.stage("graph"):
+            graph = build_graph(skeletons.vessel, found.vessel, config.cleaning)
+        return replace(scene, skeletons=skeletons, vessel_graph=graph, refusal=quality.check_graph(graph, config.vectors))
+
+    def _see_window(self, scene: Scene, image: Image, known: Background, window: Window, sight: Sight, watch: _Stopwatch) -> Scene:
+        """The same, with only the robot in the window seen anew."""
+        config = self._config
+        with watch.stage("network"):
+            robot_probability = look(sight.segment, image, window, known.robot_probability)
+        with watch.stage("masks"):
+            robot = masks.clean_robot(robot_probability, config)
+            found = Masks(known.vessel, robot, known.vessel_probability, robot_probability)
+        scene = replace(scene, window=window, masks=found, refusal=quality.check_masks(found))
+        if scene.refusal is not None:
+            return scene
+        with watch.stage("skeletons"):
+            skeletons = Skeletons(vessel=known.vessel_skeleton, robot=skeleton.thin_robot(robot, config))
+        with watch.stage("gaps"):
+            skeletons = gaps.repair(skeletons, config.gaps)
+        return replace(scene, skeletons=skeletons, vessel_graph=known.graph)
 
     def _pose(self, scene: Scene, path: RobotPath, found: Masks, target: Point | None, calibration: Calibration | None) -> Scene:
         """Vectors, the centerline's piece, the pose, and the quality gate's word on each."""
@@ -176,7 +225,9 @@ def open_pipeline(config: PerceptionConfig) -> Pipeline:
     plain = Sight(segmenter, info.calibration)
     twice = Sight(Mirrored(segmenter), info.calibration_mirrored or info.calibration)
     stream = twice if mirrored == "always" else plain
-    return Pipeline(stream.segment, config, stream.calibration, plain if mirrored == "never" else twice)
+    # A window costs a fifth of the whole, so that there is time to look at it twice.
+    careful = plain if mirrored == "never" else twice
+    return Pipeline(stream.segment, config, stream.calibration, careful, glance=careful)
 
 
 class NoPerception:

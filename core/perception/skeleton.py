@@ -24,13 +24,18 @@ TANGENT_PX = 10
 
 def thin_masks(masks: Masks, config: PerceptionConfig) -> Skeletons:
     """Skeletons of both masks; the robot's ends reach the edge of its mask if ``cleaning.extend_ends`` says so."""
-    robot = np.zeros(masks.robot.shape, np.bool_)
-    x, y, width, height = cv2.boundingRect(masks.robot.view(np.uint8))
+    vessel = thin_half_size(masks.vessel) if config.cleaning.half_size_thinning else thin(masks.vessel)
+    return Skeletons(vessel=vessel, robot=thin_robot(masks.robot, config))
+
+
+def thin_robot(mask: Mask, config: PerceptionConfig) -> Mask:
+    """The robot's skeleton alone."""
+    robot = np.zeros(mask.shape, np.bool_)
+    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
     if width:
         window = np.s_[y : y + height, x : x + width]
-        robot[window] = _robot_skeleton(np.ascontiguousarray(masks.robot[window]), config.cleaning)
-    vessel = thin_half_size(masks.vessel) if config.cleaning.half_size_thinning else thin(masks.vessel)
-    return Skeletons(vessel=vessel, robot=robot)
+        robot[window] = _robot_skeleton(np.ascontiguousarray(mask[window]), config.cleaning)
+    return robot
 
 
 def _robot_skeleton(mask: Mask, config: CleaningConfig) -> Mask:

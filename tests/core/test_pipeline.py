@@ -8,7 +8,7 @@ from core.config import PerceptionConfig, TrackingConfig
 from core.learning.model_file import ModelInfo
 from core.perception.pipeline import NoPerception, Pipeline, Sight, open_pipeline
 from core.perception.segmentation import Mirrored, open_segmenter
-from core.types import Frame, Image, Points, Reason, Scene
+from core.types import Frame, Image, Points, PoseState, Reason, Scene
 from tests.core.drawing import SIZE, curve, depth, probability
 
 CONFIG = PerceptionConfig()
@@ -277,3 +277,13 @@ def test_the_configuration_says_what_is_mirrored(mirrored: str, stream: int, sin
     assert len(seen) == stream
     pipeline.perceive_single(Frame(0, 0.0, image))
     assert len(seen) - stream == single
+
+
+def test_other_thresholds_act_with_the_same_networks_and_no_memory(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    wide = CONFIG.pose.model_copy(update={"d_allow_px": 200.0, "theta_allow_deg": 180.0})
+    other = pipeline.with_config(CONFIG.model_copy(update={"pose": wide}))
+    scenes = [one.perceive_single(frame()) for one in (pipeline, other, pipeline)]
+    assert scenes[1].pose is not None
+    assert scenes[1].pose.state is PoseState.A, "everything is allowed"
+    assert scenes[0].pose == scenes[2].pose, "the first one is as it was"
+    assert other.engine == pipeline.engine

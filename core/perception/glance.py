@@ -1,0 +1,128 @@
+"""Streams: between two looks at the whole picture only the window around the robot's head is looked at anew.
+
+A phantom stands still under a camera that stands still. Vessel mask, skeleton and graph of the last whole look therefore stay
+true, and so does what it saw of the robot's body outside the window. Three things end that: time (``tracking.refresh_s``), a
+picture that has changed elsewhere (a moved phantom, another light, a hand), and a frame without an answer. Then the next look is a
+whole one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.config import TrackingConfig
+from core.perception.segmentation import Segmenter
+from core.types import Image, Mask, Point, Scene, VesselGraph, Window
+
+CELL_PX = 8
+"""Pictures are compared by the means of cells of this size: noise averages out, an edge that moves by 3 px does not."""
+CHANGED_LEVELS = 8.0
+"""Grey levels of 255. Noise of 20 levels moves a cell's mean by less than 3."""
+CHANGED_SHARE = 0.03
+"""Of the cells outside the window. The robot's body, which slides along itself, is less."""
+MARGIN_PX = 16
+"""At the window's inner edges the network lacks context: so much of what it says there is left out."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Background:
+    """What the last whole look at (h, w) working pixels saw. ``robot_probability`` also holds what the windows since then saw."""
+
+    captured_s: float
+    cells: NDArray[np.float32]
+    head: Point
+    vessel: Mask
+    vessel_probability: NDArray[np.float32]
+    vessel_skeleton: Mask
+    graph: VesselGraph
+    robot_probability: NDArray[np.float32]
+
+
+class Glances:
+    """Decides for each frame of a stream whether a window is enough, and which."""
+
+    def __init__(self, config: TrackingConfig) -> None:
+        self._config = config
+        self._background: Background | None = None
+        self._cells: NDArray[np.float32] | None = None
+
+    def forget(self) -> None:
+        """The next look is a whole one."""
+        self._background = None
+
+    def choose(self, image: Image, captured_s: float) -> tuple[Background, Window] | None:
+        """The window (x, y, width, height) to look at in a working image and what is known of the rest, or None: all of it."""
+        self._cells = cells_of(image)
+        before, side = self._background, self._config.window_px
+        height, width = image.shape[:2]
+        if before is None or before.vessel.shape != (height, width) or side >= max(height, width):
+            return None
+        if not 0.0 <= captured_s - before.captured_s <= self._config.refresh_s:
+            return None
+        window = window_around(before.head, (width, height), side)
+        return None if has_changed(before.cells, self._cells, window) else (before, window)
+
+    def remember(self, scene: Scene) -> None:
+        """Keep what the frame of the last ``choose`` showed; one without an answer leaves nothing that could be relied on."""
+        if scene.pose is None or scene.path is None or scene.masks is None or scene.skeletons is None or scene.vessel_graph is None:
+            self._background = None
+        elif scene.window is None:
+            assert self._cells is not None
+            masks, graph = scene.masks, scene.vessel_graph
+            self._background = Background(
+                scene.captured_s,
+                self._cells,
+                scene.path.head,
+                masks.vessel,
+                masks.vessel_probability,
+                scene.skeletons.vessel,
+                graph,
+                masks.robot_probability,
+            )
+        elif self._background is not None:
+            robot_probability = scene.masks.robot_probability
+            self._background = replace(self._background, head=scene.path.head, robot_probability=robot_probability)
+
+
+def cells_of(image: Image) -> NDArray[np.float32]:
+    """Means (h / 8, w / 8, 3) of the cells of an RGB image."""
+    size = max(1, image.shape[1] // CELL_PX), max(1, image.shape[0] // CELL_PX)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def has_changed(before: NDArray[np.float32], now: NDArray[np.float32], window: Window) -> bool:
+    """Whether the picture outside the window is another one; a change of brightness or colour of all of it alike does not count."""
+    if before.shape != now.shape:
+        return True
+    outside = np.ones(now.shape[:2], np.bool_)
+    x, y, width, height = window
+    outside[y // CELL_PX : -(-(y + height) // CELL_PX), x // CELL_PX : -(-(x + width) // CELL_PX)] = False
+    difference = (now - before)[outside]
+    if not len(difference):
+        return True
+    difference -= np.median(difference, axis=0)
+    return float(np.mean(np.abs(difference).max(axis=1) > CHANGED_LEVELS)) > CHANGED_SHARE
+
+
+def window_around(head: Point, size: tuple[int, int], side: int) -> Window:
+    """The window (x, y, width, height) of at most `side` px with the head in its middle, or as near to it as the picture allows."""
+    width, height = min(side, size[0]), min(side, size[1])
+    x = min(max(round(head[0]) - width // 2, 0), size[0] - width)
+    y = min(max(round(head[1]) - height // 2, 0), size[1] - height)
+    return x, y, width, height
+
+
+def look(segment: Segmenter, image: Image, window: Window, robot_probability: NDArray[np.float32]) -> NDArray[np.float32]:
+    """`robot_probability` (h, w) with the window seen anew; at the window's inner edges the old values stay."""
+    x, y, width, height = window
+    seen = segment(np.ascontiguousarray(image[y : y + height, x : x + width]))[1]
+    left, top = (MARGIN_PX if x > 0 else 0), (MARGIN_PX if y > 0 else 0)
+    right = width - (MARGIN_PX if x + width < image.shape[1] else 0)
+    bottom = height - (MARGIN_PX if y + height < image.shape[0] else 0)
+    renewed = robot_probability.copy()
+    renewed[y + top : y + bottom, x + left : x + right] = seen[top:bottom, left:right]
+    return renewed
