@@ -29,6 +29,9 @@ class EventKind(StrEnum):
     TARGET = "target"
     NOTE = "note"
     DROPPED = "frames dropped"
+    """By the recorder, which was behind."""
+    LOST = "frames lost"
+    """By the camera: they never came."""
     VIDEO = "video"
 
 

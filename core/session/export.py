@@ -98,6 +98,7 @@ _COLUMNS: dict[str, Callable[[RecordedRow, float], Any]] = {
     "video": _of("video"),
     "pts_ms": _of("pts_ms"),
     "dropped_frames": _of("dropped_frames"),
+    "camera_lost": _of("camera_lost"),
     "dropped_rows": _of("dropped_rows"),
     "state": _pose("state"),
     "theta_deg": _pose("theta_deg"),

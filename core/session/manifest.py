@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from core.config import Config
 from core.errors import UserError
 from core.learning.model_file import ModelError, model_folder, read_model_info
+from core.rig_file import RigFileError, calibration_of
 
 MANIFEST, FRAMES, EVENTS = "manifest.json", "frames.jsonl", "events.jsonl"
 PREFIX, RECOVERED = "session_", "_recovered"
@@ -96,7 +97,7 @@ class Manifest(BaseModel):
 
 
 def about_rig(config: Config, kind: Kind, rig: str, calibration: dict[str, Any] | None = None) -> About:
-    """What is known of a rig from its configuration; a model that cannot be read has no hashes."""
+    """What is known of a rig from its configuration; a model that cannot be read has no hashes. `calibration`: the rig file's."""
     name = config.perception.segmentation.model
     model: dict[str, str | None] = {"name": name}
     try:
@@ -106,6 +107,10 @@ def about_rig(config: Config, kind: Kind, rig: str, calibration: dict[str, Any] 
     else:
         model["sha256"] = info.weights_sha256
         model["onnx_sha256"], model["onnx_int8_sha256"] = info.onnx_sha256, info.onnx_int8_sha256
+    if calibration is None:
+        with contextlib.suppress(RigFileError):  # whoever opens the rig is told
+            known = calibration_of(config)
+            calibration = known.model_dump(mode="json") if known is not None else None
     return About(kind, rig, config.model_dump(mode="json"), model, calibration)
 
 

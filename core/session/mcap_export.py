@@ -47,7 +47,7 @@ TOPICS = {
 }
 _LINE_STRIP = 3
 _SIDES = ("right", "left", "up", "down")
-_LEVELS = {EventKind.FAULT: 4, EventKind.DROPPED: 3, EventKind.ALERT: 3, EventKind.OVERRIDE: 3}
+_LEVELS = {EventKind.FAULT: 4, EventKind.DROPPED: 3, EventKind.LOST: 3, EventKind.ALERT: 3, EventKind.OVERRIDE: 3}
 _JPEG_QUALITY = 90
 _COLOURS = {
     "vessel": (0.34, 0.71, 0.91),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from core.control.faults import Cause, Fault
 from core.record_config import RecordConfig
 
 _MB = 1e6
@@ -42,6 +43,18 @@ class RecordStatus:
     ring_s: float = 0.0
     saving: bool = False
     saved: Path | None = None
+
+
+def faults_between(before: RecordStatus, now: RecordStatus) -> list[Fault]:
+    """What the pilot must tell the operator of the recorder, from one look to the next."""
+    faults = []
+    if now.problem and now.problem != before.problem:
+        faults.append(Fault(Cause.DISK_FULL, now.problem))
+    elif now.warning:
+        faults.append(Fault(Cause.DISK_LOW, now.warning))
+    if now.dropped > before.dropped:
+        faults.append(Fault(Cause.RECORDER_BEHIND, f"{now.dropped} frames"))
+    return faults
 
 
 class StatusBoard:

@@ -57,7 +57,8 @@ _MAX_MASK_PX = 4096
 class RecordedRow:
     """One recorded frame without its picture. ``row`` counts in the session, ``index`` is the camera's; ``pts_ms`` is the time in
     the video file number ``video``. ``size`` is the picture's (width, height). ``drive`` is None when there was no robot to drive.
-    ``bus`` is the status of the servo bus as plain values, None where there was none.
+    ``bus`` is the status of the servo bus as plain values, None where there was none. ``camera_lost`` counts, since the camera was
+    opened, the frames that never came from it; ``dropped_frames`` those that came and were skipped for a newer one.
     """
 
     row: int
@@ -75,10 +76,11 @@ class RecordedRow:
     status: RobotStatus | None
     drive: DriveView | None
     bus: dict[str, Any] | None
+    camera_lost: int = 0
 
     def tick(self, image: Image) -> Tick:
         """The tick as it was, with its picture from the video."""
-        frame = Frame(self.index, self.captured_s, image)
+        frame = Frame(self.index, self.captured_s, image, self.camera_lost)
         return Tick(
             frame, self.scene, self.advice, self.sent, self.status, self.dropped_frames + self.dropped_rows, self.frames_per_second
         )
@@ -103,6 +105,7 @@ def row_from_json(record: Row) -> RecordedRow:
         status=status_from(record.get("servo")),
         drive=drive_from(record.get("drive")),
         bus=group(record["bus"], "bus") if record.get("bus") is not None else None,
+        camera_lost=count(record.get("camera_lost", 0), "camera_lost"),  # sessions of before have none
     )
 
 

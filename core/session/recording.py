@@ -19,9 +19,9 @@ from core.session.ring import EncodedFrame, Ring
 from core.session.ring_saver import RingSaver
 from core.session.rows import row_of
 from core.session.video import FrameEncoder
-from core.types import Tick
+from core.types import Frame, Tick
 
-_TELL_DROPPED_S = 1.0
+_TELL_EVERY_S = 1.0
 _MAX_EARLY_EVENTS = 1000
 
 
@@ -33,6 +33,14 @@ class Picture:
     drive: DriveView | None
     bus: Any
     dropped: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Lost:
+    """How many frames of the camera are known to be lost, and when that was told (or first looked at)."""
+
+    total: int
+    told_s: float
 
 
 class Recording:
@@ -59,6 +67,7 @@ class Recording:
         self._drive: DriveView | None = None
         self._dropped_told = 0
         self._dropped_told_s = -math.inf
+        self._lost: _Lost | None = None
         # read by other threads
         self.dropped_before = 0
         self.began_s = 0.0
@@ -85,9 +94,8 @@ class Recording:
         if self._is_armed:
             self._open(picture)
         if picture.drive is not None:
-            for event in events_between(self._drive, picture.drive):
-                self.take_event(event)
-            self._drive = picture.drive
+            self.take_drive(picture.drive)
+        self._tell_lost(picture.tick.frame)
         encoded = self._encoded(picture)
         if self._ring is not None:
             self._ring.add(encoded)
@@ -109,6 +117,14 @@ class Recording:
         row = row_of(picture.tick, picture.drive, bus=picture.bus, dropped_rows=dropped, with_masks=self._config.masks)
         return EncodedFrame(frame.captured_s, packet, self._encoder, json.dumps(row, allow_nan=False, separators=(",", ":")))
 
+    def take_drive(self, view: DriveView) -> None:
+        """Write what changed since the last view; one that is overtaken by a newer one tells nothing new. Raises OSError."""
+        if self._drive is not None and view.time_s < self._drive.time_s:
+            return
+        for event in events_between(self._drive, view):
+            self.take_event(event)
+        self._drive = view
+
     def take_event(self, event: Event) -> None:
         """Keep it and write it; between start and the first frame it waits. Raises OSError."""
         if self._ring is not None:
@@ -121,10 +137,20 @@ class Recording:
     def _tell_dropped(self, picture: Picture) -> None:
         """At most once a second: a recorder that is behind must not be kept busy with saying so."""
         total, now_s = picture.dropped - self.dropped_before, picture.tick.frame.captured_s
-        if total > self._dropped_told and now_s - self._dropped_told_s >= _TELL_DROPPED_S:
+        if total > self._dropped_told and now_s - self._dropped_told_s >= _TELL_EVERY_S:
             count = total - self._dropped_told
             self._dropped_told, self._dropped_told_s = total, now_s
             self.take_event(Event(now_s, EventKind.DROPPED, f"{count} frames", {"count": count, "total": total}))
+
+    def _tell_lost(self, frame: Frame) -> None:
+        """Frames that never came from the camera; at most once a second, too. A camera that was opened again counts from 0."""
+        known = self._lost
+        if known is None or frame.lost < known.total:
+            self._lost = _Lost(frame.lost, frame.captured_s)
+        elif frame.lost > known.total and frame.captured_s - known.told_s >= _TELL_EVERY_S:
+            count = frame.lost - known.total
+            self._lost = _Lost(frame.lost, frame.captured_s)
+            self.take_event(Event(frame.captured_s, EventKind.LOST, f"{count} frames", {"count": count, "total": frame.lost}))
 
     def begin(self) -> None:
         """A session begins with the next frame; nothing happens when one is being recorded."""
@@ -171,7 +197,7 @@ class Recording:
     def change_rig(self, about: About, dropped: int) -> None:
         """A session never mixes two rigs, and neither does the ring."""
         self.end("another rig was opened", dropped)
-        self._about, self._drive = about, None
+        self._about, self._drive, self._lost = about, None, None
         if self._ring is not None:
             self._ring.clear()
 

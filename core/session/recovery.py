@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -27,6 +28,7 @@ from core.session.manifest import (
     sync_folder,
     write_manifest,
 )
+from core.session.pictures import packet_times
 from core.session.reader import check_is_session
 from core.session.recorded import row_from_json
 from core.session.remux import Expected, remux
@@ -142,15 +144,44 @@ def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda 
     return recovery
 
 
-def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Recovery:
-    found = _Salvage()
+def expected_loss(session: Path, on_bytes: OnBytes = lambda _: None) -> Recovery:
+    """What `recover` would find, without writing anything. Pictures count as there when their packets are: none is decoded.
+
+    Raises
+    ------
+    SessionError
+        Not a session, being recorded, of a newer version, or nothing left in it.
+    """
+    session = session.absolute()
+    check_is_session(session)
+    if is_being_written(session):
+        raise SessionError(f"{session}: is being recorded; stop the recording first")
+    found, manifest = _Salvage(), _manifest_of(session)
+    nowhere = Path(os.devnull)
+    _copy_lines(session / FRAMES, nowhere, found, _take_row, on_bytes)
+    _copy_lines(session / EVENTS, nowhere, found, _take_event, lambda _: None)
+    for path in sorted(session.glob("video_*.mkv")):
+        if (video := _number_of(path)) is not None:
+            found.kept |= {(video, pts_ms) for pts_ms, _ in packet_times(path)}
+        on_bytes(path.stat().st_size)
+    if not found.rows and not found.kept:
+        raise SessionError(f"{session}: nothing left to recover: neither rows nor pictures can be read")
+    return Recovery(session, len(found.rows), len(found.kept), _loss(session, manifest[0], found))
+
+
+def _manifest_of(session: Path) -> tuple[Manifest, list[str]]:
+    """The manifest, or one that claims nothing, and what is wrong with it. Raises SessionError for a newer version."""
     try:
-        manifest = read_manifest(session)
+        return read_manifest(session), []
     except SessionError as error:
         if "newer version" in str(error):
             raise
-        found.problems.append(str(error))
-        manifest = _unknown(session)
+        return _unknown(session), [str(error)]
+
+
+def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Recovery:
+    manifest, problems = _manifest_of(session)
+    found = _Salvage(problems)
     _copy_lines(session / FRAMES, work / FRAMES, found, _take_row, on_bytes)
     _copy_lines(session / EVENTS, work / EVENTS, found, _take_event, lambda _: None)
     for path in sorted(session.glob("video_*.mkv")):
@@ -212,15 +243,20 @@ def _take_event(line: Line, found: _Salvage) -> None:
 
 
 def _copy_video(path: Path, target: Path, found: _Salvage) -> None:
-    digits = path.stem.rpartition("_")[2]
-    if not digits.isascii() or not digits.isdigit():
+    video = _number_of(path)
+    if video is None:
         found.problems.append(f"{path.name}: not a name of ours; left out")
         return
-    video = int(digits)
     done = remux(path, target, found.expected.get(video, []))
     found.problems += done.problems
     found.kept |= {(video, pts_ms) for pts_ms in done.kept_ms}
     found.videos += bool(done.kept_ms)
+
+
+def _number_of(path: Path) -> int | None:
+    """Of a video file; None when it is none of ours."""
+    digits = path.stem.rpartition("_")[2]
+    return int(digits) if digits.isascii() and digits.isdigit() else None
 
 
 def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:

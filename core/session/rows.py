@@ -78,6 +78,7 @@ def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, dropped_rows
         "captured_s": finite(tick.frame.captured_s, 6),
         "size": [width, height],
         "dropped_frames": tick.dropped_frames,
+        "camera_lost": tick.frame.lost,
         "dropped_rows": dropped_rows,
         "fps": finite(tick.frames_per_second, 3),
         "mode": drive.mode.value if drive else None,

@@ -100,16 +100,26 @@ class SessionWriter:
             self._changed.notify()
         return True
 
+    def drive(self, view: DriveView) -> bool:
+        """Who drives has changed, or what hinders: recorded although there may be no picture. Never waits.
+
+        False when the recorder has ended or is hopelessly behind.
+        """
+        return self._queue(lambda: self._recording.take_drive(view))
+
     def event(self, kind: EventKind, text: str = "", data: dict[str, Any] | None = None, time_s: float | None = None) -> bool:
         """Add an event (a note, a destination, an alert); modes, faults and acknowledgements are found in the drive views."""
         return self.add_event(Event(self._clock() if time_s is None else time_s, kind, text, data or {}))
 
     def add_event(self, event: Event) -> bool:
         """False when the recorder has ended or is hopelessly behind."""
+        return self._queue(event)
+
+    def _queue(self, item: Event | _Order) -> bool:
         with self._changed:
             if self._is_closing or len(self._waiting) >= _MAX_EVENTS:
                 return False
-            self._waiting.append(event)
+            self._waiting.append(item)
             self._changed.notify()
         return True
 

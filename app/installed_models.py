@@ -1,0 +1,62 @@
+"""Which models there are, shipped and the user's own, and what is known of each. No Qt here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from core.learning.model_file import INFO, MODELS, ModelError, ModelInfo, own_models, read_model_info
+
+
+@dataclass(frozen=True, slots=True)
+class InstalledModel:
+    """A model by the name it is called. ``problem``: why it cannot be used, "" when it can."""
+
+    name: str
+    folder: Path
+    is_own: bool
+    info: ModelInfo | None
+    problem: str = ""
+
+    @property
+    def figures(self) -> str:
+        """How good it was measured to be, in one line."""
+        return figures_line(self.info) if self.info is not None else self.problem
+
+
+def installed_models() -> list[InstalledModel]:
+    """All models, shipped ones first; a damaged one is named as such. Hashes are checked when one is opened, not here."""
+    found = []
+    for place, is_own in ((MODELS, False), (own_models(), True)):
+        for path in sorted(place.glob(f"*/{INFO}")):
+            try:
+                info, problem = read_model_info(path.parent, verify=()), ""
+            except ModelError as error:
+                info, problem = None, str(error)
+            found.append(InstalledModel(path.parent.name, path.parent, is_own, info, problem))
+    return found
+
+
+def figures_line(info: ModelInfo) -> str:
+    """Dice of vessel and robot, on what; and whether it was taught what its confidence means."""
+    figures: dict[str, Any] = info.figures
+    parts = []
+    if "vessel_dice" in figures and "robot_dice" in figures:
+        parts.append(f"Dice vessel {_figure(figures, 'vessel_dice')}, robot {_figure(figures, 'robot_dice')}")
+        what = "held-out pictures" if figures.get("held_out") else f"pictures of {figures.get('set', 'a test set')}"
+        parts[0] += f" on {figures.get('frames', '?')} {what}"
+    else:
+        parts.append("not measured")
+    if "state_agreement" in figures:
+        parts.append(f"state {100 * figures['state_agreement']:.0f} %")
+    if info.calibration is None:
+        parts.append("confidence not calibrated")
+    return ", ".join(parts)
+
+
+def _figure(figures: dict[str, Any], name: str) -> str:
+    """Now, and before training where that is known."""
+    before = figures.get("before")
+    now = f"{figures[name]:.2f}"
+    return f"{before[name]:.2f} \N{RIGHTWARDS ARROW} {now}" if isinstance(before, dict) and name in before else now

@@ -1,0 +1,194 @@
+"""Sessions that were cut (kill, power, full disk): looked for when the window starts, offered one by one, recovered into copies."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from PySide6.QtCore import QObject, Signal
+
+from app.child_process import ChildProcess, command_of
+from app.widgets.offer_strip import Answer, Offer
+from app.work_thread import WorkThread
+from core.session.recovery import CutSession, find_cut_sessions
+
+_KEY = "recovery"
+_END_WITHIN_MS = 3000
+
+
+class Offers(Protocol):
+    """Where offers are shown."""
+
+    def offer(self, offer: Offer) -> None: ...
+    def withdraw(self, key: str) -> None: ...
+
+
+class Declined:
+    """The sessions that nobody wants to hear of again, by their folders' names; a small file in the program's state folder."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def names(self) -> set[str]:
+        """A file that cannot be read declines nothing."""
+        try:
+            names = json.loads(self._path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError):
+            return set()
+        return {name for name in names if isinstance(name, str)} if isinstance(names, list) else set()
+
+    def add(self, name: str) -> None:
+        """Raises OSError."""
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = self._path.with_name(f".{self._path.name}.{os.getpid()}")
+        temporary.write_text(json.dumps(sorted(self.names() | {name})), encoding="utf-8")
+        temporary.replace(self._path)
+
+
+class RecoveryDesk(QObject):
+    """Looks, measures, offers, recovers. The window waits for none of it, and the damaged original is never touched.
+
+    ``said`` carries a line for people and whether it is a fault; ``recovered`` the folder of a copy and what it lacks, in words.
+
+    Parameters
+    ----------
+    folder : where recordings go.
+    offers : where to ask.
+    declined : what is not asked again.
+    """
+
+    said = Signal(str, bool)
+    recovered = Signal(object, str)
+
+    def __init__(self, folder: Path, offers: Offers, declined: Declined, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._folder, self._offers, self._declined = folder, offers, declined
+        self._waiting: list[CutSession] = []
+        self._found = 0
+        self._child: ChildProcess | None = None
+        self._says_none = False
+        self._work = WorkThread("looking for cut sessions", self)
+        self._work.done.connect(self._on_looked)
+        self._work.failed.connect(self._on_look_failed)
+
+    def look(self, *, again: bool = False) -> None:
+        """Look for cut sessions; `again`: also for those that were declined, and say when there are none."""
+        if self._child is not None or self._waiting:
+            return
+        self._says_none = again
+        folder, declined = self._folder, self._declined
+
+        def find() -> list[CutSession]:
+            not_wanted = set() if again else declined.names()
+            return [cut for cut in find_cut_sessions(folder) if cut.folder.name not in not_wanted]
+
+        self._work.submit("look", find, once=True)
+
+    def close(self) -> None:
+        """Look no further; a recovery that goes on ends by itself, and leaves a whole copy or none."""
+        if self._child is not None:
+            self._child.leave()
+            self._child.ask_to_end()
+        self._work.stop(finish=False)
+        self._work.wait(_END_WITHIN_MS)
+
+    def _on_looked(self, _key: object, found: list[CutSession]) -> None:
+        self._waiting, self._found = list(found), len(found)
+        if not found and self._says_none:
+            self.said.emit(f"No cut session in {self._folder}", False)
+        self._measure_next()
+
+    def _on_look_failed(self, _key: object, line: str) -> None:
+        self.said.emit(f"Cut sessions could not be looked for: {line}", True)
+
+    # ---- one after the other
+
+    def _measure_next(self) -> None:
+        """How much would be lost is read before anybody is asked."""
+        if not self._waiting:
+            return
+        session = self._waiting[0].folder
+        told: dict[str, Any] = {}
+        self._run("--only-look", session, told.update, lambda code, line: self._on_measured(session, told, code, line))
+
+    def _on_measured(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
+        self._child = None
+        lost = told.get("lost")
+        if code != 0 or not isinstance(lost, dict):
+            never = Answer("Never", lambda: self._decline(session), "Do not ask again for this one")
+            text = "A recording was cut, and it cannot be recovered"
+            self._offers.offer(Offer(_KEY, text, line or session.name, (never,), is_fault=True, dismissed=self._next))
+            return
+        place = f" ({self._found - len(self._waiting) + 1} of {self._found})" if self._found > 1 else ""
+        text = f"A recording was cut{place}: {loss_words(lost)}"
+        kept = f"{told.get('pictures', 0)} pictures are whole"
+        self._offers.offer(
+            Offer(
+                _KEY,
+                text,
+                f"{session.name}; {kept}. The damaged original stays as it is.",
+                (
+                    Answer("Recover", lambda: self._recover(session), f"Make a whole copy beside {session}"),
+                    Answer("Not now", self._next, "Ask again at the next start"),
+                    Answer("Never", lambda: self._decline(session), "Do not ask again for this one"),
+                ),
+                dismissed=self._next,
+            )
+        )
+
+    def _next(self) -> None:
+        self._waiting.pop(0)
+        self._measure_next()
+
+    def _decline(self, session: Path) -> None:
+        try:
+            self._declined.add(session.name)
+        except OSError as error:
+            self.said.emit(f"That you do not want to be asked could not be kept ({error.strerror})", True)
+        self._next()
+
+    def _recover(self, session: Path) -> None:
+        told: dict[str, Any] = {}
+
+        def on_told(record: dict[str, Any]) -> None:
+            if "done" in record:  # progress
+                self._show_share(session, record)
+            else:
+                told.update(record)
+
+        self._show_share(session, {})
+        self._run("--progress-json", session, on_told, lambda code, line: self._on_recovered(session, told, code, line))
+
+    def _show_share(self, session: Path, record: dict[str, Any]) -> None:
+        done, total = record.get("done"), record.get("total")
+        share = min(1.0, done / total) if done is not None and total else -1.0
+        self._offers.offer(Offer(_KEY, "Recovering a copy", session.name, share=share))
+
+    def _on_recovered(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
+        self._child = None
+        self._offers.withdraw(_KEY)
+        if code == 0 and "session" in told:
+            words = loss_words(told["lost"])
+            self.said.emit(f"Recovered: {told['session']}; {words}", False)
+            self.recovered.emit(Path(told["session"]), f"Recovered; {words}")
+        else:
+            self.said.emit(f"Not recovered: {line or f'exit code {code}'}", True)
+        self._next()
+
+    def _run(
+        self, option: str, session: Path, on_told: Callable[[dict[str, Any]], None], on_ended: Callable[[int, str], None]
+    ) -> None:
+        self._child = ChildProcess(command_of("session", "recover", str(session), option, "--json"), self)
+        self._child.told.connect(on_told)
+        self._child.ended.connect(on_ended)
+        self._child.start()
+
+
+def loss_words(lost: dict[str, Any]) -> str:
+    """A loss as people say it."""
+    if not lost["rows"] and not lost["pictures"]:
+        return "nothing of it is lost"
+    return f"{lost['seconds']:.1f} s are lost ({lost['rows']} rows, {lost['pictures']} pictures)"

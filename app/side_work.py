@@ -1,0 +1,227 @@
+"""What the operator window does beside driving: cut sessions, the steps after a session, checks before arming, models, crashes."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtWidgets import QFileDialog, QMessageBox
+
+from app.after_session import AfterSession, open_file
+from app.annotate_sources import default_store
+from app.crash_report import Crash, CrashWatch, crash_of_last_run
+from app.engine_thread import Phase
+from app.menus import MenuEntry, add_menu
+from app.model_menu import ModelMenu
+from app.next_step import Step
+from app.operator_window import OperatorWindow
+from app.preflight_desk import PreflightDesk
+from app.recovery_desk import Declined, RecoveryDesk
+from app.training_dialog import TrainingDialog
+from app.training_source import collect_from_file
+from app.widgets.offer_strip import Answer, Offer
+from app.widgets.preflight_list import PreflightList
+from core.control.modes import ARMED_MODES, Act
+from core.record_config import sessions_folder
+from core.session.record_status import RecordStatus
+
+_LOOK_AFTER_MS = 1500
+"""The window is open and its rig is being started; a search must not delay that."""
+_CRASH = "crash"
+
+
+class SideWork(QObject):
+    """Composes and wires; all work is done in threads and processes of their own.
+
+    Parameters
+    ----------
+    window : not started yet.
+    state : folder of what the program remembers between runs.
+    watch : is told what to do at an unforeseen error; installed and removed by its owner.
+    """
+
+    _crashed = Signal(object)
+
+    def __init__(self, window: OperatorWindow, state: Path, watch: CrashWatch | None = None) -> None:
+        super().__init__(window)
+        self._window, self._state = window, state
+        offers = window.panels.offers
+        self._offers = offers
+        self.after = AfterSession(offers, parent=self)
+        self.recovery = RecoveryDesk(
+            sessions_folder(window.config.record.folder), offers, Declined(state / "not_to_recover.json"), self
+        )
+        self.preflight = PreflightDesk(lambda: window.config, lambda: window.desk.view, self)
+        self.checks = PreflightList(self.preflight, window)
+        self.models = ModelMenu(window, offers, self._model, self._against_another_model, self._cost_of_another_model, self.train)
+        self.training: TrainingDialog | None = None
+        self._saved: Path | None = None
+        self._is_recording = False
+        self._wire()
+        self._add_menus()
+        if watch is not None:
+            watch.on_first, watch.on_report = self.make_safe, self._crashed.emit
+            # also from the window's own thread not before the slot that failed has returned
+            self._crashed.connect(self._show_crash, Qt.ConnectionType.QueuedConnection)
+
+    def _wire(self) -> None:
+        window = self._window
+        for part in (self.after, self.recovery, self.models):
+            part.said.connect(window.say)
+        self.recovery.recovered.connect(self.after.offer)
+        window.recorder.changed.connect(self._on_recording)
+        window.phase_changed.connect(self._on_phase)
+        window.may_take = self.preflight.may_take
+        self.preflight.asked.connect(self._on_not_armed)
+        self.checks.arm_asked.connect(partial(window.take, Step.ARM))
+        self.models.chosen.connect(self._use_model)
+
+    def _add_menus(self) -> None:
+        window = self._window
+        session = [
+            MenuEntry("&Evaluate the newest session", partial(self._with_newest, self.after.evaluate)),
+            MenuEntry("&Annotate the newest session", partial(self._with_newest, self.after.annotate)),
+            MenuEntry("&Play the newest session", partial(self._with_newest, self.after.play)),
+            MenuEntry("&Open another session...", self._choose_session),
+            None,
+            MenuEntry("Look for &cut sessions", partial(self.recovery.look, again=True)),
+        ]
+        add_menu(window, "&Session", session)
+        add_menu(window, "&Robot", [MenuEntry("Chec&ks before driving...", self.checks.open_list, ("F2",))])
+
+    def start(self) -> None:
+        """Look for what the last run left behind."""
+        QTimer.singleShot(_LOOK_AFTER_MS, self, self.recovery.look)
+        crash = crash_of_last_run(self._state / "crashes")
+        if crash is not None and crash.report is not None:
+            self._offer_report("The last run of the program crashed", crash)
+
+    def close(self) -> None:
+        """The window closes."""
+        for part in (self.recovery, self.preflight, self.after):
+            part.close()
+        self.checks.close()
+        if self.training is not None:
+            self.training.end()
+
+    # ---- sessions
+
+    def _on_recording(self, status: RecordStatus) -> None:
+        if status.recording and not self._is_recording:
+            self.after.withdraw()
+        self._is_recording = status.recording
+        if status.saved is not None and status.saved != self._saved:
+            self._saved = status.saved
+            if not status.recording:
+                self.after.offer(status.saved)
+
+    def _with_newest(self, step: object) -> None:
+        session = self.after.session
+        if session is None:
+            self._window.say("No session yet: F9 records one", False)
+        elif callable(step):
+            step(session)
+
+    def _choose_session(self) -> None:
+        folder = sessions_folder(self._window.config.record.folder)
+        dialog = QFileDialog(self._window, "A recorded session", str(folder))
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+        dialog.fileSelected.connect(lambda path: self.after.offer(Path(path), "Session"))
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.show()  # not open(): the STOP button must stay within reach
+
+    # ---- before driving
+
+    def _on_phase(self, phase: Phase) -> None:
+        if phase is Phase.RUNNING:
+            self.preflight.begin_soon()
+
+    def _on_not_armed(self, line: str) -> None:
+        self._window.say(line, True)
+        self.checks.open_list()
+
+    # ---- models
+
+    def _model(self) -> str:
+        return self._window.config.perception.segmentation.model
+
+    def _against_another_model(self) -> str:
+        view = self._window.desk.view
+        if view is not None and view.mode in ARMED_MODES:
+            return "the program is armed; disarm first (Shift+F6)"
+        return ""
+
+    def _cost_of_another_model(self) -> str:
+        ends = " The recording ends." if self._is_recording else ""
+        return f"The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}"
+
+    def _use_model(self, name: str) -> None:
+        config = self._window.config
+        segmentation = config.perception.segmentation.model_copy(update={"model": name})
+        perception = config.perception.model_copy(update={"segmentation": segmentation})
+        self._window.say(f"Model {name} from now on, until the program ends", False)
+        self._window.use_config(config.model_copy(update={"perception": perception}))
+
+    def train(self) -> None:
+        """The training that is there already, or a new one on a chosen annotation file."""
+        if self.training is not None and self.training.is_busy:
+            self.training.show()
+            self.training.raise_()
+            return
+        session = self.after.session
+        start = default_store([session]).parent if session is not None else sessions_folder(self._window.config.record.folder)
+        dialog = QFileDialog(self._window, "Annotations to train on", str(start), "Annotations (*.sqlite)")
+        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+        dialog.fileSelected.connect(lambda path: self.open_training(Path(path)))
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.show()
+
+    def open_training(self, store: Path) -> None:
+        """The dialog for an annotation file."""
+        if self.training is not None:
+            self.training.end()
+            self.training.deleteLater()
+        self.training = TrainingDialog(partial(collect_from_file, store), str(store), self._window)
+        self.training.job.installed.connect(self._on_installed)
+        self.training.show()
+
+    def _on_installed(self, name: str) -> None:
+        self._window.say(f"Model {name} is installed; choose it in the Model menu", False)
+
+    # ---- crashes
+
+    def make_safe(self) -> None:
+        """After an unforeseen error, from any thread: the servos stop, and the recording ends as a whole session."""
+        pilot = self._window.pilot
+        if pilot is not None:
+            pilot.ask(Act.STOP)
+        self._window.recorder.stop("the program met an unforeseen error")
+
+    def _show_crash(self, crash: Crash) -> None:
+        where = f"The report is {crash.report}" if crash.report is not None else "The report could not be written"
+        box = QMessageBox(
+            QMessageBox.Icon.Critical, "Unforeseen error", f"The program met an error: {crash.what}", parent=self._window
+        )
+        box.setInformativeText(
+            f"The servos were stopped, and a recording that ran was ended and is whole.\n\n{where}.\n\n"
+            "Best close the program and start it again. Space is still STOP."
+        )
+        leave = box.addButton("Close the program", QMessageBox.ButtonRole.AcceptRole)
+        if crash.report is not None:
+            show = box.addButton("Show the report", QMessageBox.ButtonRole.ActionRole)
+            show.clicked.disconnect()  # it answers nothing: the box stays
+            show.clicked.connect(partial(open_file, crash.report))
+        box.addButton("Go on", QMessageBox.ButtonRole.RejectRole)
+        box.setDefaultButton(leave)
+        box.setModal(False)
+        box.buttonClicked.connect(lambda button: self._window.close() if button is leave else None)
+        box.finished.connect(box.deleteLater)
+        box.show()
+
+    def _offer_report(self, text: str, crash: Crash) -> None:
+        report = crash.report
+        assert report is not None
+        show = Answer("Show the report", partial(open_file, report), str(report))
+        self._offers.offer(Offer(_CRASH, text, f"{crash.what}. The report: {report}", (show,), is_fault=True))

@@ -1,0 +1,162 @@
+"""Training on one's own annotations, watched: what to call it, how it goes, what it changes, and stop."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDialog,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QProgressBar,
+    QPushButton,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app import theme
+from app.installed_models import InstalledModel, installed_models
+from app.training_job import STEPS, Collect, Phase, TrainingJob, TrainingState, Wish, name_problem
+from app.widgets.before_after import BeforeAfter
+from app.widgets.card import Card
+from app.widgets.training_curves import TrainingCurves
+
+_SIZE = QSize(940, 640)
+
+
+class TrainingDialog(QDialog):
+    """Shows a job and hands it the user's wishes. Closing it while it trains only hides it: the training goes on.
+
+    Parameters
+    ----------
+    collect : reads annotations and images; see ``TrainingJob``.
+    source : where they come from, for the heading.
+    """
+
+    def __init__(self, collect: Collect, source: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.job = TrainingJob(collect, self)
+        self.setWindowTitle("Train on my annotations")
+        self.setModal(False)
+        self.resize(_SIZE)
+        self.name, self.init, self.steps = QLineEdit(), QComboBox(), QSpinBox()
+        self.start, self.stop = QPushButton("&Train"), QPushButton("&Stop, keep what was learnt")
+        self.hide_button = QPushButton("&Close")
+        self.curves, self.pictures = TrainingCurves(), BeforeAfter()
+        self._bar, self._line = QProgressBar(), QLabel()
+        self._fill_form()
+        heading = QLabel(f"Masks from {source}")
+        heading.setObjectName("card_title")
+        column = QVBoxLayout(self)
+        column.setContentsMargins(16, 12, 16, 12)
+        column.setSpacing(theme.GAP)
+        column.addWidget(heading)
+        column.addLayout(self._form())
+        column.addWidget(Card("", self.curves), 4)
+        column.addWidget(Card("", self.pictures), 6)
+        column.addWidget(self._line)
+        column.addLayout(self._foot())
+        self.job.changed.connect(self._on_changed)
+        self._on_changed(self.job.state)
+
+    @property
+    def line(self) -> str:
+        """What is the matter, as shown."""
+        return self._line.text()
+
+    @property
+    def is_busy(self) -> bool:
+        """A training goes on."""
+        return self.job.state.is_busy
+
+    def end(self) -> None:
+        """The window behind it closes: a training that goes on ends by itself and keeps what it learnt."""
+        self.job.close()
+        self.close()
+
+    def _fill_form(self) -> None:
+        self.name.setMaxLength(40)
+        self.name.setText(_free_name())
+        self.name.setAccessibleName("Name of the new model")
+        for model in installed_models():
+            if not model.problem:
+                self.init.addItem(_title(model), model.name)
+        self.init.setAccessibleName("Model to start from")
+        self.steps.setRange(10, 20_000)
+        self.steps.setSingleStep(100)
+        self.steps.setValue(STEPS)
+        self.steps.setSuffix(" steps")
+        self.steps.setAccessibleName("Steps of training")
+        self._line.setWordWrap(True)
+        self._line.setMinimumHeight(38)
+        self._bar.setTextVisible(False)
+        self._bar.setFixedHeight(8)
+        for button, slot in ((self.start, self._on_start), (self.stop, self.job.stop), (self.hide_button, self.close)):
+            button.setAutoDefault(False)
+            button.clicked.connect(slot)
+
+    def _form(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        for word, field, stretch in (("New model", self.name, 2), ("starts from", self.init, 3), ("for", self.steps, 1)):
+            label = QLabel(word)
+            label.setBuddy(field)
+            row.addWidget(label)
+            row.addWidget(field, stretch)
+        row.addWidget(self.start)
+        return row
+
+    def _foot(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.addWidget(self._bar, 1, Qt.AlignmentFlag.AlignVCenter)
+        row.addWidget(self.stop)
+        row.addWidget(self.hide_button)
+        return row
+
+    def _on_start(self) -> None:
+        self.job.start(Wish(self.name.text().strip(), str(self.init.currentData() or "default"), self.steps.value()))
+
+    def _on_changed(self, state: TrainingState) -> None:
+        for field in (self.name, self.init, self.steps, self.start):
+            field.setEnabled(not state.is_busy)
+        self.stop.setEnabled(state.phase is Phase.RUNNING)
+        self._bar.setRange(0, state.steps if state.step or not state.is_busy else 0)
+        self._bar.setValue(state.steps if state.phase is Phase.DONE else state.step)
+        self._line.setText(_words(state))
+        self.setAccessibleDescription(self._line.text())
+        self.curves.show_state(state)
+        if state.looks:
+            after = state.looks[-1].pictures if len(state.looks) > 1 else ()
+            self.pictures.show_pictures(state.looks[0].pictures, after)
+        if state.phase is Phase.DONE and name_problem(self.name.text()):
+            self.name.setText(_free_name())
+
+
+def _words(state: TrainingState) -> str:
+    if state.phase is Phase.IDLE:
+        return (
+            "The masks become two sets: one to learn from, and a fifth of the pictures that stays out and shows whether it helped. "
+            "It runs at low priority, and the new model is used only when you choose it."
+        )
+    if state.phase is not Phase.RUNNING or not state.step:
+        return state.line
+    left = f", {_duration(state.left_s)} left" if state.left_s is not None else ""
+    _, loss, vessel, robot = state.curve[-1]
+    return f"Step {state.step} of {state.steps}{left}. Loss {loss:.3f}, Dice vessel {vessel:.2f}, robot {robot:.2f}. {state.line}"
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
+
+
+def _title(model: InstalledModel) -> str:
+    return f"{model.name} (own)" if model.is_own else model.name
+
+
+def _free_name() -> str:
+    """A name that no model has."""
+    number = 1
+    while name_problem(name := f"own_{number}"):
+        number += 1
+    return name

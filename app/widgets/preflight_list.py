@@ -1,0 +1,160 @@
+"""The checks before driving as a list: a sign, a word, what was found, what to do. Space is STOP here, too."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
+
+from app import palette, theme
+from app.preflight_desk import Finding, Preflight, PreflightDesk
+from app.widgets.signs import Sign, paint_sign
+from hardware.driving_checks import Level
+
+_SIZE = QSize(780, 560)
+_RENEW_MS = 1000
+_TICK = QPolygonF([QPointF(4.0, 12.0), QPointF(9.0, 17.0), QPointF(18.0, 6.0)])
+_LOOK: dict[Level, tuple[Sign | None, str, str]] = {
+    Level.GOOD: (None, "ALLOWED", "good"),
+    Level.WARNING: (Sign.WARNING, "ORANGE", "to know"),
+    Level.BAD: (Sign.BARRED, "FAULT", "NOT READY"),
+}
+
+
+class _Badge(QWidget):
+    """Sign and word of a level: colour alone says nothing to some."""
+
+    def __init__(self, level: Level) -> None:
+        super().__init__()
+        self._level = level
+        self.setFixedSize(112, 22)
+        self.setAccessibleName(_LOOK[level][2])
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        sign, role, word = _LOOK[self._level]
+        colour = QColor(getattr(palette, role))
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if sign is None:
+            painter.setPen(QPen(colour, 2.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin))
+            painter.drawPolyline(_TICK)
+        else:
+            paint_sign(painter, QRectF(2, 2, 18, 18), sign, colour)
+        painter.setPen(colour)
+        painter.setFont(theme.semi_bold(13))
+        painter.drawText(QRectF(28, 0, 84, 20), Qt.AlignmentFlag.AlignVCenter, word)
+        painter.end()
+
+
+class PreflightList(QDialog):
+    """Shows what the desk knows. ``arm_asked`` is the operator's wish; nothing here decides."""
+
+    arm_asked = Signal()
+
+    def __init__(self, desk: PreflightDesk, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._desk = desk
+        self._shown: tuple[Finding, ...] = ()
+        self.setWindowTitle("Before driving")
+        self.setModal(False)
+        self.resize(_SIZE)
+        self._headline = QLabel()
+        self._headline.setWordWrap(True)
+        self._headline.setFont(theme.bold(18))
+        self._note = QLabel()
+        self._note.setObjectName("card_note")
+        self._list = QWidget()
+        self._rows = QGridLayout(self._list)
+        self._rows.setColumnStretch(2, 1)
+        self._rows.setHorizontalSpacing(14)
+        self._rows.setVerticalSpacing(8)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setWidget(self._list)
+        self.again = QPushButton("Check &again")
+        self.arm = QPushButton("A&rm  (F6)")
+        self.leave = QPushButton("&Close")
+        self.again.clicked.connect(desk.begin)
+        self.arm.clicked.connect(self._on_arm)
+        self.leave.clicked.connect(self.close)
+        for button in (self.again, self.arm, self.leave):
+            button.setAutoDefault(False)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self._note, 1)
+        for button in (self.again, self.arm, self.leave):
+            buttons.addWidget(button)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(18, 14, 18, 14)
+        column.setSpacing(12)
+        column.addWidget(self._headline)
+        column.addWidget(scroll, 1)
+        column.addLayout(buttons)
+        self._timer = QTimer(self)
+        self._timer.setInterval(_RENEW_MS)
+        self._timer.timeout.connect(self.renew)  # what the open rig says changes by itself
+        self.finished.connect(self._timer.stop)
+        desk.changed.connect(self.renew)
+        self.renew()
+
+    @property
+    def texts(self) -> list[str]:
+        """The lines as shown."""
+        return [f"{_LOOK[one.level][2]} {one.name}: {one.detail} {one.fix}".strip() for one in self._shown]
+
+    @property
+    def headline(self) -> str:
+        return self._headline.text()
+
+    def open_list(self) -> None:
+        """Show it, in front."""
+        self.renew()
+        self._timer.start()
+        self.show()
+        self.raise_()
+        self.activateWindow()
+
+    def renew(self) -> None:
+        """Show what is known now."""
+        now = self._desk.preflight
+        self._headline.setText(now.headline)
+        self._note.setText(_note(now))
+        self.again.setEnabled(not now.is_running)
+        self.arm.setEnabled(self._desk.has_robot and now.is_fresh and not now.against and not now.is_running)
+        if now.findings != self._shown:
+            self._shown = now.findings
+            self._fill()
+
+    def _on_arm(self) -> None:
+        self.close()
+        self.arm_asked.emit()
+
+    def _fill(self) -> None:
+        while (item := self._rows.takeAt(0)) is not None:
+            if (widget := item.widget()) is not None:
+                widget.hide()
+                widget.deleteLater()
+        for row in range(self._rows.rowCount()):
+            self._rows.setRowStretch(row, 0)
+        order = {Level.BAD: 0, Level.WARNING: 1, Level.GOOD: 2}
+        for place, finding in enumerate(sorted(self._shown, key=lambda one: order[one.level])):
+            name = QLabel(finding.name[0].upper() + finding.name[1:])
+            name.setFont(theme.semi_bold(theme.Size.BODY))
+            detail = QLabel(finding.detail + (f"\n\N{RIGHTWARDS ARROW} {finding.fix}" if finding.fix else ""))
+            detail.setWordWrap(True)
+            detail.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)  # a command is made to be copied
+            top = Qt.AlignmentFlag.AlignTop
+            self._rows.addWidget(_Badge(finding.level), place, 0, top)
+            self._rows.addWidget(name, place, 1, top)
+            self._rows.addWidget(detail, place, 2, top)
+        self._rows.setRowStretch(len(self._shown), 1)
+
+
+def _note(now: Preflight) -> str:
+    if now.is_running:
+        return "Nothing moves by this. Some seconds."
+    if now.age_s is None:
+        return ""
+    minutes = int(now.age_s // 60)
+    ago = "just now" if minutes < 1 else f"{minutes} min ago"
+    return f"Checked {ago}" + ("" if now.is_fresh else ": too long ago")
