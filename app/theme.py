@@ -1,4 +1,8 @@
-"""Sizes, fonts and style sheet of every window; the colours are in ``palette``."""
+"""Sizes, fonts and style sheet of every window, and which of the two colour schemes is in use; the colours are in ``palette``.
+
+A change of scheme reaches everything that is open: painters look their colours up, style sheets set by ``set_sheet`` are set anew,
+and a widget that keeps something made of colours (a pixmap, a plot's pens, rich text) has a method ``follow_theme`` for it.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,10 @@ from enum import StrEnum
 from functools import cache
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontDatabase, QFontMetrics, QPalette, QScreen
-from PySide6.QtWidgets import QApplication
+from PySide6.QtGui import QColor, QFont, QFontDatabase, QFontMetrics, QPalette, QPen, QScreen
+from PySide6.QtWidgets import QApplication, QWidget
 
-from app.palette import INK, LINE, PANEL, RAISED, SKY, TEXT, TEXT_DIM, TEXT_FAINT, WINDOW
+from app import palette
 from core.config import RESOURCES
 
 MIN_WINDOW = (1100, 660)  # fits a screen of 720 lines with title bar and task bar
@@ -29,6 +33,10 @@ class Size(StrEnum):
 
 
 _PIXELS = {Size.LABEL: 12, Size.BODY: 14, Size.TITLE: 27, Size.NUMBER: 32}
+_SEEN = 3.0
+"""Contrast from which on a plain shape is seen (WCAG 2.1)."""
+_CHOSEN = "lumenpilot_theme"
+_SHEET = "lumenpilot_sheet"
 _FAMILIES = ["Inter", "Segoe UI", "Noto Sans", "DejaVu Sans", "sans-serif"]
 
 
@@ -37,6 +45,13 @@ def colour(name: str, alpha: float = 1.0) -> QColor:
     result = QColor(name)
     result.setAlphaF(alpha)
     return result
+
+
+def edge_of(name: str) -> QPen:
+    """The outline of something filled with a colour on a panel: none, unless it would be lost there (yellow on white)."""
+    if palette.contrast(name, palette.PANEL) >= _SEEN:
+        return QPen(Qt.PenStyle.NoPen)
+    return QPen(QColor(palette.TEXT_DIM), 1.5)
 
 
 @cache
@@ -72,39 +87,88 @@ def start_size(screen: QScreen) -> QSize:
     return QSize(*START_WINDOW).boundedTo(room).expandedTo(QSize(*MIN_WINDOW))
 
 
-def apply_theme(application: QApplication) -> None:
-    """Style, palette, fonts and style sheet for the whole program. Without the font files the system's sans serif is used."""
-    for path in sorted((RESOURCES / "fonts").glob("*.otf")):
-        QFontDatabase.addApplicationFont(str(path))
-    application.setStyle("Fusion")
+class Theme(StrEnum):
+    """What can be chosen; SYSTEM is as the desktop has it."""
+
+    DARK = "dark"
+    LIGHT = "light"
+    SYSTEM = "system"
+
+
+def apply_theme(application: QApplication, theme: str = Theme.DARK) -> None:
+    """Style, palette, fonts and style sheet for the whole program, now and, with SYSTEM, whenever the desktop changes.
+
+    Without the font files the system's sans serif is used.
+    """
+    hints = application.styleHints()
+    if application.property(_CHOSEN) is None:
+        for path in sorted((RESOURCES / "fonts").glob("*.otf")):
+            QFontDatabase.addApplicationFont(str(path))
+        application.setStyle("Fusion")
+        application.setFont(font(Size.BODY))
+        hints.colorSchemeChanged.connect(lambda _scheme: _follow_desktop(application))
+    application.setProperty(_CHOSEN, str(theme))
+    _take_scheme(application, _scheme_of(Theme(theme), hints.colorScheme()))
+
+
+def chosen(application: QApplication) -> str:
+    """The theme that was asked for last."""
+    return str(application.property(_CHOSEN) or Theme.DARK)
+
+
+def set_sheet(widget: QWidget, text: str) -> None:
+    """A style sheet of one widget that follows the scheme: ``@TEXT`` stands for the colour of that role."""
+    widget.setProperty(_SHEET, text)
+    widget.setStyleSheet(palette.sheet(text))
+
+
+def _scheme_of(theme: Theme, desktop: Qt.ColorScheme) -> palette.Scheme:
+    is_light = theme is Theme.LIGHT or (theme is Theme.SYSTEM and desktop is Qt.ColorScheme.Light)
+    return palette.LIGHT if is_light else palette.DARK
+
+
+def _follow_desktop(application: QApplication) -> None:
+    if application.property(_CHOSEN) == Theme.SYSTEM:
+        _take_scheme(application, _scheme_of(Theme.SYSTEM, application.styleHints().colorScheme()))
+
+
+def _take_scheme(application: QApplication, scheme: palette.Scheme) -> None:
+    palette.use(scheme)
     application.setPalette(_palette())
-    application.setFont(font(Size.BODY))
-    application.setStyleSheet(_STYLE_SHEET)
+    application.setStyleSheet(palette.sheet(_STYLE_SHEET))
+    for widget in application.allWidgets():
+        text = widget.property(_SHEET)
+        if isinstance(text, str):
+            widget.setStyleSheet(palette.sheet(text))
+        follow = getattr(widget, "follow_theme", None)
+        if follow is not None:
+            follow()
+        QWidget.update(widget)  # item views have another one of their own
 
 
 def _palette() -> QPalette:
-    palette = QPalette()
+    colours = QPalette()
     roles = QPalette.ColorRole
     for role, name in (
-        (roles.Window, WINDOW),
-        (roles.WindowText, TEXT),
-        (roles.Base, PANEL),
-        (roles.AlternateBase, RAISED),
-        (roles.Text, TEXT),
-        (roles.PlaceholderText, TEXT_FAINT),
-        (roles.Button, RAISED),
-        (roles.ButtonText, TEXT),
-        (roles.BrightText, TEXT),
-        (roles.ToolTipBase, RAISED),
-        (roles.ToolTipText, TEXT),
-        (roles.Highlight, SKY),
-        (roles.HighlightedText, INK),
-        (roles.Link, SKY),
+        (roles.Window, palette.WINDOW),
+        (roles.WindowText, palette.TEXT),
+        (roles.Base, palette.PANEL),
+        (roles.AlternateBase, palette.RAISED),
+        (roles.Text, palette.TEXT),
+        (roles.PlaceholderText, palette.TEXT_FAINT),
+        (roles.Button, palette.RAISED),
+        (roles.ButtonText, palette.TEXT),
+        (roles.BrightText, palette.TEXT),
+        (roles.ToolTipBase, palette.RAISED),
+        (roles.ToolTipText, palette.TEXT),
+        (roles.Highlight, palette.SKY),
+        (roles.HighlightedText, palette.INK),
+        (roles.Link, palette.SKY),
     ):
-        palette.setColor(role, QColor(name))
+        colours.setColor(role, QColor(name))
     for role in (roles.WindowText, roles.Text, roles.ButtonText):
-        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(TEXT_FAINT))
-    return palette
+        colours.setColor(QPalette.ColorGroup.Disabled, role, QColor(palette.TEXT_FAINT))
+    return colours
 
 
 def elide(text_font: QFont, text: str, width_px: int) -> str:
@@ -112,39 +176,69 @@ def elide(text_font: QFont, text: str, width_px: int) -> str:
     return QFontMetrics(text_font).elidedText(text, Qt.TextElideMode.ElideRight, width_px)
 
 
-_STYLE_SHEET = f"""
-QMainWindow, QDialog {{ background: {WINDOW}; }}
-QFrame#card {{ background: {PANEL}; border: 1px solid {LINE}; border-radius: {RADIUS}px; }}
-QLabel#card_title {{ color: {TEXT_DIM}; font-size: 12px; font-weight: 600; }}
-QLabel#card_note {{ color: {TEXT_FAINT}; font-size: 12px; }}
-QMenuBar {{ background: {WINDOW}; color: {TEXT_DIM}; padding: 2px 6px; }}
-QMenuBar::item {{ padding: 4px 10px; border-radius: 4px; background: transparent; }}
-QMenuBar::item:selected {{ background: {RAISED}; color: {TEXT}; }}
-QMenu {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; padding: 4px; }}
-QMenu::item {{ padding: 6px 28px 6px 22px; border-radius: 4px; }}
-QMenu::item:selected {{ background: {SKY}; color: {INK}; }}
-QMenu::item:disabled {{ color: {TEXT_FAINT}; }}
-QMenu::separator {{ height: 1px; background: {LINE}; margin: 4px 8px; }}
-QStatusBar {{ background: {WINDOW}; color: {TEXT_DIM}; font-size: 13px; }}
-QStatusBar::item {{ border: none; }}
-QToolTip {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; padding: 6px; }}
-QComboBox, QSpinBox {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; border-radius: 5px; padding: 3px 8px;
-    min-height: 22px; selection-background-color: {SKY}; selection-color: {INK}; }}
-QComboBox:focus, QSpinBox:focus, QPushButton:focus {{ border: 1px solid {SKY}; }}
-QComboBox::drop-down {{ border: none; width: 24px; }}
-QComboBox::down-arrow {{ width: 0; height: 0; border-left: 4px solid {RAISED}; border-right: 4px solid {RAISED};
-    border-top: 5px solid {TEXT_DIM}; margin-right: 10px; }}
-QComboBox QAbstractItemView {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE};
-    selection-background-color: {SKY}; selection-color: {INK}; outline: none; }}
-QPushButton {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; border-radius: 5px;
-    padding: 4px 12px; min-height: 22px; }}
-QTabWidget::pane {{ border: none; }}
-QTabBar {{ background: transparent; }}
-QTabBar::tab {{ background: {WINDOW}; color: {TEXT_DIM}; border: 1px solid {LINE}; border-bottom: none;
-    border-top-left-radius: 5px; border-top-right-radius: 5px; padding: 4px 12px; margin-right: 3px; }}
-QTabBar::tab:selected {{ background: {RAISED}; color: {TEXT}; border-color: {TEXT_FAINT}; }}
-QTabBar::tab:hover {{ color: {TEXT}; }}
-QPushButton:hover {{ border-color: {TEXT_FAINT}; }}
-QPushButton:pressed {{ background: {LINE}; }}
-QPushButton:disabled, QSpinBox:disabled {{ color: {TEXT_FAINT}; background: {WINDOW}; }}
+_STYLE_SHEET = """
+QMainWindow, QDialog { background: @WINDOW; }
+QFrame#card { background: @PANEL; border: 1px solid @LINE; border-radius: 8px; }
+QLabel#card_title { color: @TEXT_DIM; font-size: 12px; font-weight: 600; }
+QLabel#card_note { color: @TEXT_FAINT; font-size: 12px; }
+QMenuBar { background: @WINDOW; color: @TEXT_DIM; padding: 2px 6px; }
+QMenuBar::item { padding: 4px 10px; border-radius: 4px; background: transparent; }
+QMenuBar::item:selected { background: @RAISED; color: @TEXT; }
+QMenu { background: @RAISED; color: @TEXT; border: 1px solid @LINE; padding: 4px; }
+QMenu::item { padding: 6px 28px 6px 22px; border-radius: 4px; }
+QMenu::item:selected { background: @SKY; color: @INK; }
+QMenu::item:disabled { color: @TEXT_FAINT; }
+QMenu::separator { height: 1px; background: @LINE; margin: 4px 8px; }
+QStatusBar { background: @WINDOW; color: @TEXT_DIM; font-size: 13px; }
+QStatusBar::item { border: none; }
+QToolTip { background: @RAISED; color: @TEXT; border: 1px solid @LINE; padding: 6px; }
+QComboBox, QSpinBox { background: @RAISED; color: @TEXT; border: 1px solid @LINE; border-radius: 5px; padding: 3px 8px;
+    min-height: 22px; selection-background-color: @SKY; selection-color: @INK; }
+QComboBox:focus, QSpinBox:focus, QPushButton:focus { border: 1px solid @SKY; }
+QComboBox::drop-down { border: none; width: 24px; }
+QComboBox::down-arrow { width: 0; height: 0; border-left: 4px solid @RAISED; border-right: 4px solid @RAISED;
+    border-top: 5px solid @TEXT_DIM; margin-right: 10px; }
+QComboBox QAbstractItemView { background: @RAISED; color: @TEXT; border: 1px solid @LINE;
+    selection-background-color: @SKY; selection-color: @INK; outline: none; }
+QPushButton { background: @RAISED; color: @TEXT; border: 1px solid @LINE; border-radius: 5px;
+    padding: 4px 12px; min-height: 22px; }
+QTabWidget::pane { border: none; }
+QTabBar { background: transparent; }
+QTabBar::tab { background: @WINDOW; color: @TEXT_DIM; border: 1px solid @LINE; border-bottom: none;
+    border-top-left-radius: 5px; border-top-right-radius: 5px; padding: 4px 12px; margin-right: 3px; }
+QTabBar::tab:selected { background: @RAISED; color: @TEXT; border-color: @TEXT_FAINT; }
+QTabBar::tab:hover { color: @TEXT; }
+QPushButton:hover { border-color: @TEXT_FAINT; }
+QPushButton:pressed { background: @LINE; }
+QPushButton:disabled, QSpinBox:disabled { color: @TEXT_FAINT; background: @WINDOW; }
+QPushButton#main_button:enabled { background: @SKY; color: @INK; font-weight: 600; }
+QSplitter::handle { background: transparent; }
+QSplitter::handle:hover { background: @LINE; border-radius: 3px; }
+QDialog#settings QLineEdit { background: @PANEL; color: @TEXT; border: 1px solid @LINE; border-radius: 5px; padding: 4px 8px;
+    min-height: 20px; selection-background-color: @SKY; selection-color: @INK; }
+QDialog#settings QLineEdit:focus, QDialog#settings QCheckBox:focus { border: 1px solid @SKY; }
+QDialog#settings QLineEdit[wrong="true"] { border: 1px solid @FAULT; }
+QDialog#settings QLineEdit:disabled { color: @TEXT_FAINT; }
+QDialog#settings QCheckBox { color: @TEXT; border: 1px solid transparent; border-radius: 4px; padding: 3px; }
+QDialog#settings QTreeWidget { background: @PANEL; color: @TEXT; border: 1px solid @LINE; border-radius: 8px; padding: 4px;
+    outline: none; }
+QDialog#settings QTreeWidget::item { padding: 4px 2px; }
+QDialog#settings QTreeWidget::item:selected { background: @SKY; color: @INK; }
+QDialog#settings QScrollArea, QWidget#setting_page { background: @WINDOW; }
+QFrame#setting { background: @PANEL; border: 1px solid @LINE; border-left: 4px solid @LINE; border-radius: 8px; }
+QFrame#setting[changed="true"] { border-left: 4px solid @ORANGE; }
+QFrame#setting[wrong="true"] { border: 1px solid @FAULT; border-left: 4px solid @FAULT; }
+QLabel#setting_name { color: @TEXT; font-size: 14px; font-weight: 600; }
+QLabel#setting_meaning { color: @TEXT_DIM; font-size: 13px; }
+QLabel#setting_note { color: @TEXT_FAINT; font-size: 12px; }
+QLabel#setting_error { color: @FAULT; font-size: 13px; font-weight: 600; }
+QLabel#section_title { color: @TEXT; font-size: 18px; font-weight: 700; padding-top: 8px; }
+QDialog#settings QScrollBar:vertical { background: transparent; width: 10px; margin: 0; }
+QDialog#settings QScrollBar::handle:vertical { background: @LINE; border-radius: 4px; min-height: 28px; margin: 0 1px; }
+QDialog#settings QScrollBar::handle:vertical:hover { background: @TEXT_FAINT; }
+QDialog#settings QScrollBar::add-line:vertical, QDialog#settings QScrollBar::sub-line:vertical { height: 0; }
+QDialog#settings QScrollBar::add-page:vertical, QDialog#settings QScrollBar::sub-page:vertical { background: transparent; }
+QFrame#setting QSlider::groove:horizontal { height: 4px; background: @LINE; border-radius: 2px; }
+QFrame#setting QSlider::sub-page:horizontal { background: @SKY; border-radius: 2px; }
+QFrame#setting QSlider::handle:horizontal { background: @TEXT_DIM; width: 12px; margin: -4px 0; border-radius: 6px; }
 """

@@ -14,9 +14,9 @@ class CameraConfig(BaseModel):
     device: str | None = Field(
         None, min_length=1, description="webcam: its stable path in /dev/v4l/by-id, or its number; None: the first one"
     )
-    width_px: int = Field(640, ge=160, le=4096)
-    height_px: int = Field(480, ge=120, le=4096)
-    frames_per_second: int = Field(30, ge=5, le=240)
+    width_px: int = Field(640, ge=160, le=4096, description="of the pictures")
+    height_px: int = Field(480, ge=120, le=4096, description="of the pictures")
+    frames_per_second: int = Field(30, ge=5, le=240, description="that the camera is asked for")
     pixel_format: str = Field("MJPG", pattern="^[A-Z0-9]{4}$", description="webcam: FOURCC; MJPG is what USB 2 has the room for")
     exposure_ms: float | None = Field(None, gt=0.0, le=1000.0, description="None: automatic, but never at the cost of frames")
     gain: float | None = Field(None, ge=0.0, le=65535.0, description="in the camera's own steps; None: as it is")

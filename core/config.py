@@ -42,18 +42,18 @@ class SegmentationConfig(_Section):
     precision: Literal["auto", "int8", "fp32"] = Field("auto", description="of OpenVINO; auto = int8 where the model has it")
     threads: int = Field(0, ge=0, le=64, description="CPU threads; 0 = all cores")
     mirrored: Literal["pictures", "always", "never"] = Field(
-        "pictures", description="average over the picture and its mirror image: single pictures only, streams too, or never"
+        "pictures", description="average over picture and mirror image: where that is quick (pictures, windows), always, never"
     )
-    vessel_threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
-    robot_threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+    vessel_threshold: float = Field(0.5, gt=0.0, lt=1.0, description="probability from which on a pixel is vessel")
+    robot_threshold: float = Field(0.5, gt=0.0, lt=1.0, description="probability from which on a pixel is robot")
 
 
 class CleaningConfig(_Section):
     """Mask cleaning and thinning (METHOD section 2)."""
 
-    min_vessel_area_px: int = Field(400, ge=0, le=100_000)
-    min_robot_area_px: int = Field(40, ge=0, le=100_000)
-    max_hole_area_px: int = Field(150, ge=0, le=100_000)
+    min_vessel_area_px: int = Field(400, ge=0, le=100_000, description="smaller pieces of vessel are dropped")
+    min_robot_area_px: int = Field(40, ge=0, le=100_000, description="smaller pieces of robot are dropped")
+    max_hole_area_px: int = Field(150, ge=0, le=100_000, description="holes up to this size are filled, in both masks")
     prune_spurs: bool = Field(True, description="drop vessel spurs shorter than the local lumen radius")
     extend_ends: bool = Field(True, description="extend ends along their tangent to the edge of mask or image")
     rebuild_junctions: bool = Field(True, description="lead vessel branches straight into their trunk where the skeleton bends")
@@ -64,19 +64,21 @@ class GapConfig(_Section):
     """Gap repair of the robot's skeleton (METHOD section 3)."""
 
     rule: Literal["components", "every_pair"] = Field("components", description="every_pair = the paper's Algorithm 1, literally")
-    gap_threshold_px: float = Field(40.0, ge=0.0, le=300.0)
-    max_turn_deg: float = Field(50.0, ge=0.0, le=180.0, description="not used by every_pair")
+    gap_threshold_px: float = Field(40.0, ge=0.0, le=300.0, description="ends nearer to each other than this may be joined")
+    max_turn_deg: float = Field(
+        50.0, ge=0.0, le=180.0, description="largest turn that joining two ends may make; not used by every_pair"
+    )
 
 
 class PathConfig(_Section):
     """Choice of the robot's path among candidates (METHOD section 4)."""
 
-    weight_length: float = Field(-0.2, ge=-10.0, le=10.0)
-    weight_smoothness: float = Field(1.0, ge=-10.0, le=10.0)
-    weight_consistency: float = Field(0.5, ge=-10.0, le=10.0)
+    weight_length: float = Field(-0.2, ge=-10.0, le=10.0, description="of a candidate's length; negative prefers the shorter")
+    weight_smoothness: float = Field(1.0, ge=-10.0, le=10.0, description="of how little a candidate turns at its points")
+    weight_consistency: float = Field(0.5, ge=-10.0, le=10.0, description="of how well its steps go from start to end")
     step_px: float = Field(8.0, ge=1.0, le=50.0, description="distance over which directions are taken")
     cosine: Literal["signed", "absolute"] = Field("signed", description="absolute = the paper's |cos|, blind to hairpins")
-    min_length_px: float = Field(12.0, ge=2.0, le=500.0)
+    min_length_px: float = Field(12.0, ge=2.0, le=500.0, description="shorter candidates are no robot")
     border_px: float = Field(6.0, ge=0.0, le=100.0, description="an end this near to the image border counts as the entry")
     port_px: float = Field(25.0, ge=0.0, le=300.0, description="an end this near to the insertion port counts as the entry")
     junction_turn_px: float = Field(
@@ -87,14 +89,16 @@ class PathConfig(_Section):
         0.5, description="pieces shorter than this share of the longest are outliers; 0 = only the score decides"
     )
     smoothing_px: float = Field(3.0, ge=0.0, le=20.0, description="smoothing and sub-pixel centring of the path; 0 = raw pixels")
-    max_candidates: int = Field(200, ge=1, le=10_000)
+    max_candidates: int = Field(200, ge=1, le=10_000, description="no more paths than these are compared in one frame")
 
 
 class VectorConfig(_Section):
     """Line fits (METHOD section 5)."""
 
-    robot_length_px: float = Field(40.0, ge=4.0, le=400.0)
-    vessel_half_length_px: float = Field(20.0, ge=2.0, le=200.0)
+    robot_length_px: float = Field(40.0, ge=4.0, le=400.0, description="end of the robot's path that its line is fitted to")
+    vessel_half_length_px: float = Field(
+        20.0, ge=2.0, le=200.0, description="so far to both sides of the head goes the piece of centerline that is fitted"
+    )
     vessel_rule: Literal["graph", "window"] = Field(
         "graph", description="window = all skeleton pixels near the head, the paper's way"
     )
@@ -106,11 +110,11 @@ class VectorConfig(_Section):
 class PoseConfig(_Section):
     """Pose state thresholds (METHOD section 6); hysteresis acts in a stream only."""
 
-    d_allow_px: float = Field(6.0, gt=0.0, le=200.0)
-    theta_allow_deg: float = Field(10.0, gt=0.0, le=180.0)
-    hysteresis_px: float = Field(1.0, ge=0.0, le=50.0)
-    hysteresis_deg: float = Field(1.5, ge=0.0, le=45.0)
-    dwell_frames: int = Field(3, ge=1, le=100)
+    d_allow_px: float = Field(6.0, gt=0.0, le=200.0, description="distance of head and tail that is still on the centerline")
+    theta_allow_deg: float = Field(10.0, gt=0.0, le=180.0, description="angle that is still along the centerline")
+    hysteresis_px: float = Field(1.0, ge=0.0, le=50.0, description="so much farther before a state is left again")
+    hysteresis_deg: float = Field(1.5, ge=0.0, le=45.0, description="so much more angle before state A is left again")
+    dwell_frames: int = Field(3, ge=1, le=100, description="a new state must be seen this often in a row to be shown")
 
 
 class QualityConfig(_Section):
@@ -120,23 +124,33 @@ class QualityConfig(_Section):
     black_level: float = Field(12.0, ge=0.0, le=255.0, description="99th percentile of brightness below this: black")
     white_level: float = Field(250.0, ge=0.0, le=255.0, description="1st percentile of brightness above this: overexposed")
     min_sharpness: float = Field(0.045, ge=0.0, le=1.0, description="steepest step per px against the contrast; 0 = not checked")
-    min_robot_length_px: float = Field(20.0, ge=2.0, le=640.0)
+    min_robot_length_px: float = Field(20.0, ge=2.0, le=640.0, description="a shorter robot has no direction")
     min_inside_vessel: Share = Field(0.6, description="share of the robot's last 40 px that must lie in the lumen")
     max_bridged_share: Share = Field(0.4, description="repaired length over path length")
-    max_ambiguity: Share = 0.95
-    min_confidence: Share = 0.3
+    max_ambiguity: Share = Field(0.95, description="how near the second best path may come to the best one")
+    min_confidence: Share = Field(0.3, description="below it there is no answer")
     several_robots_share: Share = Field(0.5, description="a second robot this large against the first one")
 
 
 class TrackingConfig(_Section):
     """Use of the last frames in a stream."""
 
-    enabled: bool = True
-    max_head_speed_px_s: float = Field(600.0, gt=0.0, le=100_000.0)
-    memory_s: float = Field(0.5, ge=0.0, le=10.0)
+    enabled: bool = Field(True, description="false = every frame by itself")
+    max_head_speed_px_s: float = Field(600.0, gt=0.0, le=100_000.0, description="a head that jumps faster is not believed")
+    memory_s: float = Field(0.5, ge=0.0, le=10.0, description="older frames say nothing about this one")
+    window_px: int = Field(
+        256,
+        ge=0,
+        le=4096,
+        multiple_of=32,
+        description="side of what is looked at anew between two whole looks; 0 = always all",
+    )
+    refresh_s: float = Field(1.5, ge=0.0, le=60.0, description="longest time between two whole looks")
 
 
 class PerceptionConfig(_Section):
+    """From the picture to the pose."""
+
     working_size_px: int = Field(640, ge=128, le=4096, description="longer side that all _px settings refer to")
     segmentation: SegmentationConfig = SegmentationConfig()
     cleaning: CleaningConfig = CleaningConfig()
@@ -151,40 +165,55 @@ class PerceptionConfig(_Section):
 class AdviceConfig(_Section):
     """Speeds behind the paper's words, and how theta becomes a degree of steering."""
 
-    slowest_mm_s: float = Field(1.0, ge=0.0, le=50.0)
-    slow_mm_s: float = Field(3.0, ge=0.0, le=50.0)
-    moderate_mm_s: float = Field(5.0, ge=0.0, le=50.0)
-    fast_mm_s: float = Field(8.0, ge=0.0, le=50.0)
+    slowest_mm_s: float = Field(1.0, ge=0.0, le=50.0, description="in state C, moving away from the centerline")
+    slow_mm_s: float = Field(3.0, ge=0.0, le=50.0, description="in state B, coming back to it")
+    moderate_mm_s: float = Field(5.0, ge=0.0, le=50.0, description="in state D, when it has been crossed")
+    fast_mm_s: float = Field(8.0, ge=0.0, le=50.0, description="in state A, on it and along it")
     steer_gain: float = Field(1.0, ge=0.0, le=10.0, description="degrees of steering per degree of theta in state D")
     steer_gain_away: float = Field(1.5, ge=0.0, le=10.0, description="the same in state C, where the paper steers hardest")
-    max_steer_deg: float = Field(45.0, gt=0.0, le=180.0)
+    max_steer_deg: float = Field(45.0, gt=0.0, le=180.0, description="more steering is never advised")
 
 
 class TwinConfig(_Section):
     """The bench twin (hardware/twin)."""
 
     phantom: str = Field("s_curve", min_length=1, description="a named phantom, or random:<seed>")
-    appearance_seed: int = Field(0, ge=0, le=2**31 - 1)
-    image_width_px: int = Field(640, ge=160, le=4096)
-    image_height_px: int = Field(480, ge=120, le=4096)
+    appearance_seed: int = Field(0, ge=0, le=2**31 - 1, description="of light, board and camera noise; 0 = the clear bench")
+    image_width_px: int = Field(640, ge=160, le=4096, description="of its camera")
+    image_height_px: int = Field(480, ge=120, le=4096, description="of its camera")
     frames_per_second: float = Field(30.0, gt=0.0, le=240.0, description="in lock-step: trials, data sets")
     live_frames_per_second: float = Field(20.0, gt=0.0, le=240.0, description="of the running twin, which shares the computer")
     own_process: bool = Field(True, description="with servos: the simulation takes no time from the program")
+    wiring: str | None = Field(
+        None,
+        pattern=r"^-?\d{1,3}(,-?\d{1,3}){6}$",
+        description="ids of its servos in the order of the joints, minus: it turns the other way; None: as servos.joints says",
+    )
+    roll_deg: float = Field(
+        0.0, ge=-180.0, le=180.0, description="turn of the robot about its axis; 0: right and left act in the picture"
+    )
+    lens_distortion: float = Field(0.0, ge=-0.2, le=0.3, description="of its camera's lens; negative: barrel, 0: none")
 
 
 class RigConfig(_Section):
     """Which camera and robot are used."""
 
-    name: str = Field("twin", min_length=1)
-    camera: Literal["twin", "realsense", "webcam", "video_file", "image_folder"] = "twin"
+    name: str = Field("twin", min_length=1, description="as it stands in sessions and messages")
+    camera: Literal["twin", "realsense", "webcam", "video_file", "image_folder"] = Field(
+        "twin", description="where pictures come from"
+    )
     robot: Literal["twin", "servos", "none"] = Field("twin", description="servos: real ones, on servos.port")
     source: str | None = Field(None, description="path of the video, folder, or RealSense recording (.bag)")
+    file: str | None = Field(
+        None, min_length=1, description="rig file (main.py rig list) whose calibration is used; None: not calibrated"
+    )
     watch_folder: bool = Field(False, description="image_folder: wait for new pictures, instead of playing those that are there")
 
 
 class WindowConfig(_Section):
-    """The operator window."""
+    """How the windows look, and where they keep pictures."""
 
+    theme: Literal["dark", "light", "system"] = Field("dark", description="of all windows; system = as the desktop has it")
     pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; None: LumenPilot in Pictures")
 
 
@@ -217,11 +246,12 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: not valid TOML: {error}") from None
 
 
-def _merge(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
+def merge(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
+    """Nested dictionaries, where `top` wins; lists are replaced as a whole."""
     merged = dict(base)
     for key, value in top.items():
         old = merged.get(key)
-        merged[key] = _merge(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+        merged[key] = merge(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
     return merged
 
 
@@ -288,9 +318,9 @@ def load_config(path: Path | None = None, preset: str | None = None, overrides: 
         layers.append(path)
     config = Config()
     for layer in layers:
-        data = _merge(data, _read_toml(layer))
+        data = merge(data, _read_toml(layer))
         config = _validate(data, str(layer))
-    return _validate(_merge(data, overrides), "command line") if overrides else config
+    return _validate(merge(data, overrides), "command line") if overrides else config
 
 
 def _validate(data: dict[str, Any], source: str) -> Config:

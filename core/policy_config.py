@@ -51,8 +51,8 @@ class DriveConfig(_Section):
     turn_deg: float = Field(94.0, gt=1.0, le=720.0, description="by how much the head turns at a bend of 1")
     proportional: float = Field(0.2, ge=0.0, le=5.0, description="share of the advised turn that is made at once")
     integral_s: float = Field(0.4, ge=0.02, le=60.0, description="time in which the advised turn is made, if advice stays the same")
-    max_bend_rate_per_s: float = Field(1.5, gt=0.0, le=20.0)
-    max_acceleration_mm_s2: float = Field(30.0, gt=0.0, le=1000.0)
+    max_bend_rate_per_s: float = Field(1.5, gt=0.0, le=20.0, description="share of the tendons' full pull per second, at most")
+    max_acceleration_mm_s2: float = Field(30.0, gt=0.0, le=1000.0, description="of the feed")
     max_gap_s: float = Field(0.1, gt=0.0, le=0.5, description="a longer pause between two commands counts as so much")
 
 
@@ -60,8 +60,8 @@ class HandConfig(_Section):
     """Driving by hand: speeds at full deflection of a key or a stick."""
 
     bend_rate_per_s: float = Field(1.2, gt=0.0, le=5.0, description="share of the tendons' full pull per second")
-    advance_mm_s: float = Field(10.0, gt=0.0, le=20.0)
-    delivery_mm_s: float = Field(10.0, gt=0.0, le=20.0)
+    advance_mm_s: float = Field(10.0, gt=0.0, le=20.0, description="of the robot module")
+    delivery_mm_s: float = Field(10.0, gt=0.0, le=20.0, description="of the catheter")
 
 
 class PolicyConfig(_Section):

@@ -1,0 +1,225 @@
+"""Settings of the operator window: opens the dialog, tries thresholds out on the picture, saves, and says when a setting acts.
+
+Nothing changes while the robot is armed or a session is being recorded, and the robot cannot be armed while something is tried out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from PySide6.QtCore import QObject, QTimer, Slot
+from PySide6.QtWidgets import QApplication
+
+from app import theme
+from app.engine_thread import Phase
+from app.menus import MenuEntry, add_menu
+from app.next_step import Step
+from app.operator_window import OperatorWindow
+from app.settings_dialog import SettingsDialog
+from app.settings_model import SettingsDraft, with_changes
+from app.work_thread import WorkThread
+from core.config import Config, ConfigError, PerceptionConfig
+from core.config_schema import Effect
+from core.config_write import write_settings
+from core.control.modes import ARMED_MODES
+from core.profiles import Profiles
+from core.settings_file import SettingsFile
+from core.types import Frame, Point, Scene
+
+PerceiveAgain = Callable[[Frame, Point | None, PerceptionConfig], Scene | None]
+
+_LOOK_EVERY_MS = 100
+_NOW = frozenset({Effect.NOW})
+_AT_START = frozenset({Effect.NOW, Effect.RIG})
+
+
+class SettingsDesk(QObject):
+    """Lives as long as the window.
+
+    Parameters
+    ----------
+    window : gets the menu entry, and what is changed.
+    file : the settings that the window was opened with, and where they are saved.
+    perceive_again : understands the last frame of a rig that is over under other thresholds; it takes its time.
+    profiles : the named ones, None: in the user's folder.
+    """
+
+    def __init__(
+        self, window: OperatorWindow, file: SettingsFile, perceive_again: PerceiveAgain, profiles: Profiles | None = None
+    ) -> None:
+        super().__init__(window)
+        self._window, self._file, self._perceive_again = window, file, perceive_again
+        self._profiles = profiles or Profiles()
+        self._saved = self._at_rig_start = file.config
+        self._tried: Config | None = None
+        self._wants_back = False
+        self.dialog: SettingsDialog | None = None
+        self._stills = WorkThread("preview", self)
+        self._stills.done.connect(self._on_still)
+        self._stills.failed.connect(lambda _key, line: window.say(line, is_fault=True))
+        self._timer = QTimer(self)
+        self._timer.setInterval(_LOOK_EVERY_MS)
+        self._timer.timeout.connect(self._look)
+        add_menu(window, "&File", [MenuEntry("S&ettings...", self.open, ("Ctrl+,",))])
+        window.amend_config = self._amend
+        window.may_take = partial(self._may_take, window.may_take)
+        window.phase_changed.connect(self._on_phase)
+
+    @property
+    def is_trying(self) -> bool:
+        """Whether the picture shows thresholds that are not saved."""
+        return self._tried is not None
+
+    def start(self) -> None:
+        """Say what was wrong with the settings file."""
+        for problem in self._file.problems:
+            self._window.say(problem, is_fault=True)
+
+    @Slot()
+    def open(self) -> None:
+        """The dialog, or the one that is open."""
+        if self.dialog is None:
+            draft = SettingsDraft(self._saved)
+            dialog = SettingsDialog(draft, self._file.path, self._profiles, self._file.problems, self._window)
+            dialog.drafted.connect(self._on_drafted)
+            dialog.save_asked.connect(self._save)
+            dialog.finished.connect(self._on_finished)
+            self.dialog = dialog
+            self._timer.start()
+            dialog.stand_beside(self._window, self._window.panels.mode_bar.stop)
+            dialog.show()
+        self._look()
+        self.dialog.raise_()
+        self.dialog.activateWindow()
+
+    @Slot()
+    def close(self) -> None:
+        """The window closes: nothing that was not saved is kept."""
+        self._timer.stop()
+        if self.dialog is not None:
+            self.dialog.reject()
+        self._stills.stop(finish=False)
+        self._stills.wait()
+
+    # ---- trying out
+
+    @Slot(object)
+    def _on_drafted(self, config: Config) -> None:
+        if not self._why_locked():
+            self._try(config)
+
+    def _try(self, config: Config) -> None:
+        """Show the picture, and the windows' colours, as they would be."""
+        wanted = with_changes(self._window.config, self._saved, config, _NOW)
+        shown = self._tried or self._window.config
+        self._tried = wanted if wanted != self._window.config else None
+        _take_theme(wanted)
+        if wanted.perception != shown.perception:
+            self._show(wanted.perception)
+
+    def _put_back(self) -> None:
+        """As it was before something was tried out; not within a session, which is to have one set of thresholds."""
+        if self._tried is None:
+            return
+        if self._window.recorder.status.recording:
+            self._wants_back = True
+            self._window.say("The session goes on with the thresholds that it was begun with")
+            return
+        tried, self._tried, self._wants_back = self._tried, None, False
+        _take_theme(self._window.config)
+        if tried.perception != self._window.config.perception:
+            self._show(self._window.config.perception)
+
+    def _show(self, perception: PerceptionConfig) -> None:
+        """On the running feed, else on the last frame."""
+        tick = self._window.last_tick
+        if not self._window.preview(perception) and tick is not None:
+            target = tick.scene.to_source(tick.scene.route.target) if tick.scene.route is not None else None
+            self._stills.forget()
+            self._stills.submit("still", partial(self._perceive_again, tick.frame, target, perception))
+
+    @Slot(object, object)
+    def _on_still(self, _key: object, scene: object) -> None:
+        self._window.show_still(scene if isinstance(scene, Scene) and self.is_trying else None)
+
+    @Slot(object)
+    def _on_phase(self, phase: Phase) -> None:
+        """A rig that was started again knows nothing of what is being tried out."""
+        if phase is Phase.RUNNING and self._tried is not None:
+            self._window.preview(self._tried.perception)
+
+    def _may_take(self, others: Callable[[Step], bool], step: Step) -> bool:
+        if self.is_trying and step in (Step.ARM, Step.HAND_OVER):
+            self._window.say("Not while settings are tried out: save or cancel them first", is_fault=True)
+            return False
+        return others(step)
+
+    # ---- saving
+
+    @Slot(bool)
+    def _save(self, restart: bool) -> None:
+        dialog = self.dialog
+        config = dialog.draft.config if dialog is not None else None
+        if dialog is None or config is None or self._why_locked():
+            return
+        try:
+            note = write_settings(self._file.path, config, self._file.text)
+        except ConfigError as error:
+            dialog.show_notice(str(error), is_fault=True)
+            return
+        before, self._saved, self._tried = self._saved, config, None
+        self._file = SettingsFile(self._file.path, {}, _text_of(self._file))
+        self._window.take_settings(with_changes(self._window.config, before, config, _NOW))
+        _take_theme(self._window.config)
+        self._window.say(f"Settings saved in {self._file.path}" + (f". {note}" if note else ""))
+        dialog.draft.mark_saved()
+        dialog.accept()
+        if restart:
+            self._window.use_config(self._window.config)
+
+    def _amend(self, config: Config) -> Config:
+        """What waited for a rig to be opened."""
+        amended = with_changes(config, self._at_rig_start, self._saved, _AT_START)
+        self._at_rig_start = self._saved
+        return amended
+
+    @Slot(int)
+    def _on_finished(self, _result: int) -> None:
+        self.dialog = None
+        self._put_back()
+        if not self._wants_back:
+            self._timer.stop()
+
+    # ---- what stands against it
+
+    def _why_locked(self) -> str:
+        view = self._window.desk.view
+        if view is not None and view.mode in ARMED_MODES:
+            return "The robot is armed: settings can be changed when it is disarmed"
+        if self._window.recorder.status.recording:
+            return "A session is being recorded: settings can be changed when it has ended"
+        return ""
+
+    @Slot()
+    def _look(self) -> None:
+        why = self._why_locked()
+        if self.dialog is not None:
+            self.dialog.lock(why)
+        elif self._wants_back and not why:
+            self._put_back()
+            self._timer.stop()
+
+
+def _take_theme(config: Config) -> None:
+    application = QApplication.instance()
+    if isinstance(application, QApplication) and theme.chosen(application) != config.window.theme:
+        theme.apply_theme(application, config.window.theme)
+
+
+def _text_of(file: SettingsFile) -> str | None:
+    """The text as it is on the disk now, None where it cannot be read."""
+    try:
+        return file.path.read_bytes().decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError):
+        return None

@@ -1,0 +1,373 @@
+"""The settings dialog: the whole configuration, section by section, made from its models. STOP works while it is open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QDialog,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QSplitter,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app import theme
+from app.settings_model import SettingsDraft, search
+from app.widgets.profile_row import ProfileRow
+from app.widgets.setting_page import SettingPage
+from core.config_schema import Effect, Section, schema, settings_by_key
+from core.profiles import Profile, ProfileError, Profiles
+
+_SIZE = (900, 660)
+_LEAST = (700, 420)
+_SEARCH_AFTER_MS = 150
+_ROW_PX = 26
+_TREE_PX = 186
+_MOST_SHARE, _MARGIN_PX = 0.57, 40
+_KEY_ROLE = Qt.ItemDataRole.UserRole
+
+
+class SettingsDialog(QDialog):
+    """Edits a draft and says what is to become of it; it writes profiles, and leaves the settings file to its owner.
+
+    ``drafted`` carries the configuration whenever it changes and is allowed, for the preview, ``save_asked`` whether the rig is to
+    be started again. ``finished`` comes at the end.
+
+    Parameters
+    ----------
+    draft : what is edited.
+    path : of the settings file, to be shown.
+    profiles : the named ones.
+    problems : what was wrong with the file, one line each.
+    """
+
+    drafted = Signal(object)
+    save_asked = Signal(bool)
+
+    def __init__(
+        self,
+        draft: SettingsDraft,
+        path: Path,
+        profiles: Profiles,
+        problems: tuple[str, ...] = (),
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.draft, self._path, self._profiles = draft, path, profiles
+        self._locked = ""
+        self._section: Section = schema().sections[0]
+        self.search = QLineEdit()
+        self.tree = QTreeWidget()
+        self.page = SettingPage(draft)
+        self.profile_row = ProfileRow()
+        self.status, self.notice = QLabel(), QLabel()
+        self.reset_all, self.cancel = QPushButton("Reset all"), QPushButton("Cancel")
+        self.save, self.save_and_restart = QPushButton("Save"), QPushButton("Save, and start the rig again")
+        self._items: dict[str, QTreeWidgetItem] = {}
+        self._search_soon = QTimer(self)
+        self._search_soon.setSingleShot(True)
+        self._search_soon.setInterval(_SEARCH_AFTER_MS)
+        self.setObjectName("settings")
+        self.setWindowTitle("LumenPilot \N{EM DASH} settings")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self._lay_out()
+        self._fill_tree()
+        self._wire()
+        self._show_profiles()
+        self.show_notice("\n".join(problems), is_fault=True)
+        self.show_section(self._section)
+        self.setMinimumSize(*_LEAST)
+        self.resize(*_SIZE)
+
+    # ---- what is shown
+
+    def show_section(self, section: Section) -> None:
+        """The settings of a section; of one that only holds others, those too."""
+        self._section = section
+        groups = [(section, section.settings)] if section.settings else [(part, part.settings) for part in section.sections]
+        self.page.show_groups(groups)
+        item = self._items.get(section.key)
+        if item is not None and self.tree.currentItem() is not item:
+            self.tree.setCurrentItem(item)
+        self._renew()
+
+    def stand_beside(self, window: QWidget, kept_clear: QWidget) -> None:
+        """At the right edge of a window, so that its picture stays in sight as far as can be, and `kept_clear` (STOP) wholly."""
+        frame = window.frameGeometry()
+        width = max(_LEAST[0], min(_SIZE[0], round(frame.width() * _MOST_SHARE)))
+        top = frame.top() + _MARGIN_PX
+        room = kept_clear.mapToGlobal(QPoint(0, 0)).y() - top - _MARGIN_PX
+        self.resize(width, max(_LEAST[1], min(_SIZE[1], room)))
+        self.move(frame.right() - width - 10, top)
+
+    def go_to(self, key: str) -> None:
+        """Show a setting, or a section, and give it the focus."""
+        sections = {section.key: section for section in schema().walk()}
+        section = sections.get(key) or sections.get(key.rpartition(".")[0])
+        if section is None:
+            return
+        self.page.add_all()
+        if key not in self.page.fields:
+            self.search.clear()
+            self._search_soon.stop()
+            self.show_section(section)
+        self.page.go_to(key)
+
+    def show_notice(self, text: str, *, is_fault: bool = False) -> None:
+        """A line above the settings: what was wrong with the file, what could not be done."""
+        self.notice.setText(f"\N{WARNING SIGN}  {text}" if text and is_fault else text)
+        self.notice.setObjectName("setting_error" if is_fault else "setting_meaning")
+        self.notice.style().unpolish(self.notice)
+        self.notice.style().polish(self.notice)
+        self.notice.setVisible(bool(text))
+
+    def follow_theme(self) -> None:
+        self.status.setText("")  # a link keeps the colour that it was laid out with
+        self._renew()
+
+    def lock(self, why: str) -> None:
+        """Nothing can be changed for this reason; empty: it can be again."""
+        if why != self._locked:
+            self._locked = why
+            for widget in (self.page, self.profile_row, self.reset_all):
+                widget.setEnabled(not why)
+            self._renew()
+
+    # ---- edits
+
+    def _on_edited(self, key: str, entry: object) -> None:
+        self.draft.set_entry(key, entry)
+        self._changed()
+
+    def _on_reset(self, key: str) -> None:
+        self.draft.reset([key])
+        self._changed()
+
+    def _on_section_reset(self, section: Section) -> None:
+        self.draft.reset_section(section)
+        self._changed()
+
+    def _ask_reset_all(self) -> None:
+        self.profile_row.ask("Put all settings back to their defaults?", "Reset all", self._reset_everything)
+
+    def _reset_everything(self) -> None:
+        self.draft.load(self.draft.default)
+        self._changed()
+
+    def _changed(self) -> None:
+        self._renew()
+        self.profile_row.show_current(self._profiles.matching(self.draft.config) if self.draft.config is not None else None)
+        if self.draft.config is not None:
+            self.drafted.emit(self.draft.config)
+
+    def _renew(self) -> None:
+        """Fields, marks, the line below and the buttons, as the draft is."""
+        self.page.renew()
+        for section in schema().walk():
+            if section.key:
+                count, is_wrong = self.draft.changed_in(section), self.draft.is_wrong_in(section)
+                mark = "\N{WARNING SIGN}" if is_wrong else f"\N{BLACK CIRCLE} {count}" if count else ""
+                item = self._items[section.key]
+                if item.text(1) == mark and item.toolTip(0):
+                    continue
+                item.setText(1, mark)
+                words = "something is not allowed" if is_wrong else f"{count} differ from the default" if count else "as by default"
+                item.setToolTip(0, f"{section.key}: {words}")
+                item.setData(0, Qt.ItemDataRole.AccessibleTextRole, f"{section.title}, {words}")
+        effects = self.draft.effects()
+        may_save = not self._locked and self.draft.config is not None and self.draft.is_dirty
+        self.save.setEnabled(may_save)
+        self.save_and_restart.setVisible(Effect.RIG in effects)
+        self.save_and_restart.setEnabled(may_save)
+        self.reset_all.setEnabled(not self._locked and any(self.draft.is_changed(key) for key in settings_by_key()))
+        self.status.setText(self._status(effects))
+
+    def _status(self, effects: set[Effect]) -> str:
+        if self._locked:
+            return f"\N{WARNING SIGN}  {self._locked}"
+        problem = self.draft.first_problem
+        if problem is not None:
+            return f'\N{WARNING SIGN}  <a href="{problem[0]}">{problem[0]}</a>: {problem[1]}'
+        if not self.draft.is_dirty:
+            return f"Saved in {self._path}"
+        count = len(self.draft.unsaved_keys())
+        parts = [f"{count} not saved"]
+        if Effect.NOW in effects:
+            parts.append("the picture shows it already; Cancel puts it back")
+        if Effect.RIG in effects:
+            parts.append("some act when the rig is started again")
+        if Effect.PROGRAM in effects:
+            parts.append("some at the next start of the program")
+        return "; ".join(parts)
+
+    # ---- searching
+
+    def _run_search(self) -> None:
+        words = self.search.text().strip()
+        if not words:
+            self.show_section(self._section)
+            return
+        self.tree.clearSelection()
+        self.page.show_groups(search(words), f"Nothing has {words} in its name, meaning or unit")
+
+    def _on_tree(self) -> None:
+        item = self.tree.currentItem()
+        if item is None or not item.isSelected():
+            return
+        key = item.data(0, _KEY_ROLE)
+        section = next(section for section in schema().walk() if section.key == key)
+        self.search.clear()
+        self._search_soon.stop()
+        self.show_section(section)
+
+    # ---- profiles
+
+    def _show_profiles(self) -> None:
+        config = self.draft.config
+        self.profile_row.show_profiles(self._profiles.all(), self._profiles.matching(config) if config is not None else None)
+
+    def _choose_profile(self, profile: Profile) -> None:
+        try:
+            file = self._profiles.load(profile)
+        except ProfileError as error:
+            self.show_notice(str(error), is_fault=True)
+        else:
+            self.draft.load(file.config)
+            self.show_notice("\n".join(file.problems), is_fault=True)
+        self._show_profiles()
+        self._changed()
+
+    def _ask_save_profile(self, name: str) -> None:
+        if self._profiles.exists(name):
+            self.profile_row.ask(f"There is a profile {name} already. Replace it?", "Replace", partial(self._save_profile, name))
+        else:
+            self._save_profile(name)
+
+    def _save_profile(self, name: str) -> None:
+        config = self.draft.config
+        if config is None:
+            self.show_notice("First mend what is not allowed", is_fault=True)
+            return
+        self._do(lambda: self._profiles.save(name, config)[1] or f"Saved as profile {name}")
+
+    def _delete_profile(self, profile: Profile) -> None:
+        def delete() -> str:
+            self._profiles.delete(profile)
+            return f"Profile {profile.name} deleted"
+
+        self._do(delete)
+
+    def _do(self, action: Callable[[], str]) -> None:
+        """Do something with a profile and say how it went."""
+        try:
+            self.show_notice(action())
+        except ProfileError as error:
+            self.show_notice(str(error), is_fault=True)
+        self._show_profiles()
+
+    # ---- keys
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Enter presses the button that has the focus: Space, which does it elsewhere, stops the robot."""
+        focus = self.focusWidget()
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            if isinstance(focus, QAbstractButton) and not event.isAutoRepeat():
+                focus.click()
+            return
+        if event.key() == Qt.Key.Key_Escape and self.profile_row.is_asking:
+            self.profile_row.question.cancel()
+            self.profile_row.end_asking()
+            return
+        if event.key() == Qt.Key.Key_Escape and self.search.text():
+            self.search.clear()
+            return
+        super().keyPressEvent(event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.reject()
+        super().closeEvent(event)
+
+    # ---- places
+
+    def _wire(self) -> None:
+        self.search.textChanged.connect(lambda _text: self._search_soon.start())
+        self._search_soon.timeout.connect(self._run_search)
+        self.tree.itemSelectionChanged.connect(self._on_tree)
+        self.page.edited.connect(self._on_edited)
+        self.page.reset_asked.connect(self._on_reset)
+        self.page.section_reset_asked.connect(self._on_section_reset)
+        self.profile_row.chosen.connect(self._choose_profile)
+        self.profile_row.save_asked.connect(self._ask_save_profile)
+        self.profile_row.delete_asked.connect(self._delete_profile)
+        self.status.linkActivated.connect(self.go_to)
+        self.reset_all.clicked.connect(lambda _on=False: self._ask_reset_all())
+        self.cancel.clicked.connect(lambda _on=False: self.reject())
+        self.save.clicked.connect(lambda _on=False: self.save_asked.emit(False))
+        self.save_and_restart.clicked.connect(lambda _on=False: self.save_asked.emit(True))
+        QShortcut(QKeySequence.StandardKey.Find, self).activated.connect(self.search.setFocus)
+
+    def _fill_tree(self) -> None:
+        def add(parent: QTreeWidget | QTreeWidgetItem, section: Section) -> None:
+            item = QTreeWidgetItem(parent, [section.title, ""])
+            item.setData(0, _KEY_ROLE, section.key)
+            item.setSizeHint(0, QSize(0, _ROW_PX))
+            item.setTextAlignment(1, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self._items[section.key] = item
+            for part in section.sections:
+                add(item, part)
+
+        for section in schema().sections:
+            add(self.tree, section)
+        self._items["perception"].setExpanded(True)
+
+    def _lay_out(self) -> None:
+        self.search.setPlaceholderText("Search name, meaning, unit  (Ctrl+F)")
+        self.search.setAccessibleName("Search settings")
+        self.search.setClearButtonEnabled(True)
+        self.tree.setColumnCount(2)
+        self.tree.setHeaderHidden(True)
+        self.tree.header().setStretchLastSection(False)
+        self.tree.header().setSectionResizeMode(0, self.tree.header().ResizeMode.Stretch)
+        self.tree.header().setSectionResizeMode(1, self.tree.header().ResizeMode.ResizeToContents)
+        self.tree.setAccessibleName("Sections")
+        self.tree.setIndentation(14)
+        self.notice.setWordWrap(True)
+        self.status.setWordWrap(True)
+        self.status.setObjectName("setting_meaning")
+        self.status.setAccessibleName("State of the settings")
+        top = QHBoxLayout()
+        top.setSpacing(20)
+        top.addWidget(self.search, 2)
+        top.addWidget(self.profile_row, 3)
+        self.splitter = QSplitter(Qt.Orientation.Horizontal)
+        self.splitter.addWidget(self.tree)
+        self.splitter.addWidget(self.page)
+        self.splitter.setChildrenCollapsible(False)
+        self.splitter.setStretchFactor(1, 1)
+        self.splitter.setSizes([_TREE_PX, _SIZE[0] - _TREE_PX])
+        bottom = QHBoxLayout()
+        bottom.setSpacing(8)
+        bottom.addWidget(self.status, 1)
+        for button in (self.reset_all, self.cancel, self.save, self.save_and_restart):
+            bottom.addWidget(button)
+        for button in self.findChildren(QPushButton):
+            button.setAutoDefault(False)
+        self.save.setObjectName("main_button")
+        column = QVBoxLayout(self)
+        column.setContentsMargins(theme.GAP, theme.GAP, theme.GAP, theme.GAP)
+        column.setSpacing(8)
+        column.addLayout(top)
+        column.addWidget(self.notice)
+        column.addWidget(self.splitter, 1)
+        column.addLayout(bottom)

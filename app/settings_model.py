@@ -1,0 +1,254 @@
+"""Settings while they are edited: every entry is checked as it is typed, and nothing acts before it is allowed. No Qt here."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from pydantic import ValidationError
+
+from core.config import Config, load_config
+from core.config_schema import Effect, Kind, Section, Setting, schema, settings_by_key, value_at, with_value
+from core.config_write import changed_keys
+
+_SEPARATORS = re.compile(r"[\s_.,]+")
+
+
+class SettingsDraft:
+    """A configuration under edit.
+
+    Parameters
+    ----------
+    saved : what the settings file says.
+    """
+
+    def __init__(self, saved: Config) -> None:
+        self.default = load_config()
+        self.saved = saved
+        self._defaults = _flat(self.default.model_dump(mode="json"))
+        self._data = saved.model_dump(mode="json")
+        self._saved_values = self._values = _flat(self._data)
+        self._config: Config | None = saved
+        self._entries: dict[str, str] = {}
+        self._errors: dict[str, str] = {}
+        self._section_errors: dict[str, str] = {}
+
+    # ---- what is there
+
+    @property
+    def config(self) -> Config | None:
+        """The configuration as edited, None while anything in it is not allowed."""
+        return self._config if not self._errors and not self._section_errors else None
+
+    def value(self, key: str) -> Any:
+        """The last allowed value of a setting."""
+        return self._values[key]
+
+    def default_value(self, key: str) -> Any:
+        return self._defaults[key]
+
+    def entry(self, key: str) -> str:
+        """What stands in the field: the value, or what was typed and is not allowed."""
+        return self._entries.get(key, as_text(self.value(key)))
+
+    def is_changed(self, key: str) -> bool:
+        """Whether it differs from the default."""
+        return key in self._errors or self.value(key) != self.default_value(key)
+
+    def changed_in(self, section: Section) -> int:
+        """How many settings of a section, those within included, differ from the default."""
+        return sum(self.is_changed(setting.key) for setting in section.all_settings())
+
+    @property
+    def is_dirty(self) -> bool:
+        """Whether anything is to be saved, or stands there that cannot be."""
+        return bool(self._errors or self._section_errors) or self._values != self._saved_values
+
+    def effects(self) -> set[Effect]:
+        """When what differs from the saved settings begins to act."""
+        settings = settings_by_key()
+        return {settings[key].effect for key in self.unsaved_keys()}
+
+    def unsaved_keys(self) -> tuple[str, ...]:
+        return tuple(key for key, value in self._values.items() if value != self._saved_values[key])
+
+    # ---- what is wrong
+
+    def error(self, key: str) -> str:
+        """One clear message for an entry, empty when it is allowed."""
+        return self._errors.get(key, "")
+
+    def section_error(self, section_key: str) -> str:
+        """What does not go together in a section."""
+        return self._section_errors.get(section_key, "")
+
+    def is_wrong_in(self, section: Section) -> bool:
+        return any(part.key in self._section_errors for part in section.walk()) or any(
+            setting.key in self._errors for setting in section.all_settings()
+        )
+
+    @property
+    def first_problem(self) -> tuple[str, str] | None:
+        """Key (of a setting or a section) and message of the first problem."""
+        for problems in (self._errors, self._section_errors):
+            for key, message in problems.items():
+                return key, message
+        return None
+
+    # ---- edits
+
+    def set_entry(self, key: str, entry: object) -> str:
+        """Take what was typed or chosen; returns the message, empty when it is allowed."""
+        setting = settings_by_key()[key]
+        text = entry if isinstance(entry, str) else as_text(entry)
+        value, message = parse(setting, entry)
+        if not message:
+            candidate = with_value(self._data, key, value)
+            message = _own_message(candidate, key)
+            if not message:
+                self._data = candidate
+        if message:
+            self._entries[key], self._errors[key] = text, message
+        else:
+            self._forget_entry(key)
+        self._check_sections()
+        return message
+
+    def reset(self, keys: Iterable[str]) -> None:
+        """Put settings back to their defaults, together: half of them might not go with the other half."""
+        for key in keys:
+            self._forget_entry(key)
+            self._data = with_value(self._data, key, self.default_value(key))
+        self._check_sections()
+
+    def reset_section(self, section: Section) -> None:
+        """A section and all within."""
+        self.reset([setting.key for setting in section.all_settings()])
+
+    def load(self, config: Config) -> None:
+        """Take a whole configuration, of a profile."""
+        self._entries.clear()
+        self._errors.clear()
+        self._data = config.model_dump(mode="json")
+        self._check_sections()
+
+    def mark_saved(self) -> None:
+        """What is edited is what the file says now."""
+        if self.config is not None:
+            self.saved, self._saved_values = self.config, self._values
+
+    def _forget_entry(self, key: str) -> None:
+        self._entries.pop(key, None)
+        self._errors.pop(key, None)
+
+    def _check_sections(self) -> None:
+        """Each entry is allowed by itself; do they go together?"""
+        self._values, self._section_errors = _flat(self._data), {}
+        try:
+            self._config = Config.model_validate(self._data)
+        except ValidationError as error:
+            for found in error.errors():
+                key = ".".join(str(part) for part in found["loc"])
+                self._section_errors.setdefault(key, _sentence(found["msg"]))
+
+
+def _flat(data: dict[str, Any]) -> dict[str, Any]:
+    """All settings by key."""
+    return {key: value_at(data, key) for key in settings_by_key()}
+
+
+def parse(setting: Setting, entry: object) -> tuple[Any, str]:
+    """The value of an entry, and why it is none (empty when it is)."""
+    if setting.kind is Kind.SWITCH:
+        return bool(entry), ""
+    if setting.kind is Kind.CHOICE:
+        return (entry, "") if entry in setting.choices else (None, f"must be one of: {setting.range_text}")
+    text = as_text(entry).strip()
+    if not text:
+        return (None, "") if setting.is_optional else (None, f"must not be empty{_wanted(setting)}")
+    if setting.kind is Kind.TEXT:
+        return text, ""
+    return _number(setting, text)
+
+
+def _number(setting: Setting, text: str) -> tuple[Any, str]:
+    if text.count(",") == 1 and "." not in text:
+        text = text.replace(",", ".")
+    try:
+        value = float(text)
+    except ValueError:
+        return None, f"not a number{_wanted(setting)}"
+    if not math.isfinite(value):
+        return None, f"not a finite number{_wanted(setting)}"
+    if setting.kind is Kind.WHOLE and not value.is_integer():
+        return None, f"must be a whole number{_wanted(setting)}"
+    bounds = setting.bounds
+    is_low = bounds.low is not None and (value <= bounds.low if bounds.low_open else value < bounds.low)
+    is_high = bounds.high is not None and (value >= bounds.high if bounds.high_open else value > bounds.high)
+    if is_low or is_high:
+        return None, f"must be {setting.range_text}"
+    return int(value) if setting.kind is Kind.WHOLE else value, ""
+
+
+def _wanted(setting: Setting) -> str:
+    return f"; allowed: {setting.range_text}" if setting.range_text else ""
+
+
+def _own_message(data: dict[str, Any], key: str) -> str:
+    """What pydantic has against this entry itself (a pattern, a length); what does not go together is no matter of one entry."""
+    try:
+        Config.model_validate(data)
+    except ValidationError as error:
+        for found in error.errors():
+            if ".".join(str(part) for part in found["loc"]) == key:
+                if found["type"] == "string_pattern_mismatch":
+                    return f"has not the right form: {settings_by_key()[key].description}"
+                return _sentence(found["msg"])
+    return ""
+
+
+def _sentence(message: str) -> str:
+    return message.removeprefix("Value error, ")
+
+
+def as_text(value: object) -> str:
+    """As it stands in a field: 6 for 6.0, nothing for None."""
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+    return str(value)
+
+
+def search(words: str) -> list[tuple[Section, list[Setting]]]:
+    """Settings that have all the words in name, title, description, unit or their section's title, by section."""
+    wanted = [word for word in _SEPARATORS.split(words.casefold()) if word]
+    found = []
+    for section in schema().walk():
+        hits = [setting for setting in section.settings if all(word in _haystack(section, setting) for word in wanted)]
+        if hits and wanted:
+            found.append((section, hits))
+    return found
+
+
+def _haystack(section: Section, setting: Setting) -> str:
+    parts = (section.title, setting.key.replace(".", " "), setting.title, setting.description, setting.unit, setting.range_text)
+    return " ".join(parts).casefold()
+
+
+def with_changes(running: Config, before: Config, after: Config, effects: frozenset[Effect]) -> Config:
+    """`running` with those differences of two others that act then: what it has from elsewhere (a command line, a picker) stays.
+
+    Where that does not go together it is `running` as it was; the settings then act at the next start of the program.
+    """
+    data, new = running.model_dump(mode="json"), after.model_dump(mode="json")
+    settings = settings_by_key()
+    for key in changed_keys(before, after):
+        if settings[key].effect in effects:
+            data = with_value(data, key, value_at(new, key))
+    try:
+        return Config.model_validate(data)
+    except ValidationError:
+        return running

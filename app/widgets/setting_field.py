@@ -1,0 +1,258 @@
+"""One setting: name, field, unit, what is allowed, what it means; checked as it is typed, marked where it is not the default."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QWheelEvent
+from PySide6.QtWidgets import QCheckBox, QFrame, QGridLayout, QLabel, QLineEdit, QPushButton, QSlider, QWidget
+
+from app.settings_model import as_text
+from app.widgets.quiet_combo import QuietCombo
+from core.config_schema import Effect, Kind, Setting
+
+_SLIDER_STEPS = 1000
+_CURVED_FROM = 10.0
+"""A range this much longer than the default is stretched at its lower end, or the slider could not be set finely there."""
+_UNSET = {Kind.NUMBER: "automatic", Kind.WHOLE: "automatic", Kind.TEXT: "not set"}
+_NAME_PX, _FIELD_PX, _UNIT_PX = 132, 100, 46
+
+
+class SettingField(QFrame):
+    """Shows what it is told and says what was typed; it decides nothing. ``edited`` has key and entry, ``reset_asked`` the key."""
+
+    edited = Signal(str, object)
+    reset_asked = Signal(str)
+
+    def __init__(self, setting: Setting, default: Any) -> None:
+        super().__init__()
+        self.setting = setting
+        self._default = default
+        self._state: tuple[object, ...] = ()
+        self.setObjectName("setting")
+        self._name, self._error = QLabel(setting.title), QLabel()
+        self._name.setObjectName("setting_name")
+        self._name.setWordWrap(True)
+        self._error.setObjectName("setting_error")
+        self._error.setWordWrap(True)
+        self.editor = self._make_editor()
+        self.slider = self._make_slider()
+        self.reset_button = QPushButton("Reset")
+        self.reset_button.setToolTip(f"Back to the default: {self.default_text}")
+        self.reset_button.setAccessibleName(f"Reset {setting.title} to {self.default_text}")
+        self.reset_button.clicked.connect(lambda _on=False: self.reset_asked.emit(setting.key))
+        self._lay_out()
+
+    @property
+    def default_text(self) -> str:
+        """The default with its unit."""
+        if isinstance(self._default, bool):
+            return "on" if self._default else "off"
+        text = as_text(self._default)
+        return f"{text} {self.setting.unit}".strip() if text else _UNSET.get(self.setting.kind, "not set")
+
+    @property
+    def error_text(self) -> str:
+        return self._error.text()
+
+    @property
+    def is_marked(self) -> bool:
+        """Whether it is marked as different from the default."""
+        return bool(self.property("changed"))
+
+    def show_state(self, entry: str, value: Any, *, is_changed: bool, error: str) -> None:
+        """What stands in the field, the last allowed value, and what is wrong with what stands there."""
+        state = (entry, value, is_changed, error)
+        if state == self._state:
+            return
+        self._state = state
+        with QSignalBlocker(self.editor):
+            if isinstance(self.editor, QCheckBox):
+                self.editor.setChecked(bool(value))
+                self.editor.setText("on" if value else "off")
+            elif isinstance(self.editor, QuietCombo):
+                self.editor.setCurrentIndex(self.editor.findData(value))
+            elif self.editor.text() != entry:
+                self.editor.setText(entry)
+        if self.slider is not None and value is not None and not self.slider.isSliderDown():
+            with QSignalBlocker(self.slider):
+                self.slider.setValue(self._place_of(float(value)))
+        self._error.setText(f"\N{WARNING SIGN}  {error}" if error else "")
+        self._error.setVisible(bool(error))
+        self.reset_button.setEnabled(is_changed)
+        self._name.setText(f"\N{BLACK CIRCLE} {self.setting.title}" if is_changed else self.setting.title)
+        self.editor.setAccessibleDescription(f"{error}. {self._note()}" if error else self._note())
+        if (bool(self.property("changed")), bool(self.property("wrong"))) != (is_changed, bool(error)):
+            self.setProperty("changed", is_changed)
+            self.setProperty("wrong", bool(error))
+            self.editor.setProperty("wrong", bool(error))
+            for widget in (self, self.editor):  # style sheets look at properties only when they are told to
+                widget.style().unpolish(widget)
+                widget.style().polish(widget)
+
+    def take_focus(self) -> None:
+        self.editor.setFocus()
+
+    # ---- the editor
+
+    def _make_editor(self) -> QCheckBox | QuietCombo | QLineEdit:
+        setting = self.setting
+        editor: QCheckBox | QuietCombo | QLineEdit
+        if setting.kind is Kind.SWITCH:
+            editor = _Switch()
+            editor.toggled.connect(lambda on: self.edited.emit(setting.key, on))
+        elif setting.kind is Kind.CHOICE:
+            editor = QuietCombo(setting.title)
+            for choice in setting.choices:
+                editor.addItem(as_text(choice).replace("_", " "), choice)
+            combo = editor
+            combo.currentIndexChanged.connect(lambda _place: self.edited.emit(setting.key, combo.currentData()))
+        else:
+            editor = QLineEdit() if setting.kind is Kind.TEXT else NumberEdit(is_whole=setting.kind is Kind.WHOLE)
+            editor.setPlaceholderText(_UNSET[setting.kind] if setting.is_optional else "")
+            editor.textEdited.connect(lambda text: self.edited.emit(setting.key, text))
+        editor.setAccessibleName(f"{setting.title}, {setting.unit}" if setting.unit else setting.title)
+        editor.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        return editor
+
+    def _make_slider(self) -> QSlider | None:
+        """For what acts at once, so that the picture can be watched meanwhile."""
+        setting, bounds = self.setting, self.setting.bounds
+        if setting.effect is not Effect.NOW or bounds.low is None or bounds.high is None:
+            return None
+        slider = _Slider(Qt.Orientation.Horizontal)
+        slider.setRange(0, _SLIDER_STEPS)
+        slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the field beside it has the arrows
+        slider.setAccessibleName(f"{setting.title}, as a slider")
+        slider.valueChanged.connect(lambda place: self.edited.emit(setting.key, self._value_at(place)))
+        return slider
+
+    def _power(self) -> float:
+        bounds = self.setting.bounds
+        assert bounds.low is not None
+        assert bounds.high is not None
+        is_long = bounds.low >= 0 and bounds.high - bounds.low > _CURVED_FROM * max(float(self._default or 0), 1e-9)
+        return 3.0 if is_long else 1.0
+
+    def _value_at(self, place: int) -> str:
+        """The value at a place of the slider, with no more digits than its step has."""
+        bounds = self.setting.bounds
+        assert bounds.low is not None
+        assert bounds.high is not None
+        span = bounds.high - bounds.low
+        value = bounds.low + span * (place / _SLIDER_STEPS) ** self._power()
+        if self.setting.kind is Kind.WHOLE:
+            return str(round(value))
+        digits = max(0, 2 - math.floor(math.log10(max(abs(value), span / 1e4, 1e-9))))
+        text = f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
+        return "0" if text in ("-0", "") else text
+
+    def _place_of(self, value: float) -> int:
+        bounds = self.setting.bounds
+        assert bounds.low is not None
+        assert bounds.high is not None
+        share = max(0.0, min(1.0, (value - bounds.low) / (bounds.high - bounds.low)))
+        return round(_SLIDER_STEPS * share ** (1.0 / self._power()))
+
+    # ---- places
+
+    def _lay_out(self) -> None:
+        setting = self.setting
+        unit, meaning = QLabel(setting.unit), QLabel(_capital(setting.description))
+        note = QLabel(_together(self._note(), setting.unit))
+        unit.setObjectName("setting_note")
+        meaning.setObjectName("setting_meaning")
+        note.setObjectName("setting_note")
+        for label in (meaning, note):
+            label.setWordWrap(True)
+            label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._name.setFixedWidth(_NAME_PX)
+        self._name.setBuddy(self.editor)
+        self.setToolTip(setting.key)
+        grid = QGridLayout(self)
+        grid.setContentsMargins(12, 7, 10, 8)
+        grid.setHorizontalSpacing(8)
+        grid.setVerticalSpacing(2)
+        grid.addWidget(self._name, 0, 0)
+        if setting.kind is Kind.TEXT:
+            grid.addWidget(self.editor, 0, 1, 1, 3)
+        else:
+            self.editor.setFixedWidth(_FIELD_PX if setting.kind is not Kind.CHOICE else _FIELD_PX + 50)
+            unit.setMinimumWidth(_UNIT_PX)
+            if setting.kind is Kind.CHOICE:
+                grid.addWidget(self.editor, 0, 1, 1, 2, Qt.AlignmentFlag.AlignLeft)
+            else:
+                grid.addWidget(self.editor, 0, 1)
+                grid.addWidget(unit, 0, 2)
+            grid.addWidget(self.slider if self.slider is not None else QWidget(), 0, 3)
+        grid.addWidget(self.reset_button, 0, 4)
+        row = 1
+        for label in (self._error, meaning, note):
+            if label is self._error or label.text():
+                grid.addWidget(label, row, 1, 1, 4)
+                row += 1
+        self._error.hide()
+        grid.setColumnStretch(3, 1)
+
+    def _note(self) -> str:
+        parts = [f"Default {self.default_text}"]
+        if self.setting.range_text and self.setting.kind is not Kind.CHOICE:
+            parts.append(f"allowed {self.setting.range_text}")
+        if self.setting.effect is not Effect.NOW:
+            parts.append(self.setting.effect.value)
+        return "  \N{MIDDLE DOT}  ".join(parts)
+
+
+class NumberEdit(QLineEdit):
+    """A number as text; up and down change it by a step that fits its size, with Shift by ten of them."""
+
+    def __init__(self, *, is_whole: bool) -> None:
+        super().__init__()
+        self._is_whole = is_whole
+        self.setAlignment(Qt.AlignmentFlag.AlignRight)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Up, Qt.Key.Key_Down):
+            sign = 1 if event.key() == Qt.Key.Key_Up else -1
+            self.step(sign * (10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1))
+            return
+        super().keyPressEvent(event)
+
+    def step(self, steps: int) -> None:
+        """So many steps up or down; what is no number stays as it is."""
+        try:
+            value = float(self.text().replace(",", "."))
+        except ValueError:
+            return
+        if not math.isfinite(value):
+            return
+        exponent = 0 if self._is_whole else math.floor(math.log10(abs(value))) - 1 if value else -2
+        value = round(value / 10.0**exponent + steps) * 10.0**exponent
+        self.setText(as_text(round(value, max(0, -exponent))))
+        self.textEdited.emit(self.text())
+
+
+class _Switch(QCheckBox):
+    """Enter turns it too: Space, which does it elsewhere, stops the robot."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not event.isAutoRepeat():
+            self.toggle()
+            return
+        super().keyPressEvent(event)
+
+
+class _Slider(QSlider):
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        event.ignore()  # it belongs to the page
+
+
+def _together(text: str, unit: str) -> str:
+    """No unit stands alone in a line."""
+    return text.replace(f" {unit}", f"\N{NO-BREAK SPACE}{unit}") if unit else text
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
