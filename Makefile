@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := help
-.PHONY: help run test lint setup clean
+.PHONY: help run test lint setup install uninstall clean
 
 # Tools are started as modules, so that a checkout that was moved still works (the scripts in .venv/bin name their old place).
 PY := .venv/bin/python
@@ -31,6 +31,12 @@ lint: setup  ## ruff and mypy only
 
 setup:  ## make or renew .venv; returns at once when it is up to date
 	@PYTHON='$(PYTHON)' bash scripts/set_up.sh
+
+install: setup  ## put it into your desktop's menu, and the command lumenpilot into ~/.local/bin
+	@bash scripts/desktop.sh install
+
+uninstall:  ## take both out again
+	@bash scripts/desktop.sh uninstall
 
 clean:  ## remove .venv and all caches
 	@rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis

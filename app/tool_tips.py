@@ -1,0 +1,142 @@
+"""What each quantity on the screen means, after the method: the one table behind all tool tips. No Qt here."""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+
+from app.next_step import DEADMAN_KEY
+from app.wording import STATE_MEANING
+
+_WIDTH = 96
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Its name as it is written on the screen, its unit ("" where it has none), and its meaning in whole sentences."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+QUANTITY = {
+    # ---- the pose
+    "theta": Quantity(
+        "theta",
+        "degrees",
+        "Angle between the line through the robot's last 40 px and the line through 40 px of the vessel's centerline beside the "
+        "head. Positive: the robot points to the right of the vessel's direction, as seen on screen.",
+    ),
+    "d_head": Quantity(
+        "d_head",
+        "working px",
+        "Distance of the robot's head from the vessel's line. Working pixels: the picture scaled to 640 px along its longer side.",
+    ),
+    "d_tail": Quantity(
+        "d_tail",
+        "working px",
+        "Distance of the point 40 px behind the head from the same line. On the other side than the head: the robot has crossed.",
+    ),
+    "crossed": Quantity(
+        "crossed", "", "Head and tail of the robot's line lie on opposite sides of the vessel's line: one of them is past it."
+    ),
+    "state": Quantity("Pose state", "", "\n".join(STATE_MEANING.values())),
+    "confidence": Quantity(
+        "confidence",
+        "0 to 1",
+        "Chance that the answer is right (theta within 5 degrees, head within 15 px), as learnt on pictures with known truth. "
+        "Below 0.30 there is no answer but a reason.",
+    ),
+    "reason": Quantity("No pose", "", "The program sees that it cannot tell, and names why: better no answer than a wrong one."),
+    # ---- the vessel and the way
+    "clearance": Quantity(
+        "Room",
+        "working px, about mm",
+        "Between the edge of the robot's head and the wall of the vessel. The bar is full on the centerline and empty at the wall.",
+    ),
+    "force": Quantity(
+        "Wall force", "N", "Sum of the contact forces of the robot on the vessel's wall. Known on the bench twin only."
+    ),
+    "target": Quantity(
+        "Destination",
+        "px to go",
+        "Where you want to go: a click in the picture sets it, a right click or Esc clears it. "
+        "The vessel's direction follows the way there, and the program drives to it.",
+    ),
+    "phantom": Quantity("Phantom", "", "The vessel phantom that the bench twin shows; another one starts the twin again."),
+    "seed": Quantity("Seed", "", "Of the random phantom: the same seed gives the same phantom."),
+    # ---- advice and commands
+    "advice": Quantity(
+        "Advice",
+        "mm/s and degrees",
+        "How fast to advance or retract, and how far to turn the head (right and left as seen on screen). Unless you hand over, "
+        "you steer, and nothing is sent to the robot but what you ask for.",
+    ),
+    "commands": Quantity(
+        "Commands",
+        "",
+        "Four things kept apart: advised, asked by you, commanded by the program, and sent after the gate. Bend and pitch: share "
+        "of the tendons' full pull; advised: the turn in degrees. \N{NOT EQUAL TO}: the gate sent something else than was asked.",
+    ),
+    "capture_to_servo": Quantity(
+        "Capture to servo", "ms", "From the picture to the command made of it. It should stay below 100 ms."
+    ),
+    "following": Quantity("Following", "%", "How far your motions of the last ten seconds agreed with the advice."),
+    "bend": Quantity(
+        "bend", "share of full pull", "How far the head is bent, as the tendons are pulled: left and right of the middle."
+    ),
+    "insertion": Quantity("in", "mm", "How far the robot is in, by the feed's servo."),
+    "mode": Quantity("Mode", "", "Who drives: ADVISORY and ARMED you, AUTONOMOUS the program, HOLD and STOPPED nobody."),
+    "deadman": Quantity(
+        "Deadman",
+        "",
+        f"The program drives only while you hold this with the mouse, hold {DEADMAN_KEY} or stand on the pedal. Let go and the "
+        "robot holds. It must be pressed after arming: what was down before does not count.",
+    ),
+    "tendon_balance": Quantity(
+        "Tendon pair",
+        "mm and N",
+        "Two wires that pull against each other: the sum of their pulls should be twice the pretension. Bar to the left: slack. "
+        "Bar to the right: too tight. In N: tension of either wire as the motor's current tells it, friction included.",
+    ),
+    # ---- pace
+    "shown": Quantity("shown/s", "1/s", "Frames drawn on this screen per second."),
+    "engine": Quantity("frames/s", "1/s", "Frames perceived per second."),
+    "dropped": Quantity("dropped", "frames", "The camera gave them, but nobody looked: a newer one was there already."),
+    "gui_block": Quantity("block", "ms", "Longest time in the last 10 s in which this window could not react to you."),
+    "latency": Quantity(
+        "Latency",
+        "ms",
+        "Time that each stage took for one frame, over the last seconds: half of the frames were quicker than p50, 95 % were "
+        "quicker than p95.",
+    ),
+    "trends": Quantity(
+        "Last 30 seconds", "degrees, px", "Theta above, d_head and d_tail (dotted) below, and the state as a band. Gaps: no pose."
+    ),
+    # ---- sessions and studies
+    "timeline": Quantity(
+        "Timeline",
+        "s",
+        "The whole session: states as a band, theta, gaps, and marks of alerts, steps, destinations and notes. Click or drag goes "
+        "there, the wheel zooms, Shift and drag selects.",
+    ),
+    "values": Quantity(
+        "Recorded values", "", "What no dial shows: frame, latency by stage, confidence, crossed, tendons, servo bus, faults."
+    ),
+    "lines_used": Quantity(
+        "lines used", "working px", "Length of robot and vessel that the two lines are fitted to: less than 40 + 40 is less sure."
+    ),
+}
+
+
+def tip(*names: str) -> str:
+    """A tool tip: "name (unit): meaning" of each quantity on lines that fit a screen. Raises KeyError for an unknown one."""
+    return "\n".join(_paragraph(QUANTITY[name]) for name in names)
+
+
+def _paragraph(quantity: Quantity) -> str:
+    unit = f" ({quantity.unit})" if quantity.unit else ""
+    if "\n" in quantity.meaning:  # a list of its own
+        return quantity.meaning
+    return textwrap.fill(f"{quantity.name}{unit}: {quantity.meaning}", _WIDTH)
