@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 from contextlib import ExitStack
 
-from core.config import Config, PerceptionConfig
+from core.config import Config, PerceptionConfig, SegmentationConfig
+from core.control.drive_view import LeftOver
 from core.control.engine import Engine, Perceive
 from core.control.health import ModelReport
 from core.control.pilot import Pilot
@@ -12,6 +14,7 @@ from core.control.policies import make_policy
 from core.learning.model_file import ModelError
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
 from core.perception.segmentation import cores
+from core.types import Frame, Point, Scene
 from hardware.rig import Rig, RigKind, open_rig
 from hardware.servos.bus_messages import BusStatus
 from hardware.servos.servo_robot import ServoRobot
@@ -20,13 +23,27 @@ from hardware.servos.servo_robot import ServoRobot
 class RigEngine(Engine):
     """An engine that can also be asked for the newest status of the servo bus."""
 
-    def __init__(self, rig: Rig, perceive: Perceive, config: Config, model: ModelReport) -> None:
+    def __init__(self, rig: Rig, perceive: Perceive, config: Config, model: ModelReport, left_over: LeftOver | None = None) -> None:
         policy = make_policy(config.policy.name, config)
-        pilot = Pilot(rig.robot, policy, config, model) if rig.robot is not None else None
+        pilot = Pilot(rig.robot, policy, config, model, left_over=left_over) if rig.robot is not None else None
         super().__init__(rig.camera, perceive, policy, rig.close, pilot, rig.robot)
         self._servos = rig.robot if isinstance(rig.robot, ServoRobot) else None
-        if pilot is not None and rig.kind is RigKind.SIM:
+        self._network: Pipeline | None = None
+        self._knows_past = True
+        if pilot is not None and rig.kind is RigKind.SIM and left_over is None:
             pilot.switch_on()  # there is nobody whom the twin could hurt
+
+    def use_network(self, network: Pipeline, *, knows_past: bool) -> None:
+        """What ``set_perception`` makes others from; without a past every frame stands by itself."""
+        self._network, self._knows_past = network, knows_past
+
+    def set_perception(self, config: PerceptionConfig) -> bool:
+        """Perceive under other thresholds from the next frame on; from any thread. False without a network."""
+        if self._network is None:
+            return False
+        changed = self._network.with_config(config)
+        self._perceive = changed if self._knows_past else changed.perceive_single
+        return True
 
     def bus_status(self) -> BusStatus | None:
         """None where there is no servo bus, and before its first status."""
@@ -34,39 +51,70 @@ class RigEngine(Engine):
 
 
 class EngineMaker:
-    """Opens rig and engine for a configuration, in the engine's thread. The network is loaded once and kept."""
+    """Opens rig and engine for a configuration, in the engine's thread, one at a time.
+
+    The network is loaded once and kept. So is what the operator has not acknowledged when a rig is closed: starting again is no
+    acknowledgement, or F5 would clear a latched STOP.
+    """
 
     def __init__(self) -> None:
+        self._pilot: Pilot | None = None
+        self._left_over: LeftOver | None = None
         self._perceive: Perceive | None = None
         self._loaded: PerceptionConfig | None = None
 
     def __call__(self, config: Config) -> RigEngine:
         """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame, with why."""
-        perceive, model = self._perception(_leaving_a_core(config.perception))
-        if config.rig.camera == "image_folder" and isinstance(perceive, Pipeline):
-            # Pictures that have nothing to do with each other have no past.
-            perceive = perceive.perceive_single
+        perceive, model = self._perception(leaving_a_core(config.perception))
+        network = perceive if isinstance(perceive, Pipeline) else None
+        # Pictures that have nothing to do with each other have no past.
+        knows_past = config.rig.camera != "image_folder"
+        if network is not None and not knows_past:
+            perceive = network.perceive_single
+        if self._pilot is not None:  # a rig that could not be opened, or that nobody drives, acknowledges nothing either
+            self._left_over, self._pilot = self._pilot.left_over, None
+            gc.collect()  # a rig is a knot of callbacks about pictures and physics: 30 MB each would wait for the collector's turn
         with ExitStack() as undo:
             rig = open_rig(config)
             undo.callback(rig.close)
-            engine = RigEngine(rig, perceive, config, model)
+            engine = RigEngine(rig, perceive, config, model, self._left_over)
             undo.pop_all()
+        if network is not None:
+            engine.use_network(network, knows_past=knows_past)
+        self._pilot = engine.pilot
         return engine
 
     def _perception(self, config: PerceptionConfig) -> tuple[Perceive, ModelReport]:
-        if self._perceive is None or self._loaded != config:
+        if isinstance(self._perceive, Pipeline) and self._loaded is not None and _same_network(self._loaded, config):
+            self._perceive = self._perceive.with_config(config)
+            self._loaded = config
+        elif self._perceive is None or self._loaded != config:
             try:
                 self._perceive = open_pipeline(config)
                 self._loaded = config
             except ModelError as error:
                 # Not remembered: once the model is restored, starting the rig again is enough.
                 return NoPerception(str(error)), ModelReport(False, str(error))
-        if isinstance(self._perceive, Pipeline):
-            self._perceive.reset()
+        assert self._perceive is not None
         return self._perceive, ModelReport(True)
 
+    def perceive_again(self, frame: Frame, target: Point | None, config: PerceptionConfig) -> Scene | None:
+        """A frame by itself under other thresholds, for a rig that is closed; None without a network."""
+        if not isinstance(self._perceive, Pipeline):
+            return None
+        return self._perceive.with_config(config).perceive_single(frame, target)
 
-def _leaving_a_core(config: PerceptionConfig) -> PerceptionConfig:
+
+def _same_network(first: PerceptionConfig, second: PerceptionConfig) -> bool:
+    """Whether only thresholds differ: what the network itself is set to is the same."""
+    return _network_of(first.segmentation) == _network_of(second.segmentation)
+
+
+def _network_of(config: SegmentationConfig) -> SegmentationConfig:
+    return config.model_copy(update={"vessel_threshold": 0.5, "robot_threshold": 0.5})
+
+
+def leaving_a_core(config: PerceptionConfig) -> PerceptionConfig:
     """With threads "all": one core less, for window, servos and camera.
 
     Two threads of a network wait for each other; on two cores, with a twin beside them, they took 32 ms (p95 of the frame 68 ms)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 from core.config import Config, RigConfig
 from core.control.guarded_robot import GuardedRobot
 from core.devices import Camera, DeviceError
+from core.rig_file import calibration_of
 from core.types import RobotStatus
+from hardware.cameras.straightened import StraightenedCamera
 
 if TYPE_CHECKING:
     from hardware.servos.servo_robot import ServoRobot
@@ -49,7 +51,8 @@ class Rig:
             self.camera.close()
 
 
-_START_INSERTION_MM = 70.0
+START_INSERTION_MM = 70.0
+"""The twin's robot already lies so far in the vessel when the rig is opened."""
 
 
 def kind_of(rig: RigConfig) -> RigKind:
@@ -60,17 +63,21 @@ def kind_of(rig: RigConfig) -> RigKind:
 
 
 def open_rig(config: Config) -> Rig:
-    """Open camera and robot; what was opened is closed again when the rest fails.
+    """Open camera and robot; what was opened is closed again when the rest fails. Pictures come straightened by the rig's lens.
 
     Raises
     ------
-    DeviceError
+    DeviceError, RigFileError
         With one line that says what to do.
     """
     kind = kind_of(config.rig)
-    if kind is RigKind.SIM:
-        return _open_twin(config)
-    return _open_live(config) if kind is RigKind.LIVE else _open_playback(config)
+    if kind is RigKind.PLAYBACK:
+        return _open_playback(config)
+    calibration = calibration_of(config)
+    rig = _open_twin(config) if kind is RigKind.SIM else _open_live(config)
+    if calibration is None or calibration.lens is None:
+        return rig
+    return replace(rig, camera=StraightenedCamera(rig.camera, calibration.lens))
 
 
 def _open_playback(config: Config) -> Rig:
@@ -149,7 +156,7 @@ def _open_twin(config: Config) -> Rig:
     except ValueError as error:
         raise DeviceError(str(error)) from None
     # A robot that already lies in the vessel: the first picture shows all that the program can tell.
-    world.insert(_START_INSERTION_MM)
+    world.insert(START_INSERTION_MM)
     camera = TwinCamera(world)
     robot: GuardedRobot | None = None
     if config.rig.robot == "twin":
@@ -177,7 +184,7 @@ def _open_remote_twin(config: Config) -> Rig:
 
     _check_servos(config)
     with ExitStack() as undo:
-        twin = RemoteTwin(config, _START_INSERTION_MM)
+        twin = RemoteTwin(config, START_INSERTION_MM)
         undo.callback(twin.close)
         robot = _twin_servos(config, twin.port, twin.status, None)
         undo.pop_all()
@@ -192,12 +199,16 @@ def _check_servos(config: Config) -> None:
 def _servo_robot(config: Config, world: TwinWorld) -> ServoRobot:
     """The twin's robot moved by seven software servos in this process."""
     from hardware.twin.servo_bus import SoftServoBus
-    from hardware.twin.servo_joints import drive_world
+    from hardware.twin.servo_joints import drive_world, wired
 
     _check_servos(config)
-    servos = SoftServoBus(config.servos, wire_time=True)
+    try:
+        wiring = wired(config.twin, config.servos)
+    except ValueError as error:
+        raise DeviceError(str(error)) from None
+    servos = SoftServoBus(wiring, wire_time=True)
     servos.start()
-    drive_world(world, servos, config.servos)
+    drive_world(world, servos, wiring)
     return _twin_servos(config, servos.port, world.physics.status, servos.stop)
 
 

@@ -1,0 +1,194 @@
+"""``rig``: list and show rigs, calibrate one without a window, and print the board."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.window_command import window_config
+from core.calibration.board import BoardError, BoardSpec
+from core.config import Config
+from core.errors import UserError
+from core.rig_file import RESERVED, RigFile, check_rig_name, find_rig, list_rigs, rig_path, rigs_folder, with_rig, write_rig
+
+if TYPE_CHECKING:
+    from hardware.calibration_bench import See
+    from hardware.rig_draft import RigDraft
+
+STEPS = ("board", "servos", "zero", "steering")
+_BOARD_TRIES = 4
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrateOptions:
+    """``source`` names a rig to start from (twin, realsense, webcam or another rig file); ``steps`` of ``STEPS``, in that order."""
+
+    name: str
+    source: str | None
+    config_path: Path | None
+    steps: tuple[str, ...] = STEPS
+    pictures: int = 5
+    spec: BoardSpec = field(default_factory=BoardSpec)
+    as_json: bool = False
+
+
+def run_list(*, as_json: bool) -> None:
+    """All rig files, those that cannot be used with the reason."""
+    listed = list_rigs()
+    if as_json:
+        rows = [{"name": one.name, "path": str(one.path), "problem": one.problem or None, **_brief(one.rig)} for one in listed]
+        sys.stdout.write(json.dumps({"folder": str(rigs_folder()), "built_in": list(RESERVED), "rigs": rows}) + "\n")
+        return
+    for one in listed:
+        sys.stdout.write(f"{one.name}: {describe(one.rig) if one.rig is not None else one.problem}\n")
+    if not listed:
+        sys.stdout.write(
+            f"no rig files in {rigs_folder()}; make one: main.py rig calibrate NAME --auto, or menu Rig in the window\n"
+        )
+
+
+def run_show(name: str, *, as_json: bool) -> None:
+    """One rig with its calibration; raises RigFileError."""
+    path, rig = find_rig(name)
+    if as_json:
+        sys.stdout.write(json.dumps({"path": str(path), **rig.model_dump(mode="json")}) + "\n")
+        return
+    sys.stdout.write("\n".join([f"{rig.name} ({path})", describe(rig), *calibration_lines(rig)]) + "\n")
+
+
+def run_board(out: Path, spec: BoardSpec) -> None:
+    """Write the board for the printer; raises BoardPrintError."""
+    from app.board_print import print_board
+
+    paper = print_board(out, spec)
+    sys.stdout.write(f"{out}\n")
+    sys.stderr.write(f"print it on {paper} at 100 %, and measure the line of 100 mm on it\n")
+
+
+def run_calibrate(options: CalibrateOptions) -> None:
+    """Calibrate without help, and save the rig; raises UserError with what went wrong. Nothing is saved then."""
+    from hardware.calibration_bench import open_bench
+    from hardware.rig_draft import RigDraft
+
+    config, earlier = _start(options)
+    bench = open_bench(config, quick_sight(config))
+    try:
+        draft = RigDraft(bench, config, earlier.calibration if earlier is not None else None, _say)
+        draft.spec = options.spec
+        bench.warm_up()
+        calibrate(draft, options.steps, options.pictures)
+        rig = draft.rig_file(options.name)
+    finally:
+        bench.close()
+    path = write_rig(rig)
+    if options.as_json:
+        sys.stdout.write(json.dumps({"path": str(path), "notes": draft.notes, **rig.model_dump(mode="json")}) + "\n")
+        return
+    sys.stdout.write("\n".join([f"{rig.name} ({path})", describe(rig), *calibration_lines(rig), *draft.notes]) + "\n")
+
+
+def calibrate(draft: RigDraft, steps: tuple[str, ...], pictures: int) -> None:
+    """The steps in their order; each raises what the draft raises."""
+    if "board" in steps:
+        draft.forget_boards()
+        failures: list[BoardError] = []
+        while len(draft.views) < pictures:
+            try:
+                draft.take_board()
+            except BoardError as error:
+                failures.append(error)
+                if len(failures) > _BOARD_TRIES:
+                    raise
+        draft.solve_boards()
+    if set(steps) & {"servos", "zero", "steering"}:
+        draft.search_servos()
+    if "servos" in steps:
+        draft.identify()
+    if "zero" in steps:
+        draft.find_zeros()
+    if "steering" in steps:
+        draft.learn_steering()
+
+
+def quick_sight(config: Config) -> See:
+    """Perception of single frames as the calibration wants it: quickly, with a core left for servos and camera."""
+    from app.rig_engine import leaving_a_core
+    from core.perception.pipeline import open_pipeline
+
+    perception = leaving_a_core(config.perception)
+    plain = perception.segmentation.model_copy(update={"mirrored": "never"})
+    return open_pipeline(perception.model_copy(update={"segmentation": plain})).perceive_single
+
+
+def describe(rig: RigFile) -> str:
+    """One line for people."""
+    camera = {
+        "twin": "bench twin",
+        "realsense": f"RealSense {rig.camera.serial or ''}",
+        "webcam": f"webcam {rig.camera.device or ''}",
+    }
+    robot = {"twin": "its own servos", "servos": f"servos on {rig.servos.port}", "none": "no servos"}[rig.robot]
+    return f"{camera[rig.kind].strip()}, {robot}; {_calibrated(rig)}; made {rig.made_utc:%Y-%m-%d}"
+
+
+def calibration_lines(rig: RigFile) -> list[str]:
+    """What was calibrated, a line each."""
+    known = rig.calibration
+    if known is None:
+        return ["not calibrated"]
+    lines = []
+    if known.lens is not None:
+        lines.append(f"lens: k1 {known.lens.k1:+.4f}, k2 {known.lens.k2:+.4f}, {known.lens.residual_px:.2f} px left over")
+    if known.scale is not None:
+        scale = known.scale
+        share = 100 * scale.uncertainty_share
+        lines.append(f"scale: {scale.mm_per_px:.4f} mm/px in the middle, \N{PLUS-MINUS SIGN}{share:.2f} % (by {scale.method})")
+    servos = ", ".join(f"{joint.name} {'+' if joint.sign > 0 else '-'}{joint.id}" for joint in rig.servos.joints)
+    lines.append(f"servos (direction and id): {servos}")
+    if known.steering is not None:
+        ways = ", ".join(
+            f"{tendon.name} {'out of the picture' if tendon.direction_deg is None else f'{tendon.direction_deg:.0f}°'}"
+            for tendon in known.steering.tendons
+        )
+        lines.append(f"steering, 0° to the right and 90° down in the picture: {ways}; roll {known.steering.roll_deg:+.0f}°")
+    if known.zero is not None:
+        slack = ", ".join(f"{value:+.2f}" for value in known.zero.slack_mm)
+        lines.append(f"zero: wires were slack by {slack} mm; pretension {known.zero.pretension_mm:g} mm")
+    return lines
+
+
+def _start(options: CalibrateOptions) -> tuple[Config, RigFile | None]:
+    """The configuration to calibrate, and the rig that it comes from."""
+    try:
+        name = check_rig_name(options.name)
+    except ValueError as error:
+        raise UserError(str(error)) from None
+    if unknown := set(options.steps) - set(STEPS):
+        raise UserError(f"unknown step {sorted(unknown)[0]!r}; known: {', '.join(STEPS)}")
+    source = options.source
+    if source is None:
+        source = name if rig_path(name).exists() else "twin"
+    if source in RESERVED:
+        return window_config(source, options.config_path, None)[0], None
+    path, rig = find_rig(source)
+    return with_rig(window_config(None, options.config_path, None)[0], rig, path), rig
+
+
+def _brief(rig: RigFile | None) -> dict[str, Any]:
+    if rig is None:
+        return {"kind": None, "robot": None, "made_utc": None, "calibrated": []}
+    known = rig.calibration
+    done = [part for part in ("lens", "scale", "steering", "zero") if known is not None and getattr(known, part) is not None]
+    return {"kind": rig.kind, "robot": rig.robot, "made_utc": rig.made_utc.isoformat(), "calibrated": done}
+
+
+def _calibrated(rig: RigFile) -> str:
+    parts = _brief(rig)["calibrated"]
+    return f"calibrated: {', '.join(parts)}" if parts else "not calibrated"
+
+
+def _say(line: str) -> None:
+    sys.stderr.write(f"{line}\n")

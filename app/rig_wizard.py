@@ -1,0 +1,221 @@
+"""The rig wizard: camera, scale and lens, servos, zero, steering, one page each, with STOP always in reach."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QListWidgetItem, QStackedWidget, QVBoxLayout, QWidget
+
+from app import theme
+from app.widgets.card import Card
+from app.widgets.stop_button import StopButton
+from app.widgets.wizard_camera import CameraPage
+from app.widgets.wizard_motion import SteeringPage, ZeroPage
+from app.widgets.wizard_page import WizardPage, button, note
+from app.widgets.wizard_picture import WizardPicture
+from app.widgets.wizard_scale import ScalePage
+from app.widgets.wizard_servos import IdentifyPage, PortPage
+from app.widgets.wizard_summary import SummaryPage
+from app.wizard_desk import WizardDesk
+from core.rig_file import RigFileError
+
+_SIZE = QSize(1240, 660)
+_STEPS_PX, _CONTROLS_PX = 176, 420
+_STEP_LINE_PX = 30
+_LOOK_EVERY_MS = 50
+
+
+class RigWizard(QDialog):
+    """Makes or calibrates a rig. ``saved`` carries its name.
+
+    Next leads through the pages in their order, and is called Skip on a page whose step was not done. Space is STOP.
+
+    Parameters
+    ----------
+    desk : closed when the dialog is.
+    rig_name : empty for a new rig.
+    """
+
+    saved = Signal(str)
+
+    def __init__(self, desk: WizardDesk, rig_name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.desk = desk
+        desk.setParent(self)
+        self.setWindowTitle(f"Calibrate {rig_name}" if rig_name else "New rig")
+        self.setModal(True)
+        self.resize(_SIZE)
+        self.picture = WizardPicture()
+        self.picture.show_text("No camera yet")
+        self.camera_page = CameraPage(desk, self.picture, rig_name)
+        self.scale_page = ScalePage(desk, self.picture)
+        self.port_page = PortPage(desk, self.picture)
+        self.identify_page = IdentifyPage(desk, self.picture)
+        self.zero_page = ZeroPage(desk, self.picture)
+        self.steering_page = SteeringPage(desk, self.picture)
+        self.summary_page = SummaryPage(desk, self.picture, lambda: self.camera_page.rig_name)
+        self.pages: tuple[WizardPage, ...] = (
+            self.camera_page,
+            self.scale_page,
+            self.port_page,
+            self.identify_page,
+            self.zero_page,
+            self.steering_page,
+            self.summary_page,
+        )
+        self.steps = QListWidget()
+        self.stack = QStackedWidget()
+        self.stop_button = StopButton()
+        self.back_button, self.next_button = button("&Back", self.back), button("&Next", self.next)
+        self.cancel_button = button("Cancel", self.reject)
+        self.line = note("")
+        self._lay_out()
+        self.stop_button.asked.connect(desk.stop)
+        stop = QShortcut(QKeySequence(Qt.Key.Key_Space), self)
+        stop.setAutoRepeat(False)
+        stop.activated.connect(desk.stop)
+        desk.said.connect(self._say)
+        desk.failed.connect(lambda line: self._say(line, is_fault=True))
+        desk.changed.connect(self._refresh)
+        self.picture.clicked.connect(self._on_picture_clicked)
+        self._timer = QTimer(self)
+        self._timer.setInterval(_LOOK_EVERY_MS)
+        self._timer.timeout.connect(self._look)
+        self._timer.start()
+        self._shown_frame: object = None
+        self._go(0)
+
+    @property
+    def page(self) -> WizardPage:
+        """The page in front."""
+        return self.pages[self.stack.currentIndex()]
+
+    @property
+    def message(self) -> str:
+        """The line at the foot."""
+        return self.line.text()
+
+    def next(self) -> None:
+        """The next page; on the last one: save."""
+        if self.page is self.summary_page:
+            self._save()
+        elif self.page.may_leave and not self.desk.is_busy:
+            self._go(self.stack.currentIndex() + 1)
+
+    def back(self) -> None:
+        """The page before."""
+        if self.stack.currentIndex() > 0 and not self.desk.is_busy:
+            self._go(self.stack.currentIndex() - 1)
+
+    def stop(self) -> None:
+        """STOP, from whoever has one: key, button, pedal, gamepad."""
+        self.desk.stop()
+
+    def done(self, result: int) -> None:
+        """The dialog closes, whichever way: nothing moves any more, camera and port are free."""
+        self._timer.stop()
+        self.desk.close()
+        super().done(result)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.reject()
+        event.accept()
+
+    # ---- inside
+
+    def _lay_out(self) -> None:
+        self.steps.setFixedWidth(_STEPS_PX)
+        self.steps.setAccessibleName("Steps")
+        self.steps.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.steps.setSelectionMode(QListWidget.SelectionMode.NoSelection)
+        for page in self.pages:
+            item = QListWidgetItem(page.name)
+            item.setSizeHint(QSize(_STEPS_PX - 8, _STEP_LINE_PX))
+            self.steps.addItem(item)
+            self.stack.addWidget(page)
+        self.stack.setFixedWidth(_CONTROLS_PX)
+        middle = QHBoxLayout()
+        middle.setSpacing(theme.GAP)
+        middle.addWidget(self.steps)
+        middle.addWidget(Card("", self.stack))
+        middle.addWidget(self.picture, 1)
+        foot = QHBoxLayout()
+        foot.setSpacing(theme.GAP)
+        foot.addWidget(self.stop_button)
+        foot.addWidget(self.line, 1)
+        for part in (self.cancel_button, self.back_button, self.next_button):
+            foot.addWidget(part, 0, Qt.AlignmentFlag.AlignBottom)
+        self.line.setMinimumHeight(44)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(14, 12, 14, 12)
+        column.setSpacing(theme.GAP)
+        column.addLayout(middle, 1)
+        column.addLayout(foot)
+
+    def _go(self, index: int) -> None:
+        self.page.leave()
+        self.stack.setCurrentIndex(index)
+        self.page.enter()
+        self._refresh()
+
+    @Slot(float, float)
+    def _on_picture_clicked(self, x: float, y: float) -> None:
+        self.page.click(x, y)
+
+    @Slot()
+    def _refresh(self) -> None:
+        busy, page = self.desk.is_busy, self.page
+        page.refresh()
+        for row, other in enumerate(self.pages):
+            item = self.steps.item(row)
+            mark = "\N{CHECK MARK}" if other.is_done else "\N{BULLET}" if other is page else "  "
+            item.setText(f" {mark}  {other.name}")
+            font = item.font()
+            font.setBold(other is page)
+            item.setFont(font)
+        is_last = page is self.summary_page
+        self.next_button.setText("&Save" if is_last else "&Next" if page.is_done or page is self.camera_page else "&Skip")
+        self.next_button.setEnabled(page.may_leave and not busy and (not is_last or self.desk.draft is not None))
+        self.back_button.setEnabled(self.stack.currentIndex() > 0 and not busy)
+        if busy:
+            self._say(f"{self.desk.busy[0].upper()}{self.desk.busy[1:]} ...")
+        elif self.message.endswith(" ..."):
+            self._say("")
+        self._look(anew=True)
+
+    @Slot(str)
+    def _say(self, text: str, is_fault: bool = False) -> None:
+        theme.set_sheet(self.line, "color: @FAULT;" if is_fault else "color: @TEXT;")
+        self.line.setText(text)
+        self.line.setAccessibleName(text)
+
+    def _look(self, anew: bool = False) -> None:
+        """The newest picture, or the page's still."""
+        bench, still = self.desk.bench, self.page.still
+        self.picture.show_shapes(self.page.shapes())
+        if still is not None:
+            if still is not self._shown_frame or anew:
+                self._shown_frame = still
+                self.picture.show_image(still)
+            return
+        if bench is None:
+            return
+        frame = bench.feed.newest
+        if bench.feed.problem is not None:
+            self.picture.show_text(bench.feed.problem)
+        elif frame is not None and (frame is not self._shown_frame or anew):
+            self._shown_frame = frame
+            self.picture.show_image(frame.image)
+
+    def _save(self) -> None:
+        try:
+            rig = self.summary_page.rig()
+            if rig is None:
+                return
+            path = self.desk.save(rig)
+        except RigFileError as error:
+            self._say(str(error), is_fault=True)
+            return
+        self._say(f"Saved: {path}")
+        self.saved.emit(rig.name)
+        self.accept()

@@ -1,0 +1,142 @@
+"""First page of the rig wizard: what the rig is called, and which camera it has."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLineEdit, QListWidget, QListWidgetItem, QSpinBox
+
+from app.widgets.wizard_page import WizardPage, button, note, tell
+from app.widgets.wizard_picture import WizardPicture
+from app.wizard_desk import WizardDesk
+from core.camera_config import CameraConfig
+from core.config import Config
+from core.rig_file import check_rig_name, rig_path
+from hardware.rig_search import Found, FoundCamera, with_camera
+
+
+class CameraPage(WizardPage):
+    """``name_edit`` is the rig's name. The camera is opened here, and read until the wizard is closed."""
+
+    name = "Camera"
+    hint = "What is the rig called, and which camera looks at it? Open it: the picture on the right must be sharp and steady."
+
+    def __init__(self, desk: WizardDesk, picture: WizardPicture, rig_name: str) -> None:
+        super().__init__(desk, picture)
+        self.name_edit = QLineEdit(rig_name)
+        self.name_edit.setMaxLength(60)
+        self.name_edit.setPlaceholderText("bench 1")
+        self.name_edit.setAccessibleName("Name of the rig")
+        self.name_edit.textChanged.connect(lambda _text: self.desk.changed.emit())
+        self.cameras = QListWidget()
+        self.cameras.setAccessibleName("Cameras")
+        self.cameras.setMinimumHeight(96)
+        self.cameras.itemActivated.connect(lambda _item: self._open())
+        self.sizes = (
+            _spin(desk.config.camera.width_px, 160, 4096, " px", "Width"),
+            _spin(desk.config.camera.height_px, 120, 4096, " px", "Height"),
+        )
+        self.rate = _spin(desk.config.camera.frames_per_second, 5, 240, " /s", "Pictures per second")
+        size = QHBoxLayout()
+        for field in (*self.sizes, self.rate):
+            size.addWidget(field)
+        form = QFormLayout()
+        form.addRow("&Name", self.name_edit)
+        form.addRow("Real camera", size)
+        self.column.addLayout(form)
+        self.cameras.setMaximumHeight(190)
+        self.column.addWidget(self.cameras)
+        row = QHBoxLayout()
+        self.open_button = button("&Open", self._open)
+        self.search_button = button("&Search again", self.search, "Look for cameras and ports once more")
+        row.addWidget(self.open_button, 1)
+        row.addWidget(self.search_button)
+        self.column.addLayout(row)
+        self.problem = note("")
+        self.column.addWidget(self.problem)
+        self.column.addStretch(1)
+        self.found = Found((), ())
+
+    @property
+    def rig_name(self) -> str:
+        return self.name_edit.text().strip()
+
+    @property
+    def is_done(self) -> bool:
+        return self.desk.bench is not None and not self._name_problem()
+
+    @property
+    def may_leave(self) -> bool:
+        return self.is_done and not self.desk.is_busy
+
+    def enter(self) -> None:
+        if not self.found.cameras:
+            self.search()
+        self.refresh()
+
+    def search(self) -> None:
+        """Find cameras and ports."""
+        from hardware import rig_search
+
+        self.desk.run("looking for cameras", rig_search.search, self._on_found)
+
+    def refresh(self) -> None:
+        for control in (self.open_button, self.search_button, self.cameras):
+            control.setEnabled(not self.desk.is_busy)
+        lines = [self._name_problem(), *self.found.problems]
+        if self.desk.bench is not None and self.rig_name and rig_path(self.rig_name).exists():
+            lines.append(f"There is a rig {self.rig_name}: saving replaces it, and keeps the older one beside it.")
+        tell(self.problem, "\n".join(line for line in lines if line))
+
+    def _on_found(self, found: object) -> None:
+        assert isinstance(found, Found)
+        self.found = found
+        self.cameras.clear()
+        for camera in found.cameras:
+            item = QListWidgetItem(camera.title)
+            item.setData(Qt.ItemDataRole.UserRole, camera)
+            self.cameras.addItem(item)
+        chosen = next((k for k, camera in enumerate(found.cameras) if _is_of(camera, self.desk.config)), 0)
+        self.cameras.setCurrentRow(chosen)
+
+    def _open(self) -> None:
+        item = self.cameras.currentItem()
+        if item is None:
+            return
+        camera = item.data(Qt.ItemDataRole.UserRole)
+        config = self.desk.config
+        if not _is_of(camera, config):
+            config = with_camera(config, camera)
+        wanted = {"width_px": self.sizes[0].value(), "height_px": self.sizes[1].value(), "frames_per_second": self.rate.value()}
+        settings = CameraConfig.model_validate({**config.camera.model_dump(), **wanted})
+        self.picture.show_text("Opening the camera. The first time the network is loaded, too.")
+        self.desk.open_camera(config.model_copy(update={"camera": settings}))
+
+    def _name_problem(self) -> str:
+        if not self.rig_name:
+            return "Give the rig a name."
+        try:
+            check_rig_name(self.rig_name)
+        except ValueError as error:
+            text = str(error)
+            return f"{text[0].upper()}{text[1:]}."
+        return ""
+
+
+def _is_of(camera: FoundCamera, config: Config) -> bool:
+    """Whether a configuration has this camera already, with its settings."""
+    if camera.kind != config.rig.camera or config.rig.source is not None:
+        return False
+    settings = config.camera
+    if camera.kind == "realsense":
+        return settings.serial in {None, camera.serial}
+    return camera.kind == "twin" or settings.device in {None, camera.device}
+
+
+def _spin(value: int, low: int, high: int, unit: str, name: str) -> QSpinBox:
+    made = QSpinBox()
+    made.setRange(low, high)
+    made.setValue(value)
+    made.setSuffix(unit)
+    made.setAccessibleName(name)
+    made.setToolTip(f"{name}; only for real cameras")
+    return made

@@ -1,0 +1,229 @@
+"""The pages on which the servos are found, and told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QTableWidget
+
+from app.widgets.wizard_page import WizardPage, button, note, put, table, tell
+from app.widgets.wizard_picture import WizardPicture
+from app.wizard_desk import WizardDesk
+from core.calibration.identify import Assignment
+from core.errors import UserError
+from core.servo_config import JOINT_NAMES, JointName
+from hardware.rig_search import with_port
+from hardware.servos.search import find_ports
+
+_JOINT_TEXT: dict[JointName, str] = {
+    "right": "tendon right",
+    "left": "tendon left",
+    "up": "tendon up",
+    "down": "tendon down",
+    "advance": "robot forward",
+    "delivery_1": "catheter, first",
+    "delivery_2": "catheter, second",
+}
+_DIRECTIONS = (("+", 1), ("\N{MINUS SIGN}", -1))
+
+
+class PortPage(WizardPage):
+    """Which port the servos hang on, and who answers there."""
+
+    name = "Port and servos"
+    hint = (
+        "Where do the seven servos hang? Switch their 12 V on. Searching asks everybody on the line for his name; nothing moves. "
+        "Without servos the rig only looks."
+    )
+
+    def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
+        super().__init__(desk, picture)
+        self.ports = QComboBox()
+        self.ports.setAccessibleName("Servo port")
+        self.search_button = button("&Search", self._search)
+        row = QHBoxLayout()
+        row.addWidget(QLabel("Port"))
+        row.addWidget(self.ports, 1)
+        row.addWidget(self.search_button)
+        self.column.addLayout(row)
+        self.servos = table(("id", "model"), 0, "Servos found")
+        self.column.addWidget(self.servos, 1)
+        self.result = note("")
+        self.column.addWidget(self.result)
+
+    @property
+    def is_done(self) -> bool:
+        return self.desk.draft is not None and self.desk.draft.found is not None
+
+    def enter(self) -> None:
+        if self.ports.count() == 0:
+            self._fill_ports()
+        self.refresh()
+
+    def _fill_ports(self) -> None:
+        bench = self.desk.bench
+        if bench is not None and bench.config.rig.camera == "twin":
+            self.ports.addItem("the twin's own servos", bench.port)
+            return
+        for port in find_ports():
+            self.ports.addItem(f"{port.title} ({port.path})", port.path)
+        known = bench.port if bench is not None else None
+        if known is not None and self.ports.findData(known) < 0:
+            self.ports.insertItem(0, known, known)
+        self.ports.addItem("no servos: look only", None)
+        self.ports.setCurrentIndex(max(0, self.ports.findData(known)))
+
+    def refresh(self) -> None:
+        draft = self.desk.draft
+        for control in (self.ports, self.search_button):
+            control.setEnabled(draft is not None and not self.desk.is_busy)
+        found = draft.found if draft is not None else None
+        servos = found.servos if found is not None else ()
+        self.servos.setRowCount(len(servos))
+        for row, servo in enumerate(servos):
+            put(self.servos, row, 0, str(servo.id))
+            put(self.servos, row, 1, str(servo.model))
+        tell(self.result, "" if found is None else f"{len(servos)} servos at {found.baud} baud.")
+
+    def _search(self) -> None:
+        draft, bench = self.desk.draft, self.desk.bench
+        if draft is None or bench is None:
+            return
+        port = self.ports.currentData()
+        if bench.config.rig.camera != "twin":
+            draft.config = with_port(draft.config, port)
+            bench.port = port
+        if port is None:
+            draft.found = None
+            self.desk.said.emit("a rig without servos: the pages about servos have nothing to do")
+            self.desk.changed.emit()
+            return
+        self.desk.run("searching the servos", draft.search_servos)
+
+
+class IdentifyPage(WizardPage):
+    """Who is who, and which way is forward: by itself, or by hand."""
+
+    name = "Wiggle and direction"
+    hint = (
+        "Each servo is turned by 0.75 mm both ways, and farther (3 mm at most) where nothing is seen. Hands off the wires. The "
+        "robot's head must be in the picture, with room on both sides. STOP (Space) ends it at any moment. By hand: wiggle one, "
+        "watch, and say what it is."
+    )
+    needs_servos = True
+
+    def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
+        super().__init__(desk, picture)
+        self.rows = table(("joint", "id", "direction", "seen"), len(JOINT_NAMES), "Joints and their servos")
+        self.rows.verticalHeader().setDefaultSectionSize(30)
+        self._ids: list[QComboBox] = []
+        self._signs: list[QComboBox] = []
+        self._fill(self.rows)
+        self.column.addWidget(self.rows, 1)
+        self.auto_button = button("&Find by itself", self._identify)
+        self.wiggle_button = button("&Wiggle the chosen", self._wiggle, "Turn the servo of the chosen row both ways by 1.5 mm")
+        self.swap_button = button("Swap &up and down", self._swap, "One camera cannot tell them apart")
+        for parts in ((self.auto_button,), (self.wiggle_button, self.swap_button)):
+            row = QHBoxLayout()
+            for part in parts:
+                row.addWidget(part)
+            self.column.addLayout(row)
+        self.result = note("")
+        self.column.addWidget(self.result)
+        self._shown: tuple[Assignment, ...] | None = None
+        self._known_ids: tuple[int, ...] = ()
+
+    @property
+    def is_done(self) -> bool:
+        return self.desk.draft is not None and bool(self.desk.draft.assignments)
+
+    def _fill(self, rows: QTableWidget) -> None:
+        for row, name in enumerate(JOINT_NAMES):
+            put(rows, row, 0, _JOINT_TEXT[name])
+            ids, signs = QComboBox(), QComboBox()
+            ids.setAccessibleName(f"Servo of {_JOINT_TEXT[name]}")
+            signs.setAccessibleName(f"Direction of {_JOINT_TEXT[name]}")
+            for text, sign in _DIRECTIONS:
+                signs.addItem(text, sign)
+            for control in (ids, signs):
+                control.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+                control.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+                control.setMinimumContentsLength(2)
+                control.activated.connect(lambda _index: self._by_hand())
+            self._ids.append(ids)
+            self._signs.append(signs)
+            rows.setCellWidget(row, 1, ids)
+            rows.setCellWidget(row, 2, signs)
+            put(rows, row, 3, "")
+        rows.setCurrentCell(0, 0)
+
+    def refresh(self) -> None:
+        draft = self.desk.draft
+        found = draft.found if draft is not None else None
+        free = found is not None and not self.desk.is_busy
+        for control in (self.auto_button, self.wiggle_button, self.swap_button, *self._ids, *self._signs):
+            control.setEnabled(free)
+        self.swap_button.setEnabled(free and self.is_done)
+        if draft is None or found is None:
+            tell(self.result, "Search the servos first.")
+            return
+        if self._known_ids != found.ids:
+            self._known_ids = found.ids
+            joints = draft.config.servos.joints
+            spare = [servo_id for servo_id in found.ids if servo_id not in {joint.id for joint in joints}]
+            for row, (ids, joint) in enumerate(zip(self._ids, joints, strict=True)):
+                ids.clear()
+                for servo_id in found.ids:
+                    ids.addItem(str(servo_id), servo_id)
+                first = joint.id if joint.id in found.ids or not spare else spare.pop(0)
+                ids.setCurrentIndex(max(0, ids.findData(first)))
+                self._signs[row].setCurrentIndex(self._signs[row].findData(joint.sign))
+        if draft.assignments != self._shown:
+            self._show(draft.assignments)
+        assumed = any(one.assumed for one in draft.assignments)
+        text = "Up and down look alike to one camera, their ids decided: swap them if it is the other way round." if assumed else ""
+        tell(self.result, text or ("" if self.is_done else "Not told apart yet; what stands in the table is the configuration's."))
+
+    def _show(self, assignments: Sequence[Assignment]) -> None:
+        self._shown = tuple(assignments)
+        for row, one in enumerate(assignments):
+            self._ids[row].setCurrentIndex(self._ids[row].findData(one.id))
+            self._signs[row].setCurrentIndex(self._signs[row].findData(one.sign))
+            put(self.rows, row, 3, one.seen + (" (assumed)" if one.assumed else ""))
+
+    def _identify(self) -> None:
+        if self.desk.draft is not None:
+            self.desk.run("telling the servos apart", self.desk.draft.identify)
+
+    def _wiggle(self) -> None:
+        draft, row = self.desk.draft, self.rows.currentRow()
+        if draft is not None and row >= 0:
+            servo_id = int(self._ids[row].currentData())
+            self.desk.run(f"wiggling servo {servo_id}", lambda: draft.wiggle(servo_id))
+
+    def _swap(self) -> None:
+        up, down = JOINT_NAMES.index("up"), JOINT_NAMES.index("down")
+        for boxes in (self._ids, self._signs):
+            first, second = boxes[up].currentIndex(), boxes[down].currentIndex()
+            boxes[up].setCurrentIndex(second)
+            boxes[down].setCurrentIndex(first)
+        self._by_hand("swapped by hand", ("up", "down"))
+
+    def _by_hand(self, seen: str = "set by hand", changed: Sequence[str] | None = None) -> None:
+        """Take over what stands in the table."""
+        draft = self.desk.draft
+        if draft is None:
+            return
+        before = {one.name: one for one in draft.assignments}
+        made = []
+        for row, name in enumerate(JOINT_NAMES):
+            servo_id, sign = int(self._ids[row].currentData()), self._signs[row].currentData()
+            old = before.get(name)
+            is_same = old is not None and (old.id, old.sign) == (servo_id, sign) and name not in (changed or ())
+            made.append(old if is_same and old is not None else Assignment(name, servo_id, sign, seen))
+        try:
+            draft.set_assignments(made)
+        except UserError as error:
+            self.desk.failed.emit(str(error))
+        self.desk.changed.emit()

@@ -1,0 +1,125 @@
+"""What the rig wizard works on: the open bench and the draft of the rig, with one job at a time beside the window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Signal, Slot
+
+from app.work_thread import WorkThread
+from core.calibration_config import CalibrationConfig
+from core.config import Config
+from core.rig_file import RigFile, write_rig
+from hardware.calibration_bench import CalibrationBench, See
+from hardware.rig_draft import RigDraft
+
+OpenBench = Callable[[Config, See], CalibrationBench]
+MakeSight = Callable[[Config], See]
+
+_END_MS = 30_000
+
+
+class WizardDesk(QObject):
+    """Jobs run one after the other in a thread of their own; STOP does not wait for them.
+
+    Signals: ``said`` a line of progress; ``failed`` a line of what went wrong; ``changed`` when a job began or ended.
+
+    Parameters
+    ----------
+    config : what to start from.
+    known : an earlier calibration of the rig, kept where nothing new is found.
+    open_bench, make_sight : how a camera is opened, and how pictures are perceived; called in the thread.
+    """
+
+    said = Signal(str)
+    failed = Signal(str)
+    changed = Signal()
+
+    def __init__(
+        self,
+        config: Config,
+        known: CalibrationConfig | None,
+        open_bench: OpenBench,
+        make_sight: MakeSight,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.config = config
+        self._known = known
+        self._open_bench, self._make_sight = open_bench, make_sight
+        self._see: See | None = None
+        self.draft: RigDraft | None = None
+        self._bench: CalibrationBench | None = None
+        self._then: Callable[[object], None] | None = None
+        self.busy = ""
+        self._thread = WorkThread("rig wizard", self)
+        self._thread.done.connect(self._on_done)
+        self._thread.failed.connect(self._on_failed)
+
+    @property
+    def is_busy(self) -> bool:
+        return bool(self.busy)
+
+    @property
+    def bench(self) -> CalibrationBench | None:
+        """The open bench."""
+        return self._bench
+
+    def run(self, what: str, job: Callable[[], object], then: Callable[[object], None] | None = None) -> None:
+        """Do it beside the window, and then, in the window, go on with what it gave. Ignored while another job runs."""
+        if self.is_busy:
+            return
+        self.busy, self._then = what, then
+        if self._bench is not None:
+            self._bench.stop.release()  # asking for the next step is the acknowledgement of a STOP
+        self.changed.emit()
+        self._thread.submit(what, job)
+
+    def open_camera(self, config: Config, then: Callable[[object], None] | None = None) -> None:
+        """Open another bench in the place of the one that is open; what was found with that is forgotten."""
+        self.config = config
+
+        def job() -> None:
+            self._close_bench()
+            if self._see is None:
+                self._see = self._make_sight(config)
+            self._bench = self._open_bench(config, self._see)
+            self._bench.warm_up()
+            self.draft = RigDraft(self._bench, config, self._known, self.said.emit)
+
+        self.run("opening the camera", job, then)
+
+    @Slot()
+    def stop(self) -> None:
+        """STOP: reaches the servos at once, from whatever thread."""
+        if self._bench is not None:
+            self._bench.stop.press()
+
+    def save(self, rig: RigFile) -> str:
+        """Save the rig; returns where. Raises RigFileError."""
+        return str(write_rig(rig))
+
+    def close(self) -> None:
+        """Stop, and give camera and port back; waits for a job that is still running."""
+        self.stop()
+        self._thread.submit("closing", self._close_bench)
+        self._thread.stop(finish=True)
+        self._thread.wait(_END_MS)
+
+    def _close_bench(self) -> None:
+        bench, self._bench, self.draft = self._bench, None, None
+        if bench is not None:
+            bench.close()
+
+    @Slot(object, object)
+    def _on_done(self, _key: object, given: object) -> None:
+        then, self._then, self.busy = self._then, None, ""
+        if then is not None:
+            then(given)
+        self.changed.emit()
+
+    @Slot(object, str)
+    def _on_failed(self, _key: object, line: str) -> None:
+        self._then, self.busy = None, ""
+        self.failed.emit(line)
+        self.changed.emit()

@@ -1,0 +1,235 @@
+"""Rig files: camera, servos and calibration of one bench in one TOML file, in the user's configuration folder.
+
+A file that cannot be used is told in one line and left as it is; a rig that is saved again keeps its older file beside the new one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import tomllib
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import tomlkit
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from core.calibration_config import CalibrationConfig
+from core.camera_config import CameraConfig
+from core.config import Config, RigConfig, TwinConfig
+from core.errors import UserError
+from core.profiles import settings_folder
+from core.servo_config import ServosConfig
+
+FORMAT = 1
+RESERVED = ("twin", "realsense", "webcam")
+"""What ``--rig`` means without a rig file."""
+_NAME = re.compile(r"^[\w][\w .()+-]{0,59}$")
+_ENDING, _OLDER = ".toml", ".older.toml"
+_MAX_BYTES = 200_000
+_HEADER = "A rig of LumenPilot: camera, servos, calibration. Made by the rig wizard (menu Rig, or main.py rig calibrate)."
+
+
+class RigFileError(UserError):
+    """A rig file cannot be read, found or saved; one line names file, key and what is wrong."""
+
+
+class RigFile(BaseModel):
+    """One bench. ``twin`` is there when its camera is the twin's."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    format: int = Field(FORMAT, ge=1)
+    name: str = Field(min_length=1, max_length=60)
+    made_utc: datetime
+    kind: Literal["twin", "realsense", "webcam"]
+    robot: Literal["twin", "servos", "none"]
+    camera: CameraConfig = CameraConfig()
+    twin: TwinConfig | None = None
+    servos: ServosConfig = ServosConfig()
+    calibration: CalibrationConfig | None = None
+
+    @model_validator(mode="after")
+    def _check_parts(self) -> Self:
+        check_rig_name(self.name)
+        if (self.kind == "twin") is not (self.twin is not None):
+            raise ValueError("a twin needs the section twin, and no other rig has one")
+        if (self.robot == "twin") and self.kind != "twin":
+            raise ValueError("a real camera does not see the twin's robot: robot must be servos or none")
+        if self.robot == "servos" and (self.kind == "twin" or self.servos.port is None):
+            raise ValueError("robot servos needs a real camera and servos.port")
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class ListedRig:
+    """A rig file in the folder; ``rig`` is None when it cannot be used, and ``problem`` says why."""
+
+    name: str
+    path: Path
+    rig: RigFile | None
+    problem: str = ""
+
+
+def rigs_folder() -> Path:
+    """Where rig files are; it need not exist."""
+    return settings_folder() / "rigs"
+
+
+def check_rig_name(name: str) -> str:
+    """The name without blanks around it. Raises ValueError for one that makes no good file name, or means something else."""
+    name = name.strip()
+    if not _NAME.match(name):
+        raise ValueError("a rig's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit")
+    if name.casefold() in RESERVED or name.casefold().endswith(".older"):
+        raise ValueError(f"a rig cannot be called {name}: choose another name")
+    return name
+
+
+def rig_path(name: str, folder: Path | None = None) -> Path:
+    """The file of a rig of this name."""
+    return (folder if folder is not None else rigs_folder()) / f"{name.strip()}{_ENDING}"
+
+
+def list_rigs(folder: Path | None = None) -> tuple[ListedRig, ...]:
+    """All rigs by name; those that cannot be used, too. A folder that cannot be read has none."""
+    try:
+        paths = [path for path in (folder or rigs_folder()).glob(f"*{_ENDING}") if not path.name.endswith(_OLDER)]
+    except OSError:
+        paths = []
+    found = []
+    for path in sorted(paths, key=lambda path: path.stem.casefold()):
+        try:
+            rig = read_rig(path)
+        except RigFileError as error:
+            found.append(ListedRig(path.stem, path, None, str(error)))
+        else:
+            found.append(ListedRig(rig.name, path, rig))
+    return tuple(found)
+
+
+def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
+    """The rig of this name, whatever its case. Raises RigFileError, with those that there are."""
+    listed = list_rigs(folder)
+    for rig in listed:
+        if name.strip().casefold() in {rig.name.casefold(), rig.path.stem.casefold()}:
+            if rig.rig is None:
+                raise RigFileError(rig.problem)
+            return rig.path, rig.rig
+    known = ", ".join((*RESERVED, *(rig.name for rig in listed)))
+    raise RigFileError(f"unknown rig {name!r}; known: {known}")
+
+
+def read_rig(path: Path) -> RigFile:
+    """Read and check a rig file; raises RigFileError. The file is never changed."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise RigFileError(f"{path}: no such rig file; main.py rig list names those that there are") from None
+    except OSError as error:
+        raise RigFileError(f"{path}: cannot be read ({error.strerror})") from None
+    if len(data) > _MAX_BYTES:
+        raise RigFileError(f"{path}: too large for a rig file")
+    try:
+        content = tomllib.loads(data.decode("utf-8-sig"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise RigFileError(
+            f"{path}: no TOML ({' '.join(str(error).split())}); the file is kept: mend it, or calibrate anew"
+        ) from None
+    version = content.get("format")
+    if type(version) is int and version > FORMAT:
+        raise RigFileError(f"{path}: format {version} is of a newer version (this one knows {FORMAT}); update the program")
+    try:
+        return RigFile.model_validate(content)
+    except ValidationError as error:
+        raise RigFileError(f"{path}: {_first_problem(error)}; the file is kept: mend it, or calibrate anew") from None
+
+
+def write_rig(rig: RigFile, path: Path | None = None) -> Path:
+    """Save a rig atomically; an older file of that name stays beside it as NAME.older.toml.
+
+    Raises
+    ------
+    RigFileError
+        The disk does not take it.
+    """
+    target = path if path is not None else rig_path(rig.name)
+    document = tomlkit.document()
+    document.add(tomlkit.comment(_HEADER))
+    document.update(rig.model_dump(mode="json", exclude_none=True))
+    temporary = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("wb") as file:
+            file.write(tomlkit.dumps(document).encode())
+            file.flush()
+            os.fsync(file.fileno())
+        if target.exists():
+            target.with_name(target.stem + _OLDER).write_bytes(target.read_bytes())
+        temporary.replace(target)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
+    return target
+
+
+def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -> RigFile:
+    """What a configuration says of its bench, as a rig file.
+
+    Raises
+    ------
+    RigFileError
+        A recording is no bench, or the name is none.
+    """
+    kind = config.rig.camera
+    if kind not in RESERVED or config.rig.source is not None:
+        raise RigFileError(f"rig {config.rig.name} plays a recording: it cannot be saved as a rig")
+    port = None if kind == "twin" or config.rig.robot == "none" else config.servos.port
+    try:
+        return RigFile.model_validate(
+            {
+                "name": name.strip(),
+                "made_utc": datetime.now(UTC).replace(microsecond=0),
+                "kind": kind,
+                "robot": config.rig.robot,
+                "camera": config.camera,
+                "twin": config.twin if kind == "twin" else None,
+                "servos": config.servos.model_copy(update={"port": port}),
+                "calibration": calibration,
+            }
+        )
+    except ValidationError as error:
+        raise RigFileError(f"rig {name}: {_first_problem(error)}") from None
+
+
+def with_rig(base: Config, rig: RigFile, path: Path) -> Config:
+    """The configuration with the rig's camera, servos and twin in the place of its own."""
+    chosen = RigConfig(name=rig.name, camera=rig.kind, robot=rig.robot, file=str(path))
+    update: dict[str, Any] = {"rig": chosen, "camera": rig.camera, "servos": rig.servos}
+    if rig.twin is not None:
+        update["twin"] = rig.twin
+    return base.model_copy(update=update)
+
+
+def calibration_of(config: Config) -> CalibrationConfig | None:
+    """The calibration of the configured rig; None without a rig file, and for recordings, whose pictures are straight already.
+
+    Raises
+    ------
+    RigFileError
+    """
+    if config.rig.file is None or config.rig.source is not None or config.rig.camera not in RESERVED:
+        return None
+    return read_rig(Path(config.rig.file)).calibration
+
+
+def _first_problem(error: ValidationError) -> str:
+    first: Any = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    text = str(first["msg"]).removeprefix("Value error, ")
+    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    return f"{key + ': ' if key else ''}{text}{more}"

@@ -1,0 +1,238 @@
+"""A rig that is being calibrated: every step by itself, in any order that makes sense, by a window or by a command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+
+from core.calibration.board import BoardSpec, find_board
+from core.calibration.identify import Assignment, Finding, NotIdentified, assign
+from core.calibration.lens import BoardView, LensError, distort, fit_lens, straighten
+from core.calibration.scale import scale_of_board, scale_of_clicks
+from core.calibration_config import CalibrationConfig, LensConfig, ScaleConfig, SteeringConfig, ZeroConfig
+from core.config import Config
+from core.devices import DeviceError
+from core.rig_file import RigFile, make_rig
+from core.servo_config import JOINT_NAMES, ServosConfig
+from core.types import Image, Point
+from hardware import servo_wizard
+from hardware.calibration_bench import CalibrationBench
+from hardware.servos.search import BAUDS, FoundServos, find_servos
+
+_NOTICEABLE_PX = 1.0
+"""A lens that moves nothing farther than this in a picture 640 px wide is left alone: straightening costs a millisecond a frame."""
+
+Say = Callable[[str], object]
+
+
+class RigDraft:
+    """What is known so far. Each step replaces what it found before; ``rig_file`` puts all of it together.
+
+    The steps that move servos (``identify``, ``identify_one``, ``find_zeros``, ``learn_steering``) need ``search_servos`` before,
+    and are ended by ``bench.stop``. They raise DeviceError or a UserError of ``core.calibration``, one line that says what to do.
+
+    Parameters
+    ----------
+    bench : open; whoever opened it closes it.
+    config : the configuration to start from, with the rig's camera and servos.
+    known : what was calibrated earlier, and stays where nothing new is found.
+    """
+
+    def __init__(
+        self, bench: CalibrationBench, config: Config, known: CalibrationConfig | None = None, say: Say = lambda _: None
+    ) -> None:
+        self.bench, self.say = bench, say
+        self.config = config
+        self.spec = BoardSpec()
+        self.views: list[BoardView] = []
+        self.lens: LensConfig | None = known.lens if known is not None else None
+        self.scale: ScaleConfig | None = known.scale if known is not None else None
+        self.steering: SteeringConfig | None = known.steering if known is not None else None
+        self.zero: ZeroConfig | None = known.zero if known is not None else None
+        self.found: FoundServos | None = None
+        self.findings: dict[int, Finding] = {}
+        self.assignments: tuple[Assignment, ...] = ()
+        self.zeros: servo_wizard.Zeros | None = None
+        self.notes: list[str] = []
+        self._head_px: Point | None = None
+        bench.set_lens(self.lens)
+
+    @property
+    def servos(self) -> ServosConfig:
+        """As found out so far, on the bench's port."""
+        return self.bench.servos_config(self.config.servos)
+
+    # ---- lens and scale
+
+    def take_board(self) -> tuple[Image, BoardView]:
+        """Take one picture of the board and keep its corners; raises BoardError when there is no board in it."""
+        image = self.bench.board_picture(self.spec)
+        view = find_board(image, self.spec)
+        self.views.append(view)
+        self.say(f"board {len(self.views)}: {len(view.pixels)} of {(self.spec.columns - 1) * (self.spec.rows - 1)} corners")
+        return image, view
+
+    def forget_boards(self) -> None:
+        """Begin anew."""
+        self.views.clear()
+
+    def solve_boards(self) -> tuple[LensConfig | None, ScaleConfig]:
+        """Lens and scale from the pictures taken; no lens where it hardly bends anything. Raises LensError, ScaleError."""
+        if not self.views:
+            raise LensError("no picture of the board was taken yet")
+        size = self._picture_size()
+        lens = fit_lens(self.views, size)
+        bent_px = _most_bent_px(lens)
+        straight: Sequence[BoardView] = self.views
+        if bent_px * 640.0 / max(size) > _NOTICEABLE_PX:
+            self.lens = lens
+            straight = [BoardView(straighten(view.pixels, lens), view.board_mm) for view in self.views]
+            self.say(f"lens: up to {bent_px:.1f} px at the border, {lens.residual_px:.2f} px left over")
+        else:
+            self.lens = None
+            self.say(f"lens: straight enough ({bent_px:.1f} px at the border)")
+        self.scale = scale_of_board(straight, size)
+        self.bench.set_lens(self.lens)
+        self._tell_scale()
+        return self.lens, self.scale
+
+    def solve_clicks(self, first: Point, second: Point, length_mm: float) -> ScaleConfig:
+        """The scale from two places of the (straightened) picture that are so far apart; raises ScaleError."""
+        self.scale = scale_of_clicks(first, second, length_mm, self._picture_size())
+        self._tell_scale()
+        return self.scale
+
+    def _tell_scale(self) -> None:
+        assert self.scale is not None
+        self.say(f"scale: {self.scale.mm_per_px:.4f} mm/px, \N{PLUS-MINUS SIGN}{100 * self.scale.uncertainty_share:.2f} %")
+
+    def _picture_size(self) -> tuple[int, int]:
+        frame = self.bench.feed.newest or self.bench.feed.take(1, 5.0)[0]
+        return frame.image.shape[1], frame.image.shape[0]
+
+    # ---- servos
+
+    def search_servos(self, bauds: Sequence[int] | None = None) -> FoundServos:
+        """Find the servos on the bench's port, and take over their speed and model.
+
+        Raises
+        ------
+        DeviceError
+            No port, nobody answers, or not seven of one model.
+        """
+        servos = self.servos
+        assert servos.port is not None
+        chosen = bauds if bauds is not None else (servos.baud, *(baud for baud in BAUDS if baud != servos.baud))
+        found = find_servos(servos.port, chosen, self.say, self.bench.stop.check)
+        listed = ", ".join(f"{servo.id} (model {servo.model})" for servo in found.servos)
+        if len(found.servos) != len(JOINT_NAMES):
+            raise DeviceError(
+                f"{len(found.servos)} servos answer, seven are needed: {listed}; check cables, and that no id is used twice"
+            )
+        models = {servo.model for servo in found.servos}
+        if len(models) != 1:
+            raise DeviceError(f"servos of several models: {listed}; all seven must be of one")
+        self.say(f"seven servos at {found.baud} baud: {', '.join(map(str, found.ids))}")
+        self.found = found
+        self._set_servos(servos.model_copy(update={"baud": found.baud, "model": models.pop()}))
+        return found
+
+    def wiggle(self, servo_id: int) -> None:
+        """Turn one servo both ways, for somebody who watches."""
+        servo_wizard.wiggle(self.bench.bench, self.servos, self._ids(), servo_id)
+
+    def identify_one(self, servo_id: int) -> Finding | None:
+        """What one servo does, as the camera sees it; None when nothing is clear."""
+        finding = servo_wizard.identify_servo(self.bench.bench, self.servos, self._ids(), servo_id, self.say)
+        self.findings.pop(servo_id, None)
+        if finding is not None:
+            self.findings[servo_id] = finding
+        return finding
+
+    def identify(self) -> tuple[Assignment, ...]:
+        """Who is who; raises NotIdentified when not all are clear."""
+        for servo_id in self._ids():
+            self.identify_one(servo_id)
+        return self.take_findings()
+
+    def take_findings(self) -> tuple[Assignment, ...]:
+        """Name the servos after what was found; raises NotIdentified."""
+        assigned = assign(self.findings)
+        self.set_assignments(assigned)
+        if any(one.assumed for one in assigned):
+            self.notes.append(
+                "up and down cannot be told apart by one camera: the order of their ids decided; swap them if it is wrong"
+            )
+        return assigned
+
+    def set_assignments(self, assignments: Sequence[Assignment]) -> None:
+        """Take over who is who. Raises NotIdentified when a servo has two names, or a name no servo."""
+        names = [one.name for one in assignments]
+        ids = {one.id for one in assignments}
+        if sorted(names) != sorted(JOINT_NAMES) or len(ids) != len(JOINT_NAMES):
+            raise NotIdentified("every servo must have one name, and every name one servo")
+        self.assignments = tuple(assignments)
+        self._set_servos(servo_wizard.identified(self.servos, assignments))
+
+    def find_zeros(self) -> servo_wizard.Zeros:
+        """Leave every tendon where it just becomes taut."""
+        self.zeros = servo_wizard.find_zeros(self.bench.bench, self.servos, self.say)
+        self.zero = None
+        self.notes += self.zeros.problems
+        return self.zeros
+
+    def learn_steering(self) -> SteeringConfig:
+        """Zero the joints where they stand, and learn in which direction each tendon moves the head."""
+        learnt = servo_wizard.learn_steering(self.bench.bench, self.servos, self.say)
+        steering, ticks = learnt.steering, learnt.zero_ticks
+        self.steering, self._head_px = steering, learnt.head_px
+        slack = self.zeros.slack_mm if self.zeros is not None else (0.0, 0.0, 0.0, 0.0)
+        self.zero = ZeroConfig(ticks=ticks, slack_mm=slack, pretension_mm=self.config.servos.pretension_mm)
+        self.say(f"steering: roll {steering.roll_deg:+.0f}°, way and heading {steering.disagreement_deg:.1f}° from a right angle")
+        return steering
+
+    def nudge(self, name: str, way_mm: float) -> None:
+        """Tighten one tendon by so much, or let it go (negative), for somebody who watches."""
+        servo_wizard.nudge(self.bench.bench, self.servos, name, way_mm)
+        self.zero = None
+
+    @property
+    def head_px(self) -> Point | None:
+        """Where the head was when the steering was learnt; None when it was not, or earlier."""
+        return self._head_px
+
+    def set_pretension(self, pretension_mm: float) -> None:
+        """Pull of every tendon at zero bend."""
+        self._set_servos(ServosConfig.model_validate({**self.servos.model_dump(), "pretension_mm": pretension_mm}))
+
+    def _ids(self) -> tuple[int, ...]:
+        if self.found is None:
+            raise DeviceError("search the servos first")
+        return self.found.ids
+
+    def _set_servos(self, servos: ServosConfig) -> None:
+        self.config = self.config.model_copy(update={"servos": servos})
+
+    # ---- the end
+
+    def calibration(self) -> CalibrationConfig:
+        """All that was found."""
+        return CalibrationConfig(
+            made_utc=datetime.now(UTC).replace(microsecond=0),
+            lens=self.lens,
+            scale=self.scale,
+            steering=self.steering,
+            zero=self.zero,
+        )
+
+    def rig_file(self, name: str) -> RigFile:
+        """The rig under this name, not saved yet; raises RigFileError."""
+        return make_rig(self.config, name, self.calibration())
+
+
+def _most_bent_px(lens: LensConfig) -> float:
+    width, height = lens.size_px
+    border = np.array([(x, y) for x in (0.0, (width - 1) / 2, width - 1.0) for y in (0.0, (height - 1) / 2, height - 1.0)])
+    return float(np.hypot(*(distort(border, lens) - border).T).max())

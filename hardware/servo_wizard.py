@@ -1,0 +1,260 @@
+"""What is found out about servos by moving them a little and watching: who is who, where wires are taut, where the head goes.
+
+The procedures know neither window nor command line. Every motion is a probe's (one servo, bounded) or a robot's (all seven,
+zeroed); both go through driver and gate, and STOP ends every procedure within one period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from core.calibration.identify import Assignment, Finding, Wiggle, assign, classify
+from core.calibration.look import Look, head_move
+from core.calibration.steering import Pull, learn
+from core.calibration.taut import NeverTaut, Step, is_begun, is_enough, taut_at_mm
+from core.calibration_config import SteeringConfig
+from core.servo_config import JOINT_NAMES, TENDONS, ServosConfig
+from core.types import Command, Point
+from hardware.servos.probe import MAX_CURRENT_MA, ProbeLimits, StopSwitch
+
+_AMPLITUDES_MM = (0.75, 1.5, 3.0)
+_SETTLE_S = 0.5
+_SLACK_MM, _STEP_MM, _FINE_MM, _REACH_MM = 1.25, 0.25, 0.06, 4.0
+_BELOW_MM, _PARK_MM = 0.3, 1.0
+_PAIRS = (("right", "left"), ("up", "down"))
+_PULLS_MM = (0.3, 0.5, 0.8, 1.2)
+_ENOUGH_PX = 6.5
+
+Say = Callable[[str], object]
+
+
+class Probe(Protocol):
+    """One servo that can be moved; positions from where it was when the probe was opened."""
+
+    @property
+    def position_mm(self) -> float: ...
+    def move_to(self, target_mm: float) -> None: ...
+    def pause(self, seconds: float) -> None: ...
+    def alive(self) -> None: ...
+
+
+class Steered(Protocol):
+    """The robot with all its servos, zeroed where they stood; bends and holds them while it is looked at."""
+
+    def bend_to(self, command: Command) -> None: ...
+    def pause(self, seconds: float) -> None: ...
+    def alive(self) -> None: ...
+    def ticks(self) -> tuple[int, ...]: ...
+
+
+class Eyes(Protocol):
+    """Looks at the robot while it stands still; `alive` is called meanwhile. Raises HeadNotSeen, DeviceError."""
+
+    def look(self, alive: Callable[[], None]) -> Look: ...
+
+
+class Hands(Protocol):
+    """Moves servos. Raises ServoError."""
+
+    def probe(
+        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], ids: tuple[int, ...] | None = None
+    ) -> AbstractContextManager[Probe]: ...
+    def steered(self, servos: ServosConfig) -> AbstractContextManager[Steered]: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What the procedures work with."""
+
+    eyes: Eyes
+    hands: Hands
+    stop: StopSwitch
+
+
+@dataclass(frozen=True, slots=True)
+class Zeros:
+    """How far each tendon was from taut (mm; positive: it was slack), and those that could not be told, with why."""
+
+    slack_mm: tuple[float, float, float, float]
+    problems: tuple[str, ...] = ()
+
+
+def wiggle(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, amplitude_mm: float = 1.5) -> None:
+    """Turn one servo a little both ways and back, for somebody who watches."""
+    with bench.hands.probe(servos, servo_id, ProbeLimits(-amplitude_mm, amplitude_mm), 1, ids) as probe:
+        for target_mm in (amplitude_mm, 0.0, -amplitude_mm, 0.0):
+            probe.move_to(target_mm)
+            probe.pause(_SETTLE_S / 2)
+
+
+def identify_servo(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, say: Say) -> Finding | None:
+    """What one servo does; None when nothing clear was seen. It is turned no farther than it needs.
+
+    Raises
+    ------
+    ServoError, DeviceError, HeadNotSeen
+    """
+    most_mm = _AMPLITUDES_MM[-1]
+    with bench.hands.probe(servos, servo_id, ProbeLimits(-most_mm, most_mm), 1, ids) as probe:
+        for amplitude_mm in _AMPLITUDES_MM:
+            say(f"servo {servo_id}: {amplitude_mm:g} mm both ways")
+            rest = _look(bench, probe)
+            seen = []
+            for target_mm in (amplitude_mm, -amplitude_mm):
+                probe.move_to(target_mm)
+                seen.append(_look(bench, probe))
+            probe.move_to(0.0)
+            if (finding := classify(Wiggle(amplitude_mm, rest, *seen))) is not None:
+                say(f"servo {servo_id} {finding.function} ({finding.seen}), direction {'+' if finding.sign > 0 else '-'}")
+                return finding
+    say(f"servo {servo_id}: nothing clear was seen")
+    return None
+
+
+def identify_servos(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], say: Say) -> tuple[Assignment, ...]:
+    """Who is who, of seven servos.
+
+    Raises
+    ------
+    NotIdentified
+        With what is missing.
+    """
+    found = {servo_id: identify_servo(bench, servos, ids, servo_id, say) for servo_id in ids}
+    return assign({servo_id: finding for servo_id, finding in found.items() if finding is not None})
+
+
+def identified(servos: ServosConfig, assignments: Sequence[Assignment]) -> ServosConfig:
+    """The bus with every servo in its place, turning the right way; raises ValueError when two have the same id."""
+    by_name = {one.name: one for one in assignments}
+    joints = [
+        {**joint.model_dump(), "id": by_name[joint.name].id, "sign": by_name[joint.name].sign} if joint.name in by_name else joint
+        for joint in servos.joints
+    ]
+    return ServosConfig.model_validate({**servos.model_dump(), "joints": joints})
+
+
+def find_zeros(bench: Bench, servos: ServosConfig, say: Say, max_current_ma: float = MAX_CURRENT_MA) -> Zeros:
+    """Let each tendon go slack, pull it until the head follows, and leave it where it just became taut.
+
+    A tendon that cannot be told is left where it was, and named in ``problems``.
+
+    Raises
+    ------
+    ServoError
+        Strained, stopped, or the bus is not in order: nothing goes on.
+    """
+    slack: dict[str, float] = dict.fromkeys(TENDONS, 0.0)
+    problems = []
+    for first, second in _PAIRS:
+        # Two taut wires share every pull: while one is looked at the other hangs slack.
+        _move(bench, servos, second, -_PARK_MM, max_current_ma)
+        for name, hangs_mm, then_mm in ((first, 0.0, -_PARK_MM), (second, _PARK_MM, 0.0)):
+            try:
+                taut_mm = _find_zero(bench, servos, name, then_mm, max_current_ma)
+            except NeverTaut as error:
+                problems.append(f"{name}: {error}")
+                say(problems[-1])
+                _move(bench, servos, name, hangs_mm + then_mm, max_current_ma)
+            else:
+                slack[name] = taut_mm - hangs_mm
+                say(f"{name}: taut {abs(slack[name]):.2f} mm {'farther' if slack[name] >= 0 else 'back'}")
+        _move(bench, servos, first, _PARK_MM, max_current_ma)
+    return Zeros((slack["right"], slack["left"], slack["up"], slack["down"]), tuple(problems))
+
+
+def _move(bench: Bench, servos: ServosConfig, name: str, way_mm: float, max_current_ma: float = MAX_CURRENT_MA) -> None:
+    joint = servos.joints[JOINT_NAMES.index(name)]
+    limits = ProbeLimits(-_PARK_MM, _PARK_MM, max_current_ma=max_current_ma)
+    with bench.hands.probe(servos, joint.id, limits, joint.sign) as probe:
+        probe.move_to(way_mm)
+        probe.pause(_SETTLE_S / 2)
+
+
+def _find_zero(bench: Bench, servos: ServosConfig, name: str, then_mm: float, max_current_ma: float) -> float:
+    """Where a tendon becomes taut, from where it stands; it is left `then_mm` from there. Raises NeverTaut: it is where it was."""
+    joint = servos.joints[JOINT_NAMES.index(name)]
+    limits = ProbeLimits(-_SLACK_MM - _PARK_MM, _REACH_MM, max_current_ma=max_current_ma)
+    with bench.hands.probe(servos, joint.id, limits, joint.sign) as probe:
+        probe.move_to(-_SLACK_MM)
+        rest = _look(bench, probe)
+        begun = _steps(bench, probe, rest, -_SLACK_MM, _STEP_MM, is_begun)[-1].position_mm
+        # Once more from slack, in small steps: a fraction of a millimetre takes the head through its whole way. And with another
+        # look at rest: the head does not come back to where it was by itself.
+        probe.move_to(begun - _STEP_MM - _BELOW_MM)
+        rest = _look(bench, probe)
+        steps = _steps(bench, probe, rest, begun - _STEP_MM - _FINE_MM, _FINE_MM, is_enough)
+        try:
+            taut_mm = taut_at_mm(steps)
+        except NeverTaut:
+            probe.move_to(0.0)
+            raise
+        probe.move_to(taut_mm - _BELOW_MM)
+        probe.move_to(taut_mm + then_mm)
+    return taut_mm
+
+
+def _steps(bench: Bench, probe: Probe, rest: Look, from_mm: float, step_mm: float, ends: Callable[[Step], bool]) -> list[Step]:
+    """Tighten step by step, until one of them ends it or there is no room left."""
+    steps: list[Step] = []
+    at_mm = from_mm
+    while at_mm < _REACH_MM - 1e-9 and not (steps and ends(steps[-1])):
+        at_mm = min(at_mm + step_mm, _REACH_MM)
+        probe.move_to(at_mm)
+        steps.append(Step(at_mm, head_move(rest, _look(bench, probe))))
+    return steps
+
+
+def nudge(bench: Bench, servos: ServosConfig, name: str, way_mm: float) -> None:
+    """Tighten one tendon by `way_mm`, 1 mm at most, or let it go (negative); it stays there."""
+    _move(bench, servos, name, way_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class Learnt:
+    """The steering, where the head was, and the position registers of the seven joints at zero."""
+
+    steering: SteeringConfig
+    head_px: Point
+    zero_ticks: tuple[int, ...]
+
+
+def learn_steering(bench: Bench, servos: ServosConfig, say: Say) -> Learnt:
+    """Pull each tendon a little, as far as the head needs to show its way.
+
+    The tendons must be taut and without tension where they stand: that becomes zero.
+
+    Raises
+    ------
+    SteeringNotSeen, HeadNotSeen, ServoError, DeviceError
+    """
+    pulls: dict[str, Pull] = {}
+    ways: Mapping[str, Callable[[float], Command]] = {
+        "right": lambda share: Command(bend=share),
+        "left": lambda share: Command(bend=-share),
+        "up": lambda share: Command(pitch=share),
+        "down": lambda share: Command(pitch=-share),
+    }
+    first: Look | None = None
+    with bench.hands.steered(servos) as robot:
+        ticks = robot.ticks()
+        for name in TENDONS:
+            for pull_mm in _PULLS_MM:
+                robot.bend_to(Command())
+                rest = _look(bench, robot)
+                first = first or rest
+                robot.bend_to(ways[name](pull_mm / servos.max_pull_mm))
+                pulls[name] = Pull(pull_mm, head_move(rest, _look(bench, robot)))
+                if pulls[name].move.size_px >= _ENOUGH_PX:
+                    break
+            say(f"{name}: {pulls[name].pull_mm:g} mm of pull, {pulls[name].move.size_px:.1f} px of way")
+        robot.bend_to(Command())
+    assert first is not None
+    return Learnt(learn(pulls, first.heading), first.head, ticks)
+
+
+def _look(bench: Bench, mover: Probe | Steered) -> Look:
+    mover.pause(_SETTLE_S)
+    return bench.eyes.look(mover.alive)

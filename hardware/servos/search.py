@@ -1,0 +1,112 @@
+"""Which serial ports there are, and which servos answer on one. Nothing moves, and no register is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from serial.tools import list_ports
+
+from core.servo_config import JOINT_NAMES
+from hardware.servos.errors import NoAnswer
+from hardware.servos.line import ServoLine
+from hardware.usb import DEV
+
+BAUDS = (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000)
+"""The speeds of these servos, the likeliest first; 57600 is the factory's."""
+_TRIES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class FoundPort:
+    """A serial port; ``path`` is the stable one in /dev/serial/by-id where there is one."""
+
+    path: str
+    title: str
+
+
+@dataclass(frozen=True, slots=True)
+class FoundServo:
+    """A servo that answered."""
+
+    id: int
+    model: int
+
+
+@dataclass(frozen=True, slots=True)
+class FoundServos:
+    """All that answered on a port, by id, and the speed at which they did."""
+
+    port: str
+    baud: int
+    servos: tuple[FoundServo, ...]
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        return tuple(servo.id for servo in self.servos)
+
+
+def find_ports(dev: Path = DEV) -> tuple[FoundPort, ...]:
+    """Serial ports of USB adapters, as the system lists them; none is opened."""
+    stable = {link.resolve(): link for link in sorted((dev / "serial" / "by-id").glob("*"))}
+    titles = {Path(port.device).resolve(): port.description for port in list_ports.comports() if port.vid is not None}
+    nodes = sorted({*stable, *titles}, key=lambda node: node.name)
+    return tuple(FoundPort(str(stable.get(node, node)), titles.get(node, "") or node.name) for node in nodes)
+
+
+def _nothing() -> None:
+    """Nobody wants to know."""
+
+
+def find_servos(
+    port: str,
+    bauds: Sequence[int] = BAUDS,
+    said: Callable[[str], object] = lambda _: None,
+    stopped: Callable[[], None] = _nothing,
+) -> FoundServos:
+    """Ask everybody who he is, at one speed after the other, until somebody answers.
+
+    Parameters
+    ----------
+    said : told what is being tried.
+    stopped : called in between; may raise to end the search.
+
+    Raises
+    ------
+    PortError
+        The port is missing, not permitted, in use, or no serial port.
+    NoAnswer
+        Nobody answers at any speed.
+    """
+    for baud in bauds:
+        stopped()
+        said(f"asking at {baud} baud")
+        line = ServoLine(port, baud)
+        line.open()
+        try:
+            found = [FoundServo(servo_id, model) for servo_id in _ids(line) if (model := _model(line, servo_id)) is not None]
+        finally:
+            line.close()
+        if found:
+            return FoundServos(port, baud, tuple(found))
+    speeds = ", ".join(map(str, bauds))
+    raise NoAnswer(f"no servo answers on {port} (asked at {speeds} baud): switch their 12 V on, check the cable to the adapter")
+
+
+def _ids(line: ServoLine) -> list[int]:
+    """Who answers. All talk after one another then, and whoever is missed speaks up in the next round."""
+    ids = set(line.others())
+    for _ in range(_TRIES - 1):
+        if not ids or len(ids) >= len(JOINT_NAMES):
+            break
+        ids |= set(line.others())
+    return sorted(ids)
+
+
+def _model(line: ServoLine, servo_id: int) -> int | None:
+    """Model number; None when the servo falls silent again."""
+    for _ in range(_TRIES):
+        if (model := line.ping(servo_id)) is not None:
+            return model
+    return None

@@ -1,0 +1,304 @@
+"""The rig wizard by its pages: names, camera, board, clicks, servos by hand, STOP, save; and what goes wrong."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.rig_wizard import RigWizard
+from app.wizard_desk import WizardDesk
+from core.calibration.identify import Assignment
+from core.calibration_config import CalibrationConfig, ScaleConfig
+from core.config import Config, load_config
+from core.devices import DeviceError
+from core.rig_file import find_rig, list_rigs
+from core.types import Frame
+from hardware.calibration_bench import CalibrationBench
+from hardware.servos.search import FoundServo, FoundServos
+from tests.app.fakes import make_scene, until
+
+
+class StillCamera:
+    name, is_live = "still camera", False
+
+    def open(self) -> None: ...
+
+    def read(self, timeout_s: float) -> Frame | None:
+        time.sleep(0.01)
+        return Frame(0, time.monotonic(), np.full((480, 640, 3), 90, np.uint8))
+
+    def close(self) -> None: ...
+
+
+def _open(config: Config, see: object) -> CalibrationBench:
+    return CalibrationBench(config, StillCamera(), None, lambda frame: make_scene(), lambda: None)
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+
+
+MakeWizard = Callable[..., RigWizard]
+
+
+@pytest.fixture
+def make_wizard(qtbot: QtBot) -> Iterator[MakeWizard]:
+    made: list[RigWizard] = []
+
+    def make(
+        name: str = "", config: Config | None = None, known: CalibrationConfig | None = None, opener: Callable[..., object] = _open
+    ) -> RigWizard:
+        desk = WizardDesk(config or load_config(), known, opener, lambda _config: lambda frame: make_scene())  # type: ignore[arg-type]
+        wizard = RigWizard(desk, name)
+        qtbot.addWidget(wizard)
+        made.append(wizard)
+        wizard.show()
+        until(qtbot, lambda: not desk.is_busy)
+        return wizard
+
+    yield make
+    for wizard in made:
+        wizard.reject()
+
+
+@pytest.fixture
+def opened(make_wizard: MakeWizard, qtbot: QtBot) -> RigWizard:
+    wizard = make_wizard("bench 1")
+    _open_camera(wizard, qtbot)
+    return wizard
+
+
+def _open_camera(wizard: RigWizard, qtbot: QtBot) -> None:
+    qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
+    _idle(wizard, qtbot)
+    assert wizard.desk.bench is not None
+
+
+def _idle(wizard: RigWizard, qtbot: QtBot) -> None:
+    until(qtbot, lambda: not wizard.desk.is_busy)
+
+
+def _to(wizard: RigWizard, page: object) -> None:
+    while wizard.page is not page:
+        assert wizard.next_button.isEnabled()
+        wizard.next_button.click()
+
+
+# ---- the first page
+
+
+def test_a_rig_needs_a_name_and_a_camera(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    wizard = make_wizard()
+    page = wizard.camera_page
+    assert [page.cameras.item(k).text() for k in range(page.cameras.count())][-1] == "Bench twin (no hardware)"
+    assert "Give the rig a name" in page.problem.text()
+    assert not wizard.next_button.isEnabled()
+    _open_camera(wizard, qtbot)
+    assert not wizard.next_button.isEnabled()
+    qtbot.keyClicks(page.name_edit, "twin")
+    assert "cannot be called twin" in page.problem.text()
+    assert not wizard.next_button.isEnabled()
+    page.name_edit.setText("bench 1")
+    assert wizard.next_button.isEnabled()
+    wizard.next_button.click()
+    assert wizard.page is wizard.scale_page
+
+
+def test_a_camera_that_cannot_be_opened_is_one_line(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    def refuse(config: Config, see: object) -> CalibrationBench:
+        raise DeviceError("no webcam: plug it in")
+
+    wizard = make_wizard("bench 1", opener=refuse)
+    qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
+    _idle(wizard, qtbot)
+    assert wizard.message == "no webcam: plug it in"
+    assert not wizard.next_button.isEnabled()
+
+
+def test_the_living_picture_is_shown(opened: RigWizard, qtbot: QtBot) -> None:
+    until(qtbot, lambda: opened.picture._image is not None)
+    assert opened.camera_page.is_done
+
+
+# ---- scale and lens
+
+
+def test_the_board_gives_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
+    page = opened.scale_page
+    _to(opened, page)
+    assert opened.next_button.text() == "&Skip"
+    for _ in range(2):
+        qtbot.mouseClick(page.take_button, Qt.MouseButton.LeftButton)
+        _idle(opened, qtbot)
+    assert page.count.text() == "2 pictures of the board taken"
+    assert len(page.shapes()) > 30
+    assert not page.square.isEnabled()
+    qtbot.mouseClick(page.solve_button, Qt.MouseButton.LeftButton)
+    _idle(opened, qtbot)
+    assert opened.desk.draft is not None
+    assert opened.desk.draft.scale is not None
+    assert opened.desk.draft.scale.mm_per_px == pytest.approx(1.0 / 3.1, rel=0.01)
+    assert "mm per pixel" in page.result.text()
+    assert opened.next_button.text() == "&Next"
+
+
+def test_two_clicks_give_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
+    page = opened.scale_page
+    _to(opened, page)
+    page.length.setValue(80.0)
+    qtbot.mouseClick(page.clicks_button, Qt.MouseButton.LeftButton)
+    until(qtbot, lambda: opened.picture._image is not None)
+    for place in ((100.0, 100.0), (300.0, 100.0)):
+        x, y = opened.picture.on_screen(place)
+        qtbot.mouseClick(opened.picture, Qt.MouseButton.LeftButton, pos=_point(x, y))
+    assert opened.desk.draft is not None
+    assert opened.desk.draft.scale is not None
+    assert opened.desk.draft.scale.mm_per_px == pytest.approx(0.4, rel=0.02)
+    assert len(page.shapes()) == 3
+    page.click(10.0, 10.0)
+    page.click(12.0, 10.0)
+    assert "px apart" in opened.message
+    assert page.shapes() == []
+
+
+def _point(x: float, y: float) -> object:
+    from PySide6.QtCore import QPoint
+
+    return QPoint(round(x), round(y))
+
+
+def test_a_board_that_is_not_seen_is_told(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    class Empty(CalibrationBench):
+        def board_picture(self, spec: object) -> np.ndarray:
+            return np.full((480, 640, 3), 90, np.uint8)
+
+    wizard = make_wizard(
+        "bench 1", opener=lambda config, see: Empty(config, StillCamera(), None, lambda frame: make_scene(), lambda: None)
+    )
+    _open_camera(wizard, qtbot)
+    _to(wizard, wizard.scale_page)
+    qtbot.mouseClick(wizard.scale_page.take_button, Qt.MouseButton.LeftButton)
+    _idle(wizard, qtbot)
+    assert wizard.message.startswith("no board: 0 of its markers")
+    assert not wizard.scale_page.is_done
+
+
+def test_the_board_is_written_for_the_printer(opened: RigWizard, tmp_path: Path) -> None:
+    opened.scale_page.save_board(tmp_path / "board.pdf")
+    assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
+    assert "100 %" in opened.message
+    opened.scale_page.save_board(tmp_path / "board.jpg")
+    assert "written as .pdf or .png" in opened.message
+
+
+# ---- servos
+
+
+def test_without_servos_their_pages_have_nothing_to_do(opened: RigWizard, qtbot: QtBot) -> None:
+    _to(opened, opened.port_page)
+    qtbot.mouseClick(opened.port_page.search_button, Qt.MouseButton.LeftButton)
+    _idle(opened, qtbot)
+    for page, control in (
+        (opened.identify_page, opened.identify_page.auto_button),
+        (opened.zero_page, opened.zero_page.find_button),
+        (opened.steering_page, opened.steering_page.learn_button),
+    ):
+        _to(opened, page)
+        assert not control.isEnabled()
+        assert page.result.text() == "Search the servos first."
+
+
+def _with_servos(wizard: RigWizard) -> None:
+    assert wizard.desk.draft is not None
+    assert wizard.desk.bench is not None
+    wizard.desk.bench.port = "/dev/ttyUSB0"
+    wizard.desk.draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in range(1, 8)))
+    wizard.desk.changed.emit()
+
+
+def test_servos_are_told_apart_by_hand(opened: RigWizard, qtbot: QtBot) -> None:
+    _to(opened, opened.identify_page)
+    _with_servos(opened)
+    page, draft = opened.identify_page, opened.desk.draft
+    assert draft is not None
+    assert page.auto_button.isEnabled()
+    page._signs[0].setCurrentIndex(1)
+    page._signs[0].activated.emit(1)
+    assert draft.assignments[0] == Assignment("right", 1, -1, "set by hand")
+    assert draft.config.servos.joints[0].sign == -1
+    qtbot.mouseClick(page.swap_button, Qt.MouseButton.LeftButton)
+    assert [(one.name, one.id) for one in draft.assignments[2:4]] == [("up", 4), ("down", 3)]
+    page._ids[0].setCurrentIndex(1)
+    page._ids[0].activated.emit(1)
+    assert "every servo must have one name" in opened.message
+    assert draft.assignments[0].id == 1
+
+
+def test_stop_is_heard_on_every_page(opened: RigWizard, qtbot: QtBot) -> None:
+    bench = opened.desk.bench
+    assert bench is not None
+    for press in (
+        lambda: qtbot.mousePress(opened.stop_button, Qt.MouseButton.LeftButton),
+        lambda: qtbot.keyClick(opened, Qt.Key.Key_Space),
+        opened.stop,
+    ):
+        bench.stop.release()
+        press()
+        assert bench.stop.is_pressed
+
+
+def test_stop_reaches_a_job_that_runs(opened: RigWizard, qtbot: QtBot) -> None:
+    bench = opened.desk.bench
+    assert bench is not None
+    opened.desk.run("moving a servo", lambda: bench.stop.sleep(20.0))
+    assert not opened.next_button.isEnabled()
+    assert opened.message == "Moving a servo ..."
+    qtbot.mousePress(opened.stop_button, Qt.MouseButton.LeftButton)
+    _idle(opened, qtbot)
+    assert opened.message == "stopped: nothing moves before you go on"
+    opened.desk.run("looking", bench.stop.check)  # asking for the next step is going on
+    _idle(opened, qtbot)
+    assert opened.message == ""
+
+
+# ---- the end
+
+
+def test_saved_rigs_hold_what_was_found(opened: RigWizard, qtbot: QtBot) -> None:
+    assert opened.desk.draft is not None
+    opened.desk.draft.scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="two clicks", uncertainty_share=0.01)
+    _to(opened, opened.summary_page)
+    assert "scale: 0.3000 mm/px" in opened.summary_page.text.toPlainText()
+    assert opened.next_button.text() == "&Save"
+    with qtbot.waitSignal(opened.saved) as told:
+        opened.next_button.click()
+    assert told.args == ["bench 1"]
+    _, rig = find_rig("bench 1")
+    assert rig.calibration is not None
+    assert rig.calibration.scale is not None
+    assert rig.calibration.scale.mm_per_px == 0.3
+    assert opened.desk.bench is None  # the camera is free again
+
+
+def test_a_step_that_is_left_out_keeps_what_was_known(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="board", uncertainty_share=0.01)
+    known = CalibrationConfig.model_validate({"made_utc": "2025-01-01T00:00:00Z", "scale": scale})
+    wizard = make_wizard("bench 1", known=known)
+    _open_camera(wizard, qtbot)
+    assert wizard.scale_page.is_done
+    _to(wizard, wizard.summary_page)
+    wizard.next_button.click()
+    assert find_rig("bench 1")[1].calibration.scale == scale  # type: ignore[union-attr]
+
+
+def test_cancel_saves_nothing_and_gives_the_camera_back(opened: RigWizard) -> None:
+    opened.cancel_button.click()
+    assert list_rigs() == ()
+    assert opened.desk.bench is None

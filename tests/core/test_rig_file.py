@@ -1,0 +1,158 @@
+"""Rig files: round trips, names, broken files that are kept, and what of them reaches configuration and sessions."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from core.calibration_config import CalibrationConfig, LensConfig, ScaleConfig
+from core.config import Config, load_config
+from core.rig_file import (
+    RigFileError,
+    calibration_of,
+    check_rig_name,
+    find_rig,
+    list_rigs,
+    make_rig,
+    read_rig,
+    rig_path,
+    rigs_folder,
+    with_rig,
+    write_rig,
+)
+from core.session.manifest import about_rig
+
+MADE = datetime(2025, 3, 4, 5, 6, 7, tzinfo=UTC)
+LENS = LensConfig(k1=-0.1, center_px=(319.5, 239.5), size_px=(640, 480), residual_px=0.1, pictures=3)
+SCALE = ScaleConfig(mm_per_px=0.32, size_px=(640, 480), method="board", uncertainty_share=0.001)
+KNOWN = CalibrationConfig(made_utc=MADE, lens=LENS, scale=SCALE)
+REAL = load_config(
+    overrides={
+        "rig": {"camera": "webcam", "robot": "servos"},
+        "camera": {"device": "/dev/v4l/by-id/cam"},
+        "servos": {"port": "/dev/serial/by-id/u2d2"},
+    }
+)
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+
+
+@pytest.mark.parametrize("config", [load_config(), REAL])
+def test_a_rig_comes_back_as_it_was_saved(config: Config) -> None:
+    rig = make_rig(config, "bench 1", KNOWN)
+    path = write_rig(rig)
+    assert path == rigs_folder() / "bench 1.toml"
+    assert read_rig(path) == rig
+    assert find_rig("BENCH 1") == (path, rig)
+    assert [one.name for one in list_rigs()] == ["bench 1"]
+
+
+def test_the_configuration_takes_the_rig_over() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    config = with_rig(load_config(overrides={"advice": {"slow_mm_s": 2.0}}), read_rig(path), path)
+    assert config.rig.name == "bench 1"
+    assert config.rig.camera == "webcam"
+    assert config.camera == REAL.camera
+    assert config.servos == REAL.servos
+    assert config.advice.slow_mm_s == 2.0
+    assert calibration_of(config) == KNOWN
+
+
+def test_a_session_keeps_the_calibration() -> None:
+    path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    about = about_rig(with_rig(load_config(), read_rig(path), path), "SIM", "bench 1")
+    assert about.calibration is not None
+    assert CalibrationConfig.model_validate(about.calibration) == KNOWN
+    assert about_rig(load_config(), "SIM", "twin").calibration is None
+
+
+def test_a_recording_is_straight_already() -> None:
+    path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    config = load_config(overrides={"rig": {"camera": "video_file", "source": "a.mp4", "file": str(path), "robot": "none"}})
+    assert calibration_of(config) is None
+
+
+def test_saving_again_keeps_the_older_one() -> None:
+    write_rig(make_rig(load_config(), "bench 1", None))
+    path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    older = path.with_name("bench 1.older.toml")
+    assert read_rig(older).calibration is None
+    assert read_rig(path).calibration == KNOWN
+    assert [one.path for one in list_rigs()] == [path]
+
+
+def test_a_disk_that_does_not_take_it_is_one_line(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    with pytest.raises(RigFileError, match="cannot be saved") as told:
+        write_rig(make_rig(load_config(), "bench 1", None), blocked / "bench 1.toml")
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("name", ["", "  ", "../up", "a/b", ".hidden", "twin", "Webcam", "x" * 61, "a.older"])
+def test_names_that_are_none(name: str) -> None:
+    with pytest.raises(ValueError, match=r"name|called"):
+        check_rig_name(name)
+    with pytest.raises(RigFileError):
+        make_rig(load_config(), name, None)
+
+
+BROKEN = (
+    ("= 3", "no TOML"),
+    ("format = 99", "newer version"),
+    ('name = "b"', "made_utc: Field required"),
+    ("\x00", "no TOML"),
+)
+
+
+@pytest.mark.parametrize(("text", "problem"), BROKEN)
+def test_a_broken_file_is_one_clear_line_and_is_kept(text: str, problem: str) -> None:
+    path = rig_path("bench 1")
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    with pytest.raises(RigFileError, match=problem) as told:
+        read_rig(path)
+    assert "\n" not in str(told.value)
+    assert str(path) in str(told.value)
+    assert path.read_text() == text
+    listed = list_rigs()
+    assert [(one.name, one.rig) for one in listed] == [("bench 1", None)]
+    assert problem in listed[0].problem
+    with pytest.raises(RigFileError, match=problem):
+        find_rig("bench 1")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("id = 3", "id = 2", "two servos have the same id"),
+        ("mm_per_px = 0.32", "mm_per_px = -0.32", "calibration.scale.mm_per_px"),
+        ('kind = "twin"', 'kind = "webcam"', "twin"),
+        ("roll_deg = 0.0", "roll_dog = 0.0", "twin.roll_dog"),
+        ('robot = "twin"', 'robot = "servos"', "robot servos needs a real camera"),
+    ],
+)
+def test_a_value_that_cannot_be_is_named(old: str, new: str, problem: str) -> None:
+    path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(RigFileError, match=problem):
+        read_rig(path)
+
+
+def test_a_missing_rig_names_those_that_there_are() -> None:
+    write_rig(make_rig(load_config(), "bench 1", None))
+    with pytest.raises(RigFileError, match="unknown rig 'bench 2'; known: twin, realsense, webcam, bench 1"):
+        find_rig("bench 2")
+    with pytest.raises(RigFileError, match="no such rig file"):
+        read_rig(rig_path("bench 2"))
+
+
+def test_a_recording_is_no_rig() -> None:
+    config = load_config(overrides={"rig": {"camera": "video_file", "source": "a.mp4", "robot": "none"}})
+    with pytest.raises(RigFileError, match="plays a recording"):
+        make_rig(config, "bench 1", None)

@@ -1,0 +1,163 @@
+"""The wizard's procedures on a twin whose servos, gate and camera turn on one clock: the right answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.calibration.identify import NotIdentified
+from core.calibration.look import HeadNotSeen, angle_deg, turn_deg
+from core.config import Config
+from core.servo_config import JOINT_NAMES, ServosConfig
+from core.types import Command
+from hardware import servo_wizard
+from hardware.servo_wizard import Bench
+from hardware.servos.probe import ProbeFailed, ProbeLimits, Stopped, probe_config
+from tests.hardware.lock_bench import LockTwin, lock_bench
+
+WIRING = "3,-7,1,-12,-5,2,-4"  # tendons right, left, up, down; advance; two of the catheter
+IDS = (1, 2, 3, 4, 5, 7, 12)
+
+
+def _config(**twin: object) -> Config:
+    return Config.model_validate({"twin": {"phantom": "tree", "wiring": WIRING, **twin}})
+
+
+def _tendon_mm(twin: LockTwin) -> np.ndarray:
+    return np.array(twin.joints_mm()[:4])
+
+
+@pytest.fixture(scope="module")
+def straight() -> tuple[LockTwin, Bench]:
+    return lock_bench(_config())
+
+
+@pytest.mark.slow
+def test_seven_servos_are_told_apart_whatever_their_ids_and_directions(straight: tuple[LockTwin, Bench]) -> None:
+    twin, bench = straight
+    said: list[str] = []
+    start = dict(twin.turned_mm)
+    twin.moved.clear()
+    found = servo_wizard.identify_servos(bench, ServosConfig(), IDS, said.append)
+    assert [(one.name, one.sign * one.id) for one in found] == list(zip(JOINT_NAMES, map(int, WIRING.split(",")), strict=True))
+    assert {one.name for one in found if one.assumed} == {"up", "down"}
+    assert max(abs(at_mm - start[servo_id]) for servo_id, at_mm in twin.moved) <= 3.0 + 1e-6
+    assert twin.turned_mm == pytest.approx(start, abs=0.02)
+    assert len([line for line in said if "direction" in line]) == 7
+    identified = servo_wizard.identified(ServosConfig(), found)
+    assert [(joint.id, joint.sign) for joint in identified.joints] == [(joint.id, joint.sign) for joint in twin.wiring.joints]
+
+
+@pytest.mark.slow
+def test_wires_are_left_where_they_just_become_taut(straight: tuple[LockTwin, Bench]) -> None:
+    twin, bench = straight
+    slack_mm = np.array([0.8, 0.3, -0.2, 0.5])
+    for joint, one_mm in zip(twin.wiring.joints[:4], slack_mm, strict=True):
+        twin.turn(joint.id, -joint.sign * one_mm)
+    twin.pass_time(0.5)
+    twin.moved.clear()
+    found = servo_wizard.find_zeros(bench, twin.wiring, lambda _: None)
+    assert found.problems == ()
+    assert np.array(found.slack_mm) == pytest.approx(slack_mm, abs=0.15)
+    assert _tendon_mm(twin) == pytest.approx(np.zeros(4), abs=0.15)
+    # never more than what shows the head's way beyond taut
+    by_id = {joint.id: joint.sign for joint in twin.wiring.joints}
+    assert max(by_id[servo_id] * at_mm for servo_id, at_mm in twin.moved) < 1.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("roll_deg", [0.0, 25.0])
+def test_the_steering_is_learnt_to_three_degrees(roll_deg: float) -> None:
+    twin, bench = lock_bench(_config(roll_deg=roll_deg))
+    learnt = servo_wizard.learn_steering(bench, twin.wiring, lambda _: None)
+    steering = learnt.steering
+    assert steering.roll_deg == pytest.approx(roll_deg, abs=5.0)
+    for name, axis in (("right", "bend"), ("up", "pitch")):
+        direction = next(tendon.direction_deg for tendon in steering.tendons if tendon.name == name)
+        if name == "up" and roll_deg == 0.0:
+            assert direction is None
+        elif name == "right":
+            assert direction is not None
+            assert abs(turn_deg(_true_direction(twin, bench, axis), direction)) <= 3.0
+    assert np.hypot(*(np.array(learnt.head_px) - twin.head_px())) < 15.0
+
+
+def _true_direction(twin: LockTwin, bench: Bench, axis: str) -> float:
+    """From the twin's own head: by how much it moves between a small bend to one side and to the other."""
+    heads = []
+    with bench.hands.steered(twin.wiring) as robot:
+        for share in (0.15, -0.15):
+            robot.bend_to(Command(**{axis: share}))
+            robot.pause(0.5)
+            heads.append(twin.head_px())
+        robot.bend_to(Command())
+        robot.pause(0.5)
+    return angle_deg(heads[0] - heads[1])
+
+
+def test_stop_in_the_middle_ends_it_at_once() -> None:
+    twin, bench = lock_bench(_config())
+    said: list[str] = []
+
+    def stop_at_the_first_motion(line: str) -> None:
+        said.append(line)
+        bench.stop.press()
+
+    with pytest.raises(Stopped):
+        servo_wizard.identify_servos(bench, ServosConfig(), IDS, stop_at_the_first_motion)
+    assert len(said) == 1
+    assert twin.moved == []
+    with pytest.raises(Stopped):  # and nothing else begins before somebody goes on
+        servo_wizard.nudge(bench, twin.wiring, "right", 0.5)
+    assert twin.moved == []
+    bench.stop.release()
+    servo_wizard.nudge(bench, twin.wiring, "right", 0.5)
+    assert twin.joints_mm()[0] == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_head_that_is_not_seen_moves_nothing() -> None:
+    twin, bench = lock_bench(_config())
+    twin.world.physics.reset()  # the robot is out of the vessel
+    with pytest.raises(HeadNotSeen):
+        servo_wizard.identify_servos(bench, ServosConfig(), IDS, lambda _: None)
+    assert twin.moved == []
+
+
+def test_a_wiggle_goes_both_ways_and_comes_back() -> None:
+    twin, bench = lock_bench(_config())
+    servo_wizard.wiggle(bench, ServosConfig(), IDS, 7)
+    ways = [at_mm for servo_id, at_mm in twin.moved if servo_id == 7]
+    assert {servo_id for servo_id, _ in twin.moved} == {7}
+    assert (min(ways), max(ways)) == pytest.approx((-1.5, 1.5), abs=0.02)
+    assert ways[-1] == pytest.approx(0.0, abs=0.02)
+
+
+def test_servos_that_show_nothing_are_named() -> None:
+    class _Still:
+        """Eyes that always see the same."""
+
+        def __init__(self, eyes: servo_wizard.Eyes) -> None:
+            self._look = eyes.look(lambda: None)
+
+        def look(self, alive: object) -> object:
+            return self._look
+
+    _twin, bench = lock_bench(_config())
+    blind = Bench(_Still(bench.eyes), bench.hands, bench.stop)  # type: ignore[arg-type]
+    with pytest.raises(NotIdentified, match=r"1 that pulls the head to the right \(found: none\)"):
+        servo_wizard.identify_servos(blind, ServosConfig(), IDS, lambda _: None)
+
+
+def test_the_servo_under_test_has_bounds_and_the_others_stand() -> None:
+    limits = ProbeLimits(-1.0, 2.0, speed_mm_s=4.0)
+    made = probe_config(ServosConfig(), 12, limits, -1, IDS)
+    tested = made.joints[JOINT_NAMES.index("advance")]
+    assert (tested.id, tested.sign) == (12, -1)
+    assert (tested.low_mm, tested.high_mm) == pytest.approx((-1.3, 2.3))
+    assert {joint.max_speed_mm_s for joint in made.joints} == {4.0}
+    assert {joint.id for joint in made.joints} == set(IDS)
+    assert made.pretension_mm == 0.0
+    with pytest.raises(ProbeFailed, match="servo 9 cannot be moved"):
+        probe_config(ServosConfig(), 9, limits, 1, IDS)
+    with pytest.raises(ProbeFailed, match="seven servos are needed"):
+        probe_config(ServosConfig(), 1, limits, 1, IDS[:6])
