@@ -94,7 +94,6 @@ def test_speed_is_the_contracts_json_object() -> None:
     assert result["first_frame_s"] > 0
 
 
-@pytest.mark.slow
 def test_the_window_opens_shows_and_closes_with_exit_code_0() -> None:
     environment = {name: value for name, value in os.environ.items() if name not in {"DISPLAY", "WAYLAND_DISPLAY"}}
     environment["QT_QPA_PLATFORM"] = "offscreen"
