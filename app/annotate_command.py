@@ -8,12 +8,14 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from app.annotate_sources import default_store, image_files
 from app.learning_commands import progress_bar
 from core.config import Config, load_config
+from core.profiles import own_config
 from core.study.annotation_images import FoundImage, find_images
 from core.study.annotation_records import ItemKey, StoredAnnotation
 from core.study.annotation_store import AnnotationStore
@@ -92,6 +94,8 @@ def _store_of(paths: Sequence[Path]) -> Path:
 
 # ---- the window
 
+_KEPT = (("loupe", "L"), ("masks", "K"))
+
 
 def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
     from app.window_command import _check_display, _quit_on_signal, make_application
@@ -102,15 +106,19 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         images = _listed(files, store)
         rater = options.study.rater or _user()
         items = _queue(store, images, rater, options.study, config)
-        application = make_application()
+        application = make_application(own_config().window.theme)
 
         from app.annotation_desk import AnnotationDesk
         from app.annotator_window import AnnotatorWindow
+        from app.layout_keeper import LayoutKeeper, Parts, Switch
 
         desk = AnnotationDesk(store, items, config.perception, blind=bool(options.study.name))
         _tell(store.problems)
         who = f"study {options.study.name}, rater {rater}, blind" if options.study.name else f"rater {rater}"
         window = AnnotatorWindow(desk, who)
+        bar = window.bar
+        switches = {name: Switch(partial(bar.is_on, key), lambda _on, which=key: bar.toggle(which)) for name, key in _KEPT}
+        LayoutKeeper(window, "annotator", Parts({"main": window.columns}, {}, switches))
         application.aboutToQuit.connect(window.shut_down)
         timer = _quit_on_signal(application)
         window.show()

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from app.learning_commands import progress_bar
 from core.config import Config
 from core.study.annotation_images import FoundImage
 from core.study.annotation_records import StoredAnnotation
-from core.study.annotation_report import choose_study, manual_measurements
+from core.study.annotation_report import agreement_report, choose_study, manual_measurements
 from core.study.annotations import AnnotationError
 from core.study.evaluation import Measurement
 from core.types import Frame
@@ -46,3 +47,15 @@ def compared_rows(
             if scene.refusal is not None and row.state is not None:
                 reasons[scene.refusal.reason.value] += 1
     return rows, dict(sorted(reasons.items())), pipeline.engine
+
+
+def raters_agreement(
+    annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], study: str | None, where: str, seed: int
+) -> dict[str, Any] | None:
+    """How well raters agree with themselves and each other (``agreement_report``); None when nobody measured anything twice."""
+    done = choose_study(annotations, study, where)
+    raters = {one.key.rater for one in done}
+    if len(raters) < 2 and all(one.key.repeat == 1 for one in done):
+        return None
+    report = agreement_report(done, {image.sha256: image.path.name for image in images}, seed)
+    return {"study": done[0].key.study} | report

@@ -18,13 +18,26 @@ def print_agreement(report: Mapping[str, Any]) -> None:
     console = Console()
     name = f"Study {report['study']}" if report["study"] else "Annotations outside studies"
     console.print(f"{name}: {report['annotations']} answers on {report['images']} images", "", sep="\n", highlight=False)
-    _print(console, "First against second", {rater: _of_rater(row) | _compared(row) for rater, row in report["raters"].items()})
+    for title, columns in agreement_tables(report).items():
+        _print(console, title, columns)
+    if words := between_words(report):
+        console.print(words, highlight=False)
+
+
+def agreement_tables(report: Mapping[str, Any]) -> dict[str, dict[str, dict[str, str]]]:
+    """By title: by column (a rater, two raters) the quantities as text."""
     pairs = {f"{row['first']}, {row['second']}": _compared(row) for row in report["pairs"]}
-    _print(console, "Rater against rater", pairs)
+    raters = {rater: _of_rater(row) | _compared(row) for rater, row in report["raters"].items()}
+    return {"First against second": raters, "Rater against rater": pairs}
+
+
+def between_words(report: Mapping[str, Any]) -> str:
+    """All raters together in one line; empty when there is only one."""
     both = report["between"]
-    if both["n"]:
-        spread = f"SD of one measure {_number(both['sd_deg'], 2)}°, ICC(2,1) {_number(both['icc'], 3)}"
-        console.print(f"All {both['raters']} raters on {both['n']} images: {spread}", highlight=False)
+    if not both["n"]:
+        return ""
+    spread = f"SD of one measure {_number(both['sd_deg'], 2)}°, ICC(2,1) {_number(both['icc'], 3)}"
+    return f"All {both['raters']} raters on {both['n']} images: {spread}"
 
 
 def _print(console: Console, title: str, columns: Mapping[str, Mapping[str, str]]) -> None:

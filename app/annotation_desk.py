@@ -125,6 +125,11 @@ class AnnotationDesk(QObject):
     def store_path(self) -> Path:
         return self._store.path
 
+    @property
+    def store(self) -> AnnotationStore:
+        """The open file; its methods may be called from any thread."""
+        return self._store
+
     # ---- the item in hand
 
     @property

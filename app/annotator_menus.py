@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from app.annotation_tool import Tool
-from app.menus import MenuEntry, add_menu
+from app.menus import MenuEntry, add_help_menu, add_menu
 from core.types import PoseState
 
 if TYPE_CHECKING:
@@ -25,7 +25,31 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
         [
             MenuEntry("Where is it &saved?", window.tell_saved, ("Ctrl+S",)),
             None,
+            MenuEntry("&Train on my annotations...", window.train),
+            None,
             MenuEntry("&Quit", window.close, ("Ctrl+Q",)),
+        ],
+    )
+    view = add_menu(
+        window,
+        "&View",
+        [
+            MenuEntry("Zoom &in", partial(canvas.zoom, _ZOOM_STEP), ("+", "=")),
+            MenuEntry("Zoom &out", partial(canvas.zoom, 1 / _ZOOM_STEP), ("-",)),
+            MenuEntry("&Close-up of the head", canvas.close_up, ("Z",)),
+            MenuEntry("&Whole picture", canvas.fit, ("F", "0")),
+            None,
+            MenuEntry("More contrast", partial(light.step, 1), (".",)),
+            MenuEntry("Less contrast", partial(light.step, -1), (",",)),
+            MenuEntry("Brighter", partial(light.step, 0, 1), (">",)),
+            MenuEntry("Darker", partial(light.step, 0, -1), ("<",)),
+            MenuEntry("Picture as it is", light.reset, ("/",)),
+            None,
+            MenuEntry("&Loupe", partial(bar.toggle, "L"), ("L",)),
+            MenuEntry("&Masks", partial(bar.toggle, "K"), ("K",)),
+            MenuEntry("&Algorithm", window.toggle_proposal, ("H",)),
+            None,
+            MenuEntry("&Full screen", window.toggle_full_screen, ("F11",), checked=False),
         ],
     )
     states = [MenuEntry(f"State {s.value}", partial(window.set_state, s), (s.value,)) for s in PoseState]
@@ -67,30 +91,9 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry("Next &without an answer", window.go_open, ("U",)),
             MenuEntry("&First", partial(window.open, 0), ("Home",)),
             MenuEntry("&Last", partial(window.open, len(window.desk.items) - 1), ("End",)),
-            MenuEntry("&List", window.queue.take_focus, ("F6",)),
-        ],
-    )
-    view = add_menu(
-        window,
-        "&View",
-        [
-            MenuEntry("Zoom &in", partial(canvas.zoom, _ZOOM_STEP), ("+", "=")),
-            MenuEntry("Zoom &out", partial(canvas.zoom, 1 / _ZOOM_STEP), ("-",)),
-            MenuEntry("&Close-up of the head", canvas.close_up, ("Z",)),
-            MenuEntry("&Whole picture", canvas.fit, ("F", "0")),
-            None,
-            MenuEntry("More contrast", partial(light.step, 1), (".",)),
-            MenuEntry("Less contrast", partial(light.step, -1), (",",)),
-            MenuEntry("Brighter", partial(light.step, 0, 1), (">",)),
-            MenuEntry("Darker", partial(light.step, 0, -1), ("<",)),
-            MenuEntry("Picture as it is", light.reset, ("/",)),
-            None,
-            MenuEntry("&Loupe", partial(bar.toggle, "L"), ("L",)),
-            MenuEntry("&Masks", partial(bar.toggle, "K"), ("K",)),
-            MenuEntry("&Algorithm", window.toggle_proposal, ("H",)),
-            MenuEntry("&Full screen", window.toggle_full_screen, ("F11",)),
+            MenuEntry("Lis&t", window.queue.take_focus, ("F6",)),
         ],
     )
     for action in (*go[:2], *view[:2], *view[4:8]):
         action.setAutoRepeat(True)
-    add_menu(window, "&Help", [MenuEntry("&Keys", window.help.toggle, ("F1",))])
+    add_help_menu(window, window.help.toggle)

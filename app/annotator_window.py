@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QAction, QCloseEvent, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QMainWindow, QMessageBox, QVBoxLayout, QWidget
 
-from app import palette, theme
+from app import theme
 from app.annotation_desk import AnnotationDesk
 from app.annotation_tool import Tool
 from app.annotator_menus import add_annotator_menus
 from app.heartbeat import Heartbeat
+from app.menus import action_of
+from app.training_dialog import TrainingDialog
+from app.training_source import collect_from_store
 from app.widgets.annotation_bar import AnnotationBar
 from app.widgets.annotation_canvas import AnnotationCanvas
 from app.widgets.annotation_header import AnnotationHeader
@@ -20,11 +24,13 @@ from app.widgets.annotation_help import annotation_help
 from app.widgets.annotation_list import QueueList, QueueModel
 from app.widgets.annotation_readout import AnnotationReadout
 from app.widgets.card import Card
+from app.widgets.columns import Columns
 from app.widgets.light_sliders import LightSliders
 from app.widgets.toast import Toast
 from core.study.annotations import Annotation, Readout, turn_annotation
 from core.types import PoseState
 
+_LEFT_SHARE = 0.74
 _SIDE_WIDTH = (330, 400)
 
 
@@ -42,6 +48,7 @@ class AnnotatorWindow(QMainWindow):
         self._desk = desk
         desk.setParent(self)
         self._is_shut = False
+        self._training: TrainingDialog | None = None
         self._heartbeat = Heartbeat(parent=self)
         self.canvas = AnnotationCanvas()
         self.readout = AnnotationReadout(desk.config.vectors.robot_length_px)
@@ -52,9 +59,10 @@ class AnnotatorWindow(QMainWindow):
         self.note.setPlaceholderText("Note on this image  (F2)")
         self.note.setAccessibleName("Note")
         self.note.setMaxLength(2000)
-        self.note.setStyleSheet(
-            f"QLineEdit {{ background: {palette.PANEL}; color: {palette.TEXT}; border: 1px solid {palette.LINE};"
-            f" border-radius: 6px; padding: 5px 10px; }} QLineEdit:focus {{ border-color: {palette.SKY}; }}"
+        theme.set_sheet(
+            self.note,
+            "QLineEdit { background: @PANEL; color: @TEXT; border: 1px solid @LINE; border-radius: 6px; padding: 5px 10px; }"
+            " QLineEdit:focus { border-color: @SKY; }",
         )
         self.queue = QueueList(QueueModel(self._names(), desk.status, desk.has_masks))
         self._lay_out()
@@ -91,7 +99,9 @@ class AnnotatorWindow(QMainWindow):
         return [item.image.path.name for item in self._desk.items]
 
     def _lay_out(self) -> None:
-        left = QVBoxLayout()
+        picture = QWidget()
+        left = QVBoxLayout(picture)
+        left.setContentsMargins(0, 0, 0, 0)
         left.setSpacing(6)
         for widget, stretch in ((self.header, 0), (self.canvas, 1), (self.bar, 0)):
             left.addWidget(widget, stretch)
@@ -108,9 +118,8 @@ class AnnotatorWindow(QMainWindow):
         stage = QWidget()
         row = QHBoxLayout(stage)
         row.setContentsMargins(theme.GAP, 4, theme.GAP, theme.GAP)
-        row.setSpacing(theme.GAP)
-        row.addLayout(left, 74)
-        row.addWidget(side, 26)
+        self.columns = Columns(picture, side, _LEFT_SHARE)
+        row.addWidget(self.columns)
         self.setCentralWidget(stage)
         self.help = annotation_help(stage)
 
@@ -377,6 +386,17 @@ class AnnotatorWindow(QMainWindow):
         self.bar.set_switch("H", False)
         self.canvas.show_proposal(None)
 
+    # ---- training
+
+    def train(self) -> None:
+        """Train a model on the masks of this file; the dialog watches it."""
+        if self._training is None:
+            images = [item.image for item in self._desk.items]
+            collect = partial(collect_from_store, self._desk.store, images)
+            self._training = TrainingDialog(collect, str(self._desk.store_path), self)
+        self._training.show()
+        self._training.raise_()
+
     # ---- the window
 
     def tell_saved(self) -> None:
@@ -400,6 +420,7 @@ class AnnotatorWindow(QMainWindow):
         super().changeEvent(event)
         if event.type() == QEvent.Type.WindowStateChange:
             self.menuBar().setVisible(not self.isFullScreen())
+            action_of(self, "F11").setChecked(self.isFullScreen())
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in (QEvent.Type.MouseMove, QEvent.Type.MouseButtonPress, QEvent.Type.KeyPress, QEvent.Type.Wheel):
@@ -427,6 +448,8 @@ class AnnotatorWindow(QMainWindow):
         """Finish writing and end the threads."""
         if not self._is_shut:
             self._is_shut = True
+            if self._training is not None:
+                self._training.end()
             self._heartbeat.stop()
             self.canvas.removeEventFilter(self)
             self.setUpdatesEnabled(False)

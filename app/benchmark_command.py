@@ -142,6 +142,13 @@ def run_window_pace(seconds: float, *, config_path: Path | None, as_json: bool) 
     _print(measure_window(seconds, config_path), as_json, "window")
 
 
+def run_recording(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
+    """How much a recording slows perception down."""
+    from app.benchmark_recording import measure_recording
+
+    _print(measure_recording(_config(model, preset, config_path), frames), as_json, "recording")
+
+
 def run_accuracy(
     folder: Path,
     *,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import palette
+from app.palette import ON_PICTURE
 from core.config import RESOURCES
 from core.types import Image, Point, Points, Vector
 
@@ -44,13 +45,13 @@ class Brush:
     def _lines(self, lines: list[Points], name: str, width: float, *, closed: bool = False) -> None:
         """Polylines given in canvas pixels, first a dark edge, then the colour."""
         fixed = [to_fixed(line) for line in lines]
-        for colour, extra in ((palette.rgb(palette.INK), 2.0), (palette.rgb(name), 0.0)):
+        for colour, extra in ((palette.rgb(ON_PICTURE.INK), 2.0), (palette.rgb(name), 0.0)):
             cv2.polylines(self._canvas, fixed, closed, colour, self._width(width + extra), cv2.LINE_AA, SHIFT)
 
     def _fill(self, outline: Points, name: str) -> None:
         fixed = to_fixed(outline)
         cv2.fillPoly(self._canvas, [fixed], palette.rgb(name), cv2.LINE_AA, SHIFT)
-        cv2.polylines(self._canvas, [fixed], True, palette.rgb(palette.INK), self._width(1.0), cv2.LINE_AA, SHIFT)
+        cv2.polylines(self._canvas, [fixed], True, palette.rgb(ON_PICTURE.INK), self._width(1.0), cv2.LINE_AA, SHIFT)
 
     def polylines(self, lines: tuple[Points, ...], name: str, width: float) -> None:
         drawn = [self._at(line) for line in lines if len(line) > 1]
@@ -88,7 +89,7 @@ class Brush:
         """The arc from the vessel's direction to the robot's, with the vessel's direction as a thin line through the corner."""
         (middle,) = self._at([corner])
         arc = middle + unit_arc * 70.0 * self._unit
-        self._lines([np.array([middle, middle + (arc[0] - middle) * 1.3])], palette.VESSEL_VECTOR, 1.5)
+        self._lines([np.array([middle, middle + (arc[0] - middle) * 1.3])], ON_PICTURE.VESSEL_VECTOR, 1.5)
         self._lines([arc], name, 2.5)
 
     def label_beside(self, point: Point, line: Vector, side: float, text: str, name: str) -> None:
@@ -107,18 +108,18 @@ class Brush:
     def frame(self, origin: Points, size: Point) -> None:
         """A thin rectangle from `origin`, source pixels."""
         corners = origin + np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * np.array(size)
-        self._lines([self._at(corners)], palette.TEXT, 1.5, closed=True)
+        self._lines([self._at(corners)], ON_PICTURE.TEXT, 1.5, closed=True)
 
     def paste(self, inset: Image, left: int, top: int) -> None:
         """Put a picture into a corner, with a frame."""
         height, width = inset.shape[:2]
         edge = self._width(3.0)
-        cv2.rectangle(inset, (0, 0), (width - 1, height - 1), palette.rgb(palette.INK), edge + 2)
-        cv2.rectangle(inset, (1, 1), (width - 2, height - 2), palette.rgb(palette.TEXT), edge - 1)
+        cv2.rectangle(inset, (0, 0), (width - 1, height - 1), palette.rgb(ON_PICTURE.INK), edge + 2)
+        cv2.rectangle(inset, (1, 1), (width - 2, height - 2), palette.rgb(ON_PICTURE.TEXT), edge - 1)
         self._canvas[top : top + height, left : left + width] = inset
 
     def stamp(self, text: str) -> None:
-        self._label(np.array([44.0, self._canvas.shape[0] / self._unit - 30.0]) * self._unit, text, palette.SIM)
+        self._label(np.array([44.0, self._canvas.shape[0] / self._unit - 30.0]) * self._unit, text, ON_PICTURE.SIM)
 
     def _label(self, middle: Points, text: str, name: str) -> None:
         """A text on a dark plate around `middle`, moved inside the picture."""
@@ -128,7 +129,7 @@ class Brush:
         y = float(np.clip(middle[1] - height / 2, 2, max(2, self._canvas.shape[0] - height - 2)))
         left, top = round(x), round(y)
         plate = self._canvas[top : top + height, left : left + width]
-        plate[:] = (plate * 0.25 + np.array(palette.rgb(palette.INK)) * 0.75).astype(np.uint8)
+        plate[:] = (plate * 0.25 + np.array(palette.rgb(ON_PICTURE.INK)) * 0.75).astype(np.uint8)
         put_text(self._canvas, text, (left + size // 2, top + round(1.1 * size)), name, "SemiBold", size)
 
 

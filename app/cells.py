@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from app import palette
-
 NONE = "\N{EN DASH}"
 
 
@@ -20,7 +18,8 @@ class Tone(IntEnum):
 
 
 SIGN = {Tone.FAINT: "", Tone.PLAIN: "", Tone.WARN: "!", Tone.BAD: "!!"}
-TONE_COLOUR = {Tone.FAINT: palette.TEXT_FAINT, Tone.PLAIN: palette.TEXT, Tone.WARN: palette.ORANGE, Tone.BAD: palette.FAULT}
+TONE_ROLE = {Tone.FAINT: "TEXT_FAINT", Tone.PLAIN: "TEXT", Tone.WARN: "ORANGE", Tone.BAD: "FAULT"}
+"""Colours, as roles of the palette."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,10 +22,14 @@ app = typer.Typer(
 ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file; keys that differ from the defaults are enough")]
 PresetOption = Annotated[str | None, typer.Option("--preset", help="'paper' takes the paper literally")]
 RigOption = Annotated[
-    str | None, typer.Option("--rig", help="twin (needs no hardware), realsense or webcam; default: the configured one, else twin")
+    str | None,
+    typer.Option("--rig", help="twin (needs no hardware), realsense, webcam, or a name of rig list; default: the configured one"),
 ]
 SourceOption = Annotated[Path | None, typer.Option("--source", help="video, picture or folder to look at instead of a camera")]
 JsonOption = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
+ProgressOption = Annotated[
+    bool, typer.Option("--progress-json", help="progress as JSON objects on standard output, one a line, for other programs")
+]
 
 
 def main() -> None:
@@ -52,16 +56,26 @@ def gui(
     rig: RigOption = None,
     config: ConfigOption = None,
     source: SourceOption = None,
+    tour: Annotated[bool, typer.Option("--tour", help="show the tour, as at the first start")] = False,
     until_first_frame: Annotated[bool, typer.Option("--until-first-frame", hidden=True)] = False,
 ) -> None:
     """The operator window (the same as no command)."""
-    _open_window(rig, config, source, until_first_frame)
+    _open_window(rig, config, source, until_first_frame, tour=tour)
 
 
-def _open_window(rig: str | None, config_path: Path | None, source: Path | None, until_first_frame: bool = False) -> None:
+def _open_window(
+    rig: str | None, config_path: Path | None, source: Path | None, until_first_frame: bool = False, *, tour: bool = False
+) -> None:
     from app.window_command import run_window
 
-    sys.exit(run_window(rig, config_path, source, until_first_frame=until_first_frame))
+    sys.exit(run_window(rig, config_path, source, until_first_frame=until_first_frame, tour=tour))
+
+
+def _tell_progress(asked: bool) -> None:
+    if asked:
+        from app.progress_lines import tell_progress
+
+        tell_progress()
 
 
 @app.command()
@@ -104,6 +118,7 @@ def train(
     data: Annotated[list[Path] | None, typer.Option(help="labelled folder as synth writes it; may be repeated")] = None,
     synthetic: Annotated[int, typer.Option(min=0, help="also make this many frames with the twin")] = 0,
     init: Annotated[str | None, typer.Option(help="start from this model instead of from nothing")] = None,
+    shallow: Annotated[bool, typer.Option("--shallow", help="a new network of two convolutions on every level")] = False,
     deepen: Annotated[bool, typer.Option("--deepen", help="give the --init network the default's depth before training")] = False,
     steps: Annotated[int, typer.Option(min=1)] = 6000,
     stop_after: Annotated[int | None, typer.Option(min=1, help="end after so many of the steps, to go on with --init")] = None,
@@ -119,15 +134,20 @@ def train(
     ] = None,
     seed: Annotated[int, typer.Option(min=0)] = 0,
     threads: Annotated[int, typer.Option(min=0, max=256, help="CPU threads; 0 = all")] = 0,
+    held_out: Annotated[
+        Path | None, typer.Option(help="labelled folder that is not trained on: its Dice before and after goes into the model")
+    ] = None,
+    progress_json: ProgressOption = False,
 ) -> None:
     """Train or fine-tune the network; Ctrl-C keeps what was learnt."""
-    from app.learning_commands import run_train
+    from app.learning_commands import TrainOutputs, run_train
     from core.learning.training import TrainingPlan
 
     plan = TrainingPlan(
         steps=steps,
         batch=batch,
         learning_rate=rate,
+        warmup_steps=min(100, max(1, steps // 10)),
         crop=(crop, crop),
         look_share=look_share,
         focus_share=focus,
@@ -135,7 +155,8 @@ def train(
         seed=seed,
         threads=threads,
     )
-    run_train(out, data or [], synthetic, init, base, plan, deepen=deepen)
+    _tell_progress(progress_json)
+    run_train(TrainOutputs(out, held_out), data or [], synthetic, init, base, plan, deepen=deepen, shallow=shallow)
 
 
 @app.command()
@@ -206,16 +227,29 @@ def evaluate(
         bool, typer.Option("--like-paper", help="draw a test like the paper's: 48 images, measured twice with an error")
     ] = False,
     manual_sd: Annotated[float, typer.Option(min=0, max=30, help="SD of one such manual measure, degrees")] = 1.5,
+    study: Annotated[str | None, typer.Option(help="this study of images annotated by hand, its raters and repeats too")] = None,
     seed: Annotated[int, typer.Option(min=0, help="of the drawn images, their manual errors and the bootstrap")] = 0,
     model: Annotated[str | None, typer.Option(help="model name or folder")] = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
+    progress_json: ProgressOption = False,
 ) -> None:
     """The algorithm against manual measures, with the statistics of the paper beside its own figures."""
     from app.evaluate_command import LikePaper, run_evaluate
 
-    study = LikePaper(manual_sd) if like_paper else None
-    run_evaluate(labelled, csv, out, as_json=json, model=model, preset=preset, config_path=config, like_paper=study, seed=seed)
+    _tell_progress(progress_json)
+    run_evaluate(
+        labelled,
+        csv,
+        out,
+        as_json=json,
+        model=model,
+        preset=preset,
+        config_path=config,
+        like_paper=LikePaper(manual_sd) if like_paper else None,
+        seed=seed,
+        study_name=study,
+    )
 
 
 @app.command()
@@ -258,6 +292,7 @@ def benchmark(
     json: JsonOption = False,
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
     window: Annotated[float | None, typer.Option(min=5.0, help="run the window for so many seconds and measure its pace")] = None,
+    recording: Annotated[bool, typer.Option("--recording", help="how much a recording slows perception down, in turns")] = False,
     true_masks: Annotated[bool, typer.Option("--true-masks", help="accuracy of the geometry alone, without the network")] = False,
     store: Annotated[bool, typer.Option("--store", help="keep the accuracy in the model's model.json")] = False,
     frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
@@ -266,10 +301,12 @@ def benchmark(
     config: ConfigOption = None,
 ) -> None:
     """Latency per stage, throughput, memory and start-up, against the paper-literal baseline in the same run; or accuracy."""
-    from app.benchmark_command import run_accuracy, run_speed, run_window_pace
+    from app.benchmark_command import run_accuracy, run_recording, run_speed, run_window_pace
 
     if window is not None:
         run_window_pace(window, config_path=config, as_json=json)
+    elif recording:
+        run_recording(frames, model=model, preset=preset, config_path=config, as_json=json)
     elif accuracy is not None:
         run_accuracy(accuracy, model=model, preset=preset, config_path=config, as_json=json, store=store, true_masks=true_masks)
     else:
@@ -336,12 +373,15 @@ def session_info(session: SessionArgument, json: JsonOption = False) -> None:
 def session_recover(
     session: SessionArgument,
     into: Annotated[Path | None, typer.Option(help="folder of the copy; default: beside the session")] = None,
+    only_look: Annotated[bool, typer.Option("--only-look", help="write nothing; say what would be lost")] = False,
     json: JsonOption = False,
+    progress_json: ProgressOption = False,
 ) -> None:
     """Repair a cut or damaged session into a copy; the original stays as it is."""
     from app.session_command import run_recover
 
-    run_recover(session, into, as_json=json)
+    _tell_progress(progress_json)
+    run_recover(session, into, as_json=json, only_look=only_look)
 
 
 @session_commands.command("export")
@@ -374,6 +414,107 @@ def ablation(
 
     plan = Plan(labelled, model, config, true_masks, sequence, tuple(phantom or ()), seed, out)
     run_ablation(plan, as_json=json)
+
+
+@app.command()
+def screenshots(
+    out: Annotated[Path, typer.Option(help="folder of the pictures")],
+    only: Annotated[list[str] | None, typer.Option(help="only this picture; may be repeated")] = None,
+    config: ConfigOption = None,
+) -> None:
+    """The pictures of the documents, from the running program with fixed seeds. No screen is needed."""
+    from app.screenshots_command import run_screenshots
+
+    run_screenshots(out, only or (), config)
+
+
+rig_commands = typer.Typer(help="Rigs: camera, servos and calibration of a bench, in one file.", no_args_is_help=True)
+app.add_typer(rig_commands, name="rig")
+RigName = Annotated[str, typer.Argument(metavar="NAME", help="of the rig")]
+SquareOption = Annotated[float, typer.Option(min=2.0, max=100.0, help="side of a square of the board, mm")]
+ColumnsOption = Annotated[int, typer.Option(min=4, max=40, help="squares across")]
+RowsOption = Annotated[int, typer.Option(min=4, max=40, help="squares down")]
+
+
+@rig_commands.command("list")
+def rig_list(json: JsonOption = False) -> None:
+    """The rigs that there are."""
+    from app.rig_command import run_list
+
+    run_list(as_json=json)
+
+
+@rig_commands.command("show")
+def rig_show(name: RigName, json: JsonOption = False) -> None:
+    """One rig with its calibration."""
+    from app.rig_command import run_show
+
+    run_show(name, as_json=json)
+
+
+@rig_commands.command("calibrate")
+def rig_calibrate(
+    name: RigName,
+    auto: Annotated[bool, typer.Option("--auto", help="yes, without help: the servos move by themselves")] = False,
+    source: Annotated[
+        str | None, typer.Option("--from", help="twin, realsense, webcam or a rig; default: NAME where there is one, else twin")
+    ] = None,
+    steps: Annotated[str, typer.Option(help="of board,servos,zero,steering")] = "board,servos,zero,steering",
+    pictures: Annotated[int, typer.Option(min=1, max=20, help="of the board")] = 5,
+    square_mm: SquareOption = 18.0,
+    columns: ColumnsOption = 10,
+    rows: RowsOption = 7,
+    json: JsonOption = False,
+    config: ConfigOption = None,
+) -> None:
+    """Calibrate a rig without a window and save it; with help it goes in the window, menu Rig."""
+    from app.rig_command import CalibrateOptions, run_calibrate
+    from core.calibration.board import BoardSpec
+
+    if not auto:
+        raise UserError("say --auto when nobody is in the servos' way; with pictures and buttons: main.py gui, menu Rig, Calibrate")
+    chosen = tuple(step.strip() for step in steps.split(",") if step.strip())
+    run_calibrate(CalibrateOptions(name, source, config, chosen, pictures, BoardSpec(columns, rows, square_mm), json))
+
+
+@rig_commands.command("board")
+def rig_board(
+    out: Annotated[Path, typer.Option(help="board.pdf or board.png")],
+    square_mm: SquareOption = 18.0,
+    columns: ColumnsOption = 10,
+    rows: RowsOption = 7,
+) -> None:
+    """The calibration board for the printer, at true size."""
+    from app.rig_command import run_board
+    from core.calibration.board import BoardSpec
+
+    run_board(out, BoardSpec(columns, rows, square_mm))
+
+
+@app.command()
+def faults(
+    only: Annotated[list[int] | None, typer.Option(min=1, help="this fault of the list only; may be repeated")] = None,
+    json: Annotated[bool, typer.Option("--json", help="one JSON object per fault on standard output")] = False,
+    out: Annotated[Path | None, typer.Option(help="also write the table as a page, as docs/faults.md")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="those that need no line, process or window, in lock-step")] = False,
+) -> None:
+    """Fault campaign: bring all 42 faults about and look for reaction, alert and record."""
+    from app.faults_command import run_faults
+
+    sys.exit(run_faults(only or [], out, quick=quick, as_json=json))
+
+
+@app.command()
+def soak(
+    hours: Annotated[float, typer.Option(min=0.005, max=1000.0, help="Ctrl-C ends it sooner, with the figures so far")] = 2.0,
+    seed: Annotated[int, typer.Option(min=0, help="of faults and operator")] = 0,
+    out: Annotated[Path | None, typer.Option(help="file for the samples and the summary, one JSON object a line")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Hours of twin under random faults and operator input: memory, threads, files, records, and every goal on the wire."""
+    from app.soak_command import run_soak
+
+    sys.exit(run_soak(hours, seed, out, as_json=json))
 
 
 @app.command()

@@ -195,6 +195,8 @@ class DriveDesk(QObject):
         if not self.deadman.is_held:
             pilot.deadman("window", False)
         news = pilot.news()
+        for view in news.changes:
+            self._recorder.drive(view)
         before, self._shown = self._shown, news.view
         if before is None or before.mode is not news.view.mode:
             self._panels.log(EventKind.MODE, news.view.mode.value)

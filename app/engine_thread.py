@@ -11,6 +11,7 @@ from typing import Protocol
 
 from PySide6.QtCore import QObject, QThread, Signal
 
+from core.config import PerceptionConfig
 from core.control.pilot import Pilot
 from core.devices import EndOfStream
 from core.latest import Latest
@@ -32,6 +33,7 @@ class EngineLike(Protocol):
     def problem(self) -> str | None: ...
     def bus_status(self) -> BusStatus | None: ...
     def set_target(self, target_px: Point | None) -> None: ...
+    def set_perception(self, config: PerceptionConfig) -> bool: ...
     def close(self) -> None: ...
 
 
@@ -116,6 +118,11 @@ class EngineThread(QThread):
             return False
         engine.set_target(target_px)
         return True
+
+    def set_perception(self, config: PerceptionConfig) -> bool:
+        """Perceive under other thresholds from the next frame on; False when there is no engine, or no network in it."""
+        engine = self._engine
+        return engine is not None and engine.set_perception(config)
 
     def run(self) -> None:
         while True:

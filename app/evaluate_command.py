@@ -10,9 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from app.annotate_tables import print_agreement
 from app.evaluation_report import print_tables, render_report
 from app.learning_commands import progress_bar
+from app.progress_lines import asked_teller
 from core.config import Config, load_config
+from core.study.annotation_report import write_measures
 from core.study.evaluation import EvaluationError, Measurement, angle_pairs, evaluate, read_measurements, write_measurements
 from core.study.paper_study import PAPER, against_paper, choose_images, measure_twice, wanted_images
 from core.types import Frame, PoseState
@@ -32,6 +35,7 @@ class _Study:
     rows: list[Measurement]
     source: dict[str, Any]
     notes: list[str]
+    agreement: dict[str, Any] | None = None
 
 
 def run_evaluate(
@@ -45,10 +49,13 @@ def run_evaluate(
     config_path: Path | None,
     like_paper: LikePaper | None,
     seed: int,
+    study_name: str | None = None,
 ) -> None:
-    """Evaluate a table or a labelled set and write everything to `out`; raises UserError."""
+    """Evaluate a table, a labelled set or images annotated by hand (one study of them) into `out`; raises UserError."""
     if (folder is None) == (csv is None):
         raise EvaluationError("give either a labelled set (evaluate DIR) or a table (evaluate --csv FILE)")
+    if study_name is not None and (csv is not None or like_paper is not None):
+        raise EvaluationError("--study needs images annotated by hand (evaluate DIR), not --csv or --like-paper")
     if csv is not None:
         if like_paper is not None or model is not None or preset is not None or config_path is not None:
             raise EvaluationError("--like-paper, --model, --preset and --config need a labelled set (evaluate DIR), not --csv")
@@ -57,13 +64,16 @@ def run_evaluate(
     else:
         assert folder is not None
         annotations = _annotation_file(folder)
-        truth = _read_set(folder) if annotations is None else []
         if annotations is not None and like_paper is not None:
             raise EvaluationError("--like-paper needs a labelled set with its truth, not annotations by hand")
+        if annotations is None and study_name is not None:
+            raise EvaluationError(f"{folder}: has no annotation file; begin the study with: annotate {folder} --study {study_name}")
+        truth = _read_set(folder) if annotations is None else []
         _make_folder(out)
         config = load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model else None)
         if annotations is not None:
-            study = _perceive_annotated(annotations, config, preset)
+            as_recorded = config_path is None and preset is None
+            study = _perceive_annotated(annotations, config, preset, model, study_name, seed, as_recorded=as_recorded)
         else:
             study = _perceive_set(folder, truth, config, preset, like_paper, seed)
     metrics = {"source": study.source, "seed": seed} | evaluate(study.rows, seed)
@@ -71,16 +81,24 @@ def run_evaluate(
         raise EvaluationError(f"{csv}: no row has both a manual and an algorithmic measure; nothing to compare")
     metrics["notes"] = study.notes + metrics["notes"]
     metrics["paper"] = PAPER
+    if study.agreement is not None:
+        metrics["agreement"] = {key: value for key, value in study.agreement.items() if key != "measures"}
     if like_paper is not None:
         metrics["against_paper"] = against_paper(metrics)
     try:
         _write(out, study.rows, metrics)
+        if study.agreement is not None:
+            write_measures(out / "raters.csv", study.agreement["measures"])
     except OSError as error:
         raise EvaluationError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from None
-    if as_json:
+    if (teller := asked_teller()) is not None:
+        teller.tell({"report": str(out / "report.html")} | metrics["images"])
+    elif as_json:
         sys.stdout.write(json.dumps(metrics, allow_nan=False) + "\n")
     else:
         print_tables(metrics)
+        if study.agreement is not None:
+            print_agreement(study.agreement)
         sys.stderr.write(f"report and figures are in {out}\n")
 
 
@@ -120,17 +138,41 @@ def _annotation_file(given: Path) -> Path | None:
     return own if own.is_file() and not (given / "truth.jsonl").is_file() else None
 
 
-def _perceive_annotated(annotations: Path, config: Config, preset: str | None) -> _Study:
-    """Images that were annotated by hand, against the algorithm."""
+def _perceive_annotated(
+    annotations: Path, config: Config, preset: str | None, model: str | None, study: str | None, seed: int, *, as_recorded: bool
+) -> _Study:
+    """Images that were annotated by hand, against the algorithm; those of a session as it was set in the session."""
     from app.annotate_command import read_annotated
-    from app.annotate_evaluation import compared_rows
+    from app.annotate_evaluation import compared_rows, raters_agreement
 
     answers, images = read_annotated(annotations, [annotations.parent])
-    rows, reasons, engine = compared_rows(answers, images, config, None, str(annotations))
+    notes = []
+    recorded = _recorded(annotations.parent, config, model) if as_recorded else None
+    if recorded is not None:
+        config = recorded
+        notes.append("Each picture of the session was perceived by itself, with the settings that it was recorded with.")
+    rows, reasons, engine = compared_rows(answers, images, config, study, str(annotations))
     source = {"kind": "annotated by hand", "name": annotations.parent.name, "model": config.perception.segmentation.model}
     unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
-    notes = [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
-    return _Study(rows, source | {"preset": preset, "engine": engine, "refused": reasons}, notes)
+    notes += [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
+    agreement = raters_agreement(answers, images, study, str(annotations), seed)
+    return _Study(rows, source | {"preset": preset, "engine": engine, "refused": reasons, "study": study}, notes, agreement)
+
+
+def _recorded(folder: Path, config: Config, model: str | None) -> Config | None:
+    """The configuration that a session was recorded with, with another `model` if given; None when the folder is no session."""
+    from app.play_command import recorded_config
+    from core.session.manifest import MANIFEST, SessionError, read_manifest
+
+    if not (folder / MANIFEST).is_file():
+        return None
+    try:
+        perception = recorded_config(read_manifest(folder)).perception
+    except SessionError:  # damaged: then as now
+        return None
+    if model is not None:
+        perception = perception.model_copy(update={"segmentation": perception.segmentation.model_copy(update={"model": model})})
+    return config.model_copy(update={"perception": perception})
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,10 +17,11 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from app.figure_style import BLUE, GREY, INK, PALE, styled
-from app.palette import GREEN, VERMILLION
+from app.palette import ON_PICTURE
 from core.study.agreement import LIMITS_SD, RANGE_DEG
 from core.study.evaluation import AnglePairs
 
+GREEN, VERMILLION = ON_PICTURE.GREEN, ON_PICTURE.VERMILLION  # on white paper, always
 _MEAN, _LIMIT = VERMILLION, GREEN
 _SIZE_IN = (3.46, 2.75)
 """One column of a journal's page: 88 mm."""

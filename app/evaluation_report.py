@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
+from app.annotate_tables import agreement_tables, between_words
 from core.config import RESOURCES
 from core.study.bootstrap import RESAMPLES
 from core.study.paper_study import ANGLE_FIGURES, CLASS_SCORES, PAPER, STATE_FIGURES, FigureKind, Kind, Verdict, verdict
@@ -136,10 +137,31 @@ def render_report(metrics: Mapping[str, Any], figures: Mapping[str, Figure]) -> 
         angle_caption=f"Angle between robot and vessel, algorithm against manual, n = {angle['n']}.",
         state_caption=f"Pose state, algorithm against manual, n = {state['n']}.",
         figures={name: inline_svg(figure, name) for name, figure in figures.items()},
+        agreement=_agreement(metrics.get("agreement")),
         resamples=RESAMPLES,
         seed=metrics["seed"],
     )
     return re.sub(r"\n\s*\n+", "\n", text) + "\n"
+
+
+def _agreement(report: Mapping[str, Any] | None) -> list[dict[str, Any]]:
+    """The raters against themselves and each other, as the template's tables."""
+    if report is None:
+        return []
+    captions = {
+        "First against second": "Each rater’s second measure of an image against his first.",
+        "Rater against rater": " ".join(["Two raters’ first measures of the same images.", between_words(report)]).strip(),
+    }
+    return [
+        {
+            "title": title,
+            "caption": captions[title],
+            "columns": list(columns),
+            "rows": [(quantity, [cells[quantity] for cells in columns.values()]) for quantity in next(iter(columns.values()))],
+        }
+        for title, columns in agreement_tables(report).items()
+        if columns
+    ]
 
 
 def _typeset(rows: list[Row]) -> list[Row]:

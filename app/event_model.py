@@ -17,22 +17,27 @@ Index = QModelIndex | QPersistentModelIndex
 
 @dataclass(frozen=True, slots=True)
 class KindLook:
-    """Word and colour of a kind of event, and how the filter calls all of them."""
+    """Word and colour (its role in the palette) of a kind of event, and how the filter calls all of them."""
 
     word: str
-    colour: str
+    role: str
     plural: str
+
+    @property
+    def colour(self) -> str:
+        """In the scheme in use."""
+        return palette.of(self.role)
 
 
 class EventKind(Enum):
     """What an event is about. GATE: a command that was clamped or rejected."""
 
-    MODE = KindLook("mode", palette.SKY, "Modes")
-    ALERT = KindLook("alert", palette.VERMILLION, "Alerts")
-    GATE = KindLook("gate", palette.YELLOW, "Gate: clamped and rejected")
-    OPERATOR = KindLook("operator", palette.TEXT, "Operator")
-    TARGET = KindLook("target", palette.TARGET, "Targets")
-    NOTE = KindLook("note", palette.TEXT_FAINT, "Notes")
+    MODE = KindLook("mode", "SKY", "Modes")
+    ALERT = KindLook("alert", "VERMILLION", "Alerts")
+    GATE = KindLook("gate", "YELLOW", "Gate: clamped and rejected")
+    OPERATOR = KindLook("operator", "TEXT", "Operator")
+    TARGET = KindLook("target", "TARGET", "Targets")
+    NOTE = KindLook("note", "TEXT_FAINT", "Notes")
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import signal
 import time
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -20,13 +21,21 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from app.progress_lines import ProgressLines, Teller, asked_teller
+
 _console = Console(stderr=True)
+_TOLD_EVERY = 2
+"""Steps between two lines for another program: a step takes half a second and more."""
+_LOOKS = 10
+"""How often held-out frames are looked at during a training."""
 _EXAMPLES = 40
 """Training frames from which the eight-bit network learns its ranges."""
 
 
 def progress_bar() -> Progress:
-    """The bar that all long commands show, on standard error."""
+    """The bar that all long commands show, on standard error; as lines where another program asked for them."""
+    if (teller := asked_teller()) is not None:
+        return ProgressLines(teller)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TaskProgressColumn())
     return Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=_console)
 
@@ -74,12 +83,29 @@ class Interrupt:
         self.asked = True
 
 
+@dataclass(frozen=True, slots=True)
+class TrainOutputs:
+    """The model's folder, and labelled frames that stay out of training and say whether it helped."""
+
+    out: Path
+    held_out: Path | None = None
+
+
 def run_train(
-    out: Path, data: list[Path], synthetic: int, init: str | None, base: int | None, plan: Any, *, deepen: bool = False
+    outputs: TrainOutputs,
+    data: list[Path],
+    synthetic: int,
+    init: str | None,
+    base: int | None,
+    plan: Any,
+    *,
+    deepen: bool = False,
+    shallow: bool = False,
 ) -> None:
     """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log.
 
-    With `deepen`, the network of `init` first gets the convolutions that today's default shape has more than it.
+    With `deepen`, the network of `init` first gets the convolutions that today's default shape has more than it; with `shallow`, a
+    new network has two convolutions on every level.
     """
     import torch
 
@@ -91,8 +117,8 @@ def run_train(
 
     if not data and not synthetic:
         raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
-    check_can_write(out)
-    out = out.resolve()
+    check_can_write(outputs.out)
+    out = outputs.out.resolve()
     try:
         log = out.with_name(out.name + ".log").open("a", encoding="utf-8", buffering=1)
     except OSError as error:
@@ -111,21 +137,27 @@ def run_train(
 
             network = deepened(network, default_shape().encoder_convolutions, _examples(samples))
     else:
-        network = DualUNet(UNetShape.of_base(base) if base else default_shape())
+        network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
     plan = replace(plan, crop=tuple(-(-side // network.shape.stride) * network.shape.stride for side in plan.crop))
     notes = {"plan": plan.to_json(), "init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
     log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {notes}\n")
+    teller, watch = asked_teller(), HeldOutWatch(outputs.held_out, out, asked_teller(), log.write)
     with log, Interrupt() as interrupt, progress_bar() as bar:
         difficulty = _difficulty(init, samples, bar, interrupt) if init is not None and plan.focus_share > 0 else None
+        watch.look(network, 0)
         task = bar.add_task("steps", total=plan.steps)
 
         def report(now: Report) -> None:
             dice = f"dice vessel {now.vessel_dice:.3f} robot {now.robot_dice:.3f}"
-            bar.update(task, completed=now.step, description=f"loss {now.loss:.3f} {dice}")
             log.write(f"{time.strftime('%H:%M:%S')} step {now.step} loss {now.loss:.4f} {dice} {now.images_per_s:.1f} images/s\n")
+            if teller is None:
+                bar.update(task, completed=now.step, description=f"loss {now.loss:.3f} {dice}")
+            else:
+                teller.tell(asdict(now) | {"left_s": round((plan.steps - now.step) * plan.batch / max(now.images_per_s, 1e-9), 1)})
 
         def checkpoint(average: DualUNet, step: int) -> None:
-            save_model(average, out, training=notes | {"steps_done": step}, figures={})
+            watch.look(average, step)
+            save_model(average, out, training=notes | {"steps_done": step}, figures=watch.figures)
 
         network, done = train(
             network,
@@ -134,18 +166,58 @@ def run_train(
             difficulty=difficulty,
             on_progress=report,
             on_checkpoint=checkpoint,
-            should_stop=lambda: interrupt.asked,
+            # a window that has gone can no longer ask for the end
+            should_stop=lambda: interrupt.asked or (teller is not None and not teller.is_heard),
+            report_every=50 if teller is None else _TOLD_EVERY,
+            checkpoint_every=1000 if outputs.held_out is None else max(_TOLD_EVERY, plan.steps // _LOOKS),
         )
-    save_model(network, out, training=notes | {"steps_done": done}, figures={}, examples=_examples(samples))
+        watch.look(network, done)
+    save_model(network, out, training=notes | {"steps_done": done}, figures=watch.figures, examples=_examples(samples))
+    if teller is not None:
+        teller.tell({"model": str(out), "steps_done": done, "steps": plan.steps})
     ending = "" if done == plan.steps else f" (interrupted after {done} of {plan.steps} steps; go on with --init {out})"
     _console.print(f"model written to {out}{ending}", soft_wrap=True)
 
 
-def default_shape() -> Any:
+class HeldOutWatch:
+    """Looks now and then how the network does on the frames that it does not learn from; without any it does nothing."""
+
+    def __init__(self, folder: Path | None, out: Path, teller: Teller | None, log: Callable[[str], object]) -> None:
+        from core.learning.dataset import find_samples
+
+        self._samples = find_samples([folder]) if folder is not None else []
+        self._name = folder.name if folder is not None else ""
+        self._pictures = out.with_name(out.name + "_pictures")
+        self._teller, self._log = teller, log
+        self.figures: dict[str, Any] = {}
+        """For the model's manifest: what is known now, and what was before."""
+
+    def look(self, network: Any, step: int) -> None:
+        """Measure, write pictures, tell."""
+        if not self._samples:
+            return
+        from app.training_pictures import write_pictures
+        from core.learning.held_out import measure_held_out
+
+        seen = measure_held_out(network, self._samples)
+        now = {"vessel_dice": round(seen.vessel_dice, 4), "robot_dice": round(seen.robot_dice, 4)}
+        before = self.figures.get("before", now)
+        self.figures = {"set": self._name, "held_out": True, "frames": len(self._samples)} | now | {"before": before}
+        self._log(f"{time.strftime('%H:%M:%S')} step {step} held out {now}\n")
+        try:
+            pictures = write_pictures(seen, self._pictures, "after" if step else "before")
+        except OSError as error:
+            pictures = []
+            self._log(f"the pictures cannot be written ({error.strerror})\n")
+        if self._teller is not None:
+            self._teller.tell({"held_out_step": step, "pictures": pictures} | now)
+
+
+def default_shape(*, deep: bool = True) -> Any:
     """The shipped network: chosen in docs/method.md by accuracy against time on two cores without bf16."""
     from core.perception.unet import UNetShape
 
-    return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2, (2, 2, 3, 4, 4))
+    return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2, (2, 2, 3, 4, 4) if deep else (2, 2, 2, 2, 2))
 
 
 def _difficulty(init: str, samples: list[Any], bar: Any, interrupt: Interrupt) -> Any:

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QMainWindow
+from PySide6.QtWidgets import QMainWindow, QMenu, QTabWidget
+
+from app.about import show_about
+
+KEY_HINT = "key_hint"
+"""Property of an action: the key that does the same and is handled elsewhere."""
+_LAST = "Help"
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,22 +28,57 @@ class MenuEntry:
 
 
 def add_menu(window: QMainWindow, title: str, entries: Sequence[MenuEntry | None]) -> list[QAction]:
-    """Add a menu to the window's bar; None is a separator. Returns the actions without the separators."""
-    menu = window.menuBar().addMenu(title)
+    """Add a menu to the window's bar, or entries to the menu of that title; None is a separator.
+
+    Help stays the last menu. An entry without a mnemonic (&) gets the first letter that is free in its menu. Returns the actions
+    without the separators.
+    """
+    menu = _menu_of(window, title)
+    if menu.actions():
+        menu.addSeparator()
+    taken = {mnemonic(text) for text in (*(a.text() for a in menu.actions()), *(e.text for e in entries if e is not None))}
     actions = []
     for entry in entries:
         if entry is None:
             menu.addSeparator()
             continue
-        action = _action(window, entry)
+        action = _action(window, entry, taken)
         menu.addAction(action)
         window.addAction(action)  # keeps the shortcut alive while the menu bar is hidden
         actions.append(action)
     return actions
 
 
-def _action(window: QMainWindow, entry: MenuEntry) -> QAction:
-    action = QAction(f"{entry.text}\t{entry.hint}" if entry.hint else entry.text, window)
+def plain(text: str) -> str:
+    """The text of an action as it is read: without mnemonic and without a hint."""
+    return text.partition("\t")[0].replace("&", "")
+
+
+def mnemonic(text: str) -> str:
+    """The letter behind the "&", in lower case; empty without one."""
+    return text.partition("&")[2][:1].lower()
+
+
+def _menu_of(window: QMainWindow, title: str) -> QMenu:
+    bar = window.menuBar()
+    there = {plain(action.text()): action for action in bar.actions()}
+    found = there.get(plain(title))
+    if found is not None:
+        menu = found.menu()
+        assert isinstance(menu, QMenu)
+        return menu
+    menu = QMenu(title, bar)
+    if _LAST in there:
+        bar.insertMenu(there[_LAST], menu)
+    else:
+        bar.addMenu(menu)
+    return menu
+
+
+def _action(window: QMainWindow, entry: MenuEntry, taken: set[str]) -> QAction:
+    text = _with_mnemonic(entry.text, taken)
+    action = QAction(f"{text}\t{entry.hint}" if entry.hint else text, window)
+    action.setProperty(KEY_HINT, entry.hint)
     action.setShortcuts([QKeySequence(key) for key in entry.keys])
     action.setAutoRepeat(False)
     if entry.checked is not None:
@@ -45,3 +87,36 @@ def _action(window: QMainWindow, entry: MenuEntry) -> QAction:
     slot = entry.slot
     action.triggered.connect(lambda _checked=False: slot())
     return action
+
+
+def _with_mnemonic(text: str, taken: set[str]) -> str:
+    """`text` with the first free letter marked: those that begin a word first. `taken` gets it."""
+    if mnemonic(text):
+        return text
+    starts = [k for k, letter in enumerate(text) if letter.isalnum() and (k == 0 or text[k - 1] == " ")]
+    for k in (*starts, *range(len(text))):
+        letter = text[k].lower()
+        if letter.isalnum() and letter not in taken:
+            taken.add(letter)
+            return f"{text[:k]}&{text[k:]}"
+    return text
+
+
+def add_help_menu(window: QMainWindow, show_keys: Callable[[], object], more: Sequence[MenuEntry | None] = ()) -> None:
+    """The last menu, the same in all windows; `more` stands between the keys and what the program is."""
+    about = MenuEntry("&About LumenPilot", partial(show_about, window))
+    add_menu(window, "&Help", [MenuEntry("&Keys", show_keys, ("F1",)), *more, None, about])
+
+
+def action_of(window: QMainWindow, key: str) -> QAction:
+    """The action that has this shortcut. Raises KeyError."""
+    wanted = QKeySequence(key)
+    for action in window.actions():
+        if wanted in action.shortcuts():
+            return action
+    raise KeyError(key)
+
+
+def turn_page(pages: QTabWidget, step: int) -> None:
+    """The next page (1) or the previous one (-1); after the last comes the first."""
+    pages.setCurrentIndex((pages.currentIndex() + step) % pages.count())

@@ -21,13 +21,20 @@ class OperatorDevices(QObject):
     ----------
     config : sections `gamepad` and `pedal`; without a pedal's port there is no pedal.
     pilot : the running rig's pilot, None while there is none; called from the devices' threads.
+    stop : called instead for STOP while there is no pilot: somebody else may be moving the servos.
     """
 
     said = Signal(str, bool)
 
-    def __init__(self, config: Config, pilot: Callable[[], Pilot | None], parent: QObject | None = None) -> None:
+    def __init__(
+        self,
+        config: Config,
+        pilot: Callable[[], Pilot | None],
+        parent: QObject | None = None,
+        stop: Callable[[], None] = lambda: None,
+    ) -> None:
         super().__init__(parent)
-        self._pilot = pilot
+        self._pilot, self._stop = pilot, stop
         self._gamepad = Gamepad(config.gamepad, self._on_gamepad, self._on_gamepad_device)
         self._gamepad_name: str | None = None
         self._pedal = Pedal(config.pedal, self._on_pedal, self._on_pedal_problem) if config.pedal.port is not None else None
@@ -46,6 +53,8 @@ class OperatorDevices(QObject):
     def _on_gamepad(self, state: GamepadState) -> None:
         pilot = self._pilot()
         if pilot is None:
+            if state.stop:
+                self._stop()
             return
         pilot.jog("gamepad", Jog(state.bend_rate, state.pitch_rate, state.advance, state.delivery))
         if state.deadman is not None:
@@ -65,6 +74,8 @@ class OperatorDevices(QObject):
     def _on_pedal(self, report: PedalReport) -> None:
         pilot = self._pilot()
         if pilot is None:
+            if report.stop:
+                self._stop()
             return
         pilot.deadman("pedal", report.deadman)
         if report.stop:

@@ -14,6 +14,7 @@ from app.widgets.advice_line import AdviceLine
 from app.widgets.alert_strip import AlertStrip
 from app.widgets.card import Card
 from app.widgets.clearance_bar import ClearanceBar
+from app.widgets.columns import Columns
 from app.widgets.command_panel import CommandPanel
 from app.widgets.distance_bars import DistanceBars
 from app.widgets.event_log import EventKind, EventLog
@@ -23,6 +24,7 @@ from app.widgets.live_view import LiveView
 from app.widgets.mode_badge import ModeBadge
 from app.widgets.mode_bar import ModeBar
 from app.widgets.notice import Notice
+from app.widgets.offer_strip import OfferStrip
 from app.widgets.overlay_bar import OverlayBar
 from app.widgets.performance_panel import PerformancePanel
 from app.widgets.phantom_picker import PhantomPicker
@@ -34,15 +36,19 @@ from app.widgets.theta_gauge import ThetaGauge
 from app.widgets.toast import Toast
 from app.widgets.trend_plot import TrendPlot
 from app.wording import REASON_TEXT
-from core.config import Config
+from core.calibration.scale import mm_per_working_px
+from core.calibration_config import ScaleConfig
+from core.config import Config, PoseConfig
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
-from core.types import PoseState, Tick
+from core.rig_file import RigFileError, calibration_of
+from core.types import Frame, PoseState, Scene, Tick
 from hardware.rig import RigKind
 from hardware.servos.bus_messages import BusStatus
 
 TEXT_EVERY_S = 0.2
 _NEEDLE_EVERY_S = 0.08
+_LEFT_SHARE = 0.62
 _RIGHT_WIDTH = (470, 660)
 _TALL_PX = 780
 
@@ -57,6 +63,7 @@ class OperatorPanels(QWidget):
         super().__init__()
         limits, pixels_per_mm = config.perception.pose, config.policy.pursuit.pixels_per_mm
         self._servo_config = config.servos
+        self._scale: ScaleConfig | None = None
         self.banner = SimBanner(kind, has_servos=config.rig.robot != "none")
         self.mode = ModeBadge()
         self.record_bar = RecordBar()
@@ -65,6 +72,8 @@ class OperatorPanels(QWidget):
         self.notice = Notice(self.live)
         self.alerts = AlertStrip(self.live)
         self.toast = Toast(self.live)
+        self.offers = OfferStrip(self.live)
+        self.offers.lifted.connect(self.toast.lift)
         self.overlay_bar = OverlayBar()
         self.advice = AdviceLine()
         self.badge = StateBadge(limits)
@@ -86,6 +95,35 @@ class OperatorPanels(QWidget):
         stage = QWidget()
         self._lay_out(stage)
         self.help = operator_help(stage)  # the banner stays in sight
+
+    def set_limits(self, limits: PoseConfig) -> None:
+        """Other limits of the pose states, on all dials."""
+        self._limits = limits
+        self.badge.set_limits(limits)
+        self.gauge.set_allowed(limits.theta_allow_deg)
+        self.bars.set_allowed(limits.d_allow_px)
+        self.trends.set_limits(limits)
+        self._allowed[0].setText(f"allowed {limits.theta_allow_deg:g}°")
+        self._allowed[1].setText(f"allowed {limits.d_allow_px:g} px")
+
+    def set_config(self, config: Config) -> None:
+        """What the panels know of the configuration, for a rig that is being opened with another one."""
+        self.set_limits(config.perception.pose)
+        self.live.set_scale(config.policy.pursuit.pixels_per_mm)
+        self.clearance.set_scale(config.policy.pursuit.pixels_per_mm)
+        self.jog.max_pull_mm = config.servos.max_pull_mm
+        self._servo_config = config.servos
+        self._scale = _scale_of(config)
+        if self.picker is not None:
+            self.picker.show_name(config.twin.phantom)
+
+    def show_still(self, frame: Frame, scene: Scene) -> None:
+        """A frame of a rig that is closed, understood anew; nothing of it is added to trends."""
+        self.notice.clear()
+        self.live.show_frame(frame, scene)
+        self.badge.show_scene(scene)
+        self.gauge.show_pose(scene.pose)
+        self.bars.show_pose(scene.pose)
 
     def show_drive(self, view: DriveView | None, bus: BusStatus | None) -> None:
         """Show who drives, and what the servos say; None: there is nothing to drive."""
@@ -116,6 +154,7 @@ class OperatorPanels(QWidget):
         self.badge.show_scene(scene, renew_text=renew_text)
         if self._needle_pace.due() or renew_text:
             self.gauge.show_pose(pose, renew_text=renew_text)
+            self.bars.set_scale(mm_per_working_px(self._scale, scene))
             self.bars.show_pose(pose, renew_text=renew_text)
             self.jog.show_status(tick.status)
             self.clearance.show_scene(scene, tick.status)
@@ -140,6 +179,13 @@ class OperatorPanels(QWidget):
         self.performance.clear()
         self.trends.clear()
 
+    def follow_theme(self) -> None:
+        """The legend's colours are in its text."""
+        self._show_legend(self.trends.has_distances)
+
+    def _show_legend(self, with_distances: bool) -> None:
+        self._legend.setText(_trend_legend(with_distances))
+
     def _lay_out(self, stage: QWidget) -> None:
         header = QHBoxLayout()
         header.setSpacing(16)
@@ -148,11 +194,12 @@ class OperatorPanels(QWidget):
             header.addWidget(self.picker)
         header.addWidget(self.record_bar)
         header.addWidget(self.mode)
-        columns = QHBoxLayout(stage)
-        columns.setContentsMargins(0, 0, 0, 0)
-        columns.setSpacing(theme.GAP)
-        columns.addLayout(_column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0), (self.mode_bar, 0)), 62)
-        columns.addWidget(self._right_side(), 38)
+        left = QWidget()
+        left.setLayout(_column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0), (self.mode_bar, 0)))
+        self.columns = Columns(left, self._right_side(), _LEFT_SHARE)
+        room = QHBoxLayout(stage)
+        room.setContentsMargins(0, 0, 0, 0)
+        room.addWidget(self.columns)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(theme.GAP, 4, theme.GAP, theme.GAP)
         rows.setSpacing(theme.GAP)
@@ -179,18 +226,20 @@ class OperatorPanels(QWidget):
 
     def _right_side(self) -> QWidget:
         limits = self._limits
-        angle = Card("Angle to the vessel", self.gauge, f"allowed {limits.theta_allow_deg:g}°")
-        distances = Card("Distances", self.bars, f"allowed {limits.d_allow_px:g} px")
-        legend = QLabel(_trend_legend(True))
-        legend.setObjectName("card_note")
-        self.trends.distances_shown.connect(lambda on: legend.setText(_trend_legend(on)))
-        trends = Card("Last 30 seconds", self.trends, legend)
+        self._allowed = _note(f"allowed {limits.theta_allow_deg:g}°"), _note(f"allowed {limits.d_allow_px:g} px")
+        angle = Card("Angle to the vessel", self.gauge, self._allowed[0])
+        distances = Card("Distances", self.bars, self._allowed[1])
+        self._legend = _note(_trend_legend(True))
+        self.trends.distances_shown.connect(self._show_legend)
+        trends = Card("Last 30 seconds", self.trends, self._legend)
         hands = _row(Card("Move the robot", self.jog, "hold"), Card("Performance", self.performance))
         side = QWidget()
         self.pages = QTabWidget()
         self.pages.setDocumentMode(True)
         self.pages.tabBar().setDrawBase(False)
         self.pages.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.pages.setAccessibleName("Pages")
+        self.pages.tabBar().setAccessibleName("Pages")
         self.pages.tabBar().setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the arrows move the robot
         for page, name in ((hands, "Drive"), (self.servos, "Servos"), (self.commands, "Commands"), (self.events, "Log")):
             self.pages.addTab(page, name)
@@ -201,6 +250,21 @@ class OperatorPanels(QWidget):
         side.setMinimumWidth(_RIGHT_WIDTH[0])
         side.setMaximumWidth(_RIGHT_WIDTH[1])
         return side
+
+
+def _scale_of(config: Config) -> ScaleConfig | None:
+    """What a pixel is in millimetres; None when nobody has measured it. A rig file that is broken is told by who opens the rig."""
+    try:
+        known = calibration_of(config)
+    except RigFileError:
+        return None
+    return known.scale if known is not None else None
+
+
+def _note(text: str) -> QLabel:
+    label = QLabel(text)
+    label.setObjectName("card_note")
+    return label
 
 
 def _column(*parts: tuple[QWidget, int]) -> QVBoxLayout:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from PySide6.QtCore import QEvent, Qt, QTimer, QUrl, Slot
+from PySide6.QtCore import QEvent, Qt, QTimer, QUrl, Signal, Slot
 from PySide6.QtGui import QAction, QCloseEvent, QDesktopServices, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QComboBox, QLabel, QLineEdit, QMainWindow
 
@@ -16,18 +16,21 @@ from app import theme
 from app.drive_desk import DriveDesk
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
 from app.heartbeat import Heartbeat
-from app.menus import MenuEntry, add_menu
+from app.menus import MenuEntry, add_help_menu, add_menu, turn_page
 from app.next_step import Step
 from app.operator_panels import OperatorPanels
 from app.recorder import Recorder
 from app.snapshot import Origin, SnapshotWriter, pictures_folder
+from app.tour_stops import operator_stops
 from app.widgets.event_log import EventKind
 from app.widgets.notice import NoticeKind
 from app.widgets.overlays import Layer
-from core.config import Config
+from app.widgets.tour_overlay import TourOverlay
+from core.config import Config, PerceptionConfig
 from core.control.hand import Jog
 from core.control.pilot import Pilot
-from core.types import Point, Tick
+from core.devices import DeviceError
+from core.types import Point, Scene, Tick
 from hardware.rig import RigKind
 
 OpenEngineFor = Callable[[Config], EngineLike]
@@ -52,12 +55,20 @@ class OperatorWindow(QMainWindow):
     phantoms : (name, title) of the phantoms to choose from; only the bench twin has any.
     """
 
+    phase_changed = Signal(object)
+
     def __init__(self, config: Config, open_engine: OpenEngineFor, kind: RigKind, phantoms: Sequence[tuple[str, str]] = ()) -> None:
         super().__init__()
         self._config = config
         self._open_engine = open_engine
         self._kind = kind
         self._phase = Phase.IDLE
+        self._phase_message = ""
+        self.may_take: Callable[[Step], bool] = lambda _step: True
+        """Asked before a step of the operator goes to the pilot; whoever says no tells why."""
+        self.amend_config: Callable[[Config], Config] = lambda config: config
+        """Asked before a rig is opened: settings that waited for it."""
+        self._last_tick: Tick | None = None
         self._tick: Tick | None = None
         self._is_stale = False
         self._target: Point | None = None
@@ -77,6 +88,8 @@ class OperatorWindow(QMainWindow):
         self._recorder = Recorder(config, kind, self._thread, self)
         self._desk = DriveDesk(self, self._thread, self._panels, self._recorder)
         self.setCentralWidget(self._panels)
+        self._tour = TourOverlay(self._panels, kept_clear=(self._panels.mode_bar.stop, self._panels.alerts))
+        self._tour.ended.connect(self._panels.live.setFocus)
         self._make_menus()
         self._wire()
         self.setWindowTitle(f"LumenPilot \N{EM DASH} {kind.value}")
@@ -104,6 +117,16 @@ class OperatorWindow(QMainWindow):
         return self._desk
 
     @property
+    def recorder(self) -> Recorder:
+        """Records what is in the window."""
+        return self._recorder
+
+    @property
+    def config(self) -> Config:
+        """The configuration in force."""
+        return self._config
+
+    @property
     def pilot(self) -> Pilot | None:
         """The running rig's pilot; from any thread."""
         return self._thread.pilot
@@ -113,6 +136,16 @@ class OperatorWindow(QMainWindow):
         """A line for the operator, also kept in the log."""
         self._panels.toast.show_message(message, is_fault=is_fault)
         self._panels.log(EventKind.NOTE, message)
+
+    @property
+    def tour(self) -> TourOverlay:
+        """Leads through this window."""
+        return self._tour
+
+    @Slot()
+    def show_tour(self) -> None:
+        """From its first stop."""
+        self._tour.begin(operator_stops(self._panels, has_robot=self._config.rig.robot != "none"))
 
     def drive(self, jog: Jog) -> None:
         """Move the robot as the operator's keys do."""
@@ -137,22 +170,26 @@ class OperatorWindow(QMainWindow):
             MenuEntry("&All overlays on or off", self._toggle_all_layers, ("0",)),
             None,
             MenuEntry("&Whole picture", panels.live.fit, ("F",)),
+            None,
+            MenuEntry("&Next page", partial(turn_page, panels.pages, 1), ("Ctrl+Tab",)),
+            MenuEntry("&Previous page", partial(turn_page, panels.pages, -1), ("Ctrl+Shift+Tab",)),
+            None,
             MenuEntry("&Full screen", self._toggle_full_screen, ("F11",), checked=False),
         ]
         robot_entries = [
             MenuEntry("S&TOP", self._desk.stop, hint="Space"),
             None,
-            *(MenuEntry(step.value.name, partial(self._desk.take, step), _keys_of(step)) for step in Step),
+            *(MenuEntry(step.value.name, partial(self.take, step), _keys_of(step)) for step in Step),
             None,
             MenuEntry("&Clear target", self._clear_target, hint="Esc"),
             None,
-            *([MenuEntry("&Another random phantom", panels.picker.roll, ("R",))] if panels.picker is not None else []),
+            *(panels.picker.menu_entries() if panels.picker is not None else ()),
             MenuEntry("Start the &rig again", self._restart, ("F5",)),
         ]
         add_menu(self, "&File", file_entries)
         view_actions = add_menu(self, "&View", [*layers, *view_entries])
         add_menu(self, "&Robot", robot_entries)
-        add_menu(self, "&Help", [MenuEntry("&Keys", panels.help.toggle, ("F1",))])
+        add_help_menu(self, panels.help.toggle, [MenuEntry("&Tour", self.show_tour)])
         self._layer_actions = dict(zip(Layer, view_actions[: len(Layer)], strict=True))
         self._full_screen = view_actions[-1]
         escape = QAction(self)
@@ -190,7 +227,7 @@ class OperatorWindow(QMainWindow):
             (bar.take_back_asked, Step.TAKE_BACK),
             (bar.disarm_asked, Step.DISARM),
         ):
-            asked.connect(partial(desk.take, step))
+            asked.connect(partial(self.take, step))
         panels.servos.reboot_asked.connect(desk.reboot)
         panels.servos.zero_asked.connect(desk.zero)
         panels.servos.torque_off_asked.connect(desk.torque_off)
@@ -202,7 +239,54 @@ class OperatorWindow(QMainWindow):
         if panels.picker is not None:
             panels.picker.chosen.connect(self._choose_phantom)
 
+    def take(self, step: Step) -> None:
+        """A step that the operator asks for, by key, button or menu."""
+        if self.may_take(step):
+            self._desk.take(step)
+
     # ---- the rig
+
+    def use_config(self, config: Config) -> None:
+        """Open the rig anew with another configuration."""
+        self._config = config
+        self._restart()
+
+    def lend(self, why: str) -> None:
+        """Close the rig, so that somebody else can have camera and servos; it stands as FAULT with `why` until ``use_config``."""
+        self._desk.reset()
+        self._thread.start_engine(partial(_lent, why))
+
+    def take_settings(self, config: Config) -> None:
+        """What acts without opening the rig anew: thresholds of perception, folders. What is recorded from here on says so."""
+        self._snapshots.set_folder(pictures_folder(config.window.pictures_folder))
+        if config.perception != self._config.perception:
+            self.preview(config.perception)
+        self._config = config
+
+    def preview(self, perception: PerceptionConfig) -> bool:
+        """Perceive under these thresholds from the next frame on, show their limits, and say so in what is recorded.
+
+        False when nothing is perceived now.
+        """
+        self._panels.set_limits(perception.pose)
+        is_running = self._thread.set_perception(perception)
+        if is_running:  # not before: a session that ends because of it would be one of nothing
+            self._recorder.open_rig(self._config.model_copy(update={"perception": perception}))
+        return is_running
+
+    @property
+    def last_tick(self) -> Tick | None:
+        """The newest one of this rig, also when it is over; None before its first picture."""
+        return self._last_tick
+
+    def show_still(self, scene: Scene | None) -> None:
+        """The last frame of a rig that is over, understood anew; None: as before."""
+        if self._phase not in (Phase.ENDED, Phase.FAULT) or self._last_tick is None:
+            return
+        if scene is None:
+            self._tell_phase(self._phase, self._phase_message)
+        else:
+            self._panels.show_still(self._last_tick.frame, scene)
 
     def start(self) -> None:
         """Open the rig; the window shows progress until the first picture comes."""
@@ -213,6 +297,8 @@ class OperatorWindow(QMainWindow):
         self._start_rig()
 
     def _start_rig(self) -> None:
+        self._config = self.amend_config(self._config)
+        self._panels.set_config(self._config)
         self._desk.reset()
         self._clear_target()
         self._recorder.open_rig(self._config)
@@ -240,7 +326,7 @@ class OperatorWindow(QMainWindow):
 
     def _show_phase(self, phase: Phase, message: str = "") -> None:
         panels = self._panels
-        self._phase = phase
+        self._phase, self._phase_message = phase, message
         self._tick = None
         self._is_stale = False
         if phase in (Phase.ENDED, Phase.FAULT):
@@ -249,9 +335,18 @@ class OperatorWindow(QMainWindow):
         panels.forget()
         panels.alerts.clear()
         self._desk.has_rig = phase is Phase.RUNNING
+        self.phase_changed.emit(phase)
+        if phase is Phase.STARTING:
+            self._last_tick = None
+            panels.live.clear()
+        elif phase is Phase.FAULT:
+            self._recorder.rig_stopped(message)
+        self._tell_phase(phase, message)
+
+    def _tell_phase(self, phase: Phase, message: str) -> None:
+        panels = self._panels
         what = panels.picker.title if panels.picker is not None else self._config.rig.source or self._config.rig.name
         if phase is Phase.STARTING:
-            panels.live.clear()
             self._blank("Starting", what)
             panels.notice.show_notice(NoticeKind.PROGRESS, f"Starting: {what}", "Opening camera and robot, loading the network")
         elif phase is Phase.RUNNING:
@@ -291,7 +386,7 @@ class OperatorWindow(QMainWindow):
         self._is_stale = False
         if self._tick is None:
             self._panels.jog.set_enabled(tick.status is not None, "" if tick.status is not None else "This rig has no robot")
-        self._tick = tick
+        self._tick = self._last_tick = tick
         self._panels.notice.clear()
         self._panels.show_tick(tick, self._heartbeat.max_block_ms)
 
@@ -363,6 +458,8 @@ class OperatorWindow(QMainWindow):
             self._panels.live.setFocus()
         elif self._panels.help.isVisible():
             self._panels.help.hide()
+        elif self._tour.is_running:
+            self._tour.end()
         elif self.isFullScreen():
             self._toggle_full_screen()
         else:
@@ -419,6 +516,11 @@ class OperatorWindow(QMainWindow):
         if not (has_ended and has_saved):
             # Qt would abort on a thread that still runs, or wait for it for ever; nobody drives any more
             os._exit(1)
+
+
+def _lent(why: str) -> EngineLike:
+    """Instead of an engine: the one before it is closed by the time that this is called."""
+    raise DeviceError(why)
 
 
 def _keys_of(step: Step) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from app import palette
 from app.brush import SHIFT, Brush, fitting_size, put_text, text_width, to_fixed
+from app.palette import ON_PICTURE
 from app.scene_shapes import SceneShapes, scene_shapes
 from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
 from app.wording import REASON_TEXT, STATE_TITLE, advice_headline, signed_degrees
@@ -53,7 +54,7 @@ def _tinted(image: Image, scene: Scene, zoom: float) -> Image:
     canvas = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_CUBIC), np.uint8) if zoom > 1.0 else image.copy()
     if scene.masks is None:
         return canvas
-    for mask, name, opacity in ((scene.masks.vessel, palette.VESSEL, 0.20), (scene.masks.robot, palette.ROBOT, 0.38)):
+    for mask, name, opacity in ((scene.masks.vessel, ON_PICTURE.VESSEL, 0.20), (scene.masks.robot, ON_PICTURE.ROBOT, 0.38)):
         canvas = _tint(canvas, mask, name, opacity)
     return canvas
 
@@ -112,23 +113,23 @@ def _draw_inset(brush: Brush, corner: tuple[int, int, int, int], image: Image, s
 
 
 def _draw_shapes(brush: Brush, scene: Scene, shapes: SceneShapes, *, labels: bool) -> None:
-    brush.polylines(shapes.vessel_lines, palette.VESSEL, 2.5)
+    brush.polylines(shapes.vessel_lines, ON_PICTURE.VESSEL, 2.5)
     if shapes.route is not None:
-        brush.polylines((shapes.route,), palette.ROUTE, 4.0)
+        brush.polylines((shapes.route,), ON_PICTURE.ROUTE, 4.0)
     if shapes.robot_line is not None:
-        brush.polylines((shapes.robot_line,), palette.ROBOT, 3.5)
+        brush.polylines((shapes.robot_line,), ON_PICTURE.ROBOT, 3.5)
     for first, second in shapes.bridges:
-        brush.dashes(first, second, palette.TEXT, 2.5)
+        brush.dashes(first, second, ON_PICTURE.TEXT, 2.5)
     if shapes.vessel_vector is not None:
-        brush.arrow(shapes.vessel_vector, palette.VESSEL_VECTOR, 3.5)
+        brush.arrow(shapes.vessel_vector, ON_PICTURE.VESSEL_VECTOR, 3.5)
     if shapes.robot_vector is not None:
-        brush.arrow(shapes.robot_vector, palette.ROBOT_VECTOR, 3.5)
+        brush.arrow(shapes.robot_vector, ON_PICTURE.ROBOT_VECTOR, 3.5)
     if shapes.nearest is not None:
-        brush.diamond(shapes.nearest, palette.NEAREST, 8.0)
+        brush.diamond(shapes.nearest, ON_PICTURE.NEAREST, 8.0)
     if shapes.head is not None:
-        brush.ring(shapes.head, palette.HEAD, 11.0)
+        brush.ring(shapes.head, ON_PICTURE.HEAD, 11.0)
     if scene.route is not None:
-        brush.ring(scene.to_source(scene.route.target), palette.TARGET, 14.0)
+        brush.ring(scene.to_source(scene.route.target), ON_PICTURE.TARGET, 14.0)
     if scene.pose is not None:
         _draw_measures(brush, scene.pose, shapes, labels)
 
@@ -137,22 +138,22 @@ def _draw_measures(brush: Brush, pose: Pose, shapes: SceneShapes, labels: bool) 
     robot, vessel = shapes.robot_vector, shapes.vessel_vector
     if robot is None or vessel is None or shapes.head_foot is None or shapes.tail_foot is None or shapes.angle_arc is None:
         return
-    brush.line(shapes.head_foot, robot.end, palette.D_HEAD, 3.0)
-    brush.line(shapes.tail_foot, robot.start, palette.D_TAIL, 3.0)
+    brush.line(shapes.head_foot, robot.end, ON_PICTURE.D_HEAD, 3.0)
+    brush.line(shapes.tail_foot, robot.start, ON_PICTURE.D_TAIL, 3.0)
     if labels:
-        brush.angle(robot.start, shapes.angle_arc, palette.THETA)
+        brush.angle(robot.start, shapes.angle_arc, ON_PICTURE.THETA)
         head_side = 1.0 if pose.c_head_px > 0 else -1.0
         # on the side of the vessel where the head is not: there is the least to cover
-        brush.label_beside(vessel.center, vessel, -head_side, f"θ {signed_degrees(pose.theta_signed_deg, 1)}", palette.THETA)
-        brush.label_beside(robot.end, vessel, head_side, f"d_head {pose.d_head_px:.1f} px", palette.D_HEAD)
+        brush.label_beside(vessel.center, vessel, -head_side, f"θ {signed_degrees(pose.theta_signed_deg, 1)}", ON_PICTURE.THETA)
+        brush.label_beside(robot.end, vessel, head_side, f"d_head {pose.d_head_px:.1f} px", ON_PICTURE.D_HEAD)
         tail_side = 1.0 if pose.c_tail_px > 0 else -1.0
-        brush.label_beside(robot.start, vessel, tail_side, f"d_tail {pose.d_tail_px:.1f} px", palette.D_TAIL)
+        brush.label_beside(robot.start, vessel, tail_side, f"d_tail {pose.d_tail_px:.1f} px", ON_PICTURE.D_TAIL)
 
 
 def _caption(scene: Scene, advice: Advice | None, width: int) -> Image:
     """The strip below the picture: state with its letter and shape, the values, or the reason why there is no pose."""
     unit = width / 1280
-    strip = np.full((max(36, round(104 * unit)), width, 3), palette.rgb(palette.PANEL), np.uint8)
+    strip = np.full((max(36, round(104 * unit)), width, 3), palette.rgb(ON_PICTURE.PANEL), np.uint8)
     side = round(76 * unit)
     _draw_state(strip, (round(18 * unit) + side / 2, strip.shape[0] / 2), side, scene.pose.state if scene.pose else None)
     left = round(124 * unit)
@@ -160,14 +161,17 @@ def _caption(scene: Scene, advice: Advice | None, width: int) -> Image:
         pose = scene.pose
         title = STATE_TITLE[pose.state]
         parts = [
-            (f"θ {signed_degrees(pose.theta_signed_deg, 1)}", palette.THETA),
-            (f"d_head {pose.d_head_px:.1f} px", palette.D_HEAD),
+            (f"θ {signed_degrees(pose.theta_signed_deg, 1)}", ON_PICTURE.THETA),
+            (f"d_head {pose.d_head_px:.1f} px", ON_PICTURE.D_HEAD),
         ]
-        parts += [(f"d_tail {pose.d_tail_px:.1f} px", palette.D_TAIL), (f"confidence {pose.confidence:.2f}", palette.TEXT_DIM)]
+        parts += [
+            (f"d_tail {pose.d_tail_px:.1f} px", ON_PICTURE.D_TAIL),
+            (f"confidence {pose.confidence:.2f}", ON_PICTURE.TEXT_DIM),
+        ]
     else:
         title = REASON_TEXT[scene.refusal.reason].title if scene.refusal else "No pose"
-        parts = [(f"no pose: {scene.refusal}" if scene.refusal else "no pose", palette.TEXT_DIM)]
-    put_text(strip, title, (left, round(46 * unit)), palette.TEXT, "Bold", round(34 * unit))
+        parts = [(f"no pose: {scene.refusal}" if scene.refusal else "no pose", ON_PICTURE.TEXT_DIM)]
+    put_text(strip, title, (left, round(46 * unit)), ON_PICTURE.TEXT, "Bold", round(34 * unit))
     x = left
     for text, name in parts:
         size = fitting_size(text, "SemiBold", round(24 * unit), width - x)
@@ -177,7 +181,7 @@ def _caption(scene: Scene, advice: Advice | None, width: int) -> Image:
         text = advice_headline(advice)
         size = round(30 * unit)
         x = width - text_width(text, "Bold", size) - round(26 * unit)
-        put_text(strip, text, (x, round(46 * unit)), palette.TEXT, "Bold", size)
+        put_text(strip, text, (x, round(46 * unit)), ON_PICTURE.TEXT, "Bold", size)
     return strip
 
 
@@ -190,7 +194,7 @@ def _draw_state(strip: Image, middle: Point, side: float, state: PoseState | Non
     else:
         cv2.fillPoly(strip, [fixed], colour, cv2.LINE_AA, SHIFT)
     size = round(side * LETTER_HEIGHT[state])
-    letter, name = (state.value, palette.INK) if state is not None else ("\N{EN DASH}", palette.TEXT_DIM)
+    letter, name = (state.value, ON_PICTURE.INK) if state is not None else ("\N{EN DASH}", ON_PICTURE.TEXT_DIM)
     x = round(middle[0] - text_width(letter, "Bold", size) / 2)
     y = round(middle[1] + 0.36 * size + side * LETTER_DROP.get(state, 0.0))
     put_text(strip, letter, (x, y), name, "Bold", size)

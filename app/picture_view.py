@@ -9,6 +9,7 @@ import numpy as np
 from PySide6.QtGui import QImage, QTransform
 
 from app import palette
+from app.palette import ON_PICTURE
 from core.types import Image, Point
 
 _ZOOM_MAX = 40.0
@@ -128,7 +129,7 @@ def render(levels: tuple[Image, ...], view: PictureView, ratio: float, contrast:
     x1, y1 = (round(value * ratio) for value in view.to_screen((view.size[0] - 0.5, view.size[1] - 0.5)))
     x1, y1 = min(x1, room[0]), min(y1, room[1])
     pixels = np.empty((room[1], room[0], 4), np.uint8)
-    pixels[:] = (*palette.rgb(palette.INK)[::-1], 255)
+    pixels[:] = (*palette.rgb(ON_PICTURE.INK)[::-1], 255)
     if x1 > x0 and y1 > y0:
         matrix[:, 2] += matrix[:, :2] @ (x0, y0)
         shown = cv2.warpAffine(image, matrix, (x1 - x0, y1 - y0), flags=how, borderMode=cv2.BORDER_REPLICATE)

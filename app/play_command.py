@@ -7,8 +7,9 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from core.config import Config, load_config
+from core.config import Config
 from core.errors import UserError
+from core.profiles import own_config
 from core.session.manifest import Manifest
 from core.session.reader import SessionReader
 
@@ -24,11 +25,16 @@ def run_play(session: Path, against: Path | None = None) -> int:
     reader = SessionReader(session)
     try:
         config = recorded_config(reader.manifest)
-        application = make_application()
+        application = make_application(own_config().window.theme)
 
+        from app.layout_keeper import LayoutKeeper, Parts, overlay_switches
         from app.player_window import PlayerWindow
+        from app.widgets.overlays import Layer
 
         window = PlayerWindow(reader, config, against)
+        panels = window.panels
+        switches = overlay_switches(panels.overlay_bar, without=(Layer.LOUPE,) if against is not None else ())
+        LayoutKeeper(window, "player", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
         application.aboutToQuit.connect(window.shut_down)
         timer = _quit_on_signal(application)
         window.show()
@@ -42,7 +48,7 @@ def run_play(session: Path, against: Path | None = None) -> int:
 
 def recorded_config(manifest: Manifest | None) -> Config:
     """The user's own configuration, with the limits and the scale of the recording where its manifest tells them."""
-    own = load_config()
+    own = own_config()
     recorded = manifest.config if manifest is not None else {}
     try:
         told = Config.model_validate({key: recorded[key] for key in ("perception", "policy") if key in recorded})

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtGui import QAction
 
-from app.menus import MenuEntry, add_menu
+from app.menus import MenuEntry, add_help_menu, add_menu, turn_page
 from app.session_marks import JumpKind
 from app.widgets.overlays import Layer
 
@@ -25,10 +25,30 @@ def add_player_menus(window: PlayerWindow) -> dict[Layer, QAction]:
         "&File",
         [
             MenuEntry("&Snapshot", window.take_snapshot, ("S", "Ctrl+S")),
+            None,
             MenuEntry("Selection as &video", window.export_clip, ("E",)),
             MenuEntry("&Note", window.begin_note, ("M",)),
             None,
             MenuEntry("&Quit", window.close, ("Ctrl+Q",)),
+        ],
+    )
+    layers = [MenuEntry(la.value.label, partial(panels.overlay_bar.toggle, la), (la.value.key,), checked=True) for la in Layer]
+    view = add_menu(
+        window,
+        "&View",
+        [
+            *layers,
+            MenuEntry("&All overlays on or off", window.toggle_all_layers, ("0",)),
+            None,
+            MenuEntry("&Whole picture", panels.fit, ("F",)),
+            MenuEntry("Zoom the timeline &in", partial(panels.timeline.zoom, _ZOOM), ("+", "=")),
+            MenuEntry("Zoom the timeline &out", partial(panels.timeline.zoom, 1 / _ZOOM), ("-",)),
+            MenuEntry("The whole &session", panels.timeline.fit, ("Ctrl+0",)),
+            None,
+            MenuEntry("&Next page", partial(turn_page, panels.pages, 1), ("Ctrl+Tab",)),
+            MenuEntry("&Previous page", partial(turn_page, panels.pages, -1), ("Ctrl+Shift+Tab",)),
+            None,
+            MenuEntry("&Full screen", window.toggle_full_screen, ("F11",), checked=False),
         ],
     )
     play = add_menu(
@@ -70,23 +90,7 @@ def add_player_menus(window: PlayerWindow) -> dict[Layer, QAction]:
             MenuEntry("No selection", partial(window.select, None), hint="Esc"),
         ],
     )
-    layers = [MenuEntry(la.value.label, partial(panels.overlay_bar.toggle, la), (la.value.key,), checked=True) for la in Layer]
-    view = add_menu(
-        window,
-        "&View",
-        [
-            *layers,
-            MenuEntry("&All overlays on or off", window.toggle_all_layers, ("0",)),
-            None,
-            MenuEntry("&Whole picture", panels.fit, ("F",)),
-            MenuEntry("Zoom the timeline &in", partial(panels.timeline.zoom, _ZOOM), ("+", "=")),
-            MenuEntry("Zoom the timeline &out", partial(panels.timeline.zoom, 1 / _ZOOM), ("-",)),
-            MenuEntry("The whole &session", panels.timeline.fit, ("Ctrl+0",)),
-            None,
-            MenuEntry("&Full screen", window.toggle_full_screen, ("F11",)),
-        ],
-    )
-    for action in (*play[1:7], *go[:2], *view[-4:-2]):
+    for action in (*play[1:7], *go[:2], *view[-6:-4]):
         action.setAutoRepeat(True)
-    add_menu(window, "&Help", [MenuEntry("&Keys", panels.help.toggle, ("F1",))])
+    add_help_menu(window, panels.help.toggle)
     return dict(zip(Layer, view[: len(Layer)], strict=True))

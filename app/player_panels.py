@@ -10,12 +10,14 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QPlainTextEdit, QT
 
 from app import palette, theme
 from app.pace import Pace
+from app.palette import ON_PICTURE
 from app.provenance import Provenance
 from app.recorded_values import value_lines
 from app.replayed import compared_line
 from app.widgets.advice_line import AdviceLine
 from app.widgets.card import Card
 from app.widgets.clearance_bar import ClearanceBar
+from app.widgets.columns import Columns
 from app.widgets.distance_bars import DistanceBars
 from app.widgets.head_loupe import HeadLoupe
 from app.widgets.live_view import LiveView
@@ -41,6 +43,7 @@ from core.types import Point, PoseState, Scene, Tick
 from hardware.rig import RigKind
 
 _TEXT_EVERY_S = 0.1
+_LEFT_SHARE = 0.62
 _RIGHT_WIDTH = (470, 660)
 _BANNER_WIDTH = 330
 
@@ -158,7 +161,7 @@ class PlayerPanels(QWidget):
         for view in (self.live, self.other):
             if view is not None:
                 view.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
-                view.setStyleSheet(f"LiveView {{ border: 2px solid {palette.PLAYBACK}; background: {palette.INK}; }}")
+                theme.set_sheet(view, f"LiveView {{ border: 2px solid @PLAYBACK; background: {ON_PICTURE.INK}; }}")
                 room = view.layout()
                 assert room is not None
                 room.setContentsMargins(2, 2, 2, 2)
@@ -169,15 +172,13 @@ class PlayerPanels(QWidget):
             page.setReadOnly(True)
             page.setTabChangesFocus(True)
             page.setAccessibleName(name)
-            page.setStyleSheet(
-                f"QPlainTextEdit {{ background: {palette.PANEL}; color: {palette.TEXT_DIM}; border: none; font-size: 13px; }}"
-            )
+            theme.set_sheet(page, "QPlainTextEdit { background: @PANEL; color: @TEXT_DIM; border: none; font-size: 13px; }")
         self.note.setPlaceholderText("Note at this time; Enter keeps it, Esc does not")
         self.note.setAccessibleName("Note")
         self.note.setMaxLength(2000)
-        self.note.setStyleSheet(
-            f"QLineEdit {{ background: {palette.PANEL}; color: {palette.TEXT}; border: 1px solid {palette.SKY};"
-            " border-radius: 6px; padding: 5px 10px; }"
+        theme.set_sheet(
+            self.note,
+            "QLineEdit { background: @PANEL; color: @TEXT; border: 1px solid @SKY; border-radius: 6px; padding: 5px 10px; }",
         )
         self.note.hide()
 
@@ -190,18 +191,19 @@ class PlayerPanels(QWidget):
         self._mode_note.setObjectName("card_note")
         header.addWidget(self._mode_note)
         header.addWidget(self.mode)
-        left = QVBoxLayout()
+        side = QWidget()
+        left = QVBoxLayout(side)
+        left.setContentsMargins(0, 0, 0, 0)
         left.setSpacing(8)
         left.addWidget(self._pictures(), 5)
         left.addWidget(self.overlay_bar)
         left.addWidget(self.note)
         left.addWidget(_framed(self.timeline), 1)
         left.addWidget(self.bar)
-        columns = QHBoxLayout(stage)
-        columns.setContentsMargins(0, 0, 0, 0)
-        columns.setSpacing(theme.GAP)
-        columns.addLayout(left, 62)
-        columns.addWidget(self._right_side(), 38)
+        self.columns = Columns(side, self._right_side(), _LEFT_SHARE)
+        room = QHBoxLayout(stage)
+        room.setContentsMargins(0, 0, 0, 0)
+        room.addWidget(self.columns)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(theme.GAP, 4, theme.GAP, theme.GAP)
         rows.setSpacing(theme.GAP)
@@ -217,7 +219,7 @@ class PlayerPanels(QWidget):
         for view in (self.live, self.other):
             view.setMinimumSize(300, 225)
         _CornerMark("PERCEIVED AGAIN", self.other)
-        self.compared.setStyleSheet(f"color: {palette.TEXT}; font-size: 14px;")
+        theme.set_sheet(self.compared, "color: @TEXT; font-size: 14px;")
         self.compared.setAccessibleName("Recorded against perceived again")
         holder = QWidget()
         column = QVBoxLayout(holder)
@@ -262,6 +264,8 @@ class PlayerPanels(QWidget):
         row.addWidget(Card("Distances", self.bars, f"allowed {limits.d_allow_px:g} px"), 1)
         self.pages = QTabWidget()
         self.pages.setDocumentMode(True)
+        self.pages.setAccessibleName("Pages")
+        self.pages.tabBar().setAccessibleName("Pages")
         self.pages.tabBar().setDrawBase(False)
         for page, name in (
             (self.events, "Events"),
@@ -287,9 +291,7 @@ class _CornerMark(QLabel):
     def __init__(self, text: str, parent: QWidget) -> None:
         super().__init__(text, parent)
         self._parent = parent
-        self.setStyleSheet(
-            f"background: {palette.PLAYBACK}; color: {palette.INK}; font-weight: 700; font-size: 12px; padding: 2px 8px;"
-        )
+        theme.set_sheet(self, "background: @PLAYBACK; color: @INK; font-weight: 700; font-size: 12px; padding: 2px 8px;")
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.adjustSize()
         parent.installEventFilter(self)

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QAbstractButton, QLabel, QMainWindow
 from app import theme
 from app.decode_thread import Decoded, DecodeThread
 from app.heartbeat import Heartbeat
+from app.menus import action_of
 from app.play_clock import PlayClock
 from app.player_keeper import PlayerKeeper
 from app.player_menus import add_player_menus
@@ -486,6 +487,7 @@ class PlayerWindow(QMainWindow):
         super().changeEvent(event)
         if event.type() == QEvent.Type.WindowStateChange:
             self.menuBar().setVisible(not self.isFullScreen())
+            action_of(self, "F11").setChecked(self.isFullScreen())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Enter presses the button that has the focus: Space, which does it elsewhere, plays here."""

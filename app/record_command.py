@@ -97,6 +97,7 @@ def _record(engine: RigEngine, writer: SessionWriter, seconds: float) -> _Progre
             except EndOfStream as error:
                 done.ended = str(error)
                 break
+            _tell_driving(engine, writer)
             if tick is None:
                 if done.started_s is None and time.monotonic() - began_s > _FIRST_FRAME_WITHIN_S:
                     raise DeviceError(f"no picture from the camera for {_FIRST_FRAME_WITHIN_S:.0f} s; check its cable")
@@ -120,16 +121,21 @@ def _record(engine: RigEngine, writer: SessionWriter, seconds: float) -> _Progre
 
 
 def _put(engine: RigEngine, writer: SessionWriter, tick: Tick) -> None:
-    """The tick with all that is known of driving; there is no window, which the pilot must not take for a hung one."""
+    """The tick with all that is known of driving."""
     pilot = engine.pilot
-    if pilot is None:
-        writer.put(tick)
+    writer.put(tick, pilot.view if pilot is not None else None, engine.bus_status())
+
+
+def _tell_driving(engine: RigEngine, writer: SessionWriter) -> None:
+    """What happened since the last turn, also when there was no picture. There is no window, which must not pass for a hung one."""
+    if (pilot := engine.pilot) is None:
         return
     pilot.window_alive()
     news = pilot.news()
+    for view in news.changes:
+        writer.drive(view)
     for alert in news.alerts:
         writer.add_event(event_of_alert(alert, news.view.time_s))
-    writer.put(tick, news.view, engine.bus_status())
 
 
 def _size(folder: Path) -> int:

@@ -15,7 +15,8 @@ _MOST_LINES = 200
 def value_lines(row: RecordedRow) -> list[str]:
     """Frame, latency by stage, robot, drive, and the servo bus as it was."""
     scene, status, drive = row.scene, row.status, row.drive
-    dropped = f"{row.dropped_frames} dropped by camera and perception, {row.dropped_rows} by the recorder"
+    camera = f"{row.dropped_frames} skipped for newer ones, {row.camera_lost} lost by the camera"
+    dropped = f"{camera}, {row.dropped_rows} by the recorder"
     size = f"{row.size[0]} \N{MULTIPLICATION SIGN} {row.size[1]}"
     lines = [
         f"frame {row.index} of the camera, captured at {row.captured_s:.3f} s, {size} px",

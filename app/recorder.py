@@ -7,10 +7,11 @@ from PySide6.QtCore import QObject, QTimer, Signal, Slot
 from app.engine_thread import EngineThread
 from core.config import Config
 from core.control.alerts import Alert
-from core.control.faults import Cause, Fault
+from core.control.drive_view import DriveView
+from core.control.faults import Cause
 from core.session.events import EventKind, event_of_alert
 from core.session.manifest import about_rig
-from core.session.record_status import RecordStatus
+from core.session.record_status import RecordStatus, faults_between
 from core.session.writer import SessionWriter
 from core.types import Point, Tick
 from hardware.rig import RigKind
@@ -67,6 +68,11 @@ class Recorder(QObject):
         else:
             self._writer.start()
 
+    def stop(self, why: str) -> None:
+        """End the session that is being recorded, if any; `why` goes into it. From any thread."""
+        if self._writer is not None:
+            self._writer.stop(why)
+
     @Slot()
     def save_last(self) -> None:
         """Make a session of the last seconds, without having recorded."""
@@ -84,6 +90,16 @@ class Recorder(QObject):
     def target(self, target: Point | None) -> None:
         """Keep the operator's destination, source pixels."""
         self._event(EventKind.TARGET, "" if target is None else f"{target[0]:.1f}, {target[1]:.1f}")
+
+    def drive(self, view: DriveView) -> None:
+        """Keep that mode or faults have changed, also when there are no pictures."""
+        if self._writer is not None:
+            self._writer.drive(view)
+
+    def rig_stopped(self, message: str) -> None:
+        """Keep that the rig stopped by itself, and why: from here on there is no pilot whose views would tell."""
+        if self._writer is not None:
+            self._writer.event(EventKind.FAULT, Cause.WORKER_DEAD.value, {"detail": message})
 
     def alert(self, alert: Alert, time_s: float) -> None:
         """Keep an alert that was shown."""
@@ -114,14 +130,10 @@ class Recorder(QObject):
 
     def _tell(self, before: RecordStatus, now: RecordStatus) -> None:
         """What the operator and the pilot's alerts must know."""
-        pilot = self._thread.pilot
+        if (pilot := self._thread.pilot) is not None:
+            for fault in faults_between(before, now):
+                pilot.report(fault)
         if now.problem and now.problem != before.problem:
             self.said.emit(f"Recording stopped: {now.problem}", True)
-            if pilot is not None:
-                pilot.report(Fault(Cause.DISK_FULL, now.problem))
-        elif now.warning and pilot is not None:
-            pilot.report(Fault(Cause.DISK_LOW, now.warning))
-        if now.dropped > before.dropped and pilot is not None:
-            pilot.report(Fault(Cause.RECORDER_BEHIND, f"{now.dropped} frames"))
         if now.saved is not None and now.saved != before.saved:
             self.said.emit(f"Session saved: {now.saved}", False)

@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from app.figure_style import BLUE, GREY, INK, PALE, styled
-from app.palette import STATE_COLOUR, VERMILLION
+from app.palette import ON_PICTURE, STATE_COLOUR
 from core.study.replay import STATES, Change, Seen
 from core.types import PoseState
 
+VERMILLION = ON_PICTURE.VERMILLION  # on white paper, always
 _MOST_POINTS = 3000
 """An hour has a hundred thousand frames; nobody sees more than a few per printed dot."""
 

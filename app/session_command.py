@@ -18,7 +18,7 @@ from core.session.export import export_csv, export_mp4
 from core.session.files import is_being_written
 from core.session.manifest import SessionError
 from core.session.reader import SessionReader
-from core.session.recovery import payload_bytes, recover
+from core.session.recovery import expected_loss, payload_bytes, recover
 from core.types import Image, PoseState, Tick
 
 _ENDINGS = (".mp4", ".csv", ".mcap")
@@ -81,11 +81,15 @@ def describe(reader: SessionReader) -> dict[str, Any]:
     }
 
 
-def run_recover(folder: Path, into: Path | None, *, as_json: bool) -> None:
-    """Repair a session into a copy. Raises SessionError."""
+def run_recover(folder: Path, into: Path | None, *, as_json: bool, only_look: bool = False) -> None:
+    """Repair a session into a copy, or with `only_look` only tell what would be lost. Raises SessionError."""
     with progress_bar() as bar:
         task = bar.add_task("bytes read", total=payload_bytes(folder))
-        done = recover(folder, into, lambda count: bar.advance(task, count))
+
+        def on_bytes(count: int) -> None:
+            bar.advance(task, count)
+
+        done = expected_loss(folder, on_bytes) if only_look else recover(folder, into, on_bytes)
     if as_json:
         result = {"session": str(done.folder), "frames": done.frames, "pictures": done.pictures}
         loss = {"seconds": done.loss.seconds, "rows": done.loss.rows, "pictures": done.loss.pictures}
@@ -95,7 +99,7 @@ def run_recover(folder: Path, into: Path | None, *, as_json: bool) -> None:
     for problem in done.loss.problems:
         sys.stderr.write(f"note: {problem}\n")
     sys.stderr.write(
-        f"{done.frames} rows and {done.pictures} pictures recovered; lost: {done.loss.seconds:.2f} s "
+        f"{done.frames} rows and {done.pictures} pictures {'can be ' * only_look}recovered; lost: {done.loss.seconds:.2f} s "
         f"({done.loss.rows} rows, {done.loss.pictures} pictures)\n"
     )
 

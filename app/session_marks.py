@@ -32,22 +32,28 @@ class Shape(Enum):
 
 @dataclass(frozen=True, slots=True)
 class MarkLook:
-    """Word, colour and shape of a kind of event; what is drawn later lies above."""
+    """Word, colour (its role in the palette) and shape of a kind of event; what is drawn later lies above."""
 
     word: str
-    colour: str
+    role: str
     shape: Shape
+
+    @property
+    def colour(self) -> str:
+        """In the scheme in use."""
+        return palette.of(self.role)
 
 
 MARK_LOOK: dict[EventKind, MarkLook] = {
-    EventKind.DROPPED: MarkLook("dropped", palette.FAULT, Shape.CROSS),
-    EventKind.MODE: MarkLook("mode", palette.SKY, Shape.SQUARE),
-    EventKind.ALERT: MarkLook("alert", palette.YELLOW, Shape.HOLLOW_TRIANGLE),
-    EventKind.CLEARED: MarkLook("cleared", palette.TEXT_DIM, Shape.HOLLOW_TRIANGLE),
-    EventKind.TARGET: MarkLook("target", palette.TARGET, Shape.RING),
-    EventKind.OVERRIDE: MarkLook("override", palette.ORANGE, Shape.DIAMOND),
-    EventKind.FAULT: MarkLook("fault", palette.FAULT, Shape.TRIANGLE),
-    EventKind.NOTE: MarkLook("note", palette.TEXT, Shape.FLAG),
+    EventKind.DROPPED: MarkLook("dropped", "FAULT", Shape.CROSS),
+    EventKind.LOST: MarkLook("lost by the camera", "FAULT", Shape.HOLLOW_TRIANGLE),
+    EventKind.MODE: MarkLook("mode", "SKY", Shape.SQUARE),
+    EventKind.ALERT: MarkLook("alert", "YELLOW", Shape.HOLLOW_TRIANGLE),
+    EventKind.CLEARED: MarkLook("cleared", "TEXT_DIM", Shape.HOLLOW_TRIANGLE),
+    EventKind.TARGET: MarkLook("target", "TARGET", Shape.RING),
+    EventKind.OVERRIDE: MarkLook("override", "ORANGE", Shape.DIAMOND),
+    EventKind.FAULT: MarkLook("fault", "FAULT", Shape.TRIANGLE),
+    EventKind.NOTE: MarkLook("note", "TEXT", Shape.FLAG),
 }
 """Kinds that have a mark; arming and disarming are told by their mode, the file names of the video by nobody."""
 LISTED = tuple(kind for kind in EventKind if kind is not EventKind.VIDEO)

@@ -81,6 +81,10 @@ class SnapshotWriter(QObject):
     def folder(self) -> Path:
         return self._folder
 
+    def set_folder(self, folder: Path) -> None:
+        """Where the next ones go."""
+        self._folder = folder
+
     def write(self, tick: Tick, origin: Origin) -> None:
         """Start to write; returns at once."""
         self._pool.start(_Job(self, tick, origin, datetime.now()))

@@ -13,10 +13,15 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from app.figure_style import BLUE, GREY, INK, PALE, styled
-from app.palette import GREEN, ORANGE, VERMILLION
+from app.palette import ON_PICTURE
 from core.perception.polyline import normals
 from hardware.twin.phantoms import make_phantom
 
+GREEN, ORANGE, VERMILLION = (
+    ON_PICTURE.GREEN,
+    ON_PICTURE.ORANGE,
+    ON_PICTURE.VERMILLION,
+)  # on white paper, always
 Rows = Sequence[Mapping[str, Any]]
 _LUMEN, _WALL = "#EEF1F4", "#C3CAD3"
 _MOST_N = 0.5

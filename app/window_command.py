@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from app.rig_engine import EngineMaker
 from app.sources import VIDEO_ENDINGS
-from core.config import Config, load_config
+from core.config import Config, load_config, merge
 from core.devices import DeviceError
 from core.errors import UserError
+from core.profiles import settings_of_windows
+from core.rig_file import RESERVED, find_rig, with_rig
 from core.types import Reason
 from hardware.rig import RigKind, kind_of
 from hardware.twin.phantom import PHANTOM_TITLES
@@ -27,21 +29,22 @@ if TYPE_CHECKING:
 _SWITCH_S = 0.001
 """How long a thread may keep the interpreter while another waits: at Python's 5 ms the window stood still for 198 to 221 ms, so for
 125 to 158 (alternating runs on a busy machine)."""
-RIGS = ("twin", "realsense", "webcam")
+RIGS = RESERVED
 _REALSENSE_ENDING = ".bag"
 
 
-def window_config(rig: str | None, config_path: Path | None, source: Path | None) -> tuple[Config, RigKind]:
+def window_config(
+    rig: str | None, config_path: Path | None, source: Path | None, own: dict[str, Any] | None = None
+) -> tuple[Config, RigKind]:
     """The configuration of a rig or of a recorded source, and what the banner says. Raises ConfigError, DeviceError.
 
-    Without `rig` it is the one that the configuration names; with it, the configuration says how that rig is set.
+    Without `rig` it is the one that the configuration names; with it, the configuration says how that rig is set. `own` is what the
+    user has set, over the defaults.
     """
     if source is None:
-        if rig is not None and rig not in RIGS:
-            raise DeviceError(f"unknown rig {rig!r}; known: {', '.join(RIGS)}")
-        config = load_config(config_path)
+        config = load_config(config_path, overrides=own)
         if rig is not None:
-            config = _choose(config, rig)
+            config = _choose(config, rig) if rig in RIGS else _from_file(config, rig)
     else:
         try:
             found = source.exists()
@@ -51,8 +54,15 @@ def window_config(rig: str | None, config_path: Path | None, source: Path | None
             raise DeviceError(f"{source}: no such file or folder")
         camera = "video_file" if source.suffix.lower() in VIDEO_ENDINGS else "image_folder"
         camera = "realsense" if source.suffix.lower() == _REALSENSE_ENDING else camera
-        config = load_config(config_path, overrides={"rig": {"camera": camera, "robot": "none", "source": str(source)}})
+        chosen = {"rig": {"camera": camera, "robot": "none", "source": str(source)}}
+        config = load_config(config_path, overrides=merge(own or {}, chosen))
     return config, kind_of(config.rig)
+
+
+def _from_file(config: Config, name: str) -> Config:
+    """A rig that the wizard has made; raises RigFileError."""
+    path, rig = find_rig(name)
+    return with_rig(config, rig, path)
 
 
 def _choose(config: Config, rig: str) -> Config:
@@ -68,47 +78,89 @@ def _choose(config: Config, rig: str) -> Config:
     return config.model_copy(update={"rig": chosen, "servos": servos})
 
 
-def make_window(config: Config, kind: RigKind) -> OperatorWindow:
+def make_window(config: Config, kind: RigKind, maker: EngineMaker | None = None) -> OperatorWindow:
     """The window, not shown yet. There must be an application."""
     from app.operator_window import OperatorWindow
 
-    return OperatorWindow(config, EngineMaker(), kind, list(PHANTOM_TITLES.items()) if kind is RigKind.SIM else [])
+    return OperatorWindow(config, maker or EngineMaker(), kind, list(PHANTOM_TITLES.items()) if kind is RigKind.SIM else [])
 
 
-def make_application() -> QApplication:
-    """The one application object, with theme and names."""
+def make_application(theme_name: str = "dark") -> QApplication:
+    """The one application object, with theme ("dark", "light" or "system") and names."""
     from PySide6.QtWidgets import QApplication
 
     from app import theme
+    from app.about import program_icon
 
     sys.setswitchinterval(_SWITCH_S)
     application = QApplication.instance() or QApplication([sys.argv[0]])
     assert isinstance(application, QApplication)
     application.setApplicationName("LumenPilot")
-    theme.apply_theme(application)
+    application.setDesktopFileName("lumenpilot")  # the desktop entry that `make install` writes
+    application.setWindowIcon(program_icon())
+    theme.apply_theme(application, theme_name)
     return application
 
 
-def run_window(rig: str | None, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False) -> int:
+def run_window(
+    rig: str | None, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False, tour: bool = False
+) -> int:
     """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
+    from app.crash_report import CrashWatch, state_folder
+    from app.layout_keeper import LayoutKeeper, Parts, overlay_switches
     from app.operator_devices import OperatorDevices
+    from app.rig_desk import RigDesk
+    from app.settings_desk import SettingsDesk
+    from app.side_work import SideWork
+    from app.tour import tour_at_start
 
     _check_display()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
-    config, kind = window_config(rig, config_path, source)
-    application = make_application()
-    window = make_window(config, kind)
-    devices = OperatorDevices(config, lambda: window.pilot, window)
+    file = settings_of_windows(config_path)
+    is_own = config_path is None and not until_first_frame  # what is measured does not depend on who measures
+    config, kind = window_config(rig, config_path, source, file.data if is_own else None)
+    application = make_application(config.window.theme)
+    maker = EngineMaker()
+    window = make_window(config, kind, maker)
+    watch = CrashWatch(state_folder() / "crashes", lambda: window.config.model_dump(mode="json"))
+    watch.install()
+    side_work = SideWork(window, state_folder(), watch)
+    settings = SettingsDesk(window, file, maker.perceive_again)
+    if not until_first_frame:
+        panels = window.panels
+        switches = overlay_switches(panels.overlay_bar)
+        LayoutKeeper(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
+    wanted: list[str] = []
+    rigs = RigDesk(window, lambda name: (wanted.append(name), window.close()) and None)
+    devices = OperatorDevices(config, lambda: window.pilot, window, rigs.stop)
     devices.said.connect(window.say)
+    application.aboutToQuit.connect(settings.close)
+    application.aboutToQuit.connect(rigs.close)
     application.aboutToQuit.connect(devices.close)
+    application.aboutToQuit.connect(side_work.close)
     application.aboutToQuit.connect(window.shut_down)
     timers = [_quit_on_signal(application)]
     window.show()
     window.start()
     devices.start()
+    side_work.start()
+    settings.start()
     if until_first_frame:
         timers.append(_leave_after_first_frame(window))
-    return application.exec()
+    else:
+        tour_at_start(window, asked=tour)
+    code = application.exec()
+    watch.remove()
+    if wanted:
+        _start_anew(wanted[-1], config_path)
+    return code
+
+
+def _start_anew(rig: str, config_path: Path | None) -> None:
+    """Another kind of rig: the program begins again with it, as if it had been asked for on the command line."""
+    named = ["--config", str(config_path)] if config_path is not None else []
+    sys.stdout.flush()
+    os.execv(sys.executable, [sys.executable, sys.argv[0], "gui", "--rig", rig, *named])
 
 
 def _check_display() -> None:

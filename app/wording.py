@@ -21,21 +21,6 @@ STATE_MEANING = {
     PoseState.D: "D: head and tail lie on opposite sides of the centerline. Crossed: moderate speed, steer by theta.",
 }
 
-QUANTITY_MEANING = {
-    "theta": "theta: angle between the robot's last 40 px and the vessel's direction beside the head, in degrees.\n"
-    "Positive: the robot points to the right of the vessel's direction, as seen on screen.",
-    "d_head": "d_head: distance of the robot's head from the line through the vessel's centerline, in working pixels\n"
-    "(the picture scaled to 640 px along its longer side).",
-    "d_tail": "d_tail: distance of the point 40 px behind the head from the same line, in working pixels.\n"
-    "On the other side than the head: the robot has crossed the centerline.",
-    "latency": "Time that each stage took for one frame, over the last seconds: half of the frames were quicker than p50,\n"
-    "95 % were quicker than p95.",
-    "dropped": "Frames that the camera gave but nobody looked at, because a newer one was there already.",
-    "gui_block": "Longest time in the last 10 s in which this window could not react to you.",
-    "shown": "Frames drawn on this screen per second.",
-    "engine": "Frames perceived per second.",
-}
-
 
 @dataclass(frozen=True, slots=True)
 class ReasonText:

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.tool_tips import tip
 from app.wording import advice_headline
 from core.types import Advice, PoseState, Speed
 
@@ -29,10 +30,7 @@ class AdviceLine(QWidget):
         self.setFixedHeight(68)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Advice")
-        self.setToolTip(
-            "What the program advises: how fast to advance or retract, and how far to turn the head (right and left as seen on\n"
-            "screen). Unless you hand over, you steer, and nothing is sent to the robot but what you ask for."
-        )
+        self.setToolTip(tip("advice"))
 
     @property
     def text(self) -> str:
@@ -100,7 +98,7 @@ def _paint_arrow(painter: QPainter, middle: QPointF, size: float, turn_deg: floa
     head, shaft = size * 0.62, size * 0.24
     outline = [(0, -size), (head, -size * 0.28), (shaft, -size * 0.28), (shaft, size * 0.9)]
     points = [QPointF(x, y) for x, y in outline] + [QPointF(-x, y) for x, y in reversed(outline[1:])]
-    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setPen(theme.edge_of(colour_name))
     painter.setBrush(QColor(colour_name))
     painter.drawPolygon(QPolygonF(points))
     painter.restore()

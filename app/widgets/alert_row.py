@@ -22,17 +22,22 @@ _PLATE, _GAP, _CROSS = 44, 12, 9
 class PriorityLook:
     """How urgent, by colour and sign; ``filled`` colours all of the row."""
 
-    colour: str
+    role: str
     sign: Sign
     filled: bool = False
 
+    @property
+    def colour(self) -> str:
+        """In the scheme in use."""
+        return palette.of(self.role)
+
 
 LOOK = {
-    Priority.HINT: PriorityLook(palette.SKY, Sign.INFO),
-    Priority.WARNING: PriorityLook(palette.ORANGE, Sign.WARNING),
-    Priority.HOLD: PriorityLook(palette.YELLOW, Sign.PAUSE),
-    Priority.DISARM: PriorityLook(palette.VERMILLION, Sign.BARRED),
-    Priority.STOP: PriorityLook(palette.VERMILLION, Sign.STOP, filled=True),
+    Priority.HINT: PriorityLook("SKY", Sign.INFO),
+    Priority.WARNING: PriorityLook("ORANGE", Sign.WARNING),
+    Priority.HOLD: PriorityLook("YELLOW", Sign.PAUSE),
+    Priority.DISARM: PriorityLook("VERMILLION", Sign.BARRED),
+    Priority.STOP: PriorityLook("VERMILLION", Sign.STOP, filled=True),
 }
 
 

@@ -8,12 +8,16 @@ from PySide6.QtWidgets import QAbstractButton, QButtonGroup, QHBoxLayout, QLabel
 
 from app import palette, theme
 from app.annotation_tool import BRUSH_HINT, Tool
+from app.palette import ON_PICTURE
 
+_DRAWN = ("ROBOT", "VESSEL")
+"""Roles that the picture shows in their own colours."""
+_SEEN = 3.0
 _SWITCHES = (
-    ("L", "Loupe", palette.TEXT, "The surroundings of the cursor, magnified"),
-    ("K", "Masks", palette.VESSEL, "Show the drawn masks"),
-    ("T", "Brush", palette.ORANGE, "Paint the mask instead of moving its points"),
-    ("H", "Algorithm", palette.TEXT, "Show what the algorithm says; hidden in a blind study"),
+    ("L", "Loupe", "TEXT", "The surroundings of the cursor, magnified"),
+    ("K", "Masks", "VESSEL", "Show the drawn masks"),
+    ("T", "Brush", "ORANGE", "Paint the mask instead of moving its points"),
+    ("H", "Algorithm", "TEXT", "Show what the algorithm says; hidden in a blind study"),
 )
 
 
@@ -32,7 +36,7 @@ class AnnotationBar(QWidget):
         self._tools: dict[Tool, _Chip] = {}
         group = QButtonGroup(self)
         for tool in Tool:
-            chip = _Chip(tool.value.key, tool.value.label, tool.value.colour, f"{tool.value.label}  (key {tool.value.key})")
+            chip = _Chip(tool.value.key, tool.value.label, tool.value.role, f"{tool.value.label}  (key {tool.value.key})")
             chip.clicked.connect(lambda _on=False, which=tool: self.tool_chosen.emit(which))
             group.addButton(chip)
             row.addWidget(chip)
@@ -77,6 +81,9 @@ class AnnotationBar(QWidget):
             chip.setChecked(on)
             chip.blockSignals(False)
 
+    def is_on(self, key: str) -> bool:
+        return self._switches[key].isChecked()
+
     def toggle(self, key: str) -> None:
         """As a click on the switch."""
         chip = self._switches.get(key)
@@ -87,9 +94,9 @@ class AnnotationBar(QWidget):
 class _Chip(QAbstractButton):
     """Key cap, colour and name; filled when on, outlined when off."""
 
-    def __init__(self, key: str, label: str, colour: str, tip: str) -> None:
+    def __init__(self, key: str, label: str, role: str, tip: str) -> None:
         super().__init__()
-        self._key, self._colour = key, colour
+        self._key, self._role = key, role
         self.setCheckable(True)
         self.setText(label)
         self.setFixedHeight(30)
@@ -114,8 +121,10 @@ class _Chip(QAbstractButton):
         painter.setPen(QColor(palette.TEXT_DIM if on else palette.TEXT_FAINT))
         painter.setFont(theme.semi_bold(11))
         painter.drawText(QRectF(9, 0, 12, self.height()), Qt.AlignmentFlag.AlignCenter, self._key)
-        painter.setPen(QPen(QColor(self._colour), 1.5))
-        painter.setBrush(QColor(self._colour) if on else Qt.BrushStyle.NoBrush)
+        name = getattr(ON_PICTURE, self._role) if self._role in _DRAWN else palette.of(self._role)
+        is_lost = palette.contrast(name, palette.RAISED) < _SEEN  # a pale colour on a light chip
+        painter.setPen(QPen(QColor(palette.TEXT_FAINT if is_lost else name), 1.5))
+        painter.setBrush(QColor(name) if on else Qt.BrushStyle.NoBrush)
         painter.drawRoundedRect(QRectF(27, self.height() / 2 - 4, 8, 8), 2, 2)
         painter.setPen(QColor(palette.TEXT if on else palette.TEXT_DIM))
         painter.setFont(theme.semi_bold(12))

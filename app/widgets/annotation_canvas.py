@@ -20,9 +20,10 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import palette, theme
+from app import theme
 from app.annotation_hand import AnnotationHand, Edit, Measure, Reach
 from app.annotation_tool import Tool
+from app.palette import ON_PICTURE
 from app.picture_view import PictureView, render
 from app.widgets.annotation_loupe import AnnotationLoupe, paint_cross
 from app.widgets.annotation_paint import draw
@@ -41,6 +42,17 @@ _ARROWS = {
     Qt.Key.Key_Up: (0.0, -1.0),
     Qt.Key.Key_Down: (0.0, 1.0),
 }
+CANVAS_KEYS = (
+    ("Enter", "end the line, take the state, go on"),
+    ("Tab", "select the next point"),
+    ("\N{LEFTWARDS ARROW} \N{RIGHTWARDS ARROW} \N{UPWARDS ARROW} \N{DOWNWARDS ARROW}", "move it by 1 px; Ctrl 0.1, Shift 10"),
+    ("Insert", "no point selected: set one at the cross"),
+    ("Del", "take the point out"),
+    ("Shift+Del", "the whole line"),
+    ("Space+drag", "move the picture"),
+    ("Esc", "let go of the line or the point"),
+)
+"""The keys that the picture hears itself: all others are in the menus."""
 
 
 class AnnotationCanvas(QWidget):
@@ -424,7 +436,7 @@ class AnnotationCanvas(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         if not self._levels:
-            painter.fillRect(self.rect(), QColor(palette.INK))
+            painter.fillRect(self.rect(), QColor(ON_PICTURE.INK))
             painter.end()
             return
         if self._picture is None:
@@ -450,7 +462,7 @@ class AnnotationCanvas(QWidget):
             for point in self._hand.stroke:
                 path.lineTo(QPointF(*self._view.to_screen(point)))
             path.lineTo(path.currentPosition() + QPointF(0.01, 0.0))
-            ink = palette.INK if self._hand.stroke_erases else self.tool.value.colour
+            ink = ON_PICTURE.INK if self._hand.stroke_erases else self.tool.value.colour
             pen = QPen(theme.colour(ink, 0.6), 2 * radius)
             pen.setCapStyle(Qt.PenCapStyle.RoundCap)
             pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
@@ -459,7 +471,7 @@ class AnnotationCanvas(QWidget):
             painter.drawPath(path)
         if self._cursor is not None:
             painter.setBrush(Qt.BrushStyle.NoBrush)
-            for name, width in ((palette.INK, 3.0), (palette.TEXT, 1.2)):
+            for name, width in ((ON_PICTURE.INK, 3.0), (ON_PICTURE.TEXT, 1.2)):
                 painter.setPen(QPen(QColor(name), width))
                 painter.drawEllipse(QPointF(*self._view.to_screen(self._cursor)), radius, radius)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
-from app import palette
+from app import theme
 
 
 class AnnotationHeader(QWidget):
@@ -13,11 +13,11 @@ class AnnotationHeader(QWidget):
     def __init__(self, who: str) -> None:
         super().__init__()
         self._title = QLabel()
-        self._title.setStyleSheet(f"color: {palette.TEXT}; font-size: 17px; font-weight: 700;")
+        theme.set_sheet(self._title, "color: @TEXT; font-size: 17px; font-weight: 700;")
         self._title.setMinimumWidth(40)
         self._title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._who = QLabel(who)
-        self._who.setStyleSheet(f"color: {palette.TEXT_DIM}; font-size: 13px;")
+        theme.set_sheet(self._who, "color: @TEXT_DIM; font-size: 13px;")
         self._saved = QLabel()
         self._saved.setAccessibleName("State of the file")
         row = QHBoxLayout(self)
@@ -37,13 +37,13 @@ class AnnotationHeader(QWidget):
         self._title.setToolTip(text)
 
     def show_saved(self, is_saved: bool) -> None:
-        self._show("\N{CHECK MARK}  saved" if is_saved else "saving", palette.ALLOWED if is_saved else palette.TEXT_DIM, "")
+        self._show("\N{CHECK MARK}  saved" if is_saved else "saving", "ALLOWED" if is_saved else "TEXT_DIM", "")
 
     def show_unsaved(self, count: int, why: str) -> None:
         """Edits that could not be written, and why."""
-        self._show(f"\N{WARNING SIGN}  NOT SAVED: {count} edit{'s' if count != 1 else ''}", palette.FAULT, why)
+        self._show(f"\N{WARNING SIGN}  NOT SAVED: {count} edit{'s' if count != 1 else ''}", "FAULT", why)
 
-    def _show(self, text: str, colour: str, tip: str) -> None:
+    def _show(self, text: str, role: str, tip: str) -> None:
         self._saved.setText(text)
         self._saved.setToolTip(tip)
-        self._saved.setStyleSheet(f"color: {colour}; font-size: 13px; font-weight: 600;")
+        theme.set_sheet(self._saved, f"color: @{role}; font-size: 13px; font-weight: 600;")

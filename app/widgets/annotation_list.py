@@ -13,18 +13,18 @@ from core.study.annotations import Status
 
 _ROW = 30
 _MARK = {Status.NEW: "", Status.BEGUN: "\N{HORIZONTAL ELLIPSIS}", Status.DONE: "\N{CHECK MARK}", Status.CANNOT_TELL: "?"}
-_COLOUR = {
-    Status.NEW: palette.TEXT_FAINT,
-    Status.BEGUN: palette.ORANGE,
-    Status.DONE: palette.ALLOWED,
-    Status.CANNOT_TELL: palette.SKY,
+_ROLE = {
+    Status.NEW: "TEXT_FAINT",
+    Status.BEGUN: "ORANGE",
+    Status.DONE: "ALLOWED",
+    Status.CANNOT_TELL: "SKY",
 }
-_STYLE = f"""
-QListView {{ background: {palette.PANEL}; outline: none; }}
-QScrollBar:vertical {{ background: transparent; width: 8px; margin: 0; }}
-QScrollBar::handle:vertical {{ background: {palette.LINE}; border-radius: 4px; min-height: 24px; }}
-QScrollBar::add-line:vertical, QScrollBar::sub-line:vertical {{ height: 0; }}
-QScrollBar::add-page:vertical, QScrollBar::sub-page:vertical {{ background: transparent; }}
+_STYLE = """
+QListView { background: @PANEL; outline: none; }
+QScrollBar:vertical { background: transparent; width: 8px; margin: 0; }
+QScrollBar::handle:vertical { background: @LINE; border-radius: 4px; min-height: 24px; }
+QScrollBar::add-line:vertical, QScrollBar::sub-line:vertical { height: 0; }
+QScrollBar::add-page:vertical, QScrollBar::sub-page:vertical { background: transparent; }
 """
 _Index = QModelIndex | QPersistentModelIndex
 
@@ -89,7 +89,7 @@ class _QueueRow(QStyledItemDelegate):
             painter.setBrush(theme.colour(palette.VESSEL, 0.8))
             painter.drawRoundedRect(QRectF(right - 36, box.center().y() - 5, 10, 10), 3, 3)
         painter.setFont(theme.bold(14))
-        painter.setPen(QColor(_COLOUR[status]))
+        painter.setPen(QColor(palette.of(_ROLE[status])))
         painter.drawText(QRectF(right - 18, box.top(), 18, box.height()), Qt.AlignmentFlag.AlignCenter, _MARK[status])
         painter.restore()
 
@@ -109,7 +109,7 @@ class QueueList(QWidget):
         self._view.setUniformItemSizes(True)
         self._view.setFrameShape(QListView.Shape.NoFrame)
         self._view.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._view.setStyleSheet(_STYLE)
+        theme.set_sheet(self._view, _STYLE)
         self._view.setAccessibleName("Images")
         self._view.activated.connect(lambda index: self.chosen.emit(index.row()))
         self._view.clicked.connect(lambda index: self.chosen.emit(index.row()))

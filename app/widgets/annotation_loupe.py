@@ -8,8 +8,9 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen
 
-from app import palette, theme
+from app import theme
 from app.annotation_hand import Drawing
+from app.palette import ON_PICTURE
 from app.picture_view import PictureView, render
 from app.widgets.annotation_paint import draw
 from core.types import Image, Point
@@ -54,7 +55,7 @@ class AnnotationLoupe:
         paint_cross(painter, frame.center(), 14.0)
         painter.restore()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(palette.TEXT), 2))
+        painter.setPen(QPen(QColor(ON_PICTURE.TEXT), 2))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRoundedRect(frame, theme.RADIUS, theme.RADIUS)
 
@@ -80,7 +81,7 @@ def _gap(frame: QRectF, point: Point) -> float:
 def paint_cross(painter: QPainter, at: QPointF, reach: float) -> None:
     """A cross with an open middle."""
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    for name, width in ((palette.INK, 3.0), (palette.TEXT, 1.2)):
+    for name, width in ((ON_PICTURE.INK, 3.0), (ON_PICTURE.TEXT, 1.2)):
         painter.setPen(QPen(QColor(name), width))
         for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)):
             painter.drawLine(at + QPointF(x, y) * 3.0, at + QPointF(x, y) * reach)

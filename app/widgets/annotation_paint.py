@@ -7,17 +7,18 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF, QTransform
 from PySide6.QtGui import QPainterPath as Path
 
-from app import palette, theme
+from app import theme
 from app.annotation_hand import Drawing, handle_lines
+from app.palette import ON_PICTURE
 from app.scene_shapes import foot
 from app.widgets.pencil import Pencil
 from core.study.annotation_edits import ROBOT, VESSEL, Touch, line_of
 from core.study.annotations import Annotation, Line, MaskTarget, Readout
 from core.types import Point, Points, Vector
 
-_MASK_COLOUR = {MaskTarget.VESSEL: palette.VESSEL, MaskTarget.ROBOT: palette.ROBOT}
+_MASK_COLOUR = {MaskTarget.VESSEL: ON_PICTURE.VESSEL, MaskTarget.ROBOT: ON_PICTURE.ROBOT}
 _MARKER = 11.0
-_LINE_COLOUR = {ROBOT: palette.ROBOT, VESSEL: palette.VESSEL}
+_LINE_COLOUR = {ROBOT: ON_PICTURE.ROBOT, VESSEL: ON_PICTURE.VESSEL}
 
 
 def draw(painter: QPainter, to_screen: QTransform, drawing: Drawing, label_px: int, *, is_loupe: bool = False) -> None:
@@ -26,7 +27,7 @@ def draw(painter: QPainter, to_screen: QTransform, drawing: Drawing, label_px: i
     if drawing.masks_shown:
         for target in MaskTarget:
             _fill_masks(painter, to_screen, annotation, target, is_active=drawing.tool.value.target is target, is_loupe=is_loupe)
-    for piece, name in ((readout.vessel_piece, palette.VESSEL_VECTOR), (readout.robot_piece, palette.ROBOT_VECTOR)):
+    for piece, name in ((readout.vessel_piece, ON_PICTURE.VESSEL_VECTOR), (readout.robot_piece, ON_PICTURE.ROBOT_VECTOR)):
         if piece is not None:
             _highlight(painter, to_screen, piece, name)
     pencil = Pencil(painter, to_screen, label_px)
@@ -66,16 +67,16 @@ def _highlight(painter: QPainter, to_screen: QTransform, piece: Points, name: st
 def _draw_readout(pencil: Pencil, readout: Readout) -> None:
     robot, vessel, pose = readout.robot_vector, readout.vessel_vector, readout.pose
     if vessel is not None:
-        pencil.arrow(vessel, palette.VESSEL_VECTOR, 1.5)
+        pencil.arrow(vessel, ON_PICTURE.VESSEL_VECTOR, 1.5)
     if robot is not None:
-        pencil.arrow(robot, palette.ROBOT_VECTOR, 1.5)
+        pencil.arrow(robot, ON_PICTURE.ROBOT_VECTOR, 1.5)
     if robot is None or vessel is None or pose is None:
         return
-    pencil.measure(foot(vessel, robot.end), robot.end, palette.D_HEAD, Qt.PenStyle.SolidLine)
-    pencil.measure(foot(vessel, robot.start), robot.start, palette.D_TAIL, Qt.PenStyle.DotLine)
-    pencil.angle(robot.start, _arc(vessel, robot), palette.THETA)
+    pencil.measure(foot(vessel, robot.end), robot.end, ON_PICTURE.D_HEAD, Qt.PenStyle.SolidLine)
+    pencil.measure(foot(vessel, robot.start), robot.start, ON_PICTURE.D_TAIL, Qt.PenStyle.DotLine)
+    pencil.angle(robot.start, _arc(vessel, robot), ON_PICTURE.THETA)
     side = 1.0 if pose.c_head_px < 0 else -1.0
-    pencil.label_beside(vessel.center, vessel, side, f"\N{GREEK SMALL LETTER THETA} {pose.theta_deg:.1f}°", palette.THETA)
+    pencil.label_beside(vessel.center, vessel, side, f"\N{GREEK SMALL LETTER THETA} {pose.theta_deg:.1f}°", ON_PICTURE.THETA)
 
 
 def _arc(vessel: Vector, robot: Vector) -> np.ndarray:
@@ -90,12 +91,12 @@ def _draw_proposal(pencil: Pencil, proposal: Annotation, readout: Readout | None
     """The algorithm's lines, dotted and white: nobody takes them for his own."""
     for line in (proposal.robot, proposal.vessel):
         if len(line) > 1:
-            pencil.polylines((np.array(line),), palette.TEXT, 2.0, Qt.PenStyle.DotLine)
+            pencil.polylines((np.array(line),), ON_PICTURE.TEXT, 2.0, Qt.PenStyle.DotLine)
     for mask in proposal.masks:
         outline = np.array((*mask.points, mask.points[0]))
         pencil.polylines((outline,), _MASK_COLOUR[mask.target], 1.2, Qt.PenStyle.DotLine)
     if readout is not None and readout.vessel_vector is not None and readout.pose is not None and proposal.robot:
-        pencil.tag(proposal.robot[-1], f"algorithm: \N{GREEK SMALL LETTER THETA} {readout.pose.theta_deg:.1f}°", palette.TEXT)
+        pencil.tag(proposal.robot[-1], f"algorithm: \N{GREEK SMALL LETTER THETA} {readout.pose.theta_deg:.1f}°", ON_PICTURE.TEXT)
 
 
 def _fill_masks(
@@ -141,11 +142,11 @@ def _draw_handles(painter: QPainter, to_screen: QTransform, drawing: Drawing) ->
             grown = radius + (2.0 if is_selected else 0.0) + (1.5 if is_head else 0.0)
             painter.setBrush(Qt.BrushStyle.NoBrush)  # the place itself stays visible
             thin = 0.0 if line < 0 else 0.8
-            for ink, width in ((palette.INK, 4.0 - 1.5 * thin), (palette.HEAD if is_selected else name, 2.2 - thin)):
+            for ink, width in ((ON_PICTURE.INK, 4.0 - 1.5 * thin), (ON_PICTURE.HEAD if is_selected else name, 2.2 - thin)):
                 painter.setPen(QPen(QColor(ink), width))
                 painter.drawEllipse(at, grown, grown)
     for point in drawing.draft:
-        painter.setPen(QPen(QColor(palette.INK), 1.2))
+        painter.setPen(QPen(QColor(ON_PICTURE.INK), 1.2))
         painter.setBrush(QColor(drawing.tool.value.colour))
         painter.drawEllipse(_at(to_screen, point), 4.0, 4.0)
 

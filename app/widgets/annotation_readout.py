@@ -7,8 +7,9 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.tool_tips import tip
 from app.widgets.state_badge import paint_state
-from app.wording import QUANTITY_MEANING, STATE_TITLE, side
+from app.wording import STATE_TITLE, side
 from core.study.annotations import Annotation, Readout
 
 _DASH = "\N{EN DASH}"
@@ -27,7 +28,7 @@ class AnnotationReadout(QWidget):
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Readout")
-        self.setToolTip("\n".join(QUANTITY_MEANING[name] for name in ("theta", "d_head", "d_tail")))
+        self.setToolTip(tip("theta", "d_head", "d_tail", "crossed", "lines_used", "state"))
 
     @property
     def angle_text(self) -> str:

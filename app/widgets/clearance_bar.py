@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from app import palette, theme
 from app.cells import number
 from app.pace import Pace
+from app.tool_tips import tip
 from app.wording import REASON_TEXT
 from core.control.clearance import BreachWatch, Clearance, Ladder, clearance_of
 from core.types import RobotStatus, Scene
@@ -24,7 +25,7 @@ _NEAR_USED, _USED_BAND = 0.85, 0.1
 """Share of the room that is used up; the band is one to two pixels in a usual vessel, the picture's noise."""
 _AT_WALL_PX = 1.0
 _TEXT_EVERY_S = 0.2
-_COLOUR = (palette.ALLOWED, palette.ORANGE, palette.FAULT)
+_ROLE = ("ALLOWED", "ORANGE", "FAULT")
 _HEIGHT = 48
 
 
@@ -59,11 +60,10 @@ class ClearanceBar(QWidget):
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Room to the wall")
-        self.setToolTip(
-            "Room between the edge of the robot's head and the wall of the vessel, in working pixels"
-            f"{' and roughly in mm' if pixels_per_mm else ''}.\nThe bar is full on the centerline and empty at the wall."
-            "\nWall force: sum of the contact forces on the robot, known on the bench twin only."
-        )
+        self.setToolTip(tip("clearance", "force"))
+
+    def set_scale(self, pixels_per_mm: float | None) -> None:
+        self._pixels_per_mm = pixels_per_mm
 
     @property
     def text(self) -> str:
@@ -103,7 +103,7 @@ class ClearanceBar(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
         worst = max(self._room.level, self._force.level if self._force is not None else 0)
-        painter.setPen(QPen(QColor(_COLOUR[2]), 2) if worst == 2 else QPen(QColor(palette.LINE), 1))
+        painter.setPen(QPen(QColor(palette.FAULT), 2) if worst == 2 else QPen(QColor(palette.LINE), 1))
         painter.setBrush(QColor(palette.PANEL))
         painter.drawRoundedRect(frame, 6, 6)
         inside = frame.adjusted(12, 4, -12, -3)
@@ -164,7 +164,8 @@ def _paint_block(painter: QPainter, box: QRectF, block: _Block) -> None:
     if block.level:
         _paint_sign(painter, QPointF(box.left() + 8, text_box.center().y()), block.level)
         text_box.adjust(22, 0, 0, 0)
-    painter.setPen(QColor(palette.TEXT_FAINT if block.share is None else palette.TEXT if not block.level else _COLOUR[block.level]))
+    role = "TEXT_FAINT" if block.share is None else _ROLE[block.level] if block.level else "TEXT"
+    painter.setPen(QColor(palette.of(role)))
     text_font = theme.bold(14) if block.level else theme.semi_bold(14)
     metrics = QFontMetrics(text_font)
     text = next((text for text in block.texts if metrics.horizontalAdvance(text) <= text_box.width()), block.texts[-1])
@@ -182,9 +183,9 @@ def _paint_block(painter: QPainter, box: QRectF, block: _Block) -> None:
 def _paint_fill(painter: QPainter, track: QRectF, block: _Block) -> None:
     share = max(0.0, min(1.0, block.share or 0.0))
     if block.level == 2 and share < 0.1:  # no room: nothing to fill, and yet it must be seen
-        painter.setBrush(QBrush(QColor(_COLOUR[2]), Qt.BrushStyle.BDiagPattern))
+        painter.setBrush(QBrush(QColor(palette.FAULT), Qt.BrushStyle.BDiagPattern))
         painter.drawRoundedRect(track, 3, 3)
-    painter.setBrush(QColor(_COLOUR[block.level]))
+    painter.setBrush(QColor(palette.of(_ROLE[block.level])))
     painter.drawRoundedRect(QRectF(track.left(), track.top(), max(3.0, share * track.width()), track.height()), 3, 3)
 
 
@@ -205,7 +206,7 @@ def _paint_marks(painter: QPainter, track: QRectF, marks: tuple[tuple[float, str
 
 def _paint_sign(painter: QPainter, middle: QPointF, level: int) -> None:
     """A warning triangle; filled when the limit is passed."""
-    name = _COLOUR[level]
+    name = palette.of(_ROLE[level])
     triangle = QPolygonF([middle + QPointF(x, y) for x, y in ((0.0, -7.0), (8.0, 6.5), (-8.0, 6.5))])
     painter.setPen(QPen(QColor(name), 1.6))
     painter.setBrush(QColor(name) if level == 2 else Qt.BrushStyle.NoBrush)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _SHOW_EVERY_S = 0.2
 _ROW = 17
 _WIDTHS = {"When": 66, "Joint": 68, "What the gate did": 0, "\N{MULTIPLICATION SIGN}": 46}
-_LOG_STYLE = f"QTableView {{ background: {palette.PANEL}; border: none; font-size: 12px; }}"
+_LOG_STYLE = "QTableView { background: @PANEL; border: none; font-size: 12px; }"
 
 _Index = QModelIndex | QPersistentModelIndex
 
@@ -91,7 +91,7 @@ class CommandPanel(QWidget):
     def _make_view(self) -> QTableView:
         view = QTableView()
         view.setModel(self._model)
-        view.setStyleSheet(_LOG_STYLE)
+        theme.set_sheet(view, _LOG_STYLE)
         view.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the arrow keys belong to the robot
         view.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         view.setShowGrid(False)

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QApplication, QSizePolicy, QWidget
 
 from app import palette, theme
 from app.next_step import DEADMAN_KEY
+from app.tool_tips import tip
 from app.widgets.signs import key_cap_width, paint_key_cap
 
 _WINDOW_LOST = (QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked, QEvent.Type.Hide, QEvent.Type.Close)
@@ -31,10 +32,7 @@ class DeadmanField(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setAccessibleName(f"Deadman: hold to drive ({DEADMAN_KEY})")
-        self.setToolTip(
-            f"The program drives only while you hold this with the mouse, hold {DEADMAN_KEY} or stand on the pedal.\n"
-            "Let go and the robot holds. It must be pressed after arming: what was down before does not count."
-        )
+        self.setToolTip(tip("deadman"))
         self._describe()
 
     @property

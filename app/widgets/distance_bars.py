@@ -7,10 +7,12 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.wording import QUANTITY_MEANING, side
+from app.tool_tips import tip
+from app.wording import side
 from core.types import Pose
 
 _RANGE_IN_LIMITS = 5.0
+_NAME_PX = 56
 
 
 class DistanceBars(QWidget):
@@ -22,20 +24,33 @@ class DistanceBars(QWidget):
     def __init__(self, d_allow_px: float) -> None:
         super().__init__()
         self._allow_px = d_allow_px
+        self._mm_per_px: float | None = None
         self._offsets: tuple[float, float] | None = None
         self._numbers: tuple[float, float] | None = None
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMinimumSize(200, 100)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Distances from the centerline")
-        self.setToolTip(f"{QUANTITY_MEANING['d_head']}\n{QUANTITY_MEANING['d_tail']}")
+        self.setToolTip(tip("d_head", "d_tail", "crossed"))
+
+    def set_allowed(self, d_allow_px: float) -> None:
+        self._allow_px = d_allow_px
+        self.update()
 
     @property
     def texts(self) -> tuple[str, str]:
         """The numbers of d_head and d_tail."""
         if self._numbers is None:
             return "\N{EN DASH}", "\N{EN DASH}"
-        return f"{abs(self._numbers[0]):.1f} px", f"{abs(self._numbers[1]):.1f} px"
+        return self._text(self._numbers[0]), self._text(self._numbers[1])
+
+    def set_scale(self, mm_per_px: float | None) -> None:
+        """Millimetres per working pixel beside the head; None: not calibrated, and only pixels are shown."""
+        self._mm_per_px = mm_per_px
+
+    def _text(self, offset_px: float) -> str:
+        text = f"{abs(offset_px):.1f} px"
+        return text if self._mm_per_px is None else f"{text} = {abs(offset_px) * self._mm_per_px:.2f} mm"
 
     def sizeHint(self) -> QSize:
         return QSize(240, 160)
@@ -68,7 +83,7 @@ class DistanceBars(QWidget):
         painter.setFont(theme.semi_bold(theme.Size.BODY))
         painter.drawText(text_box, Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignLeft, name)
         painter.setPen(QColor(palette.TEXT if self._numbers is not None else palette.TEXT_FAINT))
-        painter.setFont(theme.bold(24))
+        painter.setFont(theme.fitted(theme.bold(24), self.texts[index], int(box.width() - _NAME_PX)))
         right = Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignRight
         painter.drawText(text_box.adjusted(0, 0, 0, 4), right, self.texts[index])
         track = QRectF(box.left(), box.bottom() - 20, box.width(), 14)

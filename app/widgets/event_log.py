@@ -8,10 +8,9 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 
 from PySide6.QtCore import QPoint, QRectF, QSize, Qt, Slot
-from PySide6.QtGui import QColor, QFontMetrics, QGuiApplication, QPainter, QPen, QShowEvent, QWheelEvent
+from PySide6.QtGui import QColor, QFontMetrics, QGuiApplication, QPainter, QPen, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QComboBox,
     QHBoxLayout,
     QLabel,
     QListView,
@@ -25,6 +24,7 @@ from PySide6.QtWidgets import (
 
 from app import palette, theme
 from app.event_model import MOST_ROWS, EventKind, EventModel, Index, LoggedEvent
+from app.widgets.quiet_combo import QuietCombo
 
 SAME_WITHIN = timedelta(seconds=2.0)
 _ROW_HEIGHT = 24
@@ -41,7 +41,8 @@ class EventLog(QWidget):
         self._model = EventModel()
         self._view = _EventList(self._model)
         self._view.customContextMenuRequested.connect(self._open_menu)
-        self._filter = _Filter()
+        self._filter = QuietCombo("Kind of events shown")
+        self._filter.setToolTip("Which events are listed")
         self._filter.addItem("Everything", None)
         for kind in EventKind:
             self._filter.addItem(kind.value.plural, kind)
@@ -183,16 +184,3 @@ class _EventPainter(QStyledItemDelegate):
         painter.setPen(QColor(palette.TEXT))
         painter.drawText(room, centre, theme.elide(text_font, event.text, int(room.width())))
         painter.restore()
-
-
-class _Filter(QComboBox):
-    """Only a click opens it: wheel and keys belong to others."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.setAccessibleName("Kind of events shown")
-        self.setToolTip("Which events are listed")
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        event.ignore()

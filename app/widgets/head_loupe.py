@@ -8,7 +8,8 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPaintEvent, QPen, QTransform
 from PySide6.QtWidgets import QWidget
 
-from app import palette, theme
+from app import theme
+from app.palette import ON_PICTURE
 from app.widgets.overlays import OverlayItem
 from core.types import Image, Point, Scene
 
@@ -87,14 +88,14 @@ class HeadLoupe(QWidget):
         frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         glass = QPainterPath()
         glass.addRoundedRect(frame, theme.RADIUS, theme.RADIUS)
-        painter.fillPath(glass, QColor(palette.INK))
+        painter.fillPath(glass, QColor(ON_PICTURE.INK))
         painter.save()
         painter.setClipPath(glass)
         painter.setWorldTransform(self._to_widget)
         painter.drawImage(self._image.offset(), self._image)
         self._marks.draw(painter, _LABEL_PX)
         painter.restore()
-        painter.setPen(QPen(QColor(palette.TEXT), 2))
+        painter.setPen(QPen(QColor(ON_PICTURE.TEXT), 2))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRoundedRect(frame, theme.RADIUS, theme.RADIUS)
         painter.end()

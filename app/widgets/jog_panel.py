@@ -8,6 +8,8 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QSizePolicy, QVBoxLayout, 
 
 from app import palette, theme
 from app.jog_keys import Motion
+from app.tool_tips import tip
+from app.widgets.quiet_combo import QuietCombo
 from core.types import RobotStatus
 
 _LEFT, _RIGHT, _UP, _DOWN = (QPointF(-1, 0), QPointF(1, 0), QPointF(0, -1), QPointF(0, 1))
@@ -25,7 +27,7 @@ class JogPanel(QWidget):
 
     def __init__(self, max_pull_mm: float) -> None:
         super().__init__()
-        self._max_pull_mm = max_pull_mm
+        self.max_pull_mm = max_pull_mm
         self._caps: dict[Motion, _Cap] = {}
         grid = QGridLayout()
         grid.setSpacing(4)
@@ -77,14 +79,12 @@ class JogPanel(QWidget):
             self._readout.show_values(0.0, 0.0, None)
             return
         right, left, up, down = status.tendon_pull_mm
-        full_mm = 2.0 * self._max_pull_mm
+        full_mm = 2.0 * self.max_pull_mm
         self._readout.show_values((right - left) / full_mm, (up - down) / full_mm, status.insertion_mm)
 
     def _speed_choice(self) -> QComboBox:
         """Full speed, or a share of it for fine work."""
-        choice = QComboBox()
-        choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # it would take the keys that move the robot
-        choice.setAccessibleName("Speed of the keys")
+        choice = QuietCombo("Speed of the keys")
         choice.setToolTip("Speed of all motions by hand, of the configured full speed")
         for share in (1.0, 0.5, 0.2):
             choice.addItem(f"{100 * share:.0f} %", share)
@@ -194,7 +194,7 @@ class _Readout(QWidget):
         self.setFixedHeight(18)
         self.setAccessibleName("Bend and insertion")
         self.setAccessibleDescription(self.text)
-        self.setToolTip("Bend of the head (share of the tendons' full pull, as measured) and how far the robot is in")
+        self.setToolTip(tip("bend", "insertion"))
 
     @property
     def text(self) -> str:

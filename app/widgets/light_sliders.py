@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QSlider, QWidget
 
-from app import palette
+from app import theme
 
 _STEP = 10
 
@@ -22,9 +22,9 @@ class LightSliders(QWidget):
         grid.setVerticalSpacing(2)
         self._contrast, self._brightness = self._slider("Contrast", ", ."), self._slider("Brightness", "< >")
         for row, (name, keys, slider) in enumerate((("Contrast", ", .", self._contrast), ("Brightness", "< >", self._brightness))):
-            for column, text, colour in ((0, name, palette.TEXT_DIM), (2, keys, palette.TEXT_FAINT)):
+            for column, text, role in ((0, name, "TEXT_DIM"), (2, keys, "TEXT_FAINT")):
                 label = QLabel(text)
-                label.setStyleSheet(f"color: {colour}; font-size: 12px;")
+                theme.set_sheet(label, f"color: @{role}; font-size: 12px;")
                 grid.addWidget(label, row, column)
             grid.addWidget(slider, row, 1)
 

@@ -6,12 +6,13 @@ import cv2
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, Qt, Signal
-from PySide6.QtGui import QImage, QPainter, QTransform
+from PySide6.QtCore import QPointF, Qt, QTimer, Signal
+from PySide6.QtGui import QImage, QPainter, QResizeEvent, QTransform
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette
 from app.pace import Pace
+from app.palette import ON_PICTURE
 from app.scene_shapes import scene_shapes
 from app.widgets.head_loupe import HeadLoupe
 from app.widgets.overlays import Layer, Overlay, OverlayItem
@@ -51,7 +52,7 @@ class LiveView(QWidget):
         self._image: Image | None = None
         self._ghost: Points | None = None
         self._view = pg.GraphicsView()
-        self._view.setBackground(palette.INK)
+        self._view.setBackground(ON_PICTURE.INK)
         self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._box = _PictureBox()
         self._view.setCentralItem(self._box)
@@ -73,6 +74,9 @@ class LiveView(QWidget):
     def scene(self) -> Scene | None:
         return self._scene
 
+    def set_scale(self, pixels_per_mm: float) -> None:
+        self._pixels_per_mm = pixels_per_mm
+
     def show_frame(self, frame: Frame, scene: Scene, advice: Advice | None = None) -> None:
         """Show a frame with its scene, and where `advice` leads; None: no ghost."""
         self._show_picture(frame.image)
@@ -83,6 +87,10 @@ class LiveView(QWidget):
         self._show_marks()
         if scene.path is None or self._loupe_pace.due():
             self._show_loupe()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        QTimer.singleShot(0, self, self._show_loupe)  # a picture that stands still has no next frame to put it right
 
     def blank_overlays(self) -> None:
         """Take everything away that was understood: it is not true any more. The last picture and the target stay."""
@@ -246,10 +254,10 @@ def _label_colours() -> NDArray[np.uint32]:
     table = np.zeros(16, np.uint32)
     for bits in range(16):
         for bit, name, alpha in (
-            (_ROBOT_SKELETON, palette.ROBOT, 1.0),
-            (_VESSEL_SKELETON, palette.VESSEL, 1.0),
-            (_ROBOT, palette.ROBOT, 0.40),
-            (_VESSEL, palette.VESSEL, 0.24),
+            (_ROBOT_SKELETON, ON_PICTURE.ROBOT, 1.0),
+            (_VESSEL_SKELETON, ON_PICTURE.VESSEL, 1.0),
+            (_ROBOT, ON_PICTURE.ROBOT, 0.40),
+            (_VESSEL, ON_PICTURE.VESSEL, 0.24),
         ):
             if bits & bit:
                 red, green, blue = (round(part * alpha) for part in palette.rgb(name))

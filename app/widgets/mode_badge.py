@@ -21,18 +21,23 @@ _SIZE = QSize(284, 34)
 class ModeLook:
     """Colour and sign of a mode; ``filled`` where something other than the operator decides."""
 
-    colour: str
+    role: str
     filled: bool
     sign: Sign
     meaning: str
 
+    @property
+    def colour(self) -> str:
+        """In the scheme in use."""
+        return palette.of(self.role)
+
 
 MODE_LOOK = {
-    Mode.ADVISORY: ModeLook(palette.SKY, False, Sign.WHEEL, "you steer, the program only advises"),
-    Mode.ARMED: ModeLook(palette.ORANGE, False, Sign.READY, "you steer; the program may be handed over to"),
-    Mode.AUTONOMOUS: ModeLook(palette.GREEN, True, Sign.DRIVES, "the program drives while the deadman is held"),
-    Mode.HOLD: ModeLook(palette.YELLOW, True, Sign.PAUSE, "the program's motion is interrupted; the robot holds"),
-    Mode.STOPPED: ModeLook(palette.VERMILLION, True, Sign.STOP, "nothing moves until the stop is acknowledged"),
+    Mode.ADVISORY: ModeLook("SKY", False, Sign.WHEEL, "you steer, the program only advises"),
+    Mode.ARMED: ModeLook("ORANGE", False, Sign.READY, "you steer; the program may be handed over to"),
+    Mode.AUTONOMOUS: ModeLook("GREEN", True, Sign.DRIVES, "the program drives while the deadman is held"),
+    Mode.HOLD: ModeLook("YELLOW", True, Sign.PAUSE, "the program's motion is interrupted; the robot holds"),
+    Mode.STOPPED: ModeLook("VERMILLION", True, Sign.STOP, "nothing moves until the stop is acknowledged"),
 }
 
 

@@ -177,6 +177,9 @@ class _Line(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("What is next")
 
+    def follow_theme(self) -> None:
+        self._fit()
+
     def show_step(self, step: NextStep) -> None:
         self._step = step
         self.setAccessibleDescription(step.text)

@@ -12,11 +12,11 @@ from app import palette, theme
 
 
 class NoticeKind(Enum):
-    """How serious it is: the colour of the edge, and the word in front."""
+    """How serious it is: the colour of the edge, as a role of the palette."""
 
-    PROGRESS = palette.SKY
-    WARNING = palette.SIM
-    FAULT = palette.FAULT
+    PROGRESS = "SKY"
+    WARNING = "SIM"
+    FAULT = "FAULT"
 
 
 class Notice(QWidget):
@@ -87,7 +87,7 @@ class Notice(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        painter.setPen(QPen(QColor(self._kind.value), 2))
+        painter.setPen(QPen(QColor(palette.of(self._kind.value)), 2))
         painter.setBrush(theme.colour(palette.PANEL, 0.96))
         painter.drawRoundedRect(frame, 10, 10)
         painter.setPen(QColor(palette.TEXT))
@@ -109,5 +109,5 @@ class Notice(QWidget):
         left = track.left() - width + (track.width() + width) * self._phase
         bar = QRectF(max(left, track.left()), track.top(), 0, track.height())
         bar.setRight(min(left + width, track.right()))
-        painter.setBrush(QColor(self._kind.value))
+        painter.setBrush(QColor(palette.of(self._kind.value)))
         painter.drawRoundedRect(bar, 3, 3)

@@ -7,19 +7,21 @@ from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QWidget
 
 from app import palette, theme
+from app.palette import ON_PICTURE
 from app.widgets.overlays import Layer
 
+_SEEN = 3.0
 _SWATCH = {
-    Layer.MASKS: palette.VESSEL,
-    Layer.VESSEL: palette.VESSEL,
-    Layer.ROBOT: palette.ROBOT,
-    Layer.HEAD: palette.HEAD,
-    Layer.VECTORS: palette.ROBOT_VECTOR,
-    Layer.NEAREST: palette.NEAREST,
-    Layer.DISTANCES: palette.D_HEAD,
-    Layer.ROUTE: palette.ROUTE,
-    Layer.LOUPE: palette.TEXT,
-    Layer.GHOST: palette.GHOST,
+    Layer.MASKS: ON_PICTURE.VESSEL,
+    Layer.VESSEL: ON_PICTURE.VESSEL,
+    Layer.ROBOT: ON_PICTURE.ROBOT,
+    Layer.HEAD: ON_PICTURE.HEAD,
+    Layer.VECTORS: ON_PICTURE.ROBOT_VECTOR,
+    Layer.NEAREST: ON_PICTURE.NEAREST,
+    Layer.DISTANCES: ON_PICTURE.D_HEAD,
+    Layer.ROUTE: ON_PICTURE.ROUTE,
+    Layer.LOUPE: ON_PICTURE.TEXT,
+    Layer.GHOST: ON_PICTURE.GHOST,
 }
 
 
@@ -86,7 +88,8 @@ class _Chip(QAbstractButton):
         text_font = theme.font(12)
         left = 22.0
         if self.width() >= self.sizeHint().width():  # no room for the colour in a narrow window
-            painter.setPen(QPen(QColor(_SWATCH[self._layer]), 1.5))
+            is_lost = palette.contrast(_SWATCH[self._layer], palette.RAISED) < _SEEN  # a pale colour on a light chip
+            painter.setPen(QPen(QColor(palette.TEXT_FAINT if is_lost else _SWATCH[self._layer]), 1.5))
             painter.setBrush(QColor(_SWATCH[self._layer]) if on else Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(QRectF(left, self.height() / 2 - 4, 8, 8), 2, 2)
             left = 35.0

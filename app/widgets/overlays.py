@@ -11,7 +11,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
 
-from app import palette
+from app.palette import ON_PICTURE
 from app.scene_shapes import SceneShapes
 from app.widgets.pencil import Pencil
 from app.wording import signed_degrees
@@ -96,55 +96,55 @@ class OverlayItem(pg.GraphicsObject):
         shapes, pose = self._overlay.shapes, self._overlay.pose
         if shapes is not None:
             if Layer.VESSEL in self._visible:
-                pencil.polylines(shapes.vessel_lines, palette.VESSEL, 2.0)
+                pencil.polylines(shapes.vessel_lines, ON_PICTURE.VESSEL, 2.0)
             if Layer.ROUTE in self._visible and shapes.route is not None:
-                pencil.polylines((shapes.route,), palette.ROUTE, 4.0, Qt.PenStyle.DashLine)
+                pencil.polylines((shapes.route,), ON_PICTURE.ROUTE, 4.0, Qt.PenStyle.DashLine)
             if Layer.ROBOT in self._visible:
                 _draw_robot(pencil, shapes)
             if Layer.GHOST in self._visible and shapes.ghost is not None:
-                pencil.tube(shapes.ghost, palette.GHOST, shapes.robot_width)
+                pencil.tube(shapes.ghost, ON_PICTURE.GHOST, shapes.robot_width)
             if Layer.VECTORS in self._visible:
                 _draw_vectors(pencil, shapes, pose, -self._head_side)
             if Layer.DISTANCES in self._visible and pose is not None:
                 _draw_distances(pencil, shapes, pose, (self._head_side, self._tail_side))
             if Layer.NEAREST in self._visible and shapes.nearest is not None:
-                pencil.diamond(shapes.nearest, palette.NEAREST, 6.0)
+                pencil.diamond(shapes.nearest, ON_PICTURE.NEAREST, 6.0)
             if Layer.HEAD in self._visible and shapes.head is not None:
-                pencil.ring(shapes.head, palette.HEAD, 8.0)
+                pencil.ring(shapes.head, ON_PICTURE.HEAD, 8.0)
         if Layer.ROUTE in self._visible and self._overlay.target is not None:
-            pencil.crosshair(self._overlay.target, palette.TARGET, 13.0)
+            pencil.crosshair(self._overlay.target, ON_PICTURE.TARGET, 13.0)
             if self._overlay.target_note:
-                pencil.tag(self._overlay.target, self._overlay.target_note, palette.TARGET)
+                pencil.tag(self._overlay.target, self._overlay.target_note, ON_PICTURE.TARGET)
 
 
 def _draw_robot(pencil: Pencil, shapes: SceneShapes) -> None:
     if shapes.robot_line is not None:
-        pencil.polylines((shapes.robot_line,), palette.ROBOT, 3.0)
+        pencil.polylines((shapes.robot_line,), ON_PICTURE.ROBOT, 3.0)
     for first, second in shapes.bridges:
-        pencil.polylines((np.array([first, second]),), palette.TEXT, 2.0, Qt.PenStyle.DotLine)
+        pencil.polylines((np.array([first, second]),), ON_PICTURE.TEXT, 2.0, Qt.PenStyle.DotLine)
 
 
 def _draw_vectors(pencil: Pencil, shapes: SceneShapes, pose: Pose | None, angle_side: float) -> None:
     if shapes.vessel_vector is not None:
-        pencil.arrow(shapes.vessel_vector, palette.VESSEL_VECTOR, 3.0)
+        pencil.arrow(shapes.vessel_vector, ON_PICTURE.VESSEL_VECTOR, 3.0)
     if shapes.robot_vector is not None:
-        pencil.arrow(shapes.robot_vector, palette.ROBOT_VECTOR, 3.0)
+        pencil.arrow(shapes.robot_vector, ON_PICTURE.ROBOT_VECTOR, 3.0)
     if shapes.angle_arc is None or shapes.robot_vector is None or shapes.vessel_vector is None or pose is None:
         return
-    pencil.angle(shapes.robot_vector.start, shapes.angle_arc, palette.THETA)
+    pencil.angle(shapes.robot_vector.start, shapes.angle_arc, ON_PICTURE.THETA)
     # on the side of the vessel where the head is not: there is the least to cover
     vessel = shapes.vessel_vector
-    pencil.label_beside(vessel.center, vessel, angle_side, f"θ {signed_degrees(pose.theta_signed_deg, 0)}", palette.THETA)
+    pencil.label_beside(vessel.center, vessel, angle_side, f"θ {signed_degrees(pose.theta_signed_deg, 0)}", ON_PICTURE.THETA)
 
 
 def _draw_distances(pencil: Pencil, shapes: SceneShapes, pose: Pose, sides: tuple[float, float]) -> None:
     robot, vessel = shapes.robot_vector, shapes.vessel_vector
     if robot is None or vessel is None or shapes.head_foot is None or shapes.tail_foot is None:
         return
-    pencil.measure(shapes.head_foot, robot.end, palette.D_HEAD, Qt.PenStyle.SolidLine)
-    pencil.measure(shapes.tail_foot, robot.start, palette.D_TAIL, Qt.PenStyle.DotLine)
-    pencil.label_beside(robot.end, vessel, sides[0], f"d_head {pose.d_head_px:.0f}", palette.D_HEAD)
-    pencil.label_beside(robot.start, vessel, sides[1], f"d_tail {pose.d_tail_px:.0f}", palette.D_TAIL)
+    pencil.measure(shapes.head_foot, robot.end, ON_PICTURE.D_HEAD, Qt.PenStyle.SolidLine)
+    pencil.measure(shapes.tail_foot, robot.start, ON_PICTURE.D_TAIL, Qt.PenStyle.DotLine)
+    pencil.label_beside(robot.end, vessel, sides[0], f"d_head {pose.d_head_px:.0f}", ON_PICTURE.D_HEAD)
+    pencil.label_beside(robot.start, vessel, sides[1], f"d_tail {pose.d_tail_px:.0f}", ON_PICTURE.D_TAIL)
 
 
 def _steady_side(side: float, offset_px: float) -> float:

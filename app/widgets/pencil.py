@@ -7,7 +7,8 @@ import pyqtgraph as pg
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPolygonF, QTransform
 
-from app import palette, theme
+from app import theme
+from app.palette import ON_PICTURE
 from core.perception import polyline
 from core.types import Point, Points, Vector
 
@@ -49,7 +50,7 @@ class Pencil:
         return path
 
     def _stroke(self, path: QPainterPath, name: str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> None:
-        halo = QPen(theme.colour(palette.INK, 0.55), width + 2.0)
+        halo = QPen(theme.colour(ON_PICTURE.INK, 0.55), width + 2.0)
         halo.setCapStyle(Qt.PenCapStyle.FlatCap)
         halo.setJoinStyle(Qt.PenJoinStyle.BevelJoin)
         pen = QPen(QColor(name), width, style)
@@ -81,7 +82,7 @@ class Pencil:
         self._segment(start, end, name, width, Qt.PenStyle.SolidLine)
         tip = end + direction * 9.0
         head = QPolygonF([tip, end - direction * 5.0 + across * 7.0, end - direction * 5.0 - across * 7.0])
-        self._painter.setPen(QPen(theme.colour(palette.INK, 0.55), 1.2))
+        self._painter.setPen(QPen(theme.colour(ON_PICTURE.INK, 0.55), 1.2))
         self._painter.setBrush(QColor(name))
         self._painter.drawPolygon(head)
 
@@ -89,7 +90,7 @@ class Pencil:
         """The arc from the vessel's direction to the robot's, the vessel's direction as a thin line through the corner."""
         middle = self._at(corner)
         arc = [middle + QPointF(x, y) * _ARC_RADIUS for x, y in unit_arc.tolist()]
-        self._segment(middle, middle + (arc[0] - middle) * 1.35, palette.VESSEL_VECTOR, 1.2, Qt.PenStyle.DashLine)
+        self._segment(middle, middle + (arc[0] - middle) * 1.35, ON_PICTURE.VESSEL_VECTOR, 1.2, Qt.PenStyle.DashLine)
         path = QPainterPath(arc[0])
         for point in arc[1:]:
             path.lineTo(point)
@@ -114,10 +115,10 @@ class Pencil:
         self._painter.setPen(Qt.PenStyle.NoPen)
         self._painter.setBrush(theme.colour(name, 0.45))
         self._painter.drawPolygon(QPolygonF(edges[0] + edges[1][::-1]))
-        self._painter.setPen(QPen(theme.colour(palette.INK, 0.65), 4.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
+        self._painter.setPen(QPen(theme.colour(ON_PICTURE.INK, 0.65), 4.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
         self._painter.drawLines(dashes)
         self._painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        self._painter.setPen(QPen(QColor(palette.TEXT), 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
+        self._painter.setPen(QPen(QColor(ON_PICTURE.TEXT), 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
         self._painter.drawLines(dashes)
         self._painter.setBrush(QColor(name))
         self._painter.drawPolygon(QPolygonF([end + ahead * 1.35, end + aside, end - aside]))
@@ -156,7 +157,7 @@ class Pencil:
 
     def _text_box(self, box: QRectF, text: str, text_font: QFont, name: str) -> None:
         self._painter.setPen(Qt.PenStyle.NoPen)
-        self._painter.setBrush(theme.colour(palette.INK, 0.72))
+        self._painter.setBrush(theme.colour(ON_PICTURE.INK, 0.72))
         self._painter.drawRoundedRect(box, 4.0, 4.0)
         self._painter.setPen(QColor(name))
         self._painter.setFont(text_font)
@@ -173,7 +174,7 @@ class Pencil:
     def diamond(self, point: Point, name: str, radius: float) -> None:
         at = self._at(point)
         corners = [at + QPointF(x, y) * radius for x, y in ((0, -1), (1, 0), (0, 1), (-1, 0))]
-        self._painter.setPen(QPen(theme.colour(palette.INK, 0.8), 1.5))
+        self._painter.setPen(QPen(theme.colour(ON_PICTURE.INK, 0.8), 1.5))
         self._painter.setBrush(QColor(name))
         self._painter.drawPolygon(QPolygonF(corners))
 

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
 from app.pace import Pace
-from app.wording import QUANTITY_MEANING
+from app.tool_tips import tip
 from core.types import Tick
 
 _SAMPLES = 300
@@ -35,7 +35,7 @@ class PerformancePanel(QWidget):
         self.setMinimumSize(210, 92)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Performance")
-        self.setToolTip("\n".join(QUANTITY_MEANING[key] for key in ("shown", "engine", "dropped", "gui_block", "latency")))
+        self.setToolTip(tip("shown", "engine", "dropped", "gui_block", "latency"))
 
     @property
     def text(self) -> str:

@@ -6,7 +6,11 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSpinBox, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSpinBox, QWidget
+
+from app.menus import MenuEntry
+from app.tool_tips import tip
+from app.widgets.quiet_combo import QuietCombo
 
 _RANDOM = "random"
 _SEED_MAX = 999_999
@@ -20,14 +24,13 @@ class PhantomPicker(QWidget):
     def __init__(self, phantoms: Sequence[tuple[str, str]], current: str) -> None:
         """`phantoms` are (name, title) pairs; `current` is a name or "random:<seed>"."""
         super().__init__()
-        self._combo = _PhantomBox()
+        self._combo = QuietCombo("Phantom")
         for name, title in phantoms:
             self._combo.addItem(title, name)
         self._combo.addItem("Random \N{HORIZONTAL ELLIPSIS}", _RANDOM)
         self._combo.setMinimumWidth(190)
         self._combo.setMaxVisibleItems(16)
-        self._combo.setToolTip("The phantom that the bench twin shows")
-        self._combo.setAccessibleName("Phantom")
+        self._combo.setToolTip(f"{tip('phantom')}\nCtrl+P opens the list; so does Enter when Tab has come here")
         self._seed = _SeedBox()
         self._roll = QPushButton("New")
         self._roll.setToolTip("Another random phantom (key R)")
@@ -65,6 +68,19 @@ class PhantomPicker(QWidget):
                 self._seed.setValue(int(seed))
         self._show_seed()
 
+    def menu_entries(self) -> tuple[MenuEntry, ...]:
+        """The same by menu and key."""
+        return (
+            MenuEntry("Choose a &phantom", self.open_list, ("Ctrl+P",)),
+            MenuEntry("Another ran&dom phantom", self.roll, ("R",)),
+        )
+
+    @Slot()
+    def open_list(self) -> None:
+        """The list of phantoms, by keyboard: the arrows choose, Enter takes, Escape leaves."""
+        self._combo.setFocus()
+        self._combo.showPopup()
+
     def abandon(self) -> None:
         """Forget a seed that was typed and not confirmed."""
         self._seed.abandon()
@@ -88,21 +104,6 @@ class PhantomPicker(QWidget):
         self._seed.setEnabled(self._combo.currentData() == _RANDOM)
 
 
-class _PhantomBox(QComboBox):
-    """A list that only a click opens: a turn of the wheel must not restart the world, and the keys belong to the robot."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        event.ignore()
-
-    def hidePopup(self) -> None:
-        super().hidePopup()
-        self.clearFocus()
-
-
 class _SeedBox(QSpinBox):
     """A seed that counts when it is confirmed, not at each digit.
 
@@ -119,9 +120,9 @@ class _SeedBox(QSpinBox):
         self.setFixedWidth(104)
         self.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
         self.setKeyboardTracking(False)
-        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("Seed of the random phantom")
-        self.setToolTip("Seed of the random phantom; the same seed gives the same phantom")
+        self.setToolTip(tip("seed"))
         self._last = self.value()
         self.valueChanged.connect(self._on_value)
 

@@ -6,22 +6,23 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSlider, QSpinBox, QVBoxLayout, QWidget
 
-from app import palette, theme
+from app import theme
 from app.play_clock import SPEEDS
 from app.session_marks import JumpKind, clock_text
+from app.widgets.quiet_combo import name_list
 
 _BUTTON = 34
-_STYLE = f"""
-QPushButton {{ padding: 3px 6px; }}
-QPushButton#play {{ background: {palette.PLAYBACK}; color: {palette.INK}; font-weight: 700; font-size: 16px; }}
-QPushButton#play:focus {{ border: 2px solid {palette.TEXT}; }}
-QSlider::groove:horizontal {{ height: 6px; background: {palette.RAISED}; border-radius: 3px; }}
-QSlider::sub-page:horizontal {{ background: {palette.PLAYBACK}; border-radius: 3px; }}
-QSlider::handle:horizontal {{ background: {palette.TEXT}; width: 14px; margin: -5px 0; border-radius: 7px; }}
-QSlider::handle:horizontal:focus {{ background: {palette.SKY}; }}
-QProgressBar {{ background: {palette.RAISED}; border: 1px solid {palette.LINE}; border-radius: 5px; text-align: center;
-    color: {palette.TEXT}; font-size: 12px; }}
-QProgressBar::chunk {{ background: {palette.LINE}; border-radius: 4px; }}
+_STYLE = """
+QPushButton { padding: 3px 6px; }
+QPushButton#play { background: @PLAYBACK; color: @INK; font-weight: 700; font-size: 16px; }
+QPushButton#play:focus { border: 2px solid @TEXT; }
+QSlider::groove:horizontal { height: 6px; background: @RAISED; border-radius: 3px; }
+QSlider::sub-page:horizontal { background: @PLAYBACK; border-radius: 3px; }
+QSlider::handle:horizontal { background: @TEXT; width: 14px; margin: -5px 0; border-radius: 7px; }
+QSlider::handle:horizontal:focus { background: @SKY; }
+QProgressBar { background: @RAISED; border: 1px solid @LINE; border-radius: 5px; text-align: center;
+    color: @TEXT; font-size: 12px; }
+QProgressBar::chunk { background: @LINE; border-radius: 4px; }
 """
 
 
@@ -41,7 +42,7 @@ class PlayerBar(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setStyleSheet(_STYLE)
+        theme.set_sheet(self, _STYLE)
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setAccessibleName("Position in milliseconds")
         self.slider.setSingleStep(100)
@@ -64,13 +65,13 @@ class PlayerBar(QWidget):
         self.kind = QComboBox()
         for kind in JumpKind:
             self.kind.addItem(kind.value, kind)
-        self.kind.setAccessibleName("What N and P jump to")
+        name_list(self.kind, "What N and P jump to")
         self.kind.setToolTip("What N and P jump to  (K: the next kind)")
         self.kind.setFixedWidth(142)
         self.speed = QComboBox()
         for speed in SPEEDS:
             self.speed.addItem(f"{speed:g}\N{MULTIPLICATION SIGN}", speed)
-        self.speed.setAccessibleName("Speed")
+        name_list(self.speed, "Speed")
         self.speed.setToolTip("Speed  ([ slower, ] faster)")
         self.speed.setFixedWidth(78)
         self.clip = self._button("Clip", "Save the selection as a video, without one the session  (E)", self.clip_asked.emit)
@@ -177,5 +178,5 @@ class PlayerBar(QWidget):
 
 def _label(text: str) -> QLabel:
     label = QLabel(text)
-    label.setStyleSheet(f"color: {palette.TEXT_DIM};")
+    theme.set_sheet(label, "color: @TEXT_DIM;")
     return label

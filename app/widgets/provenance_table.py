@@ -7,8 +7,9 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.cells import NONE, TONE_COLOUR, Tone
+from app.cells import NONE, TONE_ROLE, Tone
 from app.provenance import HEADINGS, LABELS, ProvenanceRow
+from app.tool_tips import tip
 
 LATENCY_LIMIT_MS = 100.0
 _LABEL_WIDTH = 100.0
@@ -28,12 +29,7 @@ class ProvenanceTable(QWidget):
         self.setMinimumSize(300, _ROWS * 17)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Advice, commands and what was sent")
-        self.setToolTip(
-            "Bend and pitch: share of the tendons' full pull; advised: the turn in degrees. \N{NOT EQUAL TO}: the gate sent "
-            "something else than was asked for.\nCapture to servo: from the picture to the command made of it "
-            f"(should be below {LATENCY_LIMIT_MS:.0f} ms).\n"
-            "Following: how far your motions of the last ten seconds agreed with the advice."
-        )
+        self.setToolTip(tip("commands", "capture_to_servo", "following"))
 
     @property
     def text(self) -> str:
@@ -123,5 +119,5 @@ def _paint_row(painter: QPainter, box: QRectF, row: ProvenanceRow, width: float,
         place = QRectF(_LABEL_WIDTH + k * width, box.top(), width - 4, box.height())
         text_font = theme.semi_bold(size) if strong or cell.tone >= Tone.WARN else theme.font(size)
         painter.setFont(theme.fitted(text_font, cell.text, int(place.width())))
-        painter.setPen(QPen(QColor(TONE_COLOUR[cell.tone])))
+        painter.setPen(QPen(QColor(palette.of(TONE_ROLE[cell.tone]))))
         painter.drawText(place, _LEFT, cell.text)

@@ -8,7 +8,7 @@ from PySide6.QtCore import QTimer, Signal, Slot
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
 
-from app import palette, theme
+from app import theme
 
 _OPEN_MS = 20_000
 BUTTON_STYLE = "padding: 0 9px; min-height: 20px; font-size: 12px;"
@@ -27,7 +27,7 @@ class QuestionStrip(QWidget):
         self._action: Callable[[], None] | None = None
         self._text = ""
         self._question = QLabel()
-        self._question.setStyleSheet(f"color: {palette.ORANGE}; font-size: 12px; font-weight: 600;")
+        theme.set_sheet(self._question, "color: @ORANGE; font-size: 12px; font-weight: 600;")
         self._yes = QPushButton()
         self._no = QPushButton("Cancel")
         for button in (self._yes, self._no):

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from app import palette, theme
 from core.session.manifest import Manifest
 
-_COLOUR = {"SIM": palette.SIM, "LIVE": palette.LIVE, "PLAYBACK": palette.PLAYBACK}
+_KNOWN = ("SIM", "LIVE", "PLAYBACK")
 _HEIGHT = 34
 
 
@@ -36,7 +36,7 @@ class RecordedPlate(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        colour = QColor(_COLOUR.get(self._kind, palette.FAULT))
+        colour = QColor(palette.of(self._kind if self._kind in _KNOWN else "FAULT"))
         word, word_font = f"recorded {self._kind}", theme.bold(14)
         plate = QRectF(1, 3, QFontMetrics(word_font).horizontalAdvance(word) + 24, _HEIGHT - 6)
         pen = QPen(colour, 2, Qt.PenStyle.DashLine)

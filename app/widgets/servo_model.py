@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QStyledItemDelegate, QStyleOptionViewItem, QTableView
 
 from app import palette, theme
-from app.cells import TONE_COLOUR, Cell, Row, Tone, Track
+from app.cells import TONE_ROLE, Cell, Row, Tone, Track
 from app.servo_cells import Column
 
 _COLUMNS = tuple(Column)
@@ -19,10 +19,10 @@ _WIDTHS = {
 }  # fmt: skip
 """Least width in px, and share of what is left."""
 _HEADER, _ROW = 19, (15, 34)
-_STYLE = f"""
-QTableView {{ background: {palette.PANEL}; border: none; }}
-QHeaderView::section {{ background: {palette.PANEL}; color: {palette.TEXT_FAINT}; border: none;
-    border-bottom: 1px solid {palette.LINE}; font-size: 10px; padding: 0 3px; }}
+_STYLE = """
+QTableView { background: @PANEL; border: none; }
+QHeaderView::section { background: @PANEL; color: @TEXT_FAINT; border: none;
+    border-bottom: 1px solid @LINE; font-size: 10px; padding: 0 3px; }
 """
 _PAD = 3.0
 _NUMBER_PX = 48.0
@@ -87,7 +87,7 @@ class ServoView(QTableView):
         super().__init__()
         self.setModel(model)
         self.setItemDelegate(ServoDelegate(self))
-        self.setStyleSheet(_STYLE)
+        theme.set_sheet(self, _STYLE)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -129,14 +129,14 @@ class ServoDelegate(QStyledItemDelegate):
         if index.row() % 2:
             painter.fillRect(box, theme.colour(palette.RAISED, 0.45))
         if cell.tone >= Tone.WARN:
-            painter.fillRect(box.adjusted(1, 0, -1, 0), theme.colour(TONE_COLOUR[cell.tone], 0.16))
+            painter.fillRect(box.adjusted(1, 0, -1, 0), theme.colour(palette.of(TONE_ROLE[cell.tone]), 0.16))
         size = 14 if box.height() >= 26 else 13 if box.height() >= 21 else 12
         text_font = theme.semi_bold(size) if column is Column.JOINT or cell.tone >= Tone.WARN else theme.font(size)
         inside = box.adjusted(_PAD, 0, -_PAD, 0)
         if cell.track is not None:
             _paint_track(painter, inside.adjusted(2, 0, -_NUMBER_PX, 0), cell.track, cell.tone)
         painter.setFont(theme.fitted(text_font, cell.text, int(inside.width()), 9))
-        painter.setPen(QColor(TONE_COLOUR[cell.tone]))
+        painter.setPen(QColor(palette.of(TONE_ROLE[cell.tone])))
         side = Qt.AlignmentFlag.AlignLeft if column in _LEFT else Qt.AlignmentFlag.AlignRight
         painter.drawText(inside, side | Qt.AlignmentFlag.AlignVCenter, theme.elide(painter.font(), cell.text, int(inside.width())))
         painter.restore()
@@ -160,5 +160,5 @@ def _paint_track(painter: QPainter, box: QRectF, track: Track, tone: Tone) -> No
         painter.setPen(QPen(QColor(palette.TEXT_DIM), 1.5))
         painter.drawLine(QPointF(x(track.goal), strip.top() - 3), QPointF(x(track.goal), strip.bottom() + 3))
     painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(palette.SKY if tone < Tone.WARN else TONE_COLOUR[tone]))
+    painter.setBrush(QColor(palette.of("SKY" if tone < Tone.WARN else TONE_ROLE[tone])))
     painter.drawRect(QRectF(x(track.at) - 2.5, strip.top() - 1, 5.0, strip.height() + 2))

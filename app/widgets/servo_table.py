@@ -19,8 +19,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app import palette
-from app.cells import TONE_COLOUR, Cell, Tone
+from app import theme
+from app.cells import TONE_ROLE, Cell, Tone
 from app.pace import Pace
 from app.servo_cells import bus_line, pair_balances, servo_rows
 from app.widgets.question_strip import BUTTON_STYLE, QuestionStrip
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _SHOW_EVERY_S = 0.2
 _SILENT_AFTER_S = 1.0
-_LINE_COLOUR = {**TONE_COLOUR, Tone.PLAIN: palette.TEXT_DIM}
+_LINE_ROLE = {**TONE_ROLE, Tone.PLAIN: "TEXT_DIM"}
 
 
 class ServoTable(QWidget):
@@ -172,7 +172,7 @@ class ServoTable(QWidget):
         if line.text != self._bus.text():
             self._bus.setText(line.text)
             self._bus.setToolTip(line.tip)
-            self._bus.setStyleSheet(f"color: {_LINE_COLOUR[line.tone]}; font-size: 12px;")
+            theme.set_sheet(self._bus, f"color: @{_LINE_ROLE[line.tone]}; font-size: 12px;")
 
     def _offer(self) -> None:
         free = self._reachable and not self._armed

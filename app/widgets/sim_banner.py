@@ -17,17 +17,22 @@ class BannerText:
     """Word, colour, a note that fits beside it, and the explanation."""
 
     word: str
-    colour: str
+    role: str
     note: str
     meaning: str
 
+    @property
+    def colour(self) -> str:
+        """In the scheme in use."""
+        return palette.of(self.role)
+
 
 BANNERS = {
-    RigKind.SIM: BannerText("SIM", palette.SIM, "simulated bench twin", "Everything here is simulated; no hardware moves"),
-    RigKind.LIVE: BannerText("LIVE", palette.LIVE, "real servos move", "Commands move real servos. Keep the power cut in reach"),
-    RigKind.PLAYBACK: BannerText("PLAYBACK", palette.PLAYBACK, "recorded, not live", "Nothing here is happening now"),
+    RigKind.SIM: BannerText("SIM", "SIM", "simulated bench twin", "Everything here is simulated; no hardware moves"),
+    RigKind.LIVE: BannerText("LIVE", "LIVE", "real servos move", "Commands move real servos. Keep the power cut in reach"),
+    RigKind.PLAYBACK: BannerText("PLAYBACK", "PLAYBACK", "recorded, not live", "Nothing here is happening now"),
 }
-_LOOK_ONLY = BannerText("LIVE", palette.LIVE, "real camera, no servos", "A real camera looks; no servos that could move")
+_LOOK_ONLY = BannerText("LIVE", "LIVE", "real camera, no servos", "A real camera looks; no servos that could move")
 
 
 class SimBanner(QWidget):

@@ -10,12 +10,13 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
 from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
-from app.wording import REASON_TEXT, STATE_MEANING, STATE_TITLE, refusal_line, why_line
+from app.tool_tips import tip
+from app.wording import REASON_TEXT, STATE_TITLE, refusal_line, why_line
 from core.config import PoseConfig
 from core.types import PoseState, Scene
 
 _HEIGHT = 104
-_MEANINGS = "\n".join(STATE_MEANING.values())
+_MEANINGS = tip("state", "confidence")
 _WRAPPED = int(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap)
 
 
@@ -33,6 +34,9 @@ class StateBadge(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Pose state")
         self.setToolTip(_MEANINGS)
+
+    def set_limits(self, limits: PoseConfig) -> None:
+        self._limits = limits
 
     @property
     def letter(self) -> str:
@@ -114,10 +118,10 @@ def paint_state(painter: QPainter, box: QRectF, state: PoseState | None) -> None
         painter.setPen(QPen(QColor(name), max(2.0, side / 28), Qt.PenStyle.DashLine))
         painter.setBrush(Qt.BrushStyle.NoBrush)
     else:
-        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setPen(theme.edge_of(name))
         painter.setBrush(QColor(name))
     painter.drawPolygon(outline)
-    painter.setPen(QColor(palette.INK if state is not None else palette.TEXT_DIM))
+    painter.setPen(QColor(palette.STATE_INK if state is not None else palette.TEXT_DIM))
     painter.setFont(theme.bold(max(9, round(side * LETTER_HEIGHT[state]))))
     letter = state.value if state is not None else "\N{EN DASH}"
     painter.drawText(box.translated(0, side * LETTER_DROP.get(state, 0.0)), Qt.AlignmentFlag.AlignCenter, letter)

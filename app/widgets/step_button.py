@@ -14,13 +14,13 @@ from app.next_step import Step
 from app.widgets.signs import paint_key_cap
 
 # a button has the colour of the mode that it leads to
-_COLOUR = {
-    Step.SERVOS_ON: palette.SKY,
-    Step.ACKNOWLEDGE: palette.TEXT,
-    Step.ARM: palette.ORANGE,
-    Step.HAND_OVER: palette.GREEN,
-    Step.TAKE_BACK: palette.SKY,
-    Step.DISARM: palette.TEXT_DIM,
+_ROLE = {
+    Step.SERVOS_ON: "SKY",
+    Step.ACKNOWLEDGE: "TEXT",
+    Step.ARM: "ORANGE",
+    Step.HAND_OVER: "GREEN",
+    Step.TAKE_BACK: "SKY",
+    Step.DISARM: "TEXT_DIM",
 }
 DOUBLE_PRESS_S = 0.4
 
@@ -90,7 +90,7 @@ class StepButton(QAbstractButton):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        colour = QColor(_COLOUR[self._step])
+        colour = QColor(palette.of(_ROLE[self._step]))
         inviting = self._filled and self._granted and self.isEnabled()
         back = colour if inviting else QColor(palette.RAISED)
         ink = QColor(palette.INK if inviting else palette.TEXT if self.isEnabled() and self._granted else palette.TEXT_DIM)
@@ -98,7 +98,7 @@ class StepButton(QAbstractButton):
             back, ink = QColor(palette.WINDOW), QColor(palette.TEXT_FAINT)
         edge = QColor(palette.TEXT) if self.hasFocus() or (self.underMouse() and self.isEnabled()) else QColor(palette.LINE)
         if self._filled and self.isEnabled() and not inviting and not self.underMouse():
-            edge = theme.colour(_COLOUR[self._step], 0.6)
+            edge = theme.colour(palette.of(_ROLE[self._step]), 0.6)
         painter.setPen(QPen(edge, 1.5, Qt.PenStyle.SolidLine if self._granted else Qt.PenStyle.DashLine))
         painter.setBrush(back.darker(125) if self.isDown() else back)
         painter.drawRoundedRect(frame, 6, 6)

@@ -7,11 +7,12 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.cells import NONE, TONE_COLOUR, Tone, number
+from app.cells import NONE, TONE_ROLE, Tone, number
 from app.servo_cells import PairBalance
+from app.tool_tips import tip
 
 _HEIGHT = 33
-_COLOUR = {**TONE_COLOUR, Tone.PLAIN: palette.ALLOWED}
+_ROLE = {**TONE_ROLE, Tone.PLAIN: "ALLOWED"}
 _RANGE = 1.25
 
 
@@ -28,11 +29,7 @@ class TendonBalance(QWidget):
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Balance of the tendon pairs")
-        self.setToolTip(
-            "Two wires that pull against each other: the sum of their pulls should be twice the pretension.\n"
-            "Bar to the left: slack. Bar to the right: too tight. In N: tension of either wire as the motor's current tells it,\n"
-            "friction included."
-        )
+        self.setToolTip(tip("tendon_balance"))
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -83,7 +80,7 @@ def _forces(pair: PairBalance) -> str:
 
 def _paint_pair(painter: QPainter, box: QRectF, pair: PairBalance) -> None:
     text_box = QRectF(box.left(), box.top(), box.width(), 16)
-    name = _COLOUR[pair.tone]
+    name = palette.of(_ROLE[pair.tone])
     warns = pair.tone >= Tone.WARN
     title = f"! {_title(pair)} {pair.word}:" if warns else f"{_title(pair)} "
     right = _forces(pair).removeprefix(", ")

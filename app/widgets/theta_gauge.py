@@ -9,7 +9,8 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygon
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.wording import QUANTITY_MEANING, side, signed_degrees
+from app.tool_tips import tip
+from app.wording import side, signed_degrees
 from core.types import Pose
 
 _OVERFLOW_DEG = 22.0
@@ -32,7 +33,7 @@ class ThetaGauge(QWidget):
         self.setMinimumSize(200, 100)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("theta")
-        self.setToolTip(QUANTITY_MEANING["theta"])
+        self.setToolTip(tip("theta"))
 
     @property
     def text(self) -> str:
@@ -55,6 +56,13 @@ class ThetaGauge(QWidget):
         if renew_text or changed:
             self._number = self._theta_deg
             self.setAccessibleDescription(f"theta {self.text} {self.direction}")
+        self.update()
+
+    def follow_theme(self) -> None:
+        self._scale = None
+
+    def set_allowed(self, theta_allow_deg: float) -> None:
+        self._allow_deg, self._scale = theta_allow_deg, None
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:

@@ -25,6 +25,7 @@ from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from app import palette, theme
 from app.session_marks import MARK_LOOK, Course, clock_text, event_line
+from app.tool_tips import tip
 from app.widgets.mode_badge import MODE_LOOK
 from app.widgets.timeline_paint import curves, extents, paint_band, paint_mark
 from app.wording import signed_degrees
@@ -83,6 +84,7 @@ class TimelineView(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.setMouseTracking(True)
         self.setAccessibleName("Timeline")
+        self.setToolTip(tip("timeline"))
 
     def sizeHint(self) -> QSize:
         return QSize(800, 128)
@@ -164,6 +166,9 @@ class TimelineView(QWidget):
         return min(max(0.0, self._from_s + share * self._span_s), longest_s)
 
     # ---- painting
+
+    def follow_theme(self) -> None:
+        self._picture = None
 
     def paintEvent(self, event: QPaintEvent) -> None:
         ratio = self.devicePixelRatioF()
@@ -249,7 +254,7 @@ class TimelineView(QWidget):
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             if last - first > 14 * ratio and states[first] >= 0:
                 room = QRectF(lane.left() + first / ratio, lane.top(), (last - first) / ratio, lane.height())
-                painter.setPen(QColor(palette.INK))
+                painter.setPen(QColor(palette.STATE_INK))
                 painter.drawText(room, Qt.AlignmentFlag.AlignCenter, tuple(PoseState)[int(states[first])].value)
 
     def _paint_gaps(self, painter: QPainter, course: Course, lanes: _Lanes) -> None:

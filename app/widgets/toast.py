@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QLabel, QWidget
 
-from app import palette
+from app import theme
 
 _SHOWN_MS = 6000
 
@@ -20,6 +20,7 @@ class Toast(QLabel):
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._lift_px = 0
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.timeout.connect(self.hide)
@@ -27,10 +28,10 @@ class Toast(QLabel):
         self.hide()
 
     def show_message(self, text: str, *, is_fault: bool = False) -> None:
-        edge = palette.FAULT if is_fault else palette.LINE
-        self.setStyleSheet(
-            f"background: {palette.RAISED}; color: {palette.TEXT}; border: 1px solid {edge}; border-radius: 8px; padding: 8px 16px;"
-            "font-size: 14px;"
+        edge = "@FAULT" if is_fault else "@LINE"
+        theme.set_sheet(
+            self,
+            f"background: @RAISED; color: @TEXT; border: 1px solid {edge}; border-radius: 8px; padding: 8px 16px; font-size: 14px;",
         )
         self.setText(text)
         self.setAccessibleName(text)
@@ -38,6 +39,12 @@ class Toast(QLabel):
         self.show()
         self.raise_()
         self._timer.start(_SHOWN_MS)
+
+    def lift(self, height_px: int) -> None:
+        """Stay so far above the lower edge, where something else lies."""
+        self._lift_px = height_px
+        if self.isVisible():
+            self._place()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize and self.isVisible():
@@ -49,4 +56,4 @@ class Toast(QLabel):
         widest = max(200, room.width() - 40)
         self.setFixedWidth(min(widest, self.fontMetrics().horizontalAdvance(self.text()) + 60))
         self.setFixedHeight(self.heightForWidth(self.width()))
-        self.move((room.width() - self.width()) // 2, room.height() - self.height() - 16)
+        self.move((room.width() - self.width()) // 2, room.height() - self.height() - 16 - self._lift_px)

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette, theme
 from app.pace import Pace
+from app.tool_tips import tip
 from core.config import PoseConfig
 from core.types import PoseState, Scene
 
@@ -45,9 +46,8 @@ class TrendPlot(QWidget):
         self._has_distances = True
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Trends of theta, d_head and d_tail over the last 30 seconds")
-        self.setToolTip("theta (above), d_head and d_tail (below, dotted) and the state over the last 30 s; gaps: no pose")
+        self.setToolTip(tip("trends"))
         view = pg.GraphicsLayoutWidget()
-        view.setBackground(palette.PANEL)
         view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         view.viewport().setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         view.ci.layout.setContentsMargins(0, 4, 14, 0)
@@ -58,12 +58,27 @@ class TrendPlot(QWidget):
         column.addWidget(view)
         self._angle = _Chart(view, 0, _ANGLE_RANGES, is_signed=True, allowed=limits.theta_allow_deg)
         self._distance = _Chart(view, 1, _DISTANCE_RANGES, is_signed=False, allowed=limits.d_allow_px)
-        self._curves = (
-            self._angle.add_curve(palette.THETA),
-            self._distance.add_curve(palette.D_HEAD),
-            self._distance.add_curve(palette.D_TAIL, Qt.PenStyle.DotLine),
-        )
+        self._curves = (self._angle.add_curve(), self._distance.add_curve(), self._distance.add_curve())
         self._band = _StateBand(view, 2)
+        self._view = view
+        self.follow_theme()
+
+    def follow_theme(self) -> None:
+        """Ground, axes, curves and bands in the colours of the scheme."""
+        self._view.setBackground(palette.PANEL)
+        solid = Qt.PenStyle.SolidLine
+        looks = ((palette.THETA, solid), (palette.D_HEAD, solid), (palette.D_TAIL, Qt.PenStyle.DotLine))
+        for curve, (name, style) in zip(self._curves, looks, strict=True):
+            pen = QPen(QColor(name), 1.5, style)
+            pen.setCosmetic(True)
+            curve.setPen(pen)
+        for part in (self._angle, self._distance, self._band):
+            part.take_colours()
+
+    def set_limits(self, limits: PoseConfig) -> None:
+        """Other limits for the bands of what is allowed."""
+        self._angle.set_allowed(limits.theta_allow_deg)
+        self._distance.set_allowed(limits.d_allow_px)
 
     @property
     def has_distances(self) -> bool:
@@ -124,11 +139,14 @@ def _add_box(view: pg.GraphicsLayoutWidget, row: int) -> pg.ViewBox:
     return box
 
 
+def _colour_axis(axis: pg.AxisItem) -> None:
+    axis.setPen(QPen(QColor(palette.LINE)))
+    axis.setTextPen(QPen(QColor(palette.TEXT_DIM)))
+
+
 def _add_axis(view: pg.GraphicsLayoutWidget, row: int, side: str, box: pg.ViewBox) -> pg.AxisItem:
     axis = pg.AxisItem(side)
     axis.linkToView(box)
-    axis.setPen(QPen(QColor(palette.LINE)))
-    axis.setTextPen(QPen(QColor(palette.TEXT_DIM)))
     axis.setStyle(tickFont=theme.font(theme.Size.LABEL), tickLength=-3, hideOverlappingLabels=False)
     axis.setStyle(autoExpandTextSpace=False, autoReduceTextSpace=False)
     view.addItem(axis, row, 0 if side == "left" else 1)
@@ -148,21 +166,21 @@ class _Chart:
         self._box = _add_box(view, row)
         self._axis = _add_axis(view, row, "left", self._box)
         self._axis.setWidth(40)
-        band = pg.LinearRegionItem(
-            (-allowed if is_signed else 0.0, allowed),
-            orientation="horizontal",
-            movable=False,
-            brush=theme.colour(palette.ALLOWED, 0.16),
-            pen=QPen(theme.colour(palette.ALLOWED, 0.0)),
-        )
-        band.setZValue(-10)
-        self._box.addItem(band, ignoreBounds=True)
+        self._band = pg.LinearRegionItem(orientation="horizontal", movable=False, pen=QPen(QColor(0, 0, 0, 0)))
+        self._band.setZValue(-10)
+        self._box.addItem(self._band, ignoreBounds=True)
+        self.set_allowed(allowed)
         self.fit(np.full((1, 1), np.nan))
 
-    def add_curve(self, colour_name: str, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> pg.PlotCurveItem:
-        pen = QPen(QColor(colour_name), 1.5, style)
-        pen.setCosmetic(True)
-        curve = pg.PlotCurveItem(pen=pen, connect="finite")
+    def take_colours(self) -> None:
+        _colour_axis(self._axis)
+        self._band.setBrush(theme.colour(palette.ALLOWED, 0.16))
+
+    def set_allowed(self, allowed: float) -> None:
+        self._band.setRegion((-allowed if self._is_signed else 0.0, allowed))
+
+    def add_curve(self) -> pg.PlotCurveItem:
+        curve = pg.PlotCurveItem(connect="finite")
         self._box.addItem(curve, ignoreBounds=True)
         return curve
 
@@ -196,15 +214,20 @@ class _StateBand:
         box = _add_box(view, row)
         box.setYRange(0.0, 1.0, padding=0)
         box.setFixedHeight(8)
-        bottom = _add_axis(view, row + 1, "bottom", box)
+        self._axis = bottom = _add_axis(view, row + 1, "bottom", box)
         bottom.setHeight(18)
         bottom.setTicks([[(float(s), f"\N{MINUS SIGN}{-s}" if s else "0 s") for s in (-30, -20, -10, 0)]])
-        colours = [theme.colour(palette.LINE, 0.6)] + [QColor(palette.STATE_COLOUR[state]) for state in PoseState]
-        self._table = np.array([[c.red(), c.green(), c.blue(), c.alpha()] for c in colours], np.uint8)
         self._cells_s = np.arange(-SPAN_S + _CELL_S / 2, 0.0, _CELL_S)
         self._image = pg.ImageItem(axisOrder="row-major")
         box.addItem(self._image, ignoreBounds=True)
-        self.show(np.zeros(0), np.zeros(0, np.uint8))
+        self._cells = np.zeros(len(self._cells_s), np.uint8)
+        self.take_colours()
+
+    def take_colours(self) -> None:
+        _colour_axis(self._axis)
+        colours = [theme.colour(palette.LINE, 0.6)] + [QColor(palette.STATE_COLOUR[state]) for state in PoseState]
+        self._table = np.array([[c.red(), c.green(), c.blue(), c.alpha()] for c in colours], np.uint8)
+        self._paint()
 
     def show(self, ago_s: np.ndarray, states: np.ndarray) -> None:
         cells = np.zeros(len(self._cells_s), np.uint8)
@@ -212,5 +235,9 @@ class _StateBand:
             newest = np.searchsorted(ago_s, self._cells_s + _CELL_S, side="right") - 1
             fresh = (newest >= 0) & (self._cells_s - ago_s[np.maximum(newest, 0)] < _HOLD_S)
             cells[fresh] = states[newest[fresh]]
-        self._image.setImage(self._table[cells][None], autoLevels=False)
+        self._cells = cells
+        self._paint()
+
+    def _paint(self) -> None:
+        self._image.setImage(self._table[self._cells][None], autoLevels=False)
         self._image.setRect(QRectF(-SPAN_S, 0.0, SPAN_S, 1.0))

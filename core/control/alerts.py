@@ -21,6 +21,7 @@ class Note(StrEnum):
 
     REACHED = "destination reached"
     AT_END = "joint at its end"
+    NEW_TARGET = "destination changed"
 
 
 AlertKey = Cause | Hindrance | RejectReason | Note
@@ -73,7 +74,7 @@ _FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
     Cause.CAMERA_LOST: ("Camera lost", "plug the camera in and start again, then acknowledge"),
     Cause.CAMERA_FROZEN: ("The camera gives the same picture", "start the camera again, then acknowledge"),
     Cause.WRONG_FORMAT: ("The camera's picture has the wrong format", "set the camera's size and colour format, then acknowledge"),
-    Cause.CAMERA_MOVED: ("The camera was moved", "put it back or set the rig up again, then acknowledge"),
+    Cause.CAMERA_MOVED: ("The camera was moved", "put it back, or start again with F5, then acknowledge"),
     Cause.FRAMES_LOST_LONG: ("Too many camera frames lost", "check the USB port and cable, then acknowledge"),
     Cause.MODEL_UNFIT: ("The model is missing or damaged", "put the model back or choose another one in the configuration"),
     Cause.SEVERAL_ROBOTS: ("Several robots in view", "leave one robot in the picture, then acknowledge"),
@@ -98,6 +99,7 @@ _FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
     Cause.NO_TARGET: ("No way to a destination", "click a destination ahead of the robot"),
     Cause.DEADMAN: ("Deadman released", "press it again at once, or hand over again"),
     Cause.FRAMES_DROPPED: ("The camera drops frames", "check the USB port and cable"),
+    Cause.OUT_OF_ORDER: ("The camera's pictures come out of order", "nothing to do: late ones are left out; check the driver"),
     Cause.WARM: ("A servo is getting hot", "pause soon and let it cool"),
     Cause.VOLTAGE_SAGS: ("The servos' supply voltage sags", "check the power supply"),
     Cause.DISK_LOW: ("The disk is nearly full", "make room or end the recording"),
@@ -107,6 +109,7 @@ _FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
 
 _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Note.REACHED: ("Destination reached", "you drive again: choose the next one, or go on by hand"),
+    Note.NEW_TARGET: ("Another destination: you drive again", "hand over again to go there"),
     Note.AT_END: ("A joint is at the end of its travel", "drive the other way"),
     Hindrance.IS_STOPPED: ("Stopped", "acknowledge the stop first"),
     Hindrance.UNACKNOWLEDGED: ("A fault is not acknowledged", "read it and acknowledge it"),

@@ -14,6 +14,14 @@ _REST = Command()
 
 
 @dataclass(frozen=True, slots=True)
+class LeftOver:
+    """What a rig that is opened again takes over from the one before: the cause that nobody has acknowledged yet."""
+
+    fault: Fault
+    stopped: bool
+
+
+@dataclass(frozen=True, slots=True)
 class DriveView:
     """Who drives, what hinders, and what was advised, asked for, commanded and sent, each by itself.
 
@@ -61,7 +69,11 @@ class DriveView:
 
 @dataclass(frozen=True, slots=True)
 class DriveNews:
-    """Alerts of the turns since the window last looked, oldest first; none is lost when the window is slow."""
+    """What happened in the turns since the window last looked, oldest first; none of it is lost when the window is slow.
+
+    ``changes`` are the views in which mode, faults or the latched cause changed: the record of driving does not depend on pictures.
+    """
 
     view: DriveView
     alerts: tuple[Alert, ...] = ()
+    changes: tuple[DriveView, ...] = ()

@@ -9,10 +9,11 @@ from collections.abc import Callable
 from typing import Protocol
 
 from core.control.faults import Cause, Fault
+from core.control.frame_reports import is_picture
 from core.control.pilot import Pilot
 from core.control.pilot_loop import PilotLoop
 from core.devices import Camera, CameraLost, DeviceError, EndOfStream, Robot
-from core.types import Advice, Frame, Point, RobotStatus, Scene, Tick
+from core.types import Advice, Frame, Point, Reason, Refusal, RobotStatus, Scene, Tick
 
 
 class Perceive(Protocol):
@@ -32,6 +33,7 @@ class Engine:
     on_close : closes the rig.
     pilot : advises and drives the rig's robot; None when there is no robot. Its turns begin now.
     robot : whose status goes into the ticks.
+    turns_pilot : False: the caller turns the pilot himself, in lock-step.
     """
 
     def __init__(
@@ -42,6 +44,8 @@ class Engine:
         on_close: Callable[[], None],
         pilot: Pilot | None = None,
         robot: Robot | None = None,
+        *,
+        turns_pilot: bool = True,
     ) -> None:
         self._camera = camera
         self._perceive = perceive
@@ -50,7 +54,7 @@ class Engine:
         self._robot = robot
         self.pilot = pilot
         self.problem: str | None = None
-        self._loop = PilotLoop(pilot) if pilot is not None else None
+        self._loop = PilotLoop(pilot) if pilot is not None and turns_pilot else None
         self._lock = threading.Lock()
         self._target: Point | None = None
         self._last_index: int | None = None
@@ -73,7 +77,7 @@ class Engine:
         if self._loop is not None and self._loop.failure is not None:
             raise DeviceError(self._loop.failure)
         frame = self._read(timeout_s)
-        if frame is None:
+        if frame is None or self._is_late(frame):
             if self.pilot is not None:
                 self.pilot.worker_alive()
             return None
@@ -82,12 +86,18 @@ class Engine:
             target = self._target
         if self.pilot is not None:
             self.pilot.frame_arrived(frame)
+        if not is_picture(frame.image):
+            self._refuse(frame)
+            return None
         scene = self._perceive(frame, target)
         status = self._status()
+        with self._lock:
+            # what was understood with another destination in mind says nothing about the way to this one
+            has_target = target is not None and target == self._target
         if self.pilot is None:
             advice, sent = self._policy(scene), None
         else:
-            advice = self.pilot.see(frame, scene, status, has_target=target is not None)
+            advice = self.pilot.see(frame, scene, status, has_target=has_target)
             sent = self.pilot.view.sent
         return Tick(frame, scene, advice, sent, status, self._dropped, self._rate())
 
@@ -119,17 +129,38 @@ class Engine:
             return None
 
     def set_target(self, point: Point | None) -> None:
-        """The operator's destination in source pixels; None clears it."""
+        """The operator's destination in source pixels; None clears it. A change ends a hand-over that is under way."""
         with self._lock:
-            self._target = point
+            changed, self._target = point != self._target, point
+        if changed and self.pilot is not None:
+            self.pilot.target_changed()
 
     def close(self) -> None:
         """Hold the robot and close the rig."""
         try:
             if self._loop is not None:
                 self._loop.close()
+            elif self.pilot is not None:
+                self.pilot.close()
         finally:
             self._on_close()
+
+    def _refuse(self, frame: Frame) -> None:
+        """A picture that is none is not looked at, shown or recorded; that it came, and what is wrong with it, is told."""
+        shape = "x".join(map(str, frame.image.shape))
+        self.problem = f"the camera's picture is {frame.image.dtype} {shape}, not 8-bit RGB: set its colour format"
+        if self.pilot is not None:
+            scene = Scene(frame.index, frame.captured_s, (0, 0), 1.0, refusal=Refusal(Reason.UNREADABLE, self.problem))
+            self.pilot.see(frame, scene, None, has_target=False)
+
+    def _is_late(self, frame: Frame) -> bool:
+        """Overtaken by a newer one, by number and by time: a camera that was opened again counts anew, but at a later time."""
+        if self._last_index is None or frame.index >= self._last_index or frame.captured_s >= self._times[-1]:
+            return False
+        self._dropped += 1
+        if self.pilot is not None:
+            self.pilot.frame_late()
+        return True
 
     def _count(self, frame: Frame) -> None:
         if self._last_index is not None:

@@ -78,6 +78,7 @@ class Cause(StrEnum):
     NO_TARGET = "no way to a destination"
     DEADMAN = "deadman released"
     FRAMES_DROPPED = "frames dropped"
+    OUT_OF_ORDER = "pictures out of order"
     WARM = "servo getting hot"
     VOLTAGE_SAGS = "supply voltage sags"
     DISK_LOW = "disk nearly full"
@@ -119,7 +120,7 @@ _TABLE: dict[tuple[Area, Reaction], tuple[Cause, ...]] = {
         Cause.FRAMES_LOST_LONG,
     ),
     (Area.CAMERA, Reaction.HOLD): (Cause.CAMERA_SILENT, Cause.IMAGE_BLACK, Cause.IMAGE_WHITE, Cause.FRAMES_LOST),
-    (Area.CAMERA, Reaction.WARN): (Cause.FRAMES_DROPPED,),
+    (Area.CAMERA, Reaction.WARN): (Cause.FRAMES_DROPPED, Cause.OUT_OF_ORDER),
     (Area.PERCEPTION, Reaction.DISARM): (
         Cause.MODEL_UNFIT,
         Cause.SEVERAL_ROBOTS,

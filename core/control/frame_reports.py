@@ -7,11 +7,13 @@ import math
 import numpy as np
 
 from core.control.frame_watch import FrameReport, RouteState
+from core.control.landmarks import Landmarks
 from core.control.pursuit import look_ahead
 from core.policy_config import PursuitConfig
-from core.types import Advice, Frame, Image, Scene
+from core.types import Advice, Frame, Image, Reason, Scene
 
 _SAMPLE = 16
+_NOTHING_SEEN = frozenset({Reason.BLACK, Reason.WHITE, Reason.UNREADABLE})
 
 
 class FrameReports:
@@ -21,14 +23,15 @@ class FrameReports:
         self._config = config
         self._before: Frame | None = None
         self._shape: tuple[int, ...] | None = None
+        self._landmarks = Landmarks()
 
     def report(self, frame: Frame, scene: Scene, advice: Advice | None, *, has_target: bool) -> FrameReport:
         """The report of a frame, what was understood of it and what was advised."""
         before, self._before = self._before, frame
-        image = frame.image
-        well_formed = image.dtype == np.uint8 and image.ndim == 3 and image.shape[2] == 3
+        image, well_formed = frame.image, is_picture(frame.image)
         if well_formed and self._shape is None:
             self._shape = image.shape
+        format_ok = well_formed and image.shape == self._shape
         return FrameReport(
             index=frame.index,
             captured_s=frame.captured_s,
@@ -36,17 +39,29 @@ class FrameReports:
             confidence=scene.pose.confidence if scene.pose is not None else 0.0,
             route=self._route(scene, has_target),
             finite=_is_finite(scene) and is_finite(advice),
-            format_ok=well_formed and image.shape == self._shape,
+            format_ok=format_ok,
             same_picture=before is not None and _same(before.image, image),
             delivered=1 if before is None else max(1, frame.index - before.index),
             lost=0 if before is None else max(0, frame.lost - before.lost),
+            drift_px=self._drift_px(frame, scene) if format_ok else None,
         )
+
+    def _drift_px(self, frame: Frame, scene: Scene) -> float | None:
+        """Of a picture in which nothing can be told, nothing is told of landmarks either."""
+        if scene.refusal is not None and scene.refusal.reason in _NOTHING_SEEN:
+            return None
+        return self._landmarks.drift_px(frame.image, frame.captured_s, scene.scale)
 
     def _route(self, scene: Scene, has_target: bool) -> RouteState:
         if not has_target or scene.route is None:
             return RouteState.NONE
         way = look_ahead(scene, self._config.look_ahead_px, self._config)
         return RouteState.BEHIND if way is not None and way.behind else RouteState.READY
+
+
+def is_picture(image: Image) -> bool:
+    """Whether it is what everybody here takes for granted: 8 bits, RGB, with pixels."""
+    return image.dtype == np.uint8 and image.ndim == 3 and image.shape[2] == 3 and image.size > 0
 
 
 def is_finite(advice: Advice | None) -> bool:
@@ -62,6 +77,11 @@ def _same(before: Image, image: Image) -> bool:
 
 
 def _is_finite(scene: Scene) -> bool:
+    if scene.masks is not None:
+        seen = scene.masks.vessel_probability, scene.masks.robot_probability
+        # one number that is none spoils the sum, which takes a tenth of the time of looking at each
+        if not all(math.isfinite(float(np.sum(probability))) for probability in seen):
+            return False
     if scene.pose is None:
         return True
     pose = scene.pose

@@ -65,12 +65,18 @@ class FrameWatch:
     counts: tuple[tuple[float, int, int], ...] = ()
     loss_since_s: float | None = None
     out_of_order: int = 0
+    out_of_order_s: float = -math.inf
 
 
 def see_arrival(watch: FrameWatch, captured_s: float, now_s: float) -> FrameWatch:
     """The watch after a frame came; a time that is older, in the future or no number is ignored."""
     known_s = watch.arrived_s if watch.arrived_s is not None else -math.inf
     return replace(watch, arrived_s=captured_s) if known_s < captured_s <= now_s else watch
+
+
+def see_late(watch: FrameWatch, now_s: float) -> FrameWatch:
+    """The watch after a frame that was overtaken by a newer one: it is counted, and counts for nothing else."""
+    return replace(watch, out_of_order=watch.out_of_order + 1, out_of_order_s=now_s)
 
 
 def see_frame(watch: FrameWatch, report: FrameReport, now_s: float, safety: SafetyConfig) -> FrameWatch:
@@ -83,7 +89,7 @@ def see_frame(watch: FrameWatch, report: FrameReport, now_s: float, safety: Safe
         later_s = report.captured_s - newest.captured_s
         # after a longer silence the camera was opened again, and counts from the beginning
         if later_s < 0.0 or (report.index <= newest.index and later_s <= safety.frame_disarm_s):
-            return replace(watch, out_of_order=watch.out_of_order + 1)
+            return see_late(watch, now_s)
     watch = _count_loss(see_arrival(watch, report.captured_s, now_s), report, now_s, safety)
     again = newest is not None and report.refusal is not None and newest.refusal is report.refusal
     watch = replace(
@@ -149,13 +155,16 @@ def _camera_faults(watch: FrameWatch, newest: FrameReport, now_s: float, safety:
     if not newest.format_ok:
         faults.append(Fault(Cause.WRONG_FORMAT))
     if newest.drift_px is not None and not abs(newest.drift_px) <= safety.max_drift_px:
-        faults.append(Fault(Cause.CAMERA_MOVED, f"by {newest.drift_px:.0f} px (at most {safety.max_drift_px:g} px)"))
+        moved = f"by {newest.drift_px:.0f} px (at most {safety.max_drift_px:g} px)"
+        faults.append(Fault(Cause.CAMERA_MOVED, moved if math.isfinite(newest.drift_px) else "it shows something else"))
     share = _lost_share(watch.counts, safety)
     if watch.loss_since_s is not None:
         long = now_s - watch.loss_since_s > safety.frame_loss_disarm_s
         faults.append(Fault(Cause.FRAMES_LOST_LONG if long else Cause.FRAMES_LOST, f"{100 * share:.0f} %"))
     elif share > safety.frame_loss_warn_share:
         faults.append(Fault(Cause.FRAMES_DROPPED, f"{100 * share:.0f} %"))
+    if now_s - watch.out_of_order_s <= safety.frame_loss_window_s:
+        faults.append(Fault(Cause.OUT_OF_ORDER, f"{watch.out_of_order} until now"))
     return faults
 
 

@@ -7,7 +7,16 @@ from enum import StrEnum
 
 from core.control.bus_watch import BusReport, BusWatch, bus_faults, checked, excused, see_bus
 from core.control.faults import AREA, Area, Cause, Fault
-from core.control.frame_watch import FrameArrived, FrameReport, FrameWatch, RouteState, frame_faults, see_arrival, see_frame
+from core.control.frame_watch import (
+    FrameArrived,
+    FrameReport,
+    FrameWatch,
+    RouteState,
+    frame_faults,
+    see_arrival,
+    see_frame,
+    see_late,
+)
 from core.control.gate_checks import RejectReason
 from core.safety_config import SafetyConfig
 from core.servo_config import ServosConfig
@@ -60,6 +69,11 @@ class ServosBusy:
 
 
 @dataclass(frozen=True, slots=True)
+class FrameLate:
+    """A frame was overtaken by a newer one, and left out before anybody looked at it."""
+
+
+@dataclass(frozen=True, slots=True)
 class GateReport:
     """What the gate said to the program's last request; None: it went through."""
 
@@ -69,6 +83,7 @@ class GateReport:
 Report = (
     FrameReport
     | FrameArrived
+    | FrameLate
     | BusReport
     | Beat
     | DeadmanReport
@@ -128,6 +143,8 @@ def take(health: Health, report: Report, *, armed: bool, now_s: float, servos: S
             return replace(health, frames=see_frame(health.frames, report, now_s, safety))
         case FrameArrived(captured_s):
             return replace(health, frames=see_arrival(health.frames, captured_s, now_s))
+        case FrameLate():
+            return replace(health, frames=see_late(health.frames, now_s))
         case BusReport():
             return _see_bus(replace(health, bus=see_bus(health.bus, report, now_s, servos, safety)), safety)
         case Beat(Part.WINDOW):

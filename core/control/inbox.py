@@ -60,6 +60,11 @@ class Inbox:
             self._seen = seen
             self._events += events
 
+    def forget_seen(self) -> None:
+        """What was advised until now was for another destination."""
+        with self._lock:
+            self._seen = None
+
     def jog(self, source: Hashable, jog: Jog, now_s: float) -> None:
         """How a control is held. Even the shortest touch is an input of the operator."""
         with self._lock:

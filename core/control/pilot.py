@@ -16,7 +16,7 @@ from core.config import Config
 from core.control.alerts import ALERTS, Alert, AlertKey, AlertQueue, Note, raise_alerts
 from core.control.command_latency import CommandLatency
 from core.control.drive import Drive
-from core.control.drive_view import DriveNews, DriveView
+from core.control.drive_view import DriveNews, DriveView, LeftOver
 from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
 from core.control.follow import Follow
 from core.control.frame_reports import FrameReports, is_finite
@@ -24,9 +24,9 @@ from core.control.frame_watch import FrameArrived, RouteState
 from core.control.gate_checks import RejectReason, Source
 from core.control.guarded_robot import GuardedRobot, SentMotion
 from core.control.hand import AT_REST, Hand, Jog
-from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Part, ServosBusy
+from core.control.health import Beat, DeadmanReport, FrameLate, GateReport, ModelReport, Part, ServosBusy
 from core.control.inbox import Inbox, Inputs, Seen
-from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Hindrance, Mode, SupervisorState
+from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Hindrance, Latched, Mode, SupervisorState
 from core.control.policies import Policy
 from core.control.servo_requests import ServoRequests
 from core.control.supervisor import hindrances, supervise
@@ -54,16 +54,23 @@ class Pilot:
     config : limits, speeds, thresholds.
     model : whether perception's model passed its check.
     clock : monotonic, the one of the frames.
+    left_over : what the operator has not acknowledged yet of the rig before this one: starting again acknowledges nothing.
     """
 
     def __init__(
-        self, robot: GuardedRobot, policy: Policy, config: Config, model: ModelReport, clock: Callable[[], float] = time.monotonic
+        self,
+        robot: GuardedRobot,
+        policy: Policy,
+        config: Config,
+        model: ModelReport,
+        clock: Callable[[], float] = time.monotonic,
+        left_over: LeftOver | None = None,
     ) -> None:
         self._robot, self._policy, self._config, self._clock = robot, policy, config, clock
         self._inbox = Inbox(config.safety, [model])
         self._requests = ServoRequests(robot, self._inbox.post)
         self._reports = FrameReports(config.policy.pursuit)
-        self._state = SupervisorState()
+        self._state = _start_of(left_over, clock())
         self._permitted: Source | None = None
         self._hand, self._drive, self._follow = Hand(config.hand), Drive(config.policy.drive), Follow()
         self._latency = CommandLatency()
@@ -77,13 +84,18 @@ class Pilot:
         self._forget = False
         self._halted = False
         self._alerts: list[Alert] = []
-        self._view = DriveView(clock())
+        self._changes: list[DriveView] = []
+        self._stop_asked = False
+        self._view = DriveView(clock(), mode=self._state.mode, latched=left_over.fault if left_over is not None else None)
+        if left_over is not None and left_over.stopped:
+            self._requests.stopped()
 
     # ---- from the window's thread
 
     def ask(self, act: Act) -> None:
         """A request of the operator. STOP goes to the robot at once, by its own way."""
         if act is Act.STOP:
+            self._stop_asked = True
             self._requests.stopped()
             self._robot.stop()
         elif act is Act.ACKNOWLEDGE:
@@ -115,6 +127,23 @@ class Pilot:
         self._requests.stopped()
         self._halted = True
 
+    @property
+    def left_over(self) -> LeftOver | None:
+        """What the next rig must take over, once this one is closed; None when there is nothing to acknowledge."""
+        view = self.view
+        if self._stop_asked and view.mode is not Mode.STOPPED:  # no turn has heard it any more
+            return LeftOver(Fault(Cause.STOP_PRESSED), True)
+        if view.latched is None and view.mode in ARMED_MODES and not self._halted:  # nobody ended it: it broke off
+            return LeftOver(Fault(Cause.WORKER_DEAD, "the rig stopped while it was armed"), False)
+        return LeftOver(view.latched, view.mode is Mode.STOPPED) if view.latched is not None else None
+
+    def target_changed(self) -> None:
+        """Another destination, or none: the operator has the hand again, and no advice for the old one is followed any more."""
+        self._inbox.forget_seen()
+        if self.view.mode in DRIVING_MODES:
+            self._inbox.post(Act.TAKE_BACK)
+            self._raise([(Note.NEW_TARGET, "")], self._clock(), armed=True)
+
     def jog(self, source: Hashable, jog: Jog) -> None:
         """How a control is held; to be repeated while it is, since its silence counts as let go."""
         self._inbox.jog(source, jog, self._clock())
@@ -138,16 +167,21 @@ class Pilot:
             return self._view
 
     def news(self) -> DriveNews:
-        """The newest view, and the alerts since the last call."""
+        """The newest view, and alerts and changes since the last call."""
         with self._lock:
             alerts, self._alerts = tuple(self._alerts), []
-            return DriveNews(self._view, alerts)
+            changes, self._changes = tuple(self._changes), []
+            return DriveNews(self._view, alerts, changes)
 
     # ---- from perception's thread
 
     def frame_arrived(self, frame: Frame) -> None:
         """The camera gave a frame, which now goes to perception."""
         self._inbox.post(FrameArrived(frame.captured_s), Beat(Part.WORKER))
+
+    def frame_late(self) -> None:
+        """The camera gave a frame that is older than the one before; nobody looked at it."""
+        self._inbox.post(FrameLate())
 
     def worker_alive(self) -> None:
         """A sign of life of perception's thread while there are no frames."""
@@ -192,14 +226,17 @@ class Pilot:
         self._tell(before, decision, inputs.jog, sent if is_news else None, now_s)
         view = self._look(decision, inputs, seen, commanded, sent, now_s)
         with self._lock:
+            if _has_changed(self._view, view):
+                self._changes = [*self._changes, view][-_MOST_ALERTS:]
             self._view = view
+            self._stop_asked = self._stop_asked and Act.STOP not in inputs.events
         return view
 
     def close(self) -> None:
         """Let nobody drive, and hold the robot. A request that is under way ends when the robot is closed."""
         self._requests.close()
-        self._robot.beat(None)
         self._robot.hold()
+        self._robot.beat(None)
 
     # ---- parts of a turn
 
@@ -253,7 +290,6 @@ class Pilot:
         permitted = decision.permitted if sent is not None else None
         if permitted is not self._permitted:
             self._change(permitted, sent)
-        robot.beat(permitted)
         self._asked, commanded = Command(), None
         try:
             if permitted is Source.OPERATOR:
@@ -266,6 +302,8 @@ class Pilot:
                 robot.hold()
         except DeviceError as error:
             self._inbox.post(Fault(Cause.BUS_DEAD, str(error)))
+        # after the order: whoever sees the permission finds the order of the permitted one, and no cycle is held at a hand-over
+        robot.beat(permitted)
         return commanded
 
     def _by_hand(self, decision: Decision, jog: Jog) -> Jog:
@@ -300,8 +338,8 @@ class Pilot:
 
     def _raise(self, raised: list[tuple[AlertKey, str]], now_s: float, *, armed: bool) -> None:
         if raised:
-            self._queue, alerts = raise_alerts(self._queue, raised, now_s, armed=armed)
             with self._lock:
+                self._queue, alerts = raise_alerts(self._queue, raised, now_s, armed=armed)
                 self._alerts = [*self._alerts, *alerts][-_MOST_ALERTS:]
 
     def _look(
@@ -340,6 +378,19 @@ class Pilot:
             latency_p95_s=self._latency.p95_s,
             follow_share=self._follow.update(jog, advice, now_s) if by_hand else None,
         )
+
+
+def _start_of(left_over: LeftOver | None, now_s: float) -> SupervisorState:
+    if left_over is None:
+        return SupervisorState()
+    mode = Mode.STOPPED if left_over.stopped else Mode.ADVISORY
+    return SupervisorState(mode=mode, latched=Latched(left_over.fault, now_s))
+
+
+def _has_changed(before: DriveView, after: DriveView) -> bool:
+    if before.mode is not after.mode or before.latched != after.latched:
+        return True
+    return {fault.cause for fault in before.active} != {fault.cause for fault in after.active}
 
 
 def _why_not_by_hand(decision: Decision, state: SupervisorState) -> tuple[Hindrance, ...]:

@@ -29,9 +29,7 @@ def choose_study(annotations: Sequence[StoredAnnotation], study: str | None, whe
     names = sorted({one.key.study for one in done})
     if study is None and len(names) > 1:
         listed = ", ".join(repr(name) if name else "'' (outside studies)" for name in names)
-        raise AnnotationError(
-            f"{where}: holds several studies ({listed}); choose one with annotate --study NAME (for evaluate: export it as csv)"
-        )
+        raise AnnotationError(f"{where}: holds several studies ({listed}); choose one with --study NAME")
     chosen = [one for one in done if study is None or one.key.study == study]
     if not chosen:
         of_study = f" of study {study!r}" if study else ""

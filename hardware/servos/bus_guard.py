@@ -63,6 +63,8 @@ class BusGuard:
         self._jam = JamWatch(servos.joints, safety.tracking_time_s)
         self._measurement: Measurement | None = None
         self._before: Measurement | None = None
+        self.followed: Order | None = None
+        self._orders: dict[Source, Order] = {}
         self._heard_s = self._cycle_s = self._armed_s = now_s
 
     def silence_s(self, beat: Heartbeat | None, now_s: float) -> float:
@@ -108,6 +110,8 @@ class BusGuard:
         self.sent = None  # a record from before tells nothing of where the next motion starts
         self._gate = GateState()
         self._jam.forget()
+        self._orders.clear()
+        self.followed = None
         self.rejection, self.clamps, self.at_end = None, (), ()
 
     def acknowledge(self) -> None:
@@ -135,10 +139,11 @@ class BusGuard:
 
     def step(self, order: Order | None, beat: Heartbeat | None, now_s: float) -> GateStep:
         """The goals for this cycle, through the gate."""
-        request, at_end = self._request(order, now_s), self.at_end
         # A permission holds good no longer than an order: whoever gives it must still be watching.
         fresh = beat is not None and now_s - beat.time_s <= self._safety.command_max_age_s
         permitted: Source | None = beat.permitted if self.armed and beat is not None and fresh else None
+        self.followed = self._order_of(permitted, order, now_s)
+        request, at_end = self._request(self.followed, now_s), self.at_end
         step = gate_step(self._gate, request, self._measurement, permitted, now_s, self._servos, self._safety)
         self._gate = step.state
         self.rejection, self.clamps = step.rejection, step.clamps
@@ -147,6 +152,20 @@ class BusGuard:
         if step.rejection is not None:
             self.rejections[step.rejection.reason] += 1
         return step
+
+    def _order_of(self, permitted: Source | None, newest: Order | None, now_s: float) -> Order | None:
+        """The newest order of the permitted one, while it is valid; else the newest of all, which the gate will refuse by name.
+
+        At a hand-over the next one's order is there before his permission: the cycle between them goes on with the order before,
+        instead of holding. A hold is everybody's.
+        """
+        if newest is None or newest.command is None:
+            self._orders.clear()
+            return newest
+        self._orders[newest.source] = newest
+        found = self._orders.get(permitted) if permitted is not None else None
+        is_valid = found is not None and 0.0 <= now_s - found.issued_s <= self._safety.command_max_age_s
+        return found if is_valid else newest
 
     def wrote(self, goals_mm: Joints, order: Order | None, now_s: float) -> None:
         """These goals went out, as the servos count them."""

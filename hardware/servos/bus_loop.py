@@ -116,7 +116,7 @@ class BusLoop:
         if step.goals_mm is None:
             return
         try:
-            self._guard.wrote(self._bus.write(step.goals_mm), order, now_s)
+            self._guard.wrote(self._bus.write(step.goals_mm), self._guard.followed, now_s)
         except (NotReady, ValueError) as error:  # the driver saw what the guard did not, or the zeros leave no room for the goals
             self._end_motion(Fault(Cause.SERVOS_WRONG, str(error)))
 

@@ -36,6 +36,7 @@ class DirectRobot:
         self._armed = False
         self._cycle = 0
         self._sent: SentMotion | None = None
+        self._waiting: SentMotion | None = None
 
     @property
     def name(self) -> str:
@@ -49,29 +50,26 @@ class DirectRobot:
         self._robot.connect()
 
     def beat(self, permitted: Source | None) -> None:
-        """Who may drive; holds good for 100 ms."""
+        """Who may drive; holds good for 100 ms. An order that came just before its permission is followed now."""
         with self._lock:
             self._permitted, self._beat_s = permitted, time.monotonic()
+            waiting, self._waiting = self._waiting, None
+            if waiting is not None and self._beat_s - waiting.time_s <= self._safety.command_max_age_s:
+                self._follow(waiting)
 
     def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
         """Make the command the current one if its source may drive; otherwise the robot holds."""
-        now_s = time.monotonic()
         with self._lock:
-            fresh = now_s - self._beat_s <= self._safety.command_max_age_s
-            if not (self._armed and fresh and source is self._permitted):
-                self._hold(RejectReason.NOT_ARMED)
-                return Command()
-            sent = self._robot.send(command)
-            self._note(SentMotion(0, now_s, sent, source, captured_s))
-            return sent
+            return self._follow(SentMotion(0, time.monotonic(), command, source, captured_s))
 
     def hold(self) -> None:
         with self._lock:
+            self._waiting = None
             self._hold(None)
 
     def stop(self) -> None:
         with self._lock:
-            self._armed = False
+            self._armed, self._waiting = False, None
             self._robot.hold()
 
     def arm(self) -> None:
@@ -106,6 +104,22 @@ class DirectRobot:
 
     def close(self) -> None:
         self._robot.close()
+
+    def _follow(self, order: SentMotion) -> Command:
+        """Do as the order says if its source may drive; else hold, and keep it for a permission that follows at once."""
+        self._waiting = None
+        is_stale = time.monotonic() - self._beat_s > self._safety.command_max_age_s
+        if not self._armed or is_stale or self._permitted is None:
+            self._hold(RejectReason.NOT_ARMED)
+            self._waiting = order
+            return Command()
+        if order.source is not self._permitted:
+            self._hold(RejectReason.WRONG_SOURCE)
+            self._waiting = order
+            return Command()
+        sent = self._robot.send(order.motion)
+        self._note(replace(order, motion=sent))
+        return sent
 
     def _hold(self, rejection: RejectReason | None) -> None:
         self._robot.hold()

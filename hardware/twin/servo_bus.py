@@ -30,6 +30,7 @@ _SPEEDS = {getattr(termios, f"B{baud}"): baud for baud in BAUD_OF_CODE.values()}
 _IDLE_S = 0.02
 _PACKET_PAUSE_S = 0.1
 _BITS_PER_BYTE = 10
+_PRIORITY = -10
 
 
 class SoftServoBus:
@@ -185,6 +186,8 @@ class SoftServoBus:
         self._parser.reset()
 
     def _run(self) -> None:
+        with contextlib.suppress(OSError):  # they stand for hardware, which does not wait for a busy computer
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _PRIORITY)
         try:
             while not self._stop.is_set():
                 self._turn()

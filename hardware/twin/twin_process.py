@@ -21,7 +21,7 @@ from core.devices import DeviceError
 from hardware.servos.shared_slot import SharedSlot
 from hardware.twin.remote_twin import memory_layout, pack_frame, pack_status
 from hardware.twin.servo_bus import SoftServoBus
-from hardware.twin.servo_joints import drive_world
+from hardware.twin.servo_joints import drive_world, wired
 from hardware.twin.world import TwinWorld
 
 _WAIT_S = 0.2
@@ -39,12 +39,13 @@ def main(arguments: list[str]) -> int:
         try:
             world = TwinWorld(config.twin, perception=config.perception)
             world.insert(message["insertion_mm"])
-            servos = SoftServoBus(config.servos, wire_time=True)
+            wiring = wired(config.twin, config.servos)
+            servos = SoftServoBus(wiring, wire_time=True)
             servos.start()
         except (ValueError, OSError, DeviceError) as error:
             _say({"error": str(error)})
             return 1
-        drive_world(world, servos, config.servos)
+        drive_world(world, servos, wiring)
         world.start()
         gc.collect()
         gc.freeze()  # what is loaded stays: later collections are short

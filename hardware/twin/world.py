@@ -13,8 +13,9 @@ from core.config import PerceptionConfig, TwinConfig
 from core.latest import Latest
 from core.perception.route import plan_route
 from core.types import Command, Frame, Point, Points
-from hardware.twin.appearance import Appearance, default_appearance, make_view, random_appearance
+from hardware.twin.appearance import Appearance, make_view
 from hardware.twin.autopilot import RouteFollower, nearest_target
+from hardware.twin.look import appearance_of
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import TwinPhysics
@@ -49,7 +50,7 @@ class TwinWorld:
         self.config = config
         self.phantom = phantom or make_phantom(config.phantom)
         if appearance is None:
-            appearance = random_appearance(config.appearance_seed) if config.appearance_seed else default_appearance()
+            appearance = appearance_of(config)
         self.appearance = appearance
         self._perception = perception or PerceptionConfig()
         size = (config.image_width_px, config.image_height_px)

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from pytestqt.qtbot import QtBot
 
-from core.config import PoseConfig
+from core.config import PerceptionConfig, PoseConfig
 from core.control.alerts import Alert
 from core.control.drive_view import DriveNews, DriveView
 from core.control.faults import Fault
@@ -275,6 +275,7 @@ class FakeEngine:
         self.fail_with: Exception | None = None
         self.pilot = FakePilot()
         self.targets: list[Point | None] = []
+        self.perceptions: list[PerceptionConfig] = []
         self.closed = threading.Event()
         self._target: Point | None = None
         self._index = 0
@@ -311,6 +312,10 @@ class FakeEngine:
     def set_target(self, point: Point | None) -> None:
         self._target = point
         self.targets.append(point)
+
+    def set_perception(self, config: PerceptionConfig) -> bool:
+        self.perceptions.append(config)
+        return True
 
     def close(self) -> None:
         self.closed.set()

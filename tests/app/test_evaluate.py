@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
+from math import atan, degrees
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,9 +20,11 @@ import pytest
 from app.evaluate_command import LikePaper, run_evaluate
 from core.config import TwinConfig
 from core.errors import UserError
+from core.learning.dataset import write_png
 from core.study.evaluation import Measurement, read_measurements, write_measurements
 from core.study.paper_study import PAPER_CONFUSION
 from hardware.twin.world import TwinWorld
+from tests.app.annotated import measure, tube
 from tests.core.test_classification import label_pairs
 
 MAIN = Path(__file__).resolve().parents[2] / "main.py"
@@ -315,3 +318,37 @@ def test_the_window_does_not_load_matplotlib_or_scikit_learn() -> None:
     code = "import sys, app.cli, app.operator_window; print([m for m in ('matplotlib', 'sklearn', 'jinja2') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=MAIN.parent)
     assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_a_study_is_evaluated_with_its_raters_and_repeats(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two raters measure two images twice: bo always two degrees more than al, and the second measure is as the first."""
+    images = [tmp_path / f"frame_{index}.png" for index in range(2)]
+    for index, image in enumerate(images):
+        write_png(image, tube(index)[0])
+    store = tmp_path / "annotations.lumenpilot.sqlite"
+    for repeat in (1, 2):
+        measure(store, images, [0.0, 10.0], study="main", rater="al", repeat=repeat)
+        measure(store, images, [2.0, 12.0], study="main", rater="bo", repeat=repeat)
+    measure(store, images, [5.0, 5.0], study="pilot", rater="al")
+    out = tmp_path / "out"
+    with pytest.raises(UserError, match=r"holds several studies.*choose one with --study NAME"):
+        evaluate(tmp_path, out=out)
+    agreement = evaluate(tmp_path, out=out, study_name="main")["agreement"]
+    assert agreement["annotations"] == 8
+    assert sorted(agreement["raters"]) == ["al", "bo"]
+    assert agreement["raters"]["al"]["sd_deg"] == pytest.approx(0.0, abs=1e-6)
+    wanted = (degrees(atan(2 / 40)) + degrees(atan(12 / 40)) - degrees(atan(10 / 40))) / 2
+    assert agreement["pairs"][0]["angle"]["mean_difference_deg"] == pytest.approx(wanted, abs=0.05)
+    report = (out / "report.html").read_text()
+    for part in ("<h2>Raters</h2>", "First against second", "al, bo", "ICC(2,1)"):
+        assert part in report
+    assert "Rater against rater" in capsys.readouterr().out
+    assert len((out / "raters.csv").read_text().splitlines()) == 9
+
+
+def test_a_study_needs_images_annotated_by_hand(paper_csv: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="--study needs images annotated by hand"):
+        evaluate(csv=paper_csv, out=tmp_path / "out", study_name="main")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UserError, match="begin the study with: annotate"):
+        evaluate(tmp_path / "empty", out=tmp_path / "out", study_name="main")

@@ -96,15 +96,39 @@ def test_escape_in_the_seed_takes_back_what_was_typed_and_gives_the_keys_to_the_
 def test_the_list_of_phantoms_never_takes_the_keys(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     assert running.panels.picker is not None
     combo = running.panels.picker._combo
-    assert combo.focusPolicy() is Qt.FocusPolicy.NoFocus
     combo.showPopup()
     qtbot.keyClick(combo.view(), Key.Key_Escape)
     combo.hidePopup()
     assert not combo.hasFocus()
     name = running.panels.picker.name
-    qtbot.keyPress(running.panels.live, Key.Key_Down)
+    for field in (running.panels.live, combo):
+        field.setFocus()
+        qtbot.keyPress(field, Key.Key_Down)
+        assert engine.jogs[-1].advance < 0.0
+        qtbot.keyRelease(field, Key.Key_Down)
+    combo.setFocus()
+    qtbot.keyClicks(combo, "tz")  # it would go to "Tree"
     assert running.panels.picker.name == name
-    assert engine.jogs[-1].advance < 0.0
+
+
+@pytest.mark.parametrize("way", ["key", "tab and enter"])
+def test_a_phantom_is_chosen_by_keyboard(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, way: str) -> None:
+    picker = running.panels.picker
+    assert picker is not None
+    combo, chosen, moved = picker._combo, [], len(engine.jogs)
+    picker.chosen.connect(chosen.append)
+    if way == "key":
+        qtbot.keyClick(running, Key.Key_P, Qt.KeyboardModifier.ControlModifier)
+    else:
+        assert combo.focusPolicy() & Qt.FocusPolicy.TabFocus
+        combo.setFocus()
+        qtbot.keyClick(combo, Key.Key_Return)
+    qtbot.waitUntil(combo.view().isVisible)
+    qtbot.keyClick(combo.view(), Key.Key_Down)
+    qtbot.keyClick(combo.view(), Key.Key_Return)
+    qtbot.waitUntil(lambda: chosen == ["tree"])
+    assert not combo.view().isVisible()
+    assert all(jog.is_rest for jog in engine.jogs[moved:]), "the arrows chose, they moved nothing"
 
 
 def test_enter_presses_the_button_that_has_the_focus(running: OperatorWindow, qtbot: QtBot) -> None:

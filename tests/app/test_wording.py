@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from app.wording import (
-    QUANTITY_MEANING,
     REASON_TEXT,
     SPEED_WORD,
     STATE_MEANING,
@@ -58,7 +57,6 @@ def test_every_case_has_a_text() -> None:
     assert set(REASON_TEXT) == set(Reason)
     assert set(STATE_TITLE) == set(STATE_MEANING) == set(PoseState)
     assert set(SPEED_WORD) == set(Speed)
-    assert {"theta", "d_head", "d_tail", "latency", "dropped", "gui_block"} <= set(QUANTITY_MEANING)
 
 
 def test_refusal_says_what_to_do_and_what_was_measured() -> None:

@@ -33,6 +33,7 @@ from core.types import (
 WELL = BusReport(
     misses=(0,) * 7, hardware_errors=(0,) * 7, temperatures_c=(30.0,) * 7, voltages_v=(12.0,) * 7, tracking_mm=(0.0,) * 7
 )
+PICTURE = np.random.default_rng(0).integers(0, 255, (48, 64, 3), dtype=np.uint8)
 ADVICE = Advice(Speed.SLOW, 2.0, 10.0, "go")
 
 
@@ -47,6 +48,7 @@ class Robot:
         self.problem = ""
         self.bus: BusReport | None = WELL
         self.permitted: Source | None = None
+        self.ordered: Source | None = None
         self.sent: list[tuple[Source, Command, float | None]] = []
         self.motion = SentMotion(0, 0.0, Command())
         self.edit: Callable[[SentMotion], SentMotion] = lambda motion: motion
@@ -58,16 +60,18 @@ class Robot:
     def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
         if self.failure is not None:
             raise DeviceError(self.failure)
-        assert source is self.permitted, "an order of somebody who may not drive"
+        self.ordered = source
         self.sent.append((source, command, captured_s))
         self.motion = self.edit(SentMotion(self.motion.cycle + 1, (captured_s or 0.0) + 0.08, command, source, captured_s))
         return command
 
     def hold(self) -> None:
+        self.ordered = None
         still = replace(self.motion.motion, advance_mm_s=0.0, delivery_mm_s=0.0)
         self.motion = SentMotion(self.motion.cycle + 1, 0.0, still)
 
     def beat(self, permitted: Source | None) -> None:
+        assert self.ordered in {None, permitted}, "an order of somebody who may not drive"
         self.permitted = permitted
 
     def stop(self) -> None:
@@ -148,12 +152,13 @@ class Bench:
         self.shown: Advice | None = None
 
     def turn(self, count: int = 1) -> Bench:
-        rng = np.random.default_rng(self.index)
         for _ in range(count):
             self.now_s += PERIOD_S
             self.index += 1
             if self.index % 2 and self.seeing:
-                frame = Frame(self.index, self.now_s - 0.03, rng.integers(0, 255, (48, 64, 3), dtype=np.uint8))
+                image = PICTURE.copy()
+                image[0, 0] = self.index % 251  # the camera stands still, and is not frozen
+                frame = Frame(self.index, self.now_s - 0.03, image)
                 self.pilot.frame_arrived(frame)
                 scene = self.scene(scene_at(self.index, frame.captured_s))
                 self.shown = self.pilot.see(frame, scene, None, has_target=scene.route is not None)

@@ -95,7 +95,7 @@ def test_the_common_answer() -> None:
 
 def test_several_studies_ask_for_a_choice() -> None:
     rows = [answer("1", "ann", 1, 4.0, PoseState.B, "pilot"), answer("1", "ann", 1, 5.0, PoseState.B, "main")]
-    with pytest.raises(AnnotationError, match=r"holds several studies \('main', 'pilot'\); choose one with annotate --study NAME"):
+    with pytest.raises(AnnotationError, match=r"holds several studies \('main', 'pilot'\); choose one with --study NAME"):
         choose_study(rows, None, "here")
     assert [one.key.study for one in choose_study(rows, "main", "here")] == ["main"]
     with pytest.raises(AnnotationError, match="no finished annotation of study 'other'"):

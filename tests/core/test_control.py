@@ -8,6 +8,7 @@ import pytest
 from core.config import AdviceConfig
 from core.control.engine import Engine
 from core.control.faults import Cause, Fault
+from core.control.modes import Hindrance
 from core.control.policy import table_policy
 from core.devices import DeviceError
 from core.types import Frame, Point, Pose, PoseState, Reason, Refusal, RobotStatus, Scene, Speed
@@ -173,3 +174,75 @@ def test_a_lost_camera_without_a_robot_ends_the_turns() -> None:
     engine = Engine(_LostCamera([]), lambda *_: None, lambda _: None, lambda: None)  # type: ignore[arg-type,return-value]
     with pytest.raises(DeviceError, match="unplugged"):
         engine.step(0.0)
+
+
+# ---- frames that are late, or none
+
+
+class _ScriptCamera(_Camera):
+    """Gives these frames."""
+
+    def __init__(self, frames: list[Frame]) -> None:
+        super().__init__([])
+        self._frames = frames
+
+    def read(self, timeout_s: float) -> Frame | None:
+        return self._frames.pop(0) if self._frames else None
+
+
+def _frame(index: int, captured_s: float, image: np.ndarray | None = None) -> Frame:
+    return Frame(index, captured_s, np.zeros((4, 4, 3), np.uint8) if image is None else image)
+
+
+def _scripted(*frames: Frame) -> tuple[Engine, list[int]]:
+    perceived: list[int] = []
+
+    def perceive(frame: Frame, target: Point | None = None) -> Scene:
+        perceived.append(frame.index)
+        return Scene(frame.index, frame.captured_s, (4, 4), 1.0, refusal=Refusal(Reason.BLACK))
+
+    return Engine(_ScriptCamera(list(frames)), perceive, lambda _: None, lambda: None), perceived
+
+
+def test_a_frame_that_was_overtaken_is_left_out_and_counted() -> None:
+    engine, perceived = _scripted(_frame(0, 0.0), _frame(2, 0.2), _frame(1, 0.1), _frame(3, 0.3))
+    ticks = [engine.step(0.0) for _ in range(4)]
+    assert perceived == [0, 2, 3]
+    assert [tick.dropped_frames for tick in ticks if tick] == [0, 1, 2]
+
+
+def test_a_camera_that_counts_anew_or_whose_clock_slipped_once_is_not_late() -> None:
+    engine, perceived = _scripted(_frame(7, 5.0), _frame(0, 5.5), _frame(1, 99.0), _frame(2, 5.6))
+    for _ in range(4):
+        engine.step(0.0)
+    assert perceived == [7, 0, 1, 2]
+
+
+@pytest.mark.parametrize("image", [np.zeros((4, 4), np.uint8), np.zeros((4, 4, 3), np.uint16), np.zeros((0, 4, 3), np.uint8)])
+def test_a_picture_that_is_none_is_told_and_not_looked_at(image: np.ndarray) -> None:
+    bench = Bench()
+    camera = _ScriptCamera([_frame(0, bench.now_s - 0.01, image)])
+    engine = Engine(camera, lambda *_: None, lambda _: None, lambda: None, bench.pilot, bench.robot, turns_pilot=False)  # type: ignore[arg-type,return-value]
+    assert engine.step(0.0) is None
+    assert engine.problem is not None
+    assert "not 8-bit RGB" in engine.problem
+    bench.pilot.tick()
+    assert Cause.WRONG_FORMAT in {fault.cause for fault in bench.pilot.view.active}
+    engine.close()
+
+
+def test_what_was_understood_for_another_destination_is_no_way_to_this_one() -> None:
+    bench = Bench()
+
+    def perceive(frame: Frame, target: Point | None = None) -> Scene:
+        engine.set_target((300.0, 60.0))  # the operator clicks while the frame is being looked at
+        return scene_at(frame.index, frame.captured_s)
+
+    camera = _ScriptCamera([_frame(0, bench.now_s - 0.02), _frame(1, bench.now_s - 0.01)])
+    engine = Engine(camera, perceive, lambda _: None, lambda: None, bench.pilot, bench.robot, turns_pilot=False)
+    engine.set_target((200.0, 60.0))
+    engine.step(0.0)
+    assert bench.pilot.tick().against_hand_over.count(Hindrance.NO_DESTINATION) == 1
+    engine.step(0.0)
+    assert Hindrance.NO_DESTINATION not in bench.pilot.tick().against_hand_over
+    engine.close()

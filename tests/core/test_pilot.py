@@ -9,12 +9,15 @@ from dataclasses import replace
 
 import pytest
 
+from core.config import Config
 from core.control.alerts import Note
+from core.control.drive_view import LeftOver
 from core.control.faults import Cause, Fault
 from core.control.gate_checks import RejectReason, Source
 from core.control.hand import AT_REST, Jog
+from core.control.health import ModelReport
 from core.control.modes import Act, Hindrance, Mode
-from core.control.pilot import PERIOD_S
+from core.control.pilot import PERIOD_S, Pilot
 from core.types import Advice, Reason, Refusal, Speed
 from tests.core.pilot_bench import ADVICE, WELL, Bench, Policy, scene_at
 
@@ -473,3 +476,87 @@ def test_closing_holds_and_permits_nobody(bench: Bench) -> None:
     bench.on().pilot.close()
     assert bench.robot.permitted is None
     assert bench.robot.motion.source is None
+
+
+# ---- what outlives a rig, and what ends a hand-over
+
+
+def test_another_destination_ends_the_hand_over_and_the_old_advice_is_not_followed(bench: Bench) -> None:
+    bench.handed_over().alerts()
+    bench.seeing = False
+    sent = len(bench.robot.sent)
+    bench.pilot.target_changed()
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    assert bench.alerts() == {Note.NEW_TARGET}
+    assert all(source is not Source.PROGRAM for source, _, _ in bench.robot.sent[sent:])
+
+
+def test_a_destination_chosen_while_driving_by_hand_changes_nothing_else(bench: Bench) -> None:
+    bench.armed().alerts()
+    bench.pilot.target_changed()
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    assert bench.alerts() == set()
+
+
+def pilot_after(bench: Bench, left_over: LeftOver | None) -> Bench:
+    """The next rig's bench; the one before is closed."""
+    bench.pilot.close()
+    after = Bench()
+    after.pilot.close()
+    after.pilot = Pilot(after.robot, after.policy, Config(), ModelReport(True), clock=lambda: after.now_s, left_over=left_over)
+    return after
+
+
+def test_a_stop_outlives_the_rig_and_needs_its_acknowledgement(bench: Bench) -> None:
+    bench.on().pilot.ask(Act.STOP)
+    bench.turn()
+    assert bench.pilot.left_over == LeftOver(Fault(Cause.STOP_PRESSED), stopped=True)
+    after = pilot_after(bench, bench.pilot.left_over)
+    assert (after.mode, after.pilot.view.latched) == (Mode.STOPPED, Fault(Cause.STOP_PRESSED))
+    after.pilot.switch_on()
+    after.done().seconds(0.2)
+    assert after.mode is Mode.STOPPED
+    assert "arm" not in after.robot.calls
+    after.pilot.ask(Act.ACKNOWLEDGE)
+    after.turn()
+    assert (after.mode, after.pilot.view.latched, after.pilot.left_over) == (Mode.ADVISORY, None, None)
+    after.on()
+    assert after.pilot.view.servos_on
+    after.pilot.close()
+
+
+def test_a_stop_that_no_turn_has_heard_any_more_is_left_over_too(bench: Bench) -> None:
+    bench.on().pilot.ask(Act.STOP)
+    assert bench.pilot.left_over == LeftOver(Fault(Cause.STOP_PRESSED), stopped=True)
+
+
+def test_a_rig_that_breaks_off_while_armed_leaves_that_and_one_that_is_ended_does_not(bench: Bench) -> None:
+    bench.armed()
+    left_over = bench.pilot.left_over
+    assert left_over is not None
+    assert (left_over.fault.cause, left_over.stopped) == (Cause.WORKER_DEAD, False)
+    bench.pilot.halt()
+    bench.turn()
+    assert bench.pilot.left_over is None
+
+
+def test_changes_are_kept_for_the_record_though_nobody_looks(bench: Bench) -> None:
+    bench.handed_over().pilot.news()
+    bench.held = False
+    bench.turn(2)
+    bench.held = True
+    bench.turn(10)
+    news = bench.pilot.news()
+    assert [view.mode for view in news.changes] == [Mode.HOLD, Mode.HOLD, Mode.AUTONOMOUS]
+    assert bench.pilot.news().changes == ()
+
+
+def test_a_late_frame_is_counted_and_told_and_changes_nothing(bench: Bench) -> None:
+    bench.handed_over().alerts()
+    bench.pilot.frame_late()
+    bench.turn()
+    assert bench.mode is Mode.AUTONOMOUS
+    assert Fault(Cause.OUT_OF_ORDER, "1 until now") in bench.pilot.view.active
+    assert bench.alerts() == {Cause.OUT_OF_ORDER}

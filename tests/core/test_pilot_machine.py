@@ -12,7 +12,6 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from core.control.gate_checks import Source
@@ -20,7 +19,7 @@ from core.control.hand import AT_REST, Jog
 from core.control.modes import Act, Mode
 from core.control.pilot import PERIOD_S
 from core.types import Advice, Command, Frame, Reason, Refusal, RobotStatus, Scene, Speed
-from tests.core.pilot_bench import ADVICE, WELL, Bench, Robot, scene_at
+from tests.core.pilot_bench import ADVICE, PICTURE, WELL, Bench, Robot, scene_at
 
 HELD_S = 0.1
 """No program's order later than this after the last word of a held deadman."""
@@ -336,7 +335,8 @@ class PilotMachine:
     def _frame(self) -> None:
         bench = self.bench
         scene = bench.scene(scene_at(bench.index, bench.now_s - 0.03))
-        pixels = np.random.default_rng(bench.index).integers(0, 255, (48, 64, 3), dtype=np.uint8)
+        pixels = PICTURE.copy()
+        pixels[0, 0] = bench.index % 251
         frame = Frame(bench.index, scene.captured_s, pixels)
         bench.pilot.frame_arrived(frame)
         bench.pilot.see(frame, scene, None, has_target=scene.route is not None)

@@ -314,7 +314,17 @@ class Drive(RuleBasedStateMachine):
             assert decision.writes_blocked == (decision.mode is Mode.STOPPED)
 
 
-HARMLESS = {"FRAMES_DROPPED", "WARM", "VOLTAGE_SAGS", "DISK_LOW", "DISK_FULL", "RECORDER_BEHIND", "DEADMAN", "NO_TARGET"}
+HARMLESS = {
+    "FRAMES_DROPPED",
+    "OUT_OF_ORDER",
+    "WARM",
+    "VOLTAGE_SAGS",
+    "DISK_LOW",
+    "DISK_FULL",
+    "RECORDER_BEHIND",
+    "DEADMAN",
+    "NO_TARGET",
+}
 
 
 def test_nothing_unsafe_ever_leaves_whatever_happens() -> None:

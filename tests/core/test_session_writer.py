@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from core.control.drive_view import DriveView
+from core.control.faults import Cause, Fault
 from core.control.modes import Mode
 from core.session import files as session_files
 from core.session import writer as session_writer
@@ -200,6 +201,27 @@ def test_events_of_driving_and_the_mode_at_the_start_are_written(tmp_path: Path)
         assert EventKind.ARM in kinds
         assert kinds[-1] is EventKind.TARGET
     assert read_manifest(session).ended == "enough"
+
+
+def test_driving_is_recorded_though_the_camera_gives_no_picture(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0), DriveView(1000.0, Mode.AUTONOMOUS))
+        lost = Fault(Cause.CAMERA_LOST, "newest frame 501 ms old")
+        writer.drive(DriveView(1000.5, Mode.ADVISORY, latched=lost, active=(lost,)))
+        writer.drive(DriveView(1000.4, Mode.HOLD))  # overtaken: it tells nothing new
+        writer.stop()
+        wait_for(lambda: writer.status().saved is not None)
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        told = [(event.time_s, event.kind, event.text) for event in reader.events if event.kind is not EventKind.VIDEO]
+    assert told == [
+        (1000.0, EventKind.MODE, "AUTONOMOUS"),
+        (1000.5, EventKind.MODE, "ADVISORY"),
+        (1000.5, EventKind.DISARM, "camera lost"),
+        (1000.5, EventKind.FAULT, "camera lost"),
+    ]
 
 
 def test_nothing_is_written_before_start_and_after_stop(tmp_path: Path) -> None:

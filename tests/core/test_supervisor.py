@@ -13,7 +13,7 @@ from core.control.bus_watch import BusReport
 from core.control.faults import AFTER_SOME, AREA, AT_ONCE, CAUSES, REACTION, Area, Cause, Fault, Reaction
 from core.control.frame_watch import FrameArrived, FrameReport, RouteState
 from core.control.gate import RejectReason, Source
-from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Part, ServosChecked
+from core.control.health import Beat, DeadmanReport, FrameLate, GateReport, ModelReport, Part, ServosChecked
 from core.control.supervisor import Act, Decision, Event, Hindrance, Mode, SupervisorState, supervise
 from core.types import Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, TICK_S, Bench
@@ -205,6 +205,7 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.NO_TARGET: _frames(1, route=RouteState.NONE),
     Cause.DEADMAN: _mute(DeadmanReport, 0.09375),
     Cause.FRAMES_DROPPED: _frames(1, delivered=10, lost=7),
+    Cause.OUT_OF_ORDER: _events(FrameLate()),
     Cause.WARM: _bus(temperatures_c=_joint(65.0, 6, 40.0)),
     Cause.VOLTAGE_SAGS: _bus(voltages_v=_joint(11.0, 0, 12.0)),
     Cause.DISK_LOW: _events(Fault(Cause.DISK_LOW)),
@@ -223,7 +224,10 @@ def test_every_refusal_of_perception_means_something() -> None:
 
 
 REACTIONS = {
-    Reaction.WARN: {Cause.FRAMES_DROPPED, Cause.WARM, Cause.VOLTAGE_SAGS, Cause.DISK_LOW, Cause.DISK_FULL, Cause.RECORDER_BEHIND},
+    Reaction.WARN: {
+        Cause.FRAMES_DROPPED, Cause.OUT_OF_ORDER, Cause.WARM, Cause.VOLTAGE_SAGS, Cause.DISK_LOW, Cause.DISK_FULL,
+        Cause.RECORDER_BEHIND,
+    },
     Reaction.STOP: {Cause.STOP_PRESSED, Cause.PORT_LOST, Cause.SERVO_ALERT, Cause.TRACKING},
     Reaction.HOLD: {
         Cause.BUS_SILENT, Cause.CAMERA_SILENT, Cause.IMAGE_BLACK, Cause.IMAGE_WHITE, Cause.FRAMES_LOST, Cause.NOT_FINITE,

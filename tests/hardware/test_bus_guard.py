@@ -349,3 +349,61 @@ def test_the_first_cause_stays_until_acknowledged_and_nothing_arms_itself(bench:
     assert not bench.guard.armed
     bench.arm()
     assert bench.guard.armed
+
+
+# --- whose order: at a hand-over the next one's order is there before his permission ----------------------------------------------
+
+
+def _hand_over(bench: Bench, *, order_first: bool) -> None:
+    """One cycle that falls between the two writes of a hand-over from the program to the operator."""
+    bench.cycle()
+    bench.now_s += CYCLE_S
+    order = Order(Command(advance_mm_s=5.0), Source.OPERATOR, bench.now_s)
+    bench.order, bench.beat = (order, bench.beat) if order_first else (bench.order, Heartbeat(bench.now_s, Source.OPERATOR))
+    bench.beating = False
+    bench.cycle(0.0)
+
+
+def test_the_cycle_between_order_and_permission_goes_on_with_the_order_before(bench: Bench) -> None:
+    _hand_over(bench, order_first=True)
+    assert bench.guard.rejection is None
+    assert bench.guard.followed is not None
+    assert bench.guard.followed.source is Source.PROGRAM
+    bench.beat = Heartbeat(bench.now_s, Source.OPERATOR)
+    bench.cycle()
+    assert bench.guard.rejection is None
+    assert bench.guard.followed.source is Source.OPERATOR
+
+
+def test_a_permission_without_an_order_of_its_own_holds(bench: Bench) -> None:
+    _hand_over(bench, order_first=False)
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.WRONG_SOURCE
+
+
+def test_the_order_before_is_good_for_no_longer_than_an_order_is(bench: Bench) -> None:
+    _hand_over(bench, order_first=True)
+    reasons = []
+    for _ in range(6):  # the program is still permitted, and says nothing any more
+        bench.now_s += CYCLE_S
+        bench.beat = Heartbeat(bench.now_s, Source.PROGRAM)
+        bench.order = Order(Command(advance_mm_s=5.0), Source.OPERATOR, bench.now_s)
+        bench.cycle(0.0)
+        reasons.append(bench.guard.rejection.reason if bench.guard.rejection is not None else None)
+    # at 100 ms sharp either may be
+    assert reasons[:3] == [None] * 3
+    assert reasons[4:] == [RejectReason.WRONG_SOURCE] * 2
+
+
+def test_a_hold_is_everybodys(bench: Bench) -> None:
+    bench.cycle()
+    bench.beating = False
+    bench.order = Order(None, Source.OPERATOR, bench.now_s)
+    bench.beat = Heartbeat(bench.now_s, Source.PROGRAM)
+    bench.cycle()
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.NO_COMMAND
+    bench.order = Order(Command(advance_mm_s=5.0), Source.OPERATOR, bench.now_s)
+    bench.cycle()
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.WRONG_SOURCE

@@ -1,0 +1,139 @@
+"""Looks at what followed a fault: the way through the modes, alerts, the record in the session; and says what is missing of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from app.faults.bench import FaultBench
+from app.faults.registry import Seen
+from core.control.alerts import ALERTS, AlertKey
+from core.control.drive_view import DriveView
+from core.control.faults import Cause
+from core.control.modes import DRIVING_MODES, Mode
+from core.session.events import EventKind
+
+_WORD = {
+    Mode.HOLD: "HOLD",
+    Mode.STOPPED: "STOP",
+    Mode.ADVISORY: "DISARM",
+    Mode.ARMED: "back to the operator",
+    Mode.AUTONOMOUS: "resumes",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Where the observation begins."""
+
+    time_s: float
+    views: int
+    alerts: int
+    mode: Mode
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What must follow.
+
+    ``path`` are the modes in turn, the one at the mark left out; ``causes`` must all have been active, be said as alerts (but for
+    those of `silent`) and be in the session; ``latched`` is what waits to be acknowledged at the end; ``within_s`` bounds the first
+    change of mode, by the pilot's own clock; ``blank``: no advice from the first cause on. ``alternatives`` are other ways through
+    the modes that are as good; with ``may_hold`` a hold on the way that clears itself is, too: a cycle that waits for answers in
+    vain leaves the gate without positions.
+    """
+
+    path: tuple[Mode, ...]
+    causes: tuple[Cause, ...]
+    latched: Cause | None = None
+    within_s: float | None = None
+    blank: bool = False
+    alerts: tuple[AlertKey, ...] = ()
+    silent: tuple[Cause, ...] = ()
+    alternatives: tuple[tuple[Mode, ...], ...] = ()
+    may_hold: bool = False
+
+
+def mark(bench: FaultBench) -> Mark:
+    """Begin to record and to look; a bench that was handed over is so at the mark, whatever the machine did meanwhile."""
+    bench.record()
+    bench.turn()
+    if bench.handed_over and bench.mode is not Mode.AUTONOMOUS:
+        bench.hand_over()
+    return Mark(bench.now_s, len(bench.views), len(bench.alerts), bench.mode)
+
+
+def judge(bench: FaultBench, start: Mark, wanted: Wanted, *more: str) -> Seen:
+    """What was seen since the mark, against what was wanted; `more` are problems found elsewhere."""
+    views = bench.views[start.views :]
+    problems = list(more)
+    path, times = _path(views, start)
+    if (_without_holds(path) if wanted.may_hold else path) not in (wanted.path, *wanted.alternatives):
+        problems.append(f"modes went {_words(path)} instead of {_words(wanted.path)}")
+    if wanted.within_s is not None and times and times[0] > wanted.within_s:
+        problems.append(f"first reaction after {1000 * times[0]:.0f} ms (at most {1000 * wanted.within_s:.0f} ms)")
+    active = {fault.cause for view in views for fault in view.active}
+    problems += [f"never active: {cause}" for cause in wanted.causes if cause not in active]
+    if wanted.latched is not None:
+        found = views[-1].latched.cause if views and views[-1].latched is not None else None
+        if found is not wanted.latched:
+            problems.append(f"latched is {found or 'nothing'} instead of {wanted.latched}")
+    if wanted.blank:
+        problems += _not_blank(views, wanted.causes)
+    if views and views[-1].mode not in DRIVING_MODES and views[-1].commanded is not None:
+        problems.append("the program goes on commanding")
+    keys: list[AlertKey] = [*(cause for cause in wanted.causes if cause not in wanted.silent), *wanted.alerts]
+    alerts = bench.alerts[start.alerts :]
+    said = {alert.key for alert in alerts}
+    problems += [f"no alert: {ALERTS[key].text}" for key in keys if key not in said]
+    told, missing = _events(bench, wanted, keys, path)
+    return Seen(_reaction(path, times), tuple(dict.fromkeys(alert.spec.text for alert in alerts)), told, (*problems, *missing))
+
+
+def _path(views: Sequence[DriveView], start: Mark) -> tuple[tuple[Mode, ...], list[float]]:
+    path: list[Mode] = []
+    times: list[float] = []
+    for view in views:
+        if view.mode is not (path[-1] if path else start.mode):
+            path.append(view.mode)
+            times.append(view.time_s - start.time_s)
+    return tuple(path), times
+
+
+def _without_holds(path: tuple[Mode, ...]) -> tuple[Mode, ...]:
+    """Without the holds that cleared themselves."""
+    kept = list(path)
+    while len(kept) >= 2 and kept[0] is Mode.HOLD and kept[1] is Mode.AUTONOMOUS:
+        del kept[:2]
+    return tuple(kept)
+
+
+def _words(path: Sequence[Mode]) -> str:
+    return ", ".join(path) or "nowhere"
+
+
+def _reaction(path: Sequence[Mode], times: Sequence[float]) -> str:
+    if not path:
+        return "goes on"
+    return ", ".join(f"{_WORD[mode]} at {1000 * time_s:.0f} ms" for mode, time_s in zip(path, times, strict=True))
+
+
+def _not_blank(views: Sequence[DriveView], causes: Sequence[Cause]) -> list[str]:
+    for view in views:
+        if any(fault.cause in causes for fault in view.active):
+            if view.advice is not None:
+                return ["advice is shown although a fault should blank it"]
+            if not view.blanked:
+                return ["the advice is blank, but nothing says why"]
+    return []
+
+
+def _events(bench: FaultBench, wanted: Wanted, keys: Sequence[AlertKey], path: Sequence[Mode]) -> tuple[tuple[str, ...], list[str]]:
+    """The session's events in words, and what is missing among them."""
+    _, events = bench.recorded()
+    told = [(event.kind, event.data.get("key", event.text) if event.kind is EventKind.ALERT else event.text) for event in events]
+    missing = [f"not in the session: fault {cause}" for cause in wanted.causes if (EventKind.FAULT, cause.value) not in told]
+    missing += [f"not in the session: mode {mode}" for mode in path if (EventKind.MODE, mode.value) not in told]
+    missing += [f"not in the session: alert {key}" for key in keys if (EventKind.ALERT, str(key)) not in told]
+    shown = [f"{kind}: {text}" if text else kind.value for kind, text in told if kind is not EventKind.VIDEO]
+    return tuple(dict.fromkeys(shown[1:])), missing

@@ -1,0 +1,58 @@
+"""``faults``: brings every fault of the list about, and prints what followed."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from app.faults.registry import COUNT, CampaignError, FaultCase, Result, all_cases, run_case, tidy
+from app.faults.report import line_of, page_of, summary_of, to_json
+from app.learning_commands import Interrupt, progress_bar
+
+
+def run_faults(only: list[int], out: Path | None, *, quick: bool, as_json: bool) -> int:
+    """Run the campaign, or the faults that are named; returns 0 when all went as listed, 1 when not.
+
+    Raises CampaignError.
+    """
+    cases = _chosen(only, quick=quick)
+    if out is not None and len(cases) < COUNT:
+        raise CampaignError("--out writes the whole list: leave --only and --quick out")
+    os.environ["QT_QPA_PLATFORM"] = "offscreen"  # windows are opened and closed; nobody shall see them
+    logging.disable(logging.CRITICAL)  # what is logged of injected faults is what is looked for anyway
+    try:
+        results = list(_with_progress(cases, live=not quick, as_json=as_json))
+    finally:
+        logging.disable(logging.NOTSET)
+    if out is not None and len(results) == COUNT:
+        out.write_text(page_of(results, live=not quick), encoding="utf-8")
+    if not as_json:
+        sys.stdout.write(f"{summary_of(results)}\n")
+    return 0 if len(results) == len(cases) and all(result.seen.ok for result in results) else 1
+
+
+def _chosen(only: list[int], *, quick: bool) -> list[FaultCase]:
+    cases = list(all_cases())
+    if unknown := [number for number in only if not 1 <= number <= COUNT]:
+        raise CampaignError(f"there is no fault {unknown[0]}: they are numbered 1 to {COUNT}")
+    return [case for case in cases if (not only or case.number in only) and (case.quick or not quick)]
+
+
+def _with_progress(cases: list[FaultCase], *, live: bool, as_json: bool) -> Iterator[Result]:
+    with Interrupt() as interrupt, progress_bar() as bar:
+        task = bar.add_task("faults", total=len(cases))
+        for case in cases:
+            if interrupt.asked:
+                return
+            bar.update(task, description=f"{case.number} {case.name}")
+            result = run_case(case, live=live)
+            result = replace(result, seen=tidy(result.seen, Path.cwd()))
+            sys.stdout.write((json.dumps(to_json(result)) if as_json else line_of(result)) + "\n")
+            sys.stdout.flush()
+            bar.advance(task)
+            yield result

@@ -1,0 +1,61 @@
+"""The soak's own tools: samples, flatness, a short run over the whole program."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.soak import Soak
+from app.soak_faults import names
+from app.soak_samples import Sample, flatness, take_sample
+
+
+def samples(count: int, grow_mb: float = 0.0, threads: int = 0, files: int = 0) -> list[Sample]:
+    """Every ten seconds; what grows does so evenly."""
+    return [
+        Sample(10.0 * n, 400.0 + grow_mb * n, 12 + threads * n // count, 20 + files * n // count, 1, 50.0) for n in range(count)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("given", "flat"),
+    [
+        (samples(300), True),
+        (samples(300, grow_mb=0.02), True),
+        (samples(300, grow_mb=0.5), False),
+        (samples(300, threads=12), False),
+        (samples(300, files=30), False),
+        (samples(5), None),
+        ([], None),
+    ],
+)
+def test_flat_after_ten_minutes(given: list[Sample], flat: bool | None) -> None:
+    assert flatness(given).flat is flat
+
+
+def test_what_comes_in_the_first_ten_minutes_is_warm_up() -> None:
+    warm = [Sample(10.0 * n, min(400.0, 200.0 + 4.0 * n), 12, 20, 1, 50.0) for n in range(300)]
+    found = flatness(warm)
+    assert (found.flat, found.warm_s) == (True, 600.0)
+
+
+def test_a_sample_of_this_process() -> None:
+    sample = take_sample(1.0)
+    assert sample.memory_mb > 10.0
+    assert sample.threads >= 1
+    assert sample.files >= 3
+
+
+def test_troubles_have_names_of_their_own() -> None:
+    found = list(names())
+    assert len(found) == len(set(found)) > 10
+
+
+@pytest.mark.real_time
+def test_a_short_soak_sends_nothing_unsafe_and_loses_nothing() -> None:
+    soak = Soak(seed=1)
+    soak.run(6.0, lambda now: now.watch.seen.goals < 200)
+    summary = soak.summary()
+    assert summary["unsafe_texts"] == []
+    assert summary["records"]["lost"] == 0
+    assert summary["packets"] > 20
+    assert summary["rigs_opened"] >= 1

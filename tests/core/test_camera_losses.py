@@ -1,0 +1,62 @@
+"""Frames that the camera lost are in the session: counted in every row, and told as events."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from core.session.events import EventKind
+from core.session.export import export_csv
+from core.session.reader import SessionReader
+from core.session.recorded import row_from_json
+from core.session.rows import row_of
+from core.types import Tick
+from tests.core.session_data import picture, record, tick_of
+
+
+def losing(index: int, captured_s: float, lost: int) -> Tick:
+    tick = tick_of(index, captured_s)
+    return replace(tick, frame=replace(tick.frame, lost=lost))
+
+
+def place(row: dict[str, object]) -> dict[str, object]:
+    return row | {"row": 0, "video": 0, "pts_ms": 0}
+
+
+def test_a_row_keeps_the_count_and_gives_it_back() -> None:
+    row = row_of(losing(3, 100.0, 7), None)
+    assert row["camera_lost"] == 7
+    recorded = row_from_json(place(row))
+    assert recorded.camera_lost == 7
+    assert recorded.tick(picture(3)).frame.lost == 7
+
+
+def test_a_session_of_before_has_none() -> None:
+    row = row_of(losing(3, 100.0, 7), None)
+    del row["camera_lost"]
+    assert row_from_json(place(row)).camera_lost == 0
+
+
+def test_losses_are_events_once_a_second_at_most(tmp_path: Path) -> None:
+    # ten frames a second; what was lost before the first frame is not this session's
+    lost = [4, 4, 5, 5, 6] + [6] * 7 + [6] * 10 + [9] * 5
+    session = record(tmp_path, (losing(k, 100.0 + k / 10, count) for k, count in enumerate(lost)))
+    with SessionReader(session) as reader:
+        assert reader.wait(10.0)
+        told = [event for event in reader.events if event.kind is EventKind.LOST]
+        rows = [row.camera_lost for k in range(len(reader)) if (row := reader.row(k)) is not None]
+        out = tmp_path / "table.csv"
+        export_csv(reader, out)
+    assert [(event.text, event.data["total"]) for event in told] == [("2 frames", 6), ("3 frames", 9)]
+    assert [round(event.time_s - 100.0, 3) for event in told] == [1.0, 2.2]
+    assert rows == lost
+    assert "camera_lost" in out.read_text().splitlines()[0].split(",")
+
+
+def test_a_camera_that_was_opened_again_counts_from_nothing(tmp_path: Path) -> None:
+    lost = [50] * 3 + [0] * 12 + [2] * 12
+    session = record(tmp_path, (losing(k, 100.0 + k / 10, count) for k, count in enumerate(lost)))
+    with SessionReader(session) as reader:
+        assert reader.wait(10.0)
+        told = [(event.text, event.data["total"]) for event in reader.events if event.kind is EventKind.LOST]
+    assert told == [("2 frames", 2)]
