@@ -13,7 +13,7 @@ import pytest
 from app.doctor_command import run_doctor
 from app.window_command import window_config
 from core.config import Config
-from core.devices import DeviceError
+from core.rig_file import RigFileError
 from hardware.preflight import Check
 from hardware.rig import RigKind
 
@@ -109,6 +109,6 @@ def test_a_realsense_recording_is_played(tmp_path: Path) -> None:
 
 
 def test_an_unknown_rig_names_the_known_ones() -> None:
-    with pytest.raises(DeviceError, match="unknown rig 'moon'; known: twin, realsense, webcam"):
+    with pytest.raises(RigFileError, match="unknown rig 'moon'; known: twin, realsense, webcam"):
         window_config("moon", None, None)
     assert Config().rig.camera == "twin"
