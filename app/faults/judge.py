@@ -11,7 +11,7 @@ from core.control.alerts import ALERTS, AlertKey
 from core.control.drive_view import DriveView
 from core.control.faults import Cause
 from core.control.modes import DRIVING_MODES, Mode
-from core.session.events import EventKind
+from core.session.events import Event, EventKind
 
 _WORD = {
     Mode.HOLD: "HOLD",
@@ -20,6 +20,8 @@ _WORD = {
     Mode.ARMED: "back to the operator",
     Mode.AUTONOMOUS: "resumes",
 }
+_BEFORE_S = 0.03
+"""The turn of the mark itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,7 @@ class Mark:
     views: int
     alerts: int
     mode: Mode
+    active: frozenset[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,8 @@ def mark(bench: FaultBench) -> Mark:
     bench.turn()
     if bench.handed_over and bench.mode is not Mode.AUTONOMOUS:
         bench.hand_over()
-    return Mark(bench.now_s, len(bench.views), len(bench.alerts), bench.mode)
+    active = frozenset(fault.cause.value for fault in bench.view.active)
+    return Mark(bench.now_s, len(bench.views), len(bench.alerts), bench.mode, active)
 
 
 def judge(bench: FaultBench, start: Mark, wanted: Wanted, *more: str) -> Seen:
@@ -86,7 +90,7 @@ def judge(bench: FaultBench, start: Mark, wanted: Wanted, *more: str) -> Seen:
     alerts = bench.alerts[start.alerts :]
     said = {alert.key for alert in alerts}
     problems += [f"no alert: {ALERTS[key].text}" for key in keys if key not in said]
-    told, missing = _events(bench, wanted, keys, path)
+    told, missing = _events(bench, start, keys, wanted.causes, path)
     return Seen(_reaction(path, times), tuple(dict.fromkeys(alert.spec.text for alert in alerts)), told, (*problems, *missing))
 
 
@@ -128,12 +132,22 @@ def _not_blank(views: Sequence[DriveView], causes: Sequence[Cause]) -> list[str]
     return []
 
 
-def _events(bench: FaultBench, wanted: Wanted, keys: Sequence[AlertKey], path: Sequence[Mode]) -> tuple[tuple[str, ...], list[str]]:
-    """The session's events in words, and what is missing among them."""
+def _events(
+    bench: FaultBench, start: Mark, keys: Sequence[AlertKey], causes: Sequence[Cause], path: Sequence[Mode]
+) -> tuple[tuple[str, ...], list[str]]:
+    """The session's events since the mark in words, and what is missing among them."""
     _, events = bench.recorded()
-    told = [(event.kind, event.data.get("key", event.text) if event.kind is EventKind.ALERT else event.text) for event in events]
-    missing = [f"not in the session: fault {cause}" for cause in wanted.causes if (EventKind.FAULT, cause.value) not in told]
+    told = [(event.kind, _text(event)) for event in events if event.time_s >= start.time_s - _BEFORE_S]
+    # what was active before is told at the beginning of the session
+    earlier = {event.text for event in events if event.kind is EventKind.FAULT and event.text in start.active}
+    missing = [
+        f"not in the session: fault {c}" for c in causes if (EventKind.FAULT, c.value) not in told and c.value not in earlier
+    ]
     missing += [f"not in the session: mode {mode}" for mode in path if (EventKind.MODE, mode.value) not in told]
     missing += [f"not in the session: alert {key}" for key in keys if (EventKind.ALERT, str(key)) not in told]
     shown = [f"{kind}: {text}" if text else kind.value for kind, text in told if kind is not EventKind.VIDEO]
-    return tuple(dict.fromkeys(shown[1:])), missing
+    return tuple(dict.fromkeys([*shown, *(f"fault: {text}" for text in sorted(earlier))])), missing
+
+
+def _text(event: Event) -> str:
+    return str(event.data.get("key", event.text)) if event.kind is EventKind.ALERT else event.text

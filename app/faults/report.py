@@ -16,8 +16,9 @@ Every fault of the program's list, brought about and watched: `python main.py fa
 
 Reactions: **HOLD** stops an autonomous motion and may clear itself within half a second; **DISARM** holds, leaves autonomy and
 waits to be acknowledged; **STOP** does so in every mode and blocks the bus. Faults of camera and perception blank the advice from
-the first cause on, which is checked, too. Times are the pilot's own, from the injection on. A case is OK only if the way through
-the modes, the alerts and the record in the session are all as listed.
+the first cause on, which is checked, too. Times are the pilot's own, from the injection on; ages count from the capture of the last
+frame or from the last word, which came up to a frame's period before it. A case is OK only if the way through the modes, the alerts
+and the record in the session are all as listed.
 """
 _WAYS = {
     True: (

@@ -1,98 +1,102 @@
-"""Thresholds of a running rig can be changed between two frames; the network is loaded once."""
+"""Starting a rig again: what the operator has not acknowledged is still there."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import pytest
 
 from app import rig_engine
-from app.rig_engine import EngineMaker
-from app.window_command import window_config
+from app.rig_engine import EngineMaker, RigEngine
 from core.config import Config, PerceptionConfig
-from core.learning.model_file import ModelError
-from core.perception.pipeline import Pipeline
-from core.types import Frame
+from core.control.engine import Perceive
+from core.control.faults import Cause, Fault
+from core.control.health import ModelReport
+from core.control.modes import Act, Mode
+from core.devices import DeviceError
+from core.types import Frame, Point, Reason, Refusal, Scene
 from hardware.rig import Rig, RigKind
-from tests.core.test_pipeline import CONFIG, DrawnNetwork, frame
-
-WIDE = CONFIG.model_copy(update={"pose": CONFIG.pose.model_copy(update={"d_allow_px": 77.0})})
-OTHER_NETWORK = CONFIG.model_copy(update={"segmentation": CONFIG.segmentation.model_copy(update={"precision": "fp32"})})
+from tests.core.pilot_bench import Robot
+from tests.core.test_control import _Camera
 
 
-class _Camera:
-    def read(self, timeout_s: float) -> Frame:
-        return frame()
+class _Maker(EngineMaker):
+    """Loads no network."""
 
-    def close(self) -> None: ...
+    def _perception(self, config: PerceptionConfig) -> tuple[Perceive, ModelReport]:
+        def perceive(frame: Frame, target: Point | None = None) -> Scene:
+            return Scene(frame.index, frame.captured_s, (4, 4), 1.0, refusal=Refusal(Reason.BLACK))
+
+        return perceive, ModelReport(True)
+
+
+Open = Callable[[], RigEngine]
 
 
 @pytest.fixture
-def loaded(monkeypatch: pytest.MonkeyPatch) -> list[PerceptionConfig]:
-    """What a network was loaded for."""
-    seen: list[PerceptionConfig] = []
-
-    def load(config: PerceptionConfig) -> Pipeline:
-        seen.append(config)
-        network = DrawnNetwork()
-        network.draw_up_to(300)
-        return Pipeline(network, config)
-
-    monkeypatch.setattr(rig_engine, "open_pipeline", load)
-    monkeypatch.setattr(rig_engine, "open_rig", lambda config: Rig("drawn", RigKind.PLAYBACK, _Camera(), None))  # type: ignore[arg-type]
-    return seen
+def robots() -> list[Robot]:
+    return []
 
 
-def config_of(perception: PerceptionConfig, camera: str = "video_file") -> Config:
-    one_thread = perception.segmentation.model_copy(update={"threads": 1})
-    whole = Config.model_validate({"rig": {"camera": camera, "robot": "none", "source": "x"}})
-    return whole.model_copy(update={"perception": perception.model_copy(update={"segmentation": one_thread})})
+@pytest.fixture
+def open_engine(monkeypatch: pytest.MonkeyPatch, robots: list[Robot]) -> Open:
+    """Opens the twin's rig, again and again; the robots that it opened are kept."""
+    maker = _Maker()
+
+    def open_rig(config: Config) -> Rig:
+        robots.append(Robot())
+        return Rig("twin", RigKind.SIM, _Camera([]), robots[-1])
+
+    monkeypatch.setattr(rig_engine, "open_rig", open_rig)
+    return lambda: maker(Config())
 
 
-@pytest.mark.parametrize("camera", ["video_file", "image_folder"])
-def test_thresholds_act_from_the_next_frame_on(loaded: list[PerceptionConfig], camera: str) -> None:
-    engine = EngineMaker()(config_of(CONFIG, camera))
-    first = engine.step(0.1)
-    strict = CONFIG.model_copy(update={"quality": CONFIG.quality.model_copy(update={"min_robot_length_px": 640.0})})
-    assert engine.set_perception(strict)
-    second = engine.step(0.1)
-    assert first is not None
-    assert second is not None
-    assert first.scene.pose is not None
-    assert second.scene.refusal is not None
-    assert len(loaded) == 1
+def test_the_twins_servos_are_switched_on_at_the_start(open_engine: Open, robots: list[Robot]) -> None:
+    engine = open_engine()
+    assert engine.pilot is not None
+    engine.pilot._requests._worker.submit(lambda: None).result(5.0)
     engine.close()
+    assert "arm" in robots[0].calls
 
 
-def test_a_rig_that_is_started_again_keeps_the_network_unless_it_is_another_one(loaded: list[PerceptionConfig]) -> None:
-    maker = EngineMaker()
-    for perception, count in ((CONFIG, 1), (WIDE, 1), (CONFIG, 1), (OTHER_NETWORK, 2), (WIDE, 3)):
-        maker(config_of(perception)).close()
-        assert len(loaded) == count
-
-
-def test_the_last_frame_of_a_rig_that_is_over_can_be_perceived_again(loaded: list[PerceptionConfig]) -> None:
-    maker = EngineMaker()
-    assert maker.perceive_again(frame(), None, WIDE) is None, "no network yet"
-    maker(config_of(CONFIG)).close()
-    scene = maker.perceive_again(frame(), None, WIDE)
-    assert scene is not None
-    assert scene.pose is not None
-
-
-def test_without_a_network_there_is_nothing_to_try_out(loaded: list[PerceptionConfig], monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(_config: PerceptionConfig) -> Pipeline:
-        raise ModelError("no model")
-
-    monkeypatch.setattr(rig_engine, "open_pipeline", fail)
-    engine = EngineMaker()(config_of(CONFIG))
-    assert not engine.set_perception(WIDE)
+def test_starting_again_clears_no_stop(open_engine: Open, robots: list[Robot]) -> None:
+    engine = open_engine()
+    assert engine.pilot is not None
+    engine.pilot.ask(Act.STOP)
     engine.close()
+    for _ in range(2):  # and neither does a second time
+        engine = open_engine()
+        assert engine.pilot is not None
+        view = engine.pilot.view
+        assert (view.mode, view.latched) == (Mode.STOPPED, Fault(Cause.STOP_PRESSED))
+        engine.close()
+    assert all("arm" not in robot.calls for robot in robots[1:])
+    engine = open_engine()
+    assert engine.pilot is not None
+    engine.pilot.ask(Act.ACKNOWLEDGE)
+    engine.pilot.tick()
+    engine.close()
+    again = open_engine()
+    assert again.pilot is not None
+    assert again.pilot.view.mode is Mode.ADVISORY
+    again.close()
 
 
-def test_the_users_own_settings_are_under_what_the_command_line_says() -> None:
-    own = {"twin": {"phantom": "s_curve"}, "servos": {"port": "/dev/ttyUSB3"}, "window": {"theme": "light"}}
-    config, _ = window_config(None, None, None, own)
-    assert (config.twin.phantom, config.window.theme) == ("s_curve", "light")
-    config, kind = window_config("webcam", None, None, own)
-    assert (config.rig.robot, kind) == ("servos", RigKind.LIVE)
-    config, _ = window_config(None, None, None)
-    assert config.window.theme == "dark", "what is measured knows nothing of them"
+def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = open_engine()
+    assert engine.pilot is not None
+    engine.pilot.ask(Act.STOP)
+    engine.close()
+    works = rig_engine.open_rig
+
+    def broken(config: Config) -> Rig:
+        raise DeviceError("no camera")
+
+    monkeypatch.setattr(rig_engine, "open_rig", broken)
+    with pytest.raises(DeviceError):
+        open_engine()
+    monkeypatch.setattr(rig_engine, "open_rig", works)
+    engine = open_engine()
+    assert engine.pilot is not None
+    assert engine.pilot.view.mode is Mode.STOPPED
+    engine.close()

@@ -26,12 +26,16 @@ def goal(ticks: int, servo_id: int = ADVANCE) -> InstructionPacket:
     return InstructionPacket(0xFE, Instruction.SYNC_WRITE, data)
 
 
-@pytest.fixture
-def servo() -> SoftServo:
-    servo = SoftServo(ADVANCE, SERVOS.model, 1000)
+def servo_at(ticks: int) -> SoftServo:
+    servo = SoftServo(ADVANCE, SERVOS.model, ticks)
     servo.table["operating_mode"] = EXTENDED_POSITION
     servo.table["torque"] = 1
     return servo
+
+
+@pytest.fixture
+def servo() -> SoftServo:
+    return servo_at(1000)
 
 
 @pytest.fixture
@@ -58,16 +62,14 @@ def test_a_goal_is_near_the_horn(watch: WireWatch, servo: SoftServo, distance: f
     assert words is None or words in watch.seen.texts[0]
 
 
-def test_a_goal_is_inside_the_envelope_unless_the_joint_itself_is_not(watch: WireWatch, servo: SoftServo) -> None:
-    servo.motor.position -= 4.8 * PER_MM
-    servo.advance(0.0)
-    watch.see(goal(mm(-5.0)), {ADVANCE: servo}, 10.0)
+def test_a_goal_is_inside_the_envelope_unless_the_joint_itself_is_not(watch: WireWatch) -> None:
+    """It ends at -5 mm; the joint's zero is at 1000."""
+    near = {ADVANCE: servo_at(mm(-4.8))}
+    watch.see(goal(mm(-5.0)), near, 10.0)
     assert watch.seen.unsafe == 0
-    watch.see(goal(mm(-5.2)), {ADVANCE: servo}, 10.02)
-    assert "-5.2" in watch.seen.texts[0]
-    servo.motor.position = mm(-6.0)
-    servo.advance(0.0)
-    watch.see(goal(mm(-6.0)), {ADVANCE: servo}, 10.04)  # held where it is
+    watch.see(goal(mm(-5.2)), near, 10.02)
+    assert watch.seen.texts == ["advance: goal -5.20 mm (-5 to 400 mm)"]
+    watch.see(goal(mm(-6.0)), {ADVANCE: servo_at(mm(-6.0))}, 10.04)  # held where it is
     assert watch.seen.unsafe == 1
 
 
