@@ -132,6 +132,7 @@ def test_a_wiggle_goes_both_ways_and_comes_back() -> None:
     assert ways[-1] == pytest.approx(0.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_servos_that_show_nothing_are_named() -> None:
     class _Still:
         """Eyes that always see the same."""
