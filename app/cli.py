@@ -509,12 +509,15 @@ def soak(
     hours: Annotated[float, typer.Option(min=0.005, max=1000.0, help="Ctrl-C ends it sooner, with the figures so far")] = 2.0,
     seed: Annotated[int, typer.Option(min=0, help="of faults and operator")] = 0,
     out: Annotated[Path | None, typer.Option(help="file for the samples and the summary, one JSON object a line")] = None,
+    true_masks: Annotated[
+        bool, typer.Option("--true-masks", help="the twin's own masks instead of the network's: lighter")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Hours of twin under random faults and operator input: memory, threads, files, records, and every goal on the wire."""
     from app.soak_command import run_soak
 
-    sys.exit(run_soak(hours, seed, out, as_json=json))
+    sys.exit(run_soak(hours, seed, out, true_masks=true_masks, as_json=json))
 
 
 @app.command()

@@ -49,10 +49,11 @@ class Soak:
     Parameters
     ----------
     seed : of faults and operator.
+    true_masks : see with the twin's own masks, a lighter load than the network.
     """
 
-    def __init__(self, seed: int) -> None:
-        self.seed = seed
+    def __init__(self, seed: int, *, true_masks: bool = False) -> None:
+        self.seed, self._true_masks = seed, true_masks
         self.tally = Tally()
         self._folder = Path(tempfile.mkdtemp(prefix="lumenpilot_soak_"))
         self._config = soak_config(self._folder)
@@ -114,7 +115,9 @@ class Soak:
         self.operator.wants_restart = False
         for attempt in range(_OPEN_TRIES):
             try:
-                self._rig = SoakRig(self._config, self._maker, self.watch, self._writer, self._left_over)
+                self._rig = SoakRig(
+                    self._config, self._maker, self.watch, self._writer, self._left_over, true_masks=self._true_masks
+                )
                 break
             except DeviceError as error:  # a machine that pauses while servos are looked for
                 if attempt == _OPEN_TRIES - 1:

@@ -13,10 +13,10 @@ from app.learning_commands import Interrupt, progress_bar
 from app.soak import Soak
 
 
-def run_soak(hours: float, seed: int, out: Path | None, *, as_json: bool) -> int:
+def run_soak(hours: float, seed: int, out: Path | None, *, true_masks: bool, as_json: bool) -> int:
     """Soak; returns 0 when nothing unsafe was sent, no record was lost and nothing grew, else 1. Ctrl-C ends it early."""
     logging.disable(logging.CRITICAL)  # breakdowns are injected; what was not is in the summary
-    soak = Soak(seed)
+    soak = Soak(seed, true_masks=true_masks)
     seconds = 3600.0 * hours
     try:
         with Interrupt() as interrupt, progress_bar() as bar:

@@ -12,19 +12,23 @@ from pathlib import Path
 import numpy as np
 
 from app.rig_engine import EngineMaker, RigEngine
-from core.config import Config
+from core.config import Config, PerceptionConfig
 from core.control.drive_view import LeftOver
 from core.control.engine import Perceive
+from core.control.health import ModelReport
 from core.control.pilot import Pilot
 from core.devices import DeviceError
+from core.perception.pipeline import Pipeline
 from core.session.events import event_of_alert
 from core.session.manifest import about_rig
 from core.session.record_status import RecordStatus, faults_between
 from core.session.writer import SessionWriter
-from core.types import Frame, Point, Scene
+from core.study.accuracy import TrueMasks
+from core.types import Frame, Mask, Point, Points, Scene
 from hardware.rig import Rig, RigKind
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.camera import TwinCamera
+from hardware.twin.renderer import Picture
 from hardware.twin.servo_joints import drive_world
 from hardware.twin.wire_watch import WatchedBus, WireWatch
 from hardware.twin.world import TwinWorld
@@ -33,6 +37,7 @@ _log = logging.getLogger(__name__)
 
 _START_MM = 60.0
 _STEP_S = 0.1
+_FRAMES_KEPT = 20
 
 
 @dataclass(slots=True)
@@ -70,6 +75,31 @@ class SoakCamera(TwinCamera):
         return frame
 
 
+class TrueSight:
+    """Perceives on the masks with which the twin drew each frame: what remains of the load is the geometry's."""
+
+    def __init__(self, world: TwinWorld, config: PerceptionConfig) -> None:
+        self._masks = TrueMasks()
+        self._pipeline = Pipeline(self._masks, config)
+        self._kept: dict[int, tuple[Mask, Mask]] = {}
+        draw = world._renderer.render
+
+        def render(points_mm: Points, sheath_mm: float = 0.0, *, noise_seed: int = 0) -> Picture:
+            picture = draw(points_mm, sheath_mm, noise_seed=noise_seed)
+            self._kept[noise_seed] = picture.vessel, picture.robot
+            for old in sorted(self._kept)[:-_FRAMES_KEPT]:
+                self._kept.pop(old, None)
+            return picture
+
+        world._renderer.render = render  # type: ignore[method-assign]
+
+    def __call__(self, frame: Frame, target: Point | None = None) -> Scene:
+        masks = self._kept.get(frame.index)
+        if masks is not None:
+            self._masks.show(*masks)
+        return self._pipeline(frame, target)
+
+
 class SoakRig:
     """An open rig with its engine's thread and its recorder. ``close`` ends all of it.
 
@@ -79,10 +109,18 @@ class SoakRig:
     watch : the witness on the wire; it outlives the rig.
     writer : the recorder, which outlives the rig, too.
     left_over : of the rig before.
+    true_masks : see with the twin's own masks, not with the network.
     """
 
     def __init__(
-        self, config: Config, maker: EngineMaker, watch: WireWatch, writer: SessionWriter, left_over: LeftOver | None
+        self,
+        config: Config,
+        maker: EngineMaker,
+        watch: WireWatch,
+        writer: SessionWriter,
+        left_over: LeftOver | None,
+        *,
+        true_masks: bool = False,
     ) -> None:
         self.config, self._writer = config, writer
         self.mischief = Mischief()
@@ -103,10 +141,13 @@ class SoakRig:
             self.robot.zero()
             self.bus.zeroed()
             camera = SoakCamera(world, self.mischief)
+            rig = Rig("soak", RigKind.SIM, camera, self.robot, world)
+            if true_masks:
+                perceive, model = TrueSight(world, config.perception), ModelReport(True)
+            else:
+                perceive, model = maker._perception(config.perception)
             camera.open()
             undo.callback(camera.close)
-            rig = Rig("soak", RigKind.SIM, camera, self.robot, world)
-            perceive, model = maker._perception(config.perception)
             self.engine = RigEngine(rig, self._disturbed(perceive), config, model, left_over)
             undo.pop_all()
         assert self.engine.pilot is not None

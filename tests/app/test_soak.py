@@ -22,6 +22,7 @@ def samples(count: int, grow_mb: float = 0.0, threads: int = 0, files: int = 0) 
         (samples(300), True),
         (samples(300, grow_mb=0.02), True),
         (samples(300, grow_mb=0.5), False),
+        (samples(300, threads=5, files=5), True),
         (samples(300, threads=12), False),
         (samples(300, files=30), False),
         (samples(5), None),
