@@ -70,13 +70,14 @@ class RecoveryDesk(QObject):
         self._found = 0
         self._child: ChildProcess | None = None
         self._says_none = False
+        self._is_closed = False
         self._work = WorkThread("looking for cut sessions", self)
         self._work.done.connect(self._on_looked)
         self._work.failed.connect(self._on_look_failed)
 
     def look(self, *, again: bool = False) -> None:
         """Look for cut sessions; `again`: also for those that were declined, and say when there are none."""
-        if self._child is not None or self._waiting:
+        if self._child is not None or self._waiting or self._is_closed:
             return
         self._says_none = again
         folder, declined = self._folder, self._declined
@@ -89,6 +90,7 @@ class RecoveryDesk(QObject):
 
     def close(self) -> None:
         """Look no further; a recovery that goes on ends by itself, and leaves a whole copy or none."""
+        self._is_closed = True
         if self._child is not None:
             self._child.leave()
             self._child.ask_to_end()
@@ -96,6 +98,8 @@ class RecoveryDesk(QObject):
         self._work.wait(_END_WITHIN_MS)
 
     def _on_looked(self, _key: object, found: list[CutSession]) -> None:
+        if self._is_closed:  # what was found meanwhile was already on its way
+            return
         self._waiting, self._found = list(found), len(found)
         if not found and self._says_none:
             self.said.emit(f"No cut session in {self._folder}", False)

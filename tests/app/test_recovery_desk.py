@@ -17,6 +17,7 @@ from app.widgets.offer_strip import OfferStrip
 from core.session.files import is_being_written
 from core.session.manifest import MANIFEST
 from core.session.reader import SessionReader
+from core.session.recovery import CutSession
 from tests.core.session_data import record, tick_of
 
 LONG_MS = 60_000  # two Python processes on a busy computer
@@ -91,7 +92,16 @@ def test_a_session_that_is_not_wanted_is_not_offered_again(
     qtbot.wait(50)
     assert not strip.isVisible()
     desk.look(again=True)  # from the menu: it was declined, not forgotten
-    qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
+    qtbot.waitUntil(lambda: strip.isVisible() and "Recover" in strip.answers, timeout=LONG_MS)
+
+
+def test_what_is_found_after_closing_starts_nothing(desk: RecoveryDesk, strip: OfferStrip, qtbot: QtBot, tmp_path: Path) -> None:
+    cut(tmp_path / "sessions")
+    desk.look()
+    desk.close()
+    desk._on_looked("look", [CutSession(tmp_path, "cut", 1)])
+    assert desk._child is None
+    assert not strip.isVisible()
 
 
 def test_not_now_goes_on_to_the_next_one_and_asks_again_at_the_next_start(
