@@ -120,6 +120,9 @@ def train(
     init: Annotated[str | None, typer.Option(help="start from this model instead of from nothing")] = None,
     shallow: Annotated[bool, typer.Option("--shallow", help="a new network of two convolutions on every level")] = False,
     deepen: Annotated[bool, typer.Option("--deepen", help="give the --init network the default's depth before training")] = False,
+    second_look: Annotated[
+        bool, typer.Option("--second-look", help="train the network of the --init model's second look, near the robot's ends")
+    ] = False,
     steps: Annotated[int, typer.Option(min=1)] = 6000,
     stop_after: Annotated[int | None, typer.Option(min=1, help="end after so many of the steps, to go on with --init")] = None,
     batch: Annotated[int, typer.Option(min=1, max=512)] = 12,
@@ -156,7 +159,17 @@ def train(
         threads=threads,
     )
     _tell_progress(progress_json)
-    run_train(TrainOutputs(out, held_out), data or [], synthetic, init, base, plan, deepen=deepen, shallow=shallow)
+    run_train(
+        TrainOutputs(out, held_out),
+        data or [],
+        synthetic,
+        init,
+        base,
+        plan,
+        deepen=deepen,
+        shallow=shallow,
+        second_look=second_look,
+    )
 
 
 @app.command()

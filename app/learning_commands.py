@@ -28,8 +28,6 @@ _TOLD_EVERY = 2
 """Steps between two lines for another program: a step takes half a second and more."""
 _LOOKS = 10
 """How often held-out frames are looked at during a training."""
-_EXAMPLES = 40
-"""Training frames from which the eight-bit network learns its ranges."""
 
 
 def progress_bar() -> Progress:
@@ -101,20 +99,25 @@ def run_train(
     *,
     deepen: bool = False,
     shallow: bool = False,
+    second_look: bool = False,
 ) -> None:
     """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log.
 
     With `deepen`, the network of `init` first gets the convolutions that today's default shape has more than it; with `shallow`, a
-    new network has two convolutions on every level.
+    new network has two convolutions on every level. With `second_look`, it is the network of the second look of `init` that learns,
+    and `out` is `init` with it.
     """
     import torch
 
+    from app.lessons import FrameLesson, Lesson, SecondLookLesson
     from core.learning.dataset import DatasetError, find_samples
-    from core.learning.model_file import check_can_write, load_network, model_folder, save_model
+    from core.learning.model_file import check_can_write
     from core.learning.training import Progress as Report
     from core.learning.training import train
-    from core.perception.unet import DualUNet, UNetShape
+    from core.perception.unet import DualUNet
 
+    if second_look and outputs.held_out is not None:
+        raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
     if not data and not synthetic:
         raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
     check_can_write(outputs.out)
@@ -130,21 +133,21 @@ def run_train(
         folders.append(folder)
     samples = find_samples(folders)
     torch.manual_seed(plan.seed)
-    if init is not None:
-        network = load_network(model_folder(init))[0]
-        if deepen:
-            from core.learning.growing import deepened
-
-            network = deepened(network, default_shape().encoder_convolutions, _examples(samples))
+    lesson: Lesson
+    if second_look:
+        lesson = SecondLookLesson(samples, init)
     else:
-        network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
-    plan = replace(plan, crop=tuple(-(-side // network.shape.stride) * network.shape.stride for side in plan.crop))
+        lesson = FrameLesson(samples, init, base, deepen=deepen, shallow=shallow)
+    plan = replace(plan, crop=lesson.sides(plan.crop))
     notes = {"plan": plan.to_json(), "init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
     log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {notes}\n")
     teller, watch = asked_teller(), HeldOutWatch(outputs.held_out, out, asked_teller(), log.write)
     with log, Interrupt() as interrupt, progress_bar() as bar:
-        difficulty = _difficulty(init, samples, bar, interrupt) if init is not None and plan.focus_share > 0 else None
-        watch.look(network, 0)
+        crops = lesson.crops(plan, bar, interrupt)
+        if crops is None:
+            _console.print(f"interrupted before the first step; nothing was written to {out}", soft_wrap=True)
+            return
+        watch.look(lesson.network, 0)
         task = bar.add_task("steps", total=plan.steps)
 
         def report(now: Report) -> None:
@@ -157,13 +160,12 @@ def run_train(
 
         def checkpoint(average: DualUNet, step: int) -> None:
             watch.look(average, step)
-            save_model(average, out, training=notes | {"steps_done": step}, figures=watch.figures)
+            lesson.save(average, out, notes | {"steps_done": step}, watch.figures, whole=False)
 
         network, done = train(
-            network,
-            samples,
+            lesson.network,
+            crops,
             plan,
-            difficulty=difficulty,
             on_progress=report,
             on_checkpoint=checkpoint,
             # a window that has gone can no longer ask for the end
@@ -172,7 +174,7 @@ def run_train(
             checkpoint_every=1000 if outputs.held_out is None else max(_TOLD_EVERY, plan.steps // _LOOKS),
         )
         watch.look(network, done)
-    save_model(network, out, training=notes | {"steps_done": done}, figures=watch.figures, examples=_examples(samples))
+    lesson.save(network, out, notes | {"steps_done": done}, watch.figures, whole=True)
     if teller is not None:
         teller.tell({"model": str(out), "steps_done": done, "steps": plan.steps})
     ending = "" if done == plan.steps else f" (interrupted after {done} of {plan.steps} steps; go on with --init {out})"
@@ -211,37 +213,6 @@ class HeldOutWatch:
             self._log(f"the pictures cannot be written ({error.strerror})\n")
         if self._teller is not None:
             self._teller.tell({"held_out_step": step, "pictures": pictures} | now)
-
-
-def default_shape(*, deep: bool = True) -> Any:
-    """The shipped network: chosen in docs/method.md by accuracy against time on two cores without bf16."""
-    from core.perception.unet import UNetShape
-
-    return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2, (2, 2, 3, 4, 4) if deep else (2, 2, 2, 2, 2))
-
-
-def _difficulty(init: str, samples: list[Any], bar: Any, interrupt: Interrupt) -> Any:
-    """How hard the model `init` finds every frame; None when interrupted, as then no training follows."""
-    import numpy as np
-
-    from core.config import SegmentationConfig
-    from core.perception.segmentation import open_segmenter
-    from core.study.difficulty import difficulty
-
-    segment = open_segmenter(SegmentationConfig(model=init))
-    found = []
-    for sample in bar.track(samples, description="finding hard frames"):
-        if interrupt.asked:
-            return None
-        found.append(difficulty(sample, segment))
-    return np.array(found)
-
-
-def _examples(samples: list[Any]) -> list[Any]:
-    """Some frames from all over the sets, at working size."""
-    from core.learning.dataset import WORKING_SIZE_PX
-
-    return [sample.load(WORKING_SIZE_PX)[0] for sample in samples[:: max(1, len(samples) // _EXAMPLES)]]
 
 
 def _described(folder: Path) -> dict[str, Any]:

@@ -44,6 +44,7 @@ class SegmentationConfig(_Section):
     mirrored: Literal["pictures", "always", "never"] = Field(
         "pictures", description="average over picture and mirror image: where that is quick (pictures, windows), always, never"
     )
+    second_look: bool = Field(True, description="look again, closely, at the robot's ends, where the model has a network for it")
     vessel_threshold: float = Field(0.5, gt=0.0, lt=1.0, description="probability from which on a pixel is vessel")
     robot_threshold: float = Field(0.5, gt=0.0, lt=1.0, description="probability from which on a pixel is robot")
 

@@ -1,4 +1,4 @@
-"""A trained network made deeper without forgetting: the convolutions added to its encoder begin as identities.
+"""A trained network made deeper, or given more to see, without forgetting: what is added changes nothing at first.
 
 T. Chen et al., "Net2Net: accelerating learning via knowledge transfer", ICLR 2016: as every level ends in a rectifier, a
 convolution that copies its input changes nothing, and training goes on from where the shallower network stood.
@@ -44,6 +44,20 @@ def deepened(network: DualUNet, encoder_convolutions: tuple[int, int, int, int, 
             assert isinstance(conv, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d)
             _make_identity(conv, norm, *met)
     return deeper
+
+
+def with_first_look(network: DualUNet) -> DualUNet:
+    """A copy of `network` that also takes a first look's probabilities (5 planes), and at first does not mind them."""
+    if network.shape.inputs != 3:
+        raise ValueError("the network takes a first look already")
+    wider = DualUNet(replace(network.shape, inputs=5)).eval()
+    state = network.state_dict()
+    name = "encoder.0.0.weight"
+    kernel = wider.state_dict()[name].zero_()
+    # Folding keeps the pixels of a plane together, so that the planes of the picture come first as before.
+    kernel[:, : state[name].shape[1]] = state[name]
+    wider.load_state_dict(state | {name: kernel})
+    return wider
 
 
 def _level_statistics(network: DualUNet, images: Iterable[Image]) -> list[tuple[Tensor, Tensor]]:

@@ -1,5 +1,7 @@
 """A model on disk: ``weights.safetensors``, ``network.onnx``, perhaps ``network_int8.onnx``, and ``model.json`` with their SHA-256.
 
+The network of its second look (``core/perception/second_look.py``), where it has one, is a model of its own in the folder within.
+
 Nothing is loaded before its hash agrees, and nothing is ever unpickled: a cut, bit-flipped or foreign file is one clear error.
 """
 
@@ -26,7 +28,12 @@ if TYPE_CHECKING:
     from core.perception.unet import DualUNet
 
 WEIGHTS, ONNX, ONNX_INT8, INFO = "weights.safetensors", "network.onnx", "network_int8.onnx", "model.json"
+SECOND_LOOK = "second_look"
+"""The folder within a model that holds the network of its second look, where it has one."""
 MODELS = RESOURCES / "models"
+
+
+_PLANES = {"image": "RGB and the first look's vessel and robot, uint8 (1, H, W, 5), working pixels, values 0..255"}
 
 
 class ModelError(UserError):
@@ -145,7 +152,6 @@ def save_model(
     check_can_write(folder)
     folder = folder.resolve()
     scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    aside = scratch.with_name(scratch.name + ".old")
     try:
         state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
         save_file(state, scratch / WEIGHTS)
@@ -162,17 +168,46 @@ def save_model(
             onnx_int8_sha256=sha256_of(scratch / ONNX_INT8) if len(examples) else None,
             training=training,
             figures=figures,
+            **_PLANES if network.shape.inputs == 5 else {},
         )
         (scratch / INFO).write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
         scratch.chmod(0o755)
+        _put(scratch, folder)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return info
+
+
+def _put(scratch: Path, folder: Path) -> None:
+    """Move a whole model to its place."""
+    aside = scratch.with_name(scratch.name + ".old")
+    try:
         if folder.exists():
             # Aside first, deleted last: whenever this is interrupted, one of the two is whole.
             os.replace(folder, aside)
         os.replace(scratch, folder)
     finally:
-        shutil.rmtree(scratch, ignore_errors=True)
         shutil.rmtree(aside, ignore_errors=True)
-    return info
+
+
+def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs: Any) -> None:
+    """Write `folder`: the model in `base` with `network` for its second look. The rest of the arguments are ``save_model``'s.
+
+    What was measured of `base`, figures and calibrations, is not true of the new model and left out.
+    """
+    check_can_write(folder)
+    folder = folder.resolve()
+    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        for name in (WEIGHTS, ONNX, ONNX_INT8, INFO):
+            if (base / name).is_file():
+                shutil.copyfile(base / name, scratch / name)
+        save_model(network, scratch / SECOND_LOOK, **kwargs)
+        _update(scratch, {"name": folder.name, "calibration": None, "calibration_mirrored": None, "figures": {}})
+        scratch.chmod(0o755)
+        _put(scratch, folder)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def check_can_write(folder: Path) -> None:
@@ -229,7 +264,7 @@ def export_onnx(network: DualUNet | EightBitUNet, stride: int, path: Path) -> No
 
     from core.perception.unet import Probabilities
 
-    example = torch.zeros(1, stride * 2, stride * 2, 3, dtype=torch.uint8)
+    example = torch.zeros(1, stride * 2, stride * 2, network.shape.inputs, dtype=torch.uint8)
     was_training = network.training
     with warnings.catch_warnings():
         # The tracing exporter is the one that needs no further packages; its deprecation is noise to the user.

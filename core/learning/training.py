@@ -10,18 +10,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
-from core.learning.augment import random_clutter, random_crop, random_look
-from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.optimizer import make_optimizers
 from core.perception.unet import DualUNet
-from core.types import Image, Mask
 
-_MAX_KEPT_BYTES = 4_000_000_000
-"""Frames kept in memory by the loader: 2600 of 640x480."""
 _SMALL_AREA_PX = 50.0
 """Of a crop whose robot is smaller than this, a few pixels more or less do not decide the Dice."""
 
@@ -64,54 +58,6 @@ class Progress:
     images_per_s: float
 
 
-class _Crops(Dataset[tuple[Tensor, Tensor]]):
-    """Sample `i` of the stream depends on the seed and `i` alone, so that a run can be repeated with any number of workers."""
-
-    def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
-        self._samples = samples
-        self._plan = plan
-        self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
-        self._kept: dict[int, tuple[Image, Mask, Mask]] = {}
-        self._kept_bytes = 0
-        self._order: tuple[int, NDArray[np.int64]] | None = None
-
-    def __len__(self) -> int:
-        return self._plan.steps * self._plan.batch
-
-    def __getitem__(self, index: int) -> tuple[Tensor, Tensor]:
-        rng = np.random.default_rng((self._plan.seed, index))
-        size = self._plan.crop
-        if rng.random() < self._plan.clutter_share:
-            image, vessel, robot = random_clutter(size, rng), np.zeros(size, bool), np.zeros(size, bool)
-        else:
-            place = self._place(index)
-            if self._chances is not None and rng.random() < self._plan.focus_share:
-                place = int(np.searchsorted(self._chances, rng.random(), side="right"))
-            image, vessel, robot = random_crop(*self._frame(place), size, rng)
-        if rng.random() < self._plan.look_share:
-            image = random_look(image, rng)
-        target = np.stack([vessel, robot]).astype(np.uint8)
-        return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(target)
-
-    def _place(self, index: int) -> int:
-        """Epochs without repetition: a place in a permutation that is drawn anew for every pass."""
-        epoch, place = divmod(index, len(self._samples))
-        if self._order is None or self._order[0] != epoch:
-            rng = np.random.default_rng((self._plan.seed, 7919, epoch))
-            self._order = (epoch, rng.permutation(len(self._samples)))
-        return int(self._order[1][place])
-
-    def _frame(self, place: int) -> tuple[Image, Mask, Mask]:
-        """A frame at working size. Decoding costs as much as cropping, so frames are kept as far as they fit."""
-        frame = self._kept.get(place)
-        if frame is None:
-            frame = self._samples[place].load(WORKING_SIZE_PX)
-            if self._kept_bytes < _MAX_KEPT_BYTES:
-                self._kept[place] = frame
-                self._kept_bytes += sum(part.nbytes for part in frame)
-        return frame
-
-
 def loss_of(logits: Tensor, target: Tensor, robot_weight: float) -> tuple[Tensor, Tensor]:
     """Cross entropy + Dice of both tasks, and the soft Dice (2,) of vessel and robot over the batch.
 
@@ -136,17 +82,15 @@ def _learning_rate(plan: TrainingPlan, step: int) -> float:
     return plan.learning_rate * max(0.01, 1.0 - share)
 
 
-def _batches(samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None) -> Iterator[tuple[Tensor, Tensor]]:
-    crops = _Crops(samples, plan, difficulty)
+def _batches(crops: Dataset[tuple[Tensor, Tensor]], plan: TrainingPlan) -> Iterator[tuple[Tensor, Tensor]]:
     yield from DataLoader(crops, plan.batch, num_workers=plan.workers, prefetch_factor=4 if plan.workers else None)
 
 
 def train(
     network: DualUNet,
-    samples: list[Sample],
+    crops: Dataset[tuple[Tensor, Tensor]],
     plan: TrainingPlan,
     *,
-    difficulty: NDArray[np.float64] | None = None,
     on_progress: Callable[[Progress], None] = lambda _: None,
     on_checkpoint: Callable[[DualUNet, int], None] = lambda _network, _step: None,
     should_stop: Callable[[], bool] = lambda: False,
@@ -155,7 +99,7 @@ def train(
 ) -> tuple[DualUNet, int]:
     """Train `network` in place; returns the network with averaged weights and the number of steps done.
 
-    `difficulty` (one weight > 0 per sample, ``difficulties``) says where ``plan.focus_share`` of the samples come from.
+    `crops` (``crops.py``) gives ``plan.steps * plan.batch`` crops with their labels.
     `should_stop` is asked after every step; what was learnt until then is returned. On a CUDA device bf16 autocast is used.
     """
     torch.manual_seed(plan.seed)
@@ -168,7 +112,7 @@ def train(
     shares = [[group["lr"] / plan.learning_rate for group in optimizer.param_groups] for optimizer in optimizers]
     smooth_loss, smooth_dice = 0.0, np.zeros(2)
     done, mark, marked = 0, time.monotonic(), 0
-    for image, target in _batches(samples, plan, difficulty):
+    for image, target in _batches(crops, plan):
         for optimizer, parts in zip(optimizers, shares, strict=True):
             for group, part in zip(optimizer.param_groups, parts, strict=True):
                 group["lr"] = part * _learning_rate(plan, done)

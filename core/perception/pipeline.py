@@ -14,7 +14,8 @@ from core.perception.evidence import Calibration, collect
 from core.perception.glance import Background, Glances, look
 from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
-from core.perception.segmentation import Mirrored, Segmenter, open_segmenter, to_working
+from core.perception.second_look import PlaneSegmenter, SecondLook
+from core.perception.segmentation import Mirrored, Segmenter, open_second_look, open_segmenter, to_working
 from core.perception.tracking import Memory, check_jump, recall
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
@@ -222,12 +223,17 @@ def open_pipeline(config: PerceptionConfig) -> Pipeline:
     """Load the configured model and build the pipeline around it; raises ModelError."""
     segmenter = open_segmenter(config.segmentation)
     info, mirrored = segmenter.info, config.segmentation.mirrored
-    plain = Sight(segmenter, info.calibration)
-    twice = Sight(Mirrored(segmenter), info.calibration_mirrored or info.calibration)
+    near = open_second_look(config.segmentation)
+    plain = Sight(_closely(segmenter, near), info.calibration)
+    twice = Sight(_closely(Mirrored(segmenter), near), info.calibration_mirrored or info.calibration)
     stream = twice if mirrored == "always" else plain
     # A window costs a fifth of the whole, so that there is time to look at it twice.
     careful = plain if mirrored == "never" else twice
     return Pipeline(stream.segment, config, stream.calibration, careful, glance=careful)
+
+
+def _closely(first: Segmenter, near: PlaneSegmenter | None) -> Segmenter:
+    return first if near is None else SecondLook(first, near)
 
 
 class NoPerception:

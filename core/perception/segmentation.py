@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import SegmentationConfig
-from core.learning.model_file import ONNX, ONNX_INT8, ModelError, check_files, model_folder, read_model_info
+from core.learning.model_file import INFO, ONNX, ONNX_INT8, SECOND_LOOK, ModelError, check_files, model_folder, read_model_info
 from core.types import Image
 
 Probability = NDArray[np.float32]
@@ -90,6 +90,7 @@ class OpenVinoSegmenter:
         except RuntimeError as error:
             reason = str(error).strip().splitlines()[-1]
             raise ModelError(f"{folder / name}: cannot be read ({reason}); restore the model folder") from None
+        self._planes = int(self.info.shape.get("inputs", 3))
         self._requests: dict[tuple[int, int], openvino.InferRequest] = {}
 
     @property
@@ -110,7 +111,7 @@ class OpenVinoSegmenter:
             if len(self._requests) >= self._MAX_SIZES:
                 self._requests.pop(next(iter(self._requests)))
             model = self._model.clone()
-            model.reshape([1, height, width, 3])
+            model.reshape([1, height, width, self._planes])
             options = {"PERFORMANCE_HINT": "LATENCY", "INFERENCE_NUM_THREADS": self._threads}
             self._requests[key] = self._core.compile_model(model, "CPU", options).create_infer_request()
         return self._requests[key]
@@ -167,7 +168,19 @@ def open_segmenter(config: SegmentationConfig) -> OpenVinoSegmenter | TorchSegme
     ModelError
         Missing, cut or damaged model; the message says what to do.
     """
-    folder = model_folder(config.model)
+    return _open(model_folder(config.model), config)
+
+
+def open_second_look(config: SegmentationConfig) -> OpenVinoSegmenter | TorchSegmenter | None:
+    """The network of the configured model's second look, which takes ``second_look.Planes``; None: it has none, or none is wanted.
+
+    Raises ModelError, as ``open_segmenter`` does.
+    """
+    folder = model_folder(config.model) / SECOND_LOOK
+    return _open(folder, config) if config.second_look and (folder / INFO).is_file() else None
+
+
+def _open(folder: Path, config: SegmentationConfig) -> OpenVinoSegmenter | TorchSegmenter:
     if config.device == "torch" or (config.device == "auto" and cuda_present()):
         return TorchSegmenter(folder, config.threads)
     return OpenVinoSegmenter(folder, config.threads, config.precision)

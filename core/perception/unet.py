@@ -21,7 +21,8 @@ class UNetShape:
 
     ``widths`` are the channels of the five encoder levels, ``decoder_widths`` those of the four decoder levels from fine to coarse,
     ``fold`` the block of pixels folded into channels (1 = none). ``encoder_convolutions`` are the 3x3 convolutions of each encoder
-    level (the paper has two everywhere), ``decoder_convolutions`` those of every decoder level.
+    level (the paper has two everywhere), ``decoder_convolutions`` those of every decoder level. ``inputs`` are the planes of the
+    input: 3 of a picture, 5 where a first look's probabilities come with it (``second_look.py``).
     """
 
     widths: tuple[int, int, int, int, int] = (16, 32, 64, 128, 256)
@@ -29,6 +30,7 @@ class UNetShape:
     decoder_convolutions: int = 2
     fold: int = 1
     encoder_convolutions: tuple[int, int, int, int, int] = (2, 2, 2, 2, 2)
+    inputs: int = 3
 
     @classmethod
     def of_base(cls, base: int) -> UNetShape:
@@ -57,7 +59,10 @@ class UNetShape:
         depths = tuple(int(count) for count in data.get("encoder_convolutions", (2, 2, 2, 2, 2)))
         if len(depths) != 5 or min(depths) < 1 or max(depths) > 8:
             raise ValueError("encoder_convolutions are five counts between 1 and 8")
-        return cls(widths, decoder, convolutions, fold, depths)
+        inputs = int(data.get("inputs", 3))
+        if inputs not in (3, 5):
+            raise ValueError("inputs are 3 (a picture) or 5 (with a first look's probabilities)")
+        return cls(widths, decoder, convolutions, fold, depths, inputs)
 
 
 def _convolutions(inputs: int, outputs: int, count: int) -> nn.Sequential:
@@ -94,12 +99,12 @@ class _Decoder(nn.Module):
 
 
 class DualUNet(nn.Module):
-    """RGB images (N, 3, H, W), 0..1 -> logits (N, 2, H, W), vessel and robot. H, W are multiples of ``shape.stride``."""
+    """RGB images (N, ``shape.inputs``, H, W), 0..1 -> logits (N, 2, H, W), vessel and robot. H, W: multiples of the stride."""
 
     def __init__(self, shape: UNetShape) -> None:
         super().__init__()
         self.shape = shape
-        channels = 3 * shape.fold**2
+        channels = shape.inputs * shape.fold**2
         encoder = []
         for width, count in zip(shape.widths, shape.encoder_convolutions, strict=True):
             encoder.append(_convolutions(channels, width, count))
@@ -124,7 +129,7 @@ class DualUNet(nn.Module):
 
 
 class Probabilities(nn.Module):
-    """The network as it is exported: uint8 image (1, H, W, 3) -> probabilities (1, 2, H, W) in 0..1."""
+    """The network as it is exported: uint8 image (1, H, W, planes) -> probabilities (1, 2, H, W) in 0..1."""
 
     def __init__(self, network: nn.Module) -> None:
         super().__init__()

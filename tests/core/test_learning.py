@@ -7,6 +7,7 @@ import pytest
 
 from core.images import read_image
 from core.learning.augment import random_clutter, random_crop, random_look
+from core.learning.crops import FrameCrops
 from core.learning.dataset import DatasetError, find_samples, read_truth, write_mask, write_png
 from core.learning.optimizer import make_optimizers, orthogonalised
 from core.learning.training import Progress, TrainingPlan, train
@@ -92,7 +93,7 @@ def _toy_training(folder: Path, steps: int, **kwargs: object) -> tuple[DualUNet,
     plan = TrainingPlan(
         steps=steps, batch=4, learning_rate=4e-2, warmup_steps=5, crop=(64, 64), workers=0, average_decay=0.9, threads=1
     )
-    return train(network, find_samples([folder]), plan, **kwargs)  # type: ignore[arg-type]
+    return train(network, FrameCrops(find_samples([folder]), plan), plan, **kwargs)  # type: ignore[arg-type]
 
 
 def test_training_learns_a_toy_task_and_reports(tmp_path: Path) -> None:
@@ -165,14 +166,18 @@ def test_frames_are_trained_on_at_working_size(tmp_path: Path) -> None:
 
 
 def test_hard_frames_are_shown_more_often(tmp_path: Path) -> None:
-    from core.learning.training import _Crops
-
     samples = find_samples([_toy_set(tmp_path / "set", 4)])
     plan = TrainingPlan(steps=100, batch=4, crop=(64, 64), clutter_share=0.0, look_share=0.0, focus_share=0.5)
-    crops = _Crops(samples, plan, np.array([0.01, 0.01, 0.01, 0.97]))
+    crops = FrameCrops(samples, plan, np.array([0.01, 0.01, 0.01, 0.97]))
     drawn: list[int] = []
-    frame = crops._frame
-    crops._frame = lambda place: (drawn.append(place), frame(place))[1]  # type: ignore[method-assign]
+    frames = crops._frames
+
+    class Watched:
+        def __getitem__(self, place: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            drawn.append(place)
+            return frames[place]
+
+    crops._frames = Watched()  # type: ignore[assignment]
     for index in range(400):
         crops[index]
     # Half evenly over four frames, half nearly always the hard one: 1/8 + 0.49.

@@ -1,0 +1,126 @@
+"""What ``train`` can teach: the network that looks at whole pictures, or the one of a model's second look."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from rich.progress import Progress
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from core.config import SegmentationConfig
+from core.errors import UserError
+from core.learning.crops import FirstLook, FrameCrops, NearCrops
+from core.learning.dataset import WORKING_SIZE_PX, Sample
+from core.learning.growing import deepened, with_first_look
+from core.learning.model_file import INFO, SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look
+from core.learning.training import TrainingPlan
+from core.perception.second_look import WINDOW_PX
+from core.perception.segmentation import Mirrored, open_segmenter
+from core.perception.unet import DualUNet, UNetShape
+from core.study.difficulty import difficulty
+
+if TYPE_CHECKING:
+    from app.learning_commands import Interrupt
+
+_EXAMPLES = 40
+"""Training frames from which an eight-bit network learns its ranges."""
+
+
+class Lesson(Protocol):
+    """A network to be trained, what it is shown, and how it is kept."""
+
+    network: DualUNet
+
+    def sides(self, crop: tuple[int, int]) -> tuple[int, int]:
+        """The crops' height and width where these are asked for."""
+        ...
+
+    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> Dataset[tuple[Tensor, Tensor]] | None:
+        """What the network is shown; None when interrupted."""
+        ...
+
+    def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
+        """Write the model; without its eight-bit copy unless `whole`."""
+        ...
+
+
+class FrameLesson:
+    """The network that looks at whole pictures: from nothing, or from the model `init`."""
+
+    def __init__(self, samples: list[Sample], init: str | None, base: int | None, *, deepen: bool, shallow: bool) -> None:
+        self._samples, self._init = samples, init
+        if init is None:
+            self.network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
+            return
+        self.network = load_network(model_folder(init))[0]
+        if deepen:
+            images = [sample.load(WORKING_SIZE_PX)[0] for sample in _some(samples)]
+            self.network = deepened(self.network, default_shape().encoder_convolutions, images)
+
+    def sides(self, crop: tuple[int, int]) -> tuple[int, int]:
+        stride = self.network.shape.stride
+        return -(-crop[0] // stride) * stride, -(-crop[1] // stride) * stride
+
+    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> FrameCrops | None:
+        if self._init is None or plan.focus_share == 0:
+            return FrameCrops(self._samples, plan)
+        segment = open_segmenter(SegmentationConfig(model=self._init))
+        found = []
+        for sample in bar.track(self._samples, description="finding hard frames"):
+            if interrupt.asked:
+                return None
+            found.append(difficulty(sample, segment))
+        return FrameCrops(self._samples, plan, np.array(found))
+
+    def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
+        examples = [sample.load(WORKING_SIZE_PX)[0] for sample in _some(self._samples)] if whole else []
+        save_model(network, out, training=training, figures=figures, examples=examples)
+
+
+class SecondLookLesson:
+    """The network of a model's second look, from the one that it has, or else from its network for whole pictures."""
+
+    def __init__(self, samples: list[Sample], init: str | None) -> None:
+        if init is None:
+            raise UserError("--second-look needs --init MODEL, whose first look it looks again after")
+        self._samples, self._init = samples, init
+        self._base = model_folder(init)
+        has_one = (self._base / SECOND_LOOK / INFO).is_file()
+        self.network = load_network(self._base / SECOND_LOOK)[0] if has_one else with_first_look(load_network(self._base)[0])
+        self._shown: NearCrops | None = None
+
+    def sides(self, crop: tuple[int, int]) -> tuple[int, int]:
+        return WINDOW_PX, WINDOW_PX
+
+    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> NearCrops | None:
+        plain = open_segmenter(SegmentationConfig(model=self._init))
+        # Streams look once at the whole, single pictures twice: the second look has to get on with both.
+        ways = (plain, Mirrored(plain))
+        looks: list[FirstLook] = []
+        for index, sample in enumerate(bar.track(self._samples, description="first look")):
+            if interrupt.asked:
+                return None
+            looks.append(FirstLook.at(sample, ways[index % 2]))
+        self._shown = NearCrops(self._samples, looks, plan)
+        return self._shown
+
+    def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
+        examples = []
+        if whole and self._shown is not None:
+            step = max(1, len(self._shown) // (4 * _EXAMPLES))
+            shown = (self._shown[index][0] for index in range(0, len(self._shown), step))
+            examples = [np.ascontiguousarray(planes.numpy().transpose(1, 2, 0)) for planes in shown]
+        save_with_second_look(self._base, network, out, training=training, figures=figures, examples=examples)
+
+
+def default_shape(*, deep: bool = True) -> UNetShape:
+    """The shipped network: chosen in docs/method.md by accuracy against time on two cores without bf16."""
+    return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2, (2, 2, 3, 4, 4) if deep else (2, 2, 2, 2, 2))
+
+
+def _some(samples: list[Sample]) -> list[Sample]:
+    """From all over the sets."""
+    return samples[:: max(1, len(samples) // _EXAMPLES)]

@@ -1,0 +1,179 @@
+"""What a network is shown in training: cut-outs of labelled frames, changed at random."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from numpy.random import Generator
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from core.learning.augment import random_clutter, random_crop, random_look
+from core.learning.dataset import WORKING_SIZE_PX, Sample
+from core.learning.training import TrainingPlan
+from core.perception.second_look import WINDOW_PX, places_to_look, window_at
+from core.perception.segmentation import Segmenter
+from core.types import Image, Mask, Point
+
+_KEPT_SHARE = 0.5
+"""Of the free memory, for decoded frames: 10 GB hold 6500 of 640x480."""
+_MISSED_SHARE = 0.35
+"""Of the second look's windows: as many show a pixel that the first look got wrong. The others show what it would look at."""
+_JITTER_PX = 10.0
+
+Crop = tuple[Tensor, Tensor]
+"""uint8 (planes, h, w) and its labels uint8 (2, h, w): vessel, robot."""
+
+
+class _Frames:
+    """Labelled frames at working size. Decoding costs as much as cropping, so frames are kept as far as they fit."""
+
+    def __init__(self, samples: Sequence[Sample]) -> None:
+        self._samples = samples
+        self._kept: dict[int, tuple[Image, Mask, Mask]] = {}
+        self._room = _free_memory() * _KEPT_SHARE
+
+    def __getitem__(self, place: int) -> tuple[Image, Mask, Mask]:
+        frame = self._kept.get(place)
+        if frame is None:
+            frame = self._samples[place].load(WORKING_SIZE_PX)
+            if self._room > 0:
+                self._kept[place] = frame
+                self._room -= sum(part.nbytes for part in frame)
+        return frame
+
+
+def _free_memory() -> float:
+    """Bytes that are free, or a modest guess where the system does not tell."""
+    try:
+        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):
+        return 4e9
+
+
+class _Order:
+    """Epochs without repetition: a place in a permutation that is drawn anew for every pass."""
+
+    def __init__(self, seed: int, count: int) -> None:
+        self._seed, self._count = seed, count
+        self._drawn: tuple[int, NDArray[np.int64]] | None = None
+
+    def __getitem__(self, index: int) -> int:
+        epoch, place = divmod(index, self._count)
+        if self._drawn is None or self._drawn[0] != epoch:
+            rng = np.random.default_rng((self._seed, 7919, epoch))
+            self._drawn = (epoch, rng.permutation(self._count))
+        return int(self._drawn[1][place])
+
+
+class FrameCrops(Dataset[Crop]):
+    """For the first look: cut-outs of ``plan.crop``, turned, scaled and mirrored, most of them near the robot.
+
+    Crop `i` depends on the seed and `i` alone, so that a run can be repeated with any number of workers. `difficulty` (one weight
+    > 0 per sample, ``difficulty.py``) says where ``plan.focus_share`` of the crops come from.
+    """
+
+    def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
+        self._plan = plan
+        self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
+        self._frames = _Frames(samples)
+        self._order = _Order(plan.seed, len(samples))
+
+    def __len__(self) -> int:
+        return self._plan.steps * self._plan.batch
+
+    def __getitem__(self, index: int) -> Crop:
+        rng = np.random.default_rng((self._plan.seed, index))
+        size = self._plan.crop
+        if rng.random() < self._plan.clutter_share:
+            image, vessel, robot = random_clutter(size, rng), np.zeros(size, bool), np.zeros(size, bool)
+        else:
+            place = self._order[index]
+            if self._chances is not None and rng.random() < self._plan.focus_share:
+                place = int(np.searchsorted(self._chances, rng.random(), side="right"))
+            image, vessel, robot = random_crop(*self._frames[place], size, rng)
+        if rng.random() < self._plan.look_share:
+            image = random_look(image, rng)
+        return _tensors(image, vessel, robot)
+
+
+@dataclass(frozen=True, slots=True)
+class FirstLook:
+    """What a model saw in a frame: both probabilities as PNG, 0..255, and the places that a second look would go to."""
+
+    vessel_png: bytes
+    robot_png: bytes
+    places: tuple[Point, ...]
+
+    @classmethod
+    def at(cls, sample: Sample, segment: Segmenter) -> FirstLook:
+        """Look at a frame; raises DatasetError."""
+        vessel, robot = segment(sample.load(WORKING_SIZE_PX)[0])
+        packed = [cv2.imencode(".png", np.rint(seen * 255).astype(np.uint8))[1].tobytes() for seen in (vessel, robot)]
+        return cls(packed[0], packed[1], tuple(places_to_look(robot)))
+
+    def probabilities(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Vessel and robot (h, w), 0..255."""
+        packed = (np.frombuffer(data, np.uint8) for data in (self.vessel_png, self.robot_png))
+        vessel, robot = (np.asarray(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE), np.uint8) for data in packed)
+        return vessel, robot
+
+
+class NearCrops(Dataset[Crop]):
+    """For the second look: windows as it is shown them, with what the first look (one per sample) says there."""
+
+    def __init__(self, samples: list[Sample], first_looks: list[FirstLook], plan: TrainingPlan) -> None:
+        self._plan, self._first_looks = plan, first_looks
+        self._frames = _Frames(samples)
+        self._order = _Order(plan.seed, len(samples))
+
+    def __len__(self) -> int:
+        return self._plan.steps * self._plan.batch
+
+    def __getitem__(self, index: int) -> Crop:
+        rng = np.random.default_rng((self._plan.seed, index))
+        place = self._order[index]
+        image, vessel, robot = self._frames[place]
+        first = self._first_looks[place]
+        seen_vessel, seen_robot = first.probabilities()
+        center = _place(seen_robot, robot, first.places, rng)
+        x, y, width, height = window_at(center, (image.shape[1], image.shape[0]))
+        part = np.s_[y : y + height, x : x + width]
+        cut = _filled(np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]]))
+        # Quarter turns and mirror images cost no sharpness; the first look has seen all other angles and sizes.
+        cut = np.rot90(cut, int(rng.integers(4)))
+        cut = cut[:, ::-1] if rng.random() < 0.5 else cut
+        cut = np.ascontiguousarray(cut)
+        if rng.random() < self._plan.look_share:
+            cut[:, :, :3] = random_look(cut[:, :, :3], rng)
+        return _tensors(cut[:, :, :5], cut[:, :, 5] > 0, cut[:, :, 6] > 0)
+
+
+def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...], rng: Generator) -> Point:
+    """Where the first look went wrong, or where the second one would look, a bit beside it."""
+    height, width = robot.shape
+    if rng.random() < _MISSED_SHARE:
+        rows, columns = np.nonzero((seen_robot > 127) != robot)
+        if len(rows):
+            pick = int(rng.integers(len(rows)))
+            return float(columns[pick]), float(rows[pick])
+    x, y = places[int(rng.integers(len(places)))] if places else (rng.uniform(0, width), rng.uniform(0, height))
+    across, down = rng.normal(0, _JITTER_PX, 2)
+    return min(max(x + across, 0.0), width - 1.0), min(max(y + down, 0.0), height - 1.0)
+
+
+def _filled(cut: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A window of a small picture brought to full size, its edge going on."""
+    down, right = WINDOW_PX - cut.shape[0], WINDOW_PX - cut.shape[1]
+    return np.pad(cut, ((0, down), (0, right), (0, 0)), mode="edge") if down or right else cut
+
+
+def _tensors(image: NDArray[np.uint8], vessel: Mask, robot: Mask) -> Crop:
+    target = np.stack([vessel, robot]).astype(np.uint8)
+    return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(target)

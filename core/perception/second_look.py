@@ -1,0 +1,148 @@
+"""A second look at the robot's ends: a small network that sees the picture and what the first look took it for, close by.
+
+Most answers that are lost are lost at the robot's tip (docs/method.md), a few hundred of three hundred thousand pixels. The second
+network has the first one's shape, but is shown nothing else in training: windows around ends, and around pixels that the first look
+got wrong. What it says replaces the first look's probabilities there, of robot and vessel.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.perception.masks import clean_mask
+from core.perception.segmentation import Probability, Segmenter
+from core.perception.skeleton import MAX_KNOTS, end_pixels
+from core.perception.thinning import thin_parts
+from core.types import Image, Mask, Point, Window
+
+WINDOW_PX = 160
+"""Four times the piece of the robot that its vector is fitted to."""
+MARGIN_PX = 16
+"""At the window's inner edges the network lacks context: the first look fades in again."""
+_SEEN_PX = 40.0
+"""An end as near as this to the middle of a window has been looked at."""
+_MAX_LOOKS = 5
+_ROUNDS = 2
+"""What the second look adds may end farther on: then that end is looked at, too."""
+_FAINT = 0.1
+"""Where nothing is taken for a robot, the likeliest place is looked at, if it is as likely as this."""
+_MIN_AREA_PX = 20
+
+Planes = NDArray[np.uint8]
+"""Shape (h, w, 5): red, green, blue, and the first look's probabilities of vessel and robot as 0..255."""
+
+
+class PlaneSegmenter(Protocol):
+    """Vessel and robot probabilities, float32 (h, w) each, of what is in ``Planes``."""
+
+    def __call__(self, planes: Planes, /) -> tuple[Probability, Probability]: ...
+
+
+def planes_of(image: Image, vessel: Probability, robot: Probability) -> Planes:
+    """The second network's input of an RGB image (h, w, 3) and the probabilities (h, w) that the first look found in it."""
+    planes = np.empty((*image.shape[:2], 5), np.uint8)
+    planes[:, :, :3] = image
+    planes[:, :, 3] = np.rint(vessel * np.float32(255))
+    planes[:, :, 4] = np.rint(robot * np.float32(255))
+    return planes
+
+
+def places_to_look(robot: Probability) -> list[Point]:
+    """Where a second look is worth it: the ends (x, y) of what the first look took for robot, of the largest pieces first.
+
+    Where it took nothing for one, the likeliest place, if there is any.
+    """
+    mask = clean_mask(robot >= np.float32(0.5), _MIN_AREA_PX, 0)
+    if not mask.any():
+        likely = cv2.GaussianBlur(robot, (0, 0), 3.0)
+        row, column = np.unravel_index(int(np.argmax(likely)), likely.shape)
+        return [(float(column), float(row))] if likely[row, column] >= _FAINT else []
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
+    ends = end_pixels(_skeleton(mask))
+    if len(ends) > MAX_KNOTS or count < 2:
+        return []
+    ends.sort(key=lambda end: (-int(stats[labels[end[1], end[0]], cv2.CC_STAT_AREA]), end))
+    height, width = mask.shape
+    # Where the robot enters the picture there is no more to see of it.
+    return [(float(x), float(y)) for x, y in ends if 8 <= x < width - 8 and 8 <= y < height - 8]
+
+
+def _skeleton(mask: Mask) -> Mask:
+    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
+    skeleton = np.zeros(mask.shape, np.bool_)
+    skeleton[y : y + height, x : x + width] = thin_parts(np.ascontiguousarray(mask[y : y + height, x : x + width]))
+    return skeleton
+
+
+def window_at(place: Point, size: tuple[int, int]) -> Window:
+    """The window (x, y, width, height) with `place` in its middle, or as near to it as a picture of this (width, height) allows."""
+    width, height = min(WINDOW_PX, size[0]), min(WINDOW_PX, size[1])
+    x = min(max(round(place[0]) - width // 2, 0), size[0] - width)
+    y = min(max(round(place[1]) - height // 2, 0), size[1] - height)
+    return x, y, width, height
+
+
+class SecondLook:
+    """A segmenter that looks again, closely, at the ends of what its first look takes for the robot.
+
+    Parameters
+    ----------
+    first : the first look, at all of the picture.
+    near : the second network.
+    mirrored : whether it is asked about the mirror image of a window, too, and the mean taken.
+    """
+
+    def __init__(self, first: Segmenter, near: PlaneSegmenter, *, mirrored: bool = True) -> None:
+        self._first, self._near, self._mirrored = first, near, mirrored
+
+    @property
+    def engine(self) -> str:
+        return f"{self._first.engine}, second look"
+
+    def __call__(self, image: Image) -> tuple[Probability, Probability]:
+        seen = self._first(image)
+        planes = planes_of(image, *seen)
+        vessel, robot = (probability.copy() for probability in seen)
+        looked: list[Point] = []
+        for _ in range(_ROUNDS):
+            before = len(looked)
+            for place in places_to_look(robot):
+                if len(looked) < _MAX_LOOKS and all(math.dist(place, other) > _SEEN_PX for other in looked):
+                    looked.append(place)
+            for place in looked[before:]:
+                self._look(planes, place, vessel, robot)
+            if len(looked) == before:
+                break
+        return vessel, robot
+
+    def _look(self, planes: Planes, place: Point, vessel: Probability, robot: Probability) -> None:
+        """Replace both probabilities in the window around `place`."""
+        height, width = robot.shape
+        x, y, across, down = window_at(place, (width, height))
+        part = np.s_[y : y + down, x : x + across]
+        cut = np.ascontiguousarray(planes[part])
+        found = self._near(cut)
+        if self._mirrored:
+            other = self._near(np.ascontiguousarray(cut[:, ::-1]))
+            found = (0.5 * (found[0] + other[0][:, ::-1]), 0.5 * (found[1] + other[1][:, ::-1]))
+        columns = _fade(across, x > 0, x + across < width)
+        rows = _fade(down, y > 0, y + down < height)
+        weight = rows[:, None] * columns[None, :]
+        for whole, near in ((vessel, found[0]), (robot, found[1])):
+            whole[part] += weight * (near - whole[part])
+
+
+def _fade(length: int, at_start: bool, at_end: bool) -> NDArray[np.float32]:
+    """1, falling to 0 over the margin at those ends that lie inside the picture."""
+    distance = np.arange(length, dtype=np.float32)
+    ramp = np.ones(length, np.float32)
+    if at_start:
+        ramp = np.minimum(ramp, distance / MARGIN_PX)
+    if at_end:
+        ramp = np.minimum(ramp, distance[::-1] / MARGIN_PX)
+    return ramp
