@@ -1,0 +1,259 @@
+"""The second look: where it goes, what it changes, and how its network is taught and kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from core.config import SegmentationConfig
+from core.learning.crops import FirstLook, NearCrops
+from core.learning.dataset import Sample, write_mask, write_png
+from core.learning.growing import with_first_look
+from core.learning.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, save_model, save_with_second_look
+from core.learning.training import TrainingPlan
+from core.perception.second_look import MARGIN_PX, WINDOW_PX, Planes, SecondLook, places_to_look, planes_of, window_at
+from core.perception.segmentation import OpenVinoSegmenter, open_second_look
+from core.perception.unet import DualUNet, UNetShape
+
+SIZE = (480, 640)
+TINY = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
+
+
+def bar(start: int, end: int, row: int = 240) -> np.ndarray:
+    """A robot's probability: a horizontal bar 9 px wide."""
+    robot = np.zeros(SIZE, np.float32)
+    robot[row - 4 : row + 5, start:end] = 0.9
+    return robot
+
+
+class First:
+    """A first look that always sees the same."""
+
+    engine = "drawn"
+
+    def __init__(self, robot: np.ndarray) -> None:
+        self.robot = robot
+
+    def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.full(SIZE, 0.25, np.float32), self.robot
+
+
+class Near:
+    """A second network that knows the truth by heart, from the picture's red plane, and counts its looks."""
+
+    def __init__(self) -> None:
+        self.shown: list[Planes] = []
+
+    def __call__(self, planes: Planes, /) -> tuple[np.ndarray, np.ndarray]:
+        self.shown.append(planes.copy())
+        return np.full(planes.shape[:2], 0.75, np.float32), (planes[:, :, 0] > 0).astype(np.float32)
+
+
+def picture_of(robot: np.ndarray) -> np.ndarray:
+    image = np.zeros((*SIZE, 3), np.uint8)
+    image[:, :, 0] = np.where(robot > 0.5, 200, 0)
+    return image
+
+
+def test_ends_inside_the_picture_are_looked_at() -> None:
+    robot = bar(0, 300)
+    ((x, y),) = places_to_look(robot)
+    assert 285 <= x < 300
+    assert abs(y - 240) <= 1
+
+
+def test_the_largest_piece_comes_first_and_specks_do_not_count() -> None:
+    robot = np.maximum(bar(0, 300), bar(400, 440, row=100))
+    robot[400:403, 400:403] = 0.9
+    places = places_to_look(robot)
+    assert [round(y / 10) for _, y in places] == [24, 10, 10]
+
+
+def test_where_nothing_is_a_robot_the_likeliest_place_is_looked_at() -> None:
+    faint = bar(200, 260) * 0.4
+    ((x, y),) = places_to_look(faint)
+    assert 200 <= x < 260
+    assert abs(y - 240) <= 4
+    assert places_to_look(faint * 0.1) == []
+
+
+def test_noise_is_not_looked_at_end_by_end() -> None:
+    noise = (np.random.default_rng(0).random(SIZE) > 0.5).astype(np.float32)
+    assert len(places_to_look(noise)) <= 200
+
+
+@pytest.mark.parametrize(
+    ("place", "expected"), [((320, 240), (240, 160, 160, 160)), ((3, 470), (0, 320, 160, 160)), ((639, 0), (480, 0, 160, 160))]
+)
+def test_windows_stay_in_the_picture(place: tuple[float, float], expected: tuple[int, ...]) -> None:
+    assert window_at(place, (640, 480)) == expected
+    assert window_at(place, (100, 120)) == (0, 0, 100, 120)
+
+
+def test_a_tip_that_was_missed_is_found_and_followed() -> None:
+    truth, seen = bar(0, 420), bar(0, 300)
+    near = Near()
+    vessel, robot = SecondLook(First(seen), near, mirrored=False)(picture_of(truth))
+    # The first window reaches to 294 + 80 px; the end of what it found there is looked at in turn.
+    assert len(near.shown) == 2
+    assert np.array_equal(robot > 0.5, truth > 0.5)
+    assert vessel[240, 350] == pytest.approx(0.75)
+    assert vessel[240, 20] == pytest.approx(0.25)
+    assert np.array_equal(seen, bar(0, 300)), "what the first look saw is somebody else's"
+
+
+def test_what_the_first_look_imagined_is_taken_away() -> None:
+    _, robot = SecondLook(First(bar(0, 300)), Near())(picture_of(bar(0, 270)))
+    assert np.array_equal(robot > 0.5, bar(0, 270) > 0.5)
+
+
+def test_the_network_is_shown_the_picture_and_the_first_look() -> None:
+    near = Near()
+    SecondLook(First(bar(0, 300)), near)(picture_of(bar(0, 300)))
+    straight, mirrored = near.shown
+    assert straight.shape == (WINDOW_PX, WINDOW_PX, 5)
+    assert set(np.unique(straight[:, :, 4])) == {0, 230}
+    assert set(np.unique(straight[:, :, 3])) == {64}
+    assert np.array_equal(mirrored, straight[:, ::-1])
+
+
+def test_the_second_look_fades_out_at_its_edges_but_not_at_the_pictures() -> None:
+    vessel, _ = SecondLook(First(bar(0, 100, row=20)), Near(), mirrored=False)(picture_of(bar(0, 100, row=20)))
+    x, y, width, height = window_at((95, 20), (640, 480))
+    assert y == 0
+    assert vessel[0, x + width // 2] == pytest.approx(0.75)
+    column = vessel[:, x + width // 2]
+    steps = np.diff(column[height - MARGIN_PX - 2 : height + 2])
+    assert float(np.abs(steps).max()) <= 0.5 / MARGIN_PX + 1e-6
+    assert column[height] == pytest.approx(0.25)
+
+
+def test_small_and_empty_pictures_are_no_trouble() -> None:
+    class Small(First):
+        def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return np.zeros(image.shape[:2], np.float32), np.zeros(image.shape[:2], np.float32)
+
+    vessel, robot = SecondLook(Small(bar(0, 1)), Near())(np.zeros((60, 90, 3), np.uint8))
+    assert vessel.shape == robot.shape == (60, 90)
+    assert not robot.any()
+
+
+# ---- its network
+
+
+def test_a_network_that_is_given_a_first_look_says_at_first_what_it_said() -> None:
+    torch.manual_seed(2)
+    network = DualUNet(TINY).eval()
+    wider = with_first_look(network)
+    picture = torch.rand(1, 3, 64, 64)
+    with torch.no_grad():
+        expected = network(picture)
+        for first in (torch.zeros(1, 2, 64, 64), torch.ones(1, 2, 64, 64)):
+            torch.testing.assert_close(wider(torch.cat([picture, first], dim=1)), expected)
+    wider.train()(torch.rand(2, 5, 64, 64)).square().mean().backward()
+    gradient = wider.encoder[0][0].weight.grad
+    assert gradient is not None
+    assert float(gradient[:, 12:].abs().sum()) > 0, "it can learn to mind it"
+    with pytest.raises(ValueError, match="already"):
+        with_first_look(wider)
+
+
+def _samples(folder: Path, count: int = 2) -> list[Sample]:
+    samples = []
+    (folder / "images").mkdir(parents=True)
+    (folder / "masks").mkdir()
+    for number in range(count):
+        robot = bar(0, 250 + 60 * number) > 0.5
+        image = np.full((*SIZE, 3), 180, np.uint8)
+        image[robot] = 20
+        image[:, :, 2] += (np.arange(640) // 8).astype(np.uint8)  # no window looks like another
+        names = [folder / "images" / f"{number}.png", *(folder / "masks" / f"{number}_{part}.png" for part in ("vessel", "robot"))]
+        write_png(names[0], image)
+        write_mask(names[1], bar(0, 500) > 0.5)
+        write_mask(names[2], robot)
+        samples.append(Sample(str(number), *names))
+    return samples
+
+
+def test_windows_are_shown_with_their_labels_and_the_first_look(tmp_path: Path) -> None:
+    samples = _samples(tmp_path)
+    looks = [FirstLook.at(sample, First(bar(0, 230))) for sample in samples]
+    plan = TrainingPlan(steps=20, batch=4, crop=(WINDOW_PX, WINDOW_PX), look_share=0.0, seed=3)
+    crops = NearCrops(samples, looks, plan)
+    assert len(crops) == 80
+    has_end = 0
+    for index in range(40):
+        planes, target = (part.numpy() for part in crops[index])
+        assert planes.shape == (5, WINDOW_PX, WINDOW_PX)
+        assert np.array_equal(planes[0] < 100, target[1] > 0), "picture and label were turned alike"
+        has_end += bool((planes[4] > 127).any())
+    assert has_end > 30
+    again = NearCrops(samples, looks, plan)
+    assert all(one.equal(other) for one, other in zip(crops[7], again[7], strict=True))
+
+
+def test_what_the_first_look_got_wrong_is_shown(tmp_path: Path) -> None:
+    """The first look is blind: without its errors, nobody would know where to look."""
+    samples = _samples(tmp_path, 1)
+    looks = [FirstLook.at(samples[0], First(np.zeros(SIZE, np.float32)))]
+    assert looks[0].places == ()
+    crops = NearCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0))
+    shown = sum(bool(crops[index][1][1].any()) for index in range(100))
+    assert shown > 40
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("models") / "near"
+    torch.manual_seed(0)
+    network = DualUNet(TINY).eval()
+    images = [np.random.default_rng(0).integers(0, 256, (64, 96, 3), np.uint8)]
+    planes = [np.random.default_rng(0).integers(0, 256, (160, 160, 5), np.uint8)]
+    base = folder.with_name("base")
+    save_model(network, base, training={}, figures={"robot_dice": 0.5}, examples=images)
+    save_with_second_look(base, with_first_look(network), folder, training={"steps_done": 3}, figures={}, examples=planes)
+    return folder
+
+
+def test_a_model_is_kept_with_its_second_look(model: Path) -> None:
+    info = read_model_info(model)
+    assert (info.name, info.figures, info.calibration) == ("near", {}, None), "what was measured without it is not true of it"
+    assert (model / WEIGHTS).read_bytes() == (model.with_name("base") / WEIGHTS).read_bytes()
+    second = read_model_info(model / SECOND_LOOK)
+    assert second.training == {"steps_done": 3}
+    assert second.shape["inputs"] == 5
+
+
+@pytest.mark.parametrize("device", ["openvino", "torch"])
+@pytest.mark.parametrize("precision", ["fp32", "int8"])
+def test_every_engine_can_look_again(model: Path, device: str, precision: str) -> None:
+    config = SegmentationConfig.model_validate({"model": str(model), "device": device, "precision": precision, "threads": 1})
+    near = open_second_look(config)
+    assert near is not None
+    planes = planes_of(np.full((160, 160, 3), 90, np.uint8), np.zeros((160, 160), np.float32), np.ones((160, 160), np.float32))
+    vessel, robot = near(planes)
+    assert vessel.shape == robot.shape == (160, 160)
+    first = OpenVinoSegmenter(model, 1, "fp32")(planes[:, :, :3])
+    assert np.abs(robot - first[1]).max() < 0.05, "untaught, it says what the first look says"
+
+
+def test_it_can_be_left_out_and_need_not_be_there(model: Path) -> None:
+    assert open_second_look(SegmentationConfig(model=str(model), second_look=False)) is None
+    assert open_second_look(SegmentationConfig(model=str(model.with_name("base")))) is None
+
+
+def test_a_damaged_second_look_is_said(model: Path, tmp_path: Path) -> None:
+    import shutil
+
+    copy = shutil.copytree(model, tmp_path / "copy")
+    data = bytearray((copy / SECOND_LOOK / "network.onnx").read_bytes())
+    data[len(data) // 2] ^= 1
+    (copy / SECOND_LOOK / "network.onnx").write_bytes(data)
+    with pytest.raises(ModelError, match=r"second_look.*damaged"):
+        open_second_look(SegmentationConfig(model=str(copy), precision="fp32"))
+    (copy / SECOND_LOOK / INFO).write_text("{}")
+    with pytest.raises(ModelError, match=r"second_look.*damaged"):
+        open_second_look(SegmentationConfig(model=str(copy)))
