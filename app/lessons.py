@@ -52,10 +52,14 @@ class FrameLesson:
 
     def __init__(self, samples: list[Sample], init: str | None, base: int | None, *, deepen: bool, shallow: bool) -> None:
         self._samples, self._init = samples, init
+        self._second_look: Path | None = None
         if init is None:
             self.network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
             return
-        self.network = load_network(model_folder(init))[0]
+        folder = model_folder(init)
+        self.network = load_network(folder)[0]
+        if (folder / SECOND_LOOK / INFO).is_file():
+            self._second_look = folder / SECOND_LOOK
         if deepen:
             images = [sample.load(WORKING_SIZE_PX)[0] for sample in _some(samples)]
             self.network = deepened(self.network, default_shape().encoder_convolutions, images)
@@ -77,7 +81,7 @@ class FrameLesson:
 
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
         examples = [sample.load(WORKING_SIZE_PX)[0] for sample in _some(self._samples)] if whole else []
-        save_model(network, out, training=training, figures=figures, examples=examples)
+        save_model(network, out, training=training, figures=figures, examples=examples, second_look=self._second_look)
 
 
 class SecondLookLesson:

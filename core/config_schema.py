@@ -172,7 +172,9 @@ def effect_of(key: str) -> Effect:
     return Effect.PROGRAM if top in _AT_START else Effect.RIG
 
 
-_LOADED_ONCE = {"working_size_px"} | {f"segmentation.{name}" for name in ("model", "device", "precision", "threads", "mirrored")}
+_LOADED_ONCE = {"working_size_px"} | {
+    f"segmentation.{name}" for name in ("model", "device", "precision", "threads", "mirrored", "second_look")
+}
 _AT_START = {"rig", "record", "pedal", "gamepad"}
 
 

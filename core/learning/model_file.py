@@ -137,10 +137,12 @@ def save_model(
     training: dict[str, Any],
     figures: dict[str, Any],
     examples: Sequence[Image] = (),
+    second_look: Path | None = None,
 ) -> ModelInfo:
     """Write weights, ONNX and manifest. The folder appears whole or not at all; an older model of that name is replaced last.
 
     From `examples`, typical RGB images at working size, the ranges of an eight-bit copy are learnt; without them there is none.
+    `second_look` is the folder of a second look's network that comes along as it is.
 
     Raises
     ------
@@ -171,6 +173,8 @@ def save_model(
             **_PLANES if network.shape.inputs == 5 else {},
         )
         (scratch / INFO).write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        if second_look is not None:
+            shutil.copytree(second_look, scratch / SECOND_LOOK)
         scratch.chmod(0o755)
         _put(scratch, folder)
     finally:

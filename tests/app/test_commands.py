@@ -52,6 +52,22 @@ def test_fine_tuning_starts_from_a_model(model: Path, frames: Path, tmp_path: Pa
     assert read_model_info(tmp_path / "tuned").shape == read_model_info(model).shape
 
 
+def test_the_second_look_is_trained_used_and_carried_along(model: Path, frames: Path, tmp_path: Path) -> None:
+    few = ("--data", frames, "--steps", 1, "--batch", 1, "--threads", 1)
+    done = run("train", "--second-look", "--init", model, "--out", tmp_path / "near", *few)
+    assert done.returncode == 0, done.stderr
+    assert read_model_info(tmp_path / "near" / "second_look").training["steps_done"] == 1
+    done = run("train", "--init", tmp_path / "near", "--out", tmp_path / "tuned", "--crop", 64, *few)
+    assert done.returncode == 0, done.stderr
+    weights = [tmp_path / name / "second_look" / "weights.safetensors" for name in ("near", "tuned")]
+    assert weights[0].read_bytes() == weights[1].read_bytes()
+    done = run("perceive", frames / "images", "--model", tmp_path / "near", "--jsonl", tmp_path / "out.jsonl")
+    assert done.returncode == 0, done.stderr
+    assert len((tmp_path / "out.jsonl").read_text().splitlines()) == 6
+    done = run("train", "--second-look", "--out", tmp_path / "none", *few)
+    assert (done.returncode, "needs --init MODEL" in done.stderr) == (2, True)
+
+
 def test_an_interrupted_training_keeps_what_was_learnt(frames: Path, tmp_path: Path) -> None:
     out = tmp_path / "long"
     command = ["train", "--data", frames, "--out", out, "--steps", 100_000, "--batch", 1, "--crop", 64, "--base", 4, "--threads", 1]

@@ -240,6 +240,11 @@ def test_every_engine_can_look_again(model: Path, device: str, precision: str) -
     assert np.abs(robot - first[1]).max() < 0.05, "untaught, it says what the first look says"
 
 
+def test_a_second_look_comes_along_when_the_first_is_trained_on(model: Path, tmp_path: Path) -> None:
+    save_model(DualUNet(TINY).eval(), tmp_path / "tuned", training={}, figures={}, second_look=model / SECOND_LOOK)
+    assert open_second_look(SegmentationConfig(model=str(tmp_path / "tuned"))) is not None
+
+
 def test_it_can_be_left_out_and_need_not_be_there(model: Path) -> None:
     assert open_second_look(SegmentationConfig(model=str(model), second_look=False)) is None
     assert open_second_look(SegmentationConfig(model=str(model.with_name("base")))) is None
