@@ -120,14 +120,13 @@ def _make_folder(out: Path | None) -> None:
 
 def _open_masks(config: PerceptionConfig, true_masks: bool) -> tuple[SameMasks, PipelineOf]:
     """Where all variants get their masks from, and how a pipeline on them is made."""
-    from core.perception.pipeline import Pipeline
-    from core.perception.segmentation import open_segmenter
+    from core.perception.pipeline import Pipeline, open_sights
 
     if true_masks:
         masks, calibration = SameMasks(TrueMasks()), None
     else:
-        segmenter = open_segmenter(config.segmentation)
-        masks, calibration = SameMasks(segmenter), segmenter.info.calibration
+        sight = open_sights(config)[0]
+        masks, calibration = SameMasks(sight.segment), sight.calibration
     return masks, lambda settings: Pipeline(masks, settings, calibration)
 
 

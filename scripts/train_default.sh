@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some 25 minutes of data and five
+# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some 25 minutes of data and six
 # hours of training on two cores. The data can be interrupted and gone on with by the same call.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -19,7 +19,9 @@ $python main.py train "${sets[@]}" --init "$out/stage2" "${larger[@]}" --rate 5e
 # Five more convolutions, and at first more of the frames that the model finds hard.
 $python main.py train "${sets[@]}" --init "$out/stage3" --deepen --focus 0.3 "${larger[@]}" --rate 6e-3 --steps 14000 --stop-after 4000 \
     --seed 13 --out "$out/stage4"
-$python main.py train "${sets[@]}" --init "$out/stage4" "${larger[@]}" --rate 4.3e-3 --steps 2600 --seed 14 --out "$out/default"
+$python main.py train "${sets[@]}" --init "$out/stage4" "${larger[@]}" --rate 4.3e-3 --steps 2600 --seed 14 --out "$out/stage5"
+# The second look: a copy of the network that learns nothing but the robot's ends.
+$python main.py train "${sets[@]}" --second-look --init "$out/stage5" --batch 24 --rate 5e-3 --steps 6000 --seed 21 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 480 --seed 950000 --workers 2
 $python main.py calibrate "$out/calibration" --model "$out/default"

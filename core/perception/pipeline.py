@@ -221,15 +221,19 @@ class Pipeline:
 
 def open_pipeline(config: PerceptionConfig) -> Pipeline:
     """Load the configured model and build the pipeline around it; raises ModelError."""
-    segmenter = open_segmenter(config.segmentation)
-    info, mirrored = segmenter.info, config.segmentation.mirrored
-    near = open_second_look(config.segmentation)
-    plain = Sight(_closely(segmenter, near), info.calibration)
-    twice = Sight(_closely(Mirrored(segmenter), near), info.calibration_mirrored or info.calibration)
-    stream = twice if mirrored == "always" else plain
+    plain, twice = open_sights(config)
+    stream = twice if config.segmentation.mirrored == "always" else plain
     # A window costs a fifth of the whole, so that there is time to look at it twice.
-    careful = plain if mirrored == "never" else twice
+    careful = plain if config.segmentation.mirrored == "never" else twice
     return Pipeline(stream.segment, config, stream.calibration, careful, glance=careful)
+
+
+def open_sights(config: PerceptionConfig) -> tuple[Sight, Sight]:
+    """The configured model as it looks at a picture, and as it looks at picture and mirror image; raises ModelError."""
+    segmenter, near = open_segmenter(config.segmentation), open_second_look(config.segmentation)
+    info = segmenter.info
+    plain = Sight(_closely(segmenter, near), info.calibration)
+    return plain, Sight(_closely(Mirrored(segmenter), near), info.calibration_mirrored or info.calibration)
 
 
 def _closely(first: Segmenter, near: PlaneSegmenter | None) -> Segmenter:
