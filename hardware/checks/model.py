@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from core.config import PerceptionConfig, TwinConfig
-from core.learning.model_file import INFO, ONNX, ONNX_INT8, WEIGHTS, ModelError, ModelInfo, model_folder, read_model_info
+from core.learning.model_file import (
+    INFO,
+    ONNX,
+    ONNX_INT8,
+    SECOND_LOOK,
+    WEIGHTS,
+    ModelError,
+    ModelInfo,
+    check_files,
+    model_folder,
+    read_model_info,
+)
 from core.types import Mask, Scene
 from hardware.checks.check import Check, one_line
 
@@ -27,12 +39,19 @@ def check_model(name: str) -> Check:
     """The hashes of all files of a model."""
     try:
         folder = model_folder(name)
-        info = read_model_info(folder)
-        files = (WEIGHTS, ONNX, *((ONNX_INT8,) if info.onnx_int8_sha256 is not None else ()))
-        read_model_info(folder, verify=files)
+        info, files = _checked(folder)
+        if (folder / SECOND_LOOK / INFO).is_file():
+            files += [f"{SECOND_LOOK}/{file}" for file in _checked(folder / SECOND_LOOK)[1]]
     except ModelError as error:
         return Check("model", False, one_line(error), _advice(name))
-    return Check("model", True, f"{info.name}: {', '.join((INFO, *files))} are whole (SHA-256)")
+    return Check("model", True, f"{info.name}: {', '.join(files)} are whole (SHA-256)")
+
+
+def _checked(folder: Path) -> tuple[ModelInfo, list[str]]:
+    info = read_model_info(folder, verify=())
+    files = [WEIGHTS, ONNX, *([ONNX_INT8] if info.onnx_int8_sha256 is not None else [])]
+    check_files(info, folder, files)
+    return info, [INFO, *files]
 
 
 def check_self_test(config: PerceptionConfig) -> Check:
