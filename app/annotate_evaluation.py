@@ -36,6 +36,7 @@ def compared_rows(
         raise AnnotationError(f"{where}: none of its annotated images is here")
     manual = manual_measurements(done, {image.sha256: image.sha256 for image in images})
     pipeline = open_pipeline(config.perception)
+    folders = {here[row.image].path.parent for row in manual}
     rows: list[Measurement] = []
     reasons: Counter[str] = Counter()
     with progress_bar() as bar:
@@ -43,7 +44,8 @@ def compared_rows(
             image = here[row.image]
             scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(image.path)))
             angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
-            rows.append(replace(row, image=image.path.name, algorithm_angle=angle, algorithm_state=state))
+            group = image.path.parent.name if len(folders) > 1 else None  # pictures of one session are alike
+            rows.append(replace(row, image=image.path.name, algorithm_angle=angle, algorithm_state=state, group=group))
             if scene.refusal is not None and row.state is not None:
                 reasons[scene.refusal.reason.value] += 1
     return rows, dict(sorted(reasons.items())), pipeline.engine

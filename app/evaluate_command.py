@@ -183,6 +183,7 @@ class _Truth:
     image: Path
     theta_deg: float | None
     state: str | None
+    group: str | None
 
 
 def _read_set(folder: Path) -> list[_Truth]:
@@ -204,7 +205,8 @@ def _read_set(folder: Path) -> list[_Truth]:
         if not (theta is None or isinstance(theta, int | float)) or not (state is None or state in set(PoseState)):
             raise EvaluationError(f"{folder}: frame {sample.stem}: theta_deg {theta!r} or state {state!r} makes no sense")
         posed = theta is not None and state is not None
-        found.append(_Truth(sample.stem, sample.image, float(theta) if posed else None, state if posed else None))
+        group = f"phantom {row['seed']}" if "seed" in row else None
+        found.append(_Truth(sample.stem, sample.image, float(theta) if posed else None, state if posed else None, group))
     return found
 
 
@@ -253,7 +255,7 @@ def _perceive(
         for one in bar.track(truth, description="images"):
             scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(one.image)))
             angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
-            rows.append(Measurement(one.stem, *measured.get(one.stem, (None, None)), one.state, angle, state))
+            rows.append(Measurement(one.stem, *measured.get(one.stem, (None, None)), one.state, angle, state, one.group))
             if scene.refusal is not None and one.state is not None:
                 reasons[scene.refusal.reason.value] += 1
     return rows, dict(sorted(reasons.items())), pipeline.engine

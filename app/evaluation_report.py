@@ -139,9 +139,23 @@ def render_report(metrics: Mapping[str, Any], figures: Mapping[str, Figure]) -> 
         figures={name: inline_svg(figure, name) for name, figure in figures.items()},
         agreement=_agreement(metrics.get("agreement")),
         resamples=RESAMPLES,
+        drawn=_drawn(metrics["intervals"]),
         seed=metrics["seed"],
     )
     return re.sub(r"\n\s*\n+", "\n", text) + "\n"
+
+
+def _drawn(intervals: Mapping[str, Any]) -> str:
+    """What is said of the intervals in a sentence: images of one group are alike."""
+    groups = intervals["groups"]
+    if intervals["drawn"] == "groups":
+        return f"Whole groups (sessions or phantoms; {groups} of them) are drawn, since images of one are alike."
+    if groups:
+        return (
+            f"Images are taken as independent, since there are too few groups (sessions or phantoms; {groups}) to draw whole ones, "
+            "or as many as images; where several images show the same phantom, the true intervals are wider."
+        )
+    return "Images are taken as independent; where several show the same phantom, the true intervals are wider."
 
 
 def _agreement(report: Mapping[str, Any] | None) -> list[dict[str, Any]]:

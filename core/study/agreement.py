@@ -11,9 +11,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import ConstantInputWarning, NearConstantInputWarning, pearsonr, rankdata
 
 from core.study.bootstrap import Floats, bootstrap_rows
+
+Group = NDArray[np.int64] | None
 
 RANGE_DEG = 180.0
 SHARE_EDGES_PERCENT = (0, 4, 8, 12, 16)
@@ -111,22 +114,28 @@ def _repeat_statistics(first_deg: Floats, second_deg: Floats) -> dict[str, Float
     }
 
 
-def angle_metrics(manual_deg: Floats, algorithm_deg: Floats, seed: int = 0) -> dict[str, Any]:
-    """Statistics of algorithm against manual angles, both of shape (n,), with 95 % bootstrap intervals under ``ci95``."""
-    return _with_intervals(angle_statistics, (manual_deg, algorithm_deg), seed)
+def angle_metrics(manual_deg: Floats, algorithm_deg: Floats, seed: int = 0, group: Group = None) -> dict[str, Any]:
+    """Statistics of algorithm against manual angles, both of shape (n,), with 95 % bootstrap intervals under ``ci95``.
+
+    `group` as in ``bootstrap_rows``.
+    """
+    return _with_intervals(angle_statistics, (manual_deg, algorithm_deg), seed, group)
 
 
-def repeat_metrics(first_deg: Floats, second_deg: Floats, seed: int = 0) -> dict[str, Any]:
-    """Agreement of two manual measures of the same images, both of shape (n,), with 95 % bootstrap intervals under ``ci95``."""
-    return _with_intervals(_repeat_statistics, (first_deg, second_deg), seed)
+def repeat_metrics(first_deg: Floats, second_deg: Floats, seed: int = 0, group: Group = None) -> dict[str, Any]:
+    """Agreement of two manual measures of the same images, both of shape (n,), with 95 % bootstrap intervals under ``ci95``.
+
+    `group` as in ``bootstrap_rows``.
+    """
+    return _with_intervals(_repeat_statistics, (first_deg, second_deg), seed, group)
 
 
-def _with_intervals(statistics: Any, columns: tuple[Floats, ...], seed: int) -> dict[str, Any]:
+def _with_intervals(statistics: Any, columns: tuple[Floats, ...], seed: int, group: Group) -> dict[str, Any]:
     n = len(columns[0])
     if n == 0:
         names = statistics(*(np.zeros(1) for _ in columns))
         return {"n": 0} | dict.fromkeys(names) | {"ci95": dict.fromkeys(names)}
     values: Mapping[str, Floats] = statistics(*columns)
     point = {name: float(value) if np.isfinite(value) else None for name, value in values.items()}
-    intervals = bootstrap_rows(statistics, columns, seed)
+    intervals = bootstrap_rows(statistics, columns, seed, group)
     return {"n": n} | point | {"ci95": {name: intervals[name] if point[name] is not None else None for name in point}}

@@ -1,8 +1,11 @@
-"""Seeded bootstrap intervals (percentile method). Rows are drawn as independent of each other."""
+"""Seeded bootstrap intervals (percentile method). Rows are drawn one by one, or, where they come in groups, by whole groups.
+
+Frames of one session or of one phantom are alike: drawn one by one they would make the intervals too narrow.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +13,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 RESAMPLES = 2000
+MIN_GROUPS = 10
+"""With fewer groups than this their own spread is not known well enough: rows are drawn one by one then."""
 _DEFINED = 0.9
 """A statistic that is undefined in more resamples than the rest of these has no interval."""
 _BLOCK = 500_000
@@ -25,8 +30,23 @@ def interval_95(values: Floats) -> list[float] | None:
     return [float(low), float(high)]
 
 
+def members(groups: Sequence[Hashable | None]) -> NDArray[np.int64] | None:
+    """The number of each row's group, shape (n,); None when the rows are to be drawn one by one.
+
+    A row without a group (None) is one of its own.
+    """
+    names = [("alone", place) if group is None else ("group", group) for place, group in enumerate(groups)]
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
+    if len(numbers) < MIN_GROUPS or len(numbers) == len(names):
+        return None
+    return np.array([numbers[name] for name in names], np.int64)
+
+
 def bootstrap_rows(
-    statistics: Callable[..., Mapping[str, Floats]], columns: tuple[Floats, ...], seed: int
+    statistics: Callable[..., Mapping[str, Floats]],
+    columns: tuple[Floats, ...],
+    seed: int,
+    group: NDArray[np.int64] | None = None,
 ) -> dict[str, list[float] | None]:
     """95 % intervals of statistics of rows.
 
@@ -35,20 +55,36 @@ def bootstrap_rows(
     statistics : takes the columns, each of shape (R, n), and gives statistics of shape (R,) by name.
     columns : one array of shape (n,) per column; rows are drawn whole.
     seed : the same seed gives the same intervals.
+    group : of each row, as ``members`` numbers them: whole groups are drawn. None: single rows.
 
     Returns
     -------
     dict
         Name -> [low, high], or None where n < 2 or the statistic is undefined too often.
     """
-    rng = np.random.default_rng(seed)
     n = len(columns[0])
     collected: dict[str, list[Floats]] = {}
-    left = RESAMPLES if n > 1 else 1
-    while left:
-        count = min(left, max(1, _BLOCK // n))
-        rows = rng.integers(0, n, (count, n))
+    for rows in _draws(n, group, np.random.default_rng(seed)):
         for name, values in statistics(*(column[rows] for column in columns)).items():
             collected.setdefault(name, []).append(values)
-        left -= count
     return {name: interval_95(np.concatenate(parts)) if n > 1 else None for name, parts in collected.items()}
+
+
+def _draws(n: int, group: NDArray[np.int64] | None, rng: np.random.Generator) -> Iterator[NDArray[np.int64]]:
+    """Row numbers of some resamples at a time, shape (R, rows). Groups of several sizes make resamples of several lengths."""
+    if group is None or n < 2:
+        left = RESAMPLES if n > 1 else 1
+        while left:
+            count = min(left, max(1, _BLOCK // n))
+            yield rng.integers(0, n, (count, n))
+            left -= count
+        return
+    rows_of = [np.flatnonzero(group == number) for number in np.unique(group)]
+    sizes = np.array([len(rows) for rows in rows_of])
+    drawn = rng.integers(0, len(rows_of), (RESAMPLES, len(rows_of)))
+    lengths = sizes[drawn].sum(1)
+    for length in np.unique(lengths):
+        alike = drawn[lengths == length]
+        step = max(1, _BLOCK // int(length))
+        for first in range(0, len(alike), step):
+            yield np.stack([np.concatenate([rows_of[number] for number in one]) for one in alike[first : first + step]])

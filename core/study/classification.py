@@ -68,13 +68,16 @@ def _mean_of_defined(values: Floats) -> Floats:
     return np.asarray(np.where(count > 0, np.where(defined, values, 0.0).sum(1) / np.maximum(count, 1), np.nan))
 
 
-def state_metrics(manual: Sequence[str], algorithm: Sequence[str], seed: int = 0) -> dict[str, Any]:
+def state_metrics(
+    manual: Sequence[str], algorithm: Sequence[str], seed: int = 0, group: NDArray[np.int64] | None = None
+) -> dict[str, Any]:
     """Statistics of the algorithm's states against the manual ones, with 95 % bootstrap intervals under ``ci95``.
 
     Parameters
     ----------
     manual, algorithm : labels of the same n images.
     seed : of the bootstrap.
+    group : of each image, as ``bootstrap.members`` numbers them: whole groups are drawn. None: single images.
 
     Returns
     -------
@@ -87,12 +90,13 @@ def state_metrics(manual: Sequence[str], algorithm: Sequence[str], seed: int = 0
     n, labels = len(manual), sorted(set(manual) | set(algorithm))
     if n == 0:
         return _nothing()
+    rows_columns = np.array([(labels.index(m), labels.index(a)) for m, a in zip(manual, algorithm, strict=True)]).T
     confusion = np.zeros((len(labels), len(labels)), np.int64)
-    np.add.at(confusion, ([labels.index(label) for label in manual], [labels.index(label) for label in algorithm]), 1)
+    np.add.at(confusion, tuple(rows_columns), 1)
     classes = np.array(_scores(manual, algorithm, labels, None))
     rows = [{name: _defined(value) for name, value in zip(_AVERAGED, column, strict=True)} for column in classes.T]
     per_class_fm = np.sqrt(classes[0] * classes[1])
-    cells = np.random.default_rng(seed).multinomial(n, confusion.ravel() / n, RESAMPLES).reshape(-1, *confusion.shape)
+    cells = _drawn_tables(confusion, rows_columns, seed, group)
     point = {
         "accuracy": float(np.trace(confusion) / n),
         "kappa": kappa(manual, algorithm),
@@ -109,6 +113,22 @@ def state_metrics(manual: Sequence[str], algorithm: Sequence[str], seed: int = 0
     ci95 = {name: intervals.get(name) if known[name] is not None else None for name in known}
     counts = {"n": n, "labels": labels, "confusion": confusion.tolist()}
     return counts | point | {"per_class": per_class} | averages | {"ci95": ci95}
+
+
+def _drawn_tables(
+    confusion: NDArray[np.int64], rows_columns: NDArray[np.int64], seed: int, group: NDArray[np.int64] | None
+) -> NDArray[np.int64]:
+    """Confusion tables of the resamples, shape (R, k, k)."""
+    rng = np.random.default_rng(seed)
+    if group is None:
+        n = int(confusion.sum())
+        return np.asarray(rng.multinomial(n, confusion.ravel() / n, RESAMPLES).reshape(-1, *confusion.shape), np.int64)
+    numbers = np.unique(group, return_inverse=True)[1]
+    count = int(numbers.max()) + 1
+    tables = np.zeros((count, *confusion.shape), np.int64)
+    np.add.at(tables, (numbers, *rows_columns), 1)
+    drawn = rng.multinomial(count, np.full(count, 1.0 / count), RESAMPLES)
+    return np.asarray(np.tensordot(drawn, tables, 1), np.int64)
 
 
 _KINDS = ("macro", "weighted")

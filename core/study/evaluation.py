@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.study.agreement import RANGE_DEG, angle_metrics, repeat_metrics
+from core.study.bootstrap import members
 from core.study.classification import state_metrics
 from core.types import PoseState
 
@@ -27,7 +29,10 @@ class EvaluationError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """One image, measured by hand (once or twice) and by the algorithm; None = not measured. Field names are the CSV's columns."""
+    """One image, measured by hand (once or twice) and by the algorithm; None = not measured. Field names are the CSV's columns.
+
+    ``group`` is the session or phantom that the image is of; images of one group are alike. None: not known.
+    """
 
     image: str
     angle_1: float | None
@@ -35,6 +40,7 @@ class Measurement:
     state: str | None
     algorithm_angle: float | None
     algorithm_state: str | None
+    group: str | None = None
 
     @property
     def manual_angle_deg(self) -> float | None:
@@ -43,11 +49,14 @@ class Measurement:
         return sum(measured) / len(measured) if measured else None
 
 
-COLUMNS = tuple(column.name for column in fields(Measurement))
+GROUP = "group"
+COLUMNS = tuple(column.name for column in fields(Measurement) if column.name != GROUP)
 
 
 def read_measurements(path: Path) -> list[Measurement]:
-    """Rows of a CSV file with the columns ``COLUMNS`` in any order; others are ignored, blank cells mean "not measured".
+    """Rows of a CSV file with the columns ``COLUMNS`` in any order, and ``group`` if there is one.
+
+    Others are ignored, blank cells mean "not measured".
 
     Commas, semicolons or tabs separate cells, as the header shows; where it is not the comma, numbers may have a decimal comma.
 
@@ -81,20 +90,20 @@ def read_measurements(path: Path) -> list[Measurement]:
 
 def _places(path: Path, header: list[str]) -> dict[str, int]:
     """Where each column stands."""
-    for name in COLUMNS:
+    for name in (*COLUMNS, GROUP):
         if header.count(name) > 1:
             raise EvaluationError(f"{path}: column {name!r} occurs {header.count(name)} times")
-        if name not in header:
+        if name not in header and name != GROUP:
             alike = difflib.get_close_matches(name, [h for h in header if h not in COLUMNS], 1, cutoff=0.75)
             found = f"; is {alike[0]!r} meant?" if alike else f"; needs {', '.join(COLUMNS)} (blank where not measured)"
             raise EvaluationError(f"{path}: column {name!r} is missing{found}")
-    return {name: header.index(name) for name in COLUMNS} | {"": len(header)}
+    return {name: header.index(name) for name in (*COLUMNS, GROUP) if name in header} | {"": len(header)}
 
 
 def _measurement(where: str, cells: list[str], place: dict[str, int], separator: str) -> Measurement:
     if len(cells) > place[""] and any(map(str.strip, cells[place[""] :])):
         raise EvaluationError(f"{where}: {len(cells)} cells under {place['']} columns")
-    text = {name: cells[place[name]].strip() if place[name] < len(cells) else "" for name in COLUMNS}
+    text = {name: cells[at].strip() if at < len(cells) else "" for name, at in place.items() if name}
 
     def angle(name: str) -> float | None:
         if not text[name]:
@@ -115,16 +124,24 @@ def _measurement(where: str, cells: list[str], place: dict[str, int], separator:
         return label or None
 
     return Measurement(
-        text["image"], angle("angle_1"), angle("angle_2"), state("state"), angle("algorithm_angle"), state("algorithm_state")
+        text["image"],
+        angle("angle_1"),
+        angle("angle_2"),
+        state("state"),
+        angle("algorithm_angle"),
+        state("algorithm_state"),
+        text.get(GROUP) or None,
     )
 
 
 def write_measurements(path: Path, rows: Iterable[Measurement]) -> None:
-    """The rows as a CSV file that ``read_measurements`` reads; raises OSError."""
+    """The rows as a CSV file that ``read_measurements`` reads, with their groups where there are such; raises OSError."""
+    rows = list(rows)
+    columns = (*COLUMNS, GROUP) if any(row.group is not None for row in rows) else COLUMNS
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(COLUMNS)
-        table.writerows([["" if value is None else value for value in (getattr(row, name) for name in COLUMNS)] for row in rows])
+        table.writerow(columns)
+        table.writerows([["" if value is None else value for value in (getattr(row, name) for name in columns)] for row in rows])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,20 +170,34 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``images``, ``angle``, ``state``, ``manual`` (the two manual measures against each other) and ``notes``: one sentence for
-        each thing that a reader should know. Undefined figures are None, and a note says why.
+        ``images``, ``intervals`` (what the bootstrap draws), ``angle``, ``state``, ``manual`` (the two manual measures against
+        each other) and ``notes``: one sentence for each thing that a reader should know. Undefined figures are None, and a note
+        says why.
     """
     pairs = angle_pairs(rows)
-    twice = np.array([(r.angle_1, r.angle_2) for r in rows if r.angle_1 is not None and r.angle_2 is not None], np.float64)
-    twice = twice.reshape(-1, 2)
-    labelled = [(r.state, r.algorithm_state) for r in rows if r.state is not None and r.algorithm_state is not None]
+    twice_rows = [row for row in rows if row.angle_1 is not None and row.angle_2 is not None]
+    twice = np.array([(row.angle_1, row.angle_2) for row in twice_rows], np.float64).reshape(-1, 2)
+    labelled = [row for row in rows if row.state is not None and row.algorithm_state is not None]
+    measured = [row for row in rows if row.manual_angle_deg is not None and row.algorithm_angle is not None]
+    manual, algorithm = [str(row.state) for row in labelled], [str(row.algorithm_state) for row in labelled]
     metrics = {
         "images": _counts(rows),
-        "angle": angle_metrics(pairs.manual_deg, pairs.algorithm_deg, seed),
-        "state": state_metrics([str(m) for m, _ in labelled], [str(a) for _, a in labelled], seed),
-        "manual": repeat_metrics(twice[:, 0], twice[:, 1], seed),
+        "intervals": _drawn(measured if measured else labelled),
+        "angle": angle_metrics(pairs.manual_deg, pairs.algorithm_deg, seed, _members(measured)),
+        "state": state_metrics(manual, algorithm, seed, _members(labelled)),
+        "manual": repeat_metrics(twice[:, 0], twice[:, 1], seed, _members(twice_rows)),
     }
     return metrics | {"notes": _angle_notes(metrics, rows) + _state_notes(metrics["state"])}
+
+
+def _members(rows: Sequence[Measurement]) -> NDArray[np.int64] | None:
+    return members([row.group for row in rows])
+
+
+def _drawn(rows: Sequence[Measurement]) -> dict[str, Any]:
+    """What the bootstrap draws, and how many groups are known (0: none)."""
+    known = len({row.group for row in rows if row.group is not None})
+    return {"drawn": "images" if _members(rows) is None else "groups", "groups": known}
 
 
 def _counts(rows: Sequence[Measurement]) -> dict[str, int]:

@@ -1,11 +1,13 @@
 """Statistics of angles against values worked out by hand or printed elsewhere."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
 from core.study.agreement import angle_metrics, correlation, icc_absolute, repeat_metrics, shares
-from core.study.bootstrap import bootstrap_rows, interval_95
+from core.study.bootstrap import bootstrap_rows, interval_95, members
 
 MANUAL = np.array([10.0, 20.0, 30.0, 40.0])
 ALGORITHM = np.array([11.0, 19.0, 33.0, 41.0])  # errors 1, -1, 3, 1
@@ -83,6 +85,36 @@ def test_no_value_has_nothing_but_all_names() -> None:
     nothing = angle_metrics(MANUAL[:0], ALGORITHM[:0])
     assert nothing.keys() == angle_metrics(MANUAL, ALGORITHM).keys()
     assert {value for name, value in nothing.items() if name not in {"n", "ci95"}} == {None}
+
+
+def test_rows_come_in_groups_only_where_there_are_enough_of_them() -> None:
+    assert members(["a"] * 40) is None
+    assert members([f"s{k // 5}" for k in range(45)]) is None, "nine groups"
+    assert members([f"s{k}" for k in range(45)]) is None, "every row a group of its own: the same as one by one"
+    assert members([None] * 40) is None
+    found = members([*(f"s{k // 2}" for k in range(18)), None, None])
+    assert found is not None
+    assert found.tolist() == [*(k // 2 for k in range(18)), 9, 10], "rows without a group stand alone"
+
+
+def test_copies_of_an_image_make_no_interval_narrower() -> None:
+    """Each of 20 images 16 times: drawn one by one their mean would seem four times as certain as it is."""
+    rng = np.random.default_rng(5)
+    errors = rng.normal(0.0, 5.0, 20)
+    manual = rng.uniform(20.0, 160.0, 20)
+    group = members([place for place in range(20) for _ in range(16)])
+    assert group is not None
+    once = angle_metrics(manual, manual + errors)
+    alone = angle_metrics(np.repeat(manual, 16), np.repeat(manual + errors, 16))
+    whole = angle_metrics(np.repeat(manual, 16), np.repeat(manual + errors, 16), group=group)
+
+    def width(metrics: dict[str, Any]) -> float:
+        low, high = metrics["ci95"]["mean_error_deg"]
+        return float(high - low)
+
+    assert width(alone) == pytest.approx(width(once) / 4, rel=0.2)
+    assert width(whole) == pytest.approx(width(once), rel=0.1)
+    assert whole["mean_error_deg"] == pytest.approx(once["mean_error_deg"])
 
 
 def test_intervals_are_seeded_and_hold_the_value() -> None:

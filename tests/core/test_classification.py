@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from sklearn.metrics import accuracy_score, cohen_kappa_score, f1_score, fowlkes_mallows_score
 
+from core.study.bootstrap import members
 from core.study.classification import fowlkes_mallows_pairs, kappa, state_metrics, table_statistics
 from core.study.paper_study import PAPER, PAPER_CONFUSION, PAPER_LABELS
 
@@ -13,6 +14,20 @@ def label_pairs(confusion: object, labels: tuple[str, ...] = PAPER_LABELS) -> tu
     table = np.array(confusion)
     pairs = [(labels[i], labels[j]) for i, j in np.ndindex(*table.shape) for _ in range(table[i, j])]
     return [manual for manual, _ in pairs], [algorithm for _, algorithm in pairs]
+
+
+def test_frames_of_one_phantom_are_drawn_together() -> None:
+    """Twelve phantoms of thirty frames each, all right or all wrong: as certain as twelve frames, not as 360."""
+    right = [True] * 8 + [False] * 4
+    manual = ["B"] * 360
+    algorithm = ["B" if right[place // 30] else "C" for place in range(360)]
+    group = members([place // 30 for place in range(360)])
+    alone, whole = state_metrics(manual, algorithm), state_metrics(manual, algorithm, group=group)
+    once = state_metrics(manual[::30], algorithm[::30])
+    assert whole["accuracy"] == alone["accuracy"] == pytest.approx(8 / 12)
+    assert whole["ci95"]["accuracy"] == pytest.approx(once["ci95"]["accuracy"], abs=0.09)
+    assert alone["ci95"]["accuracy"][1] - alone["ci95"]["accuracy"][0] < 0.11
+    assert whole["ci95"]["accuracy"][1] - whole["ci95"]["accuracy"][0] > 0.4
 
 
 def test_the_papers_labels_give_the_papers_figures_digit_for_digit() -> None:

@@ -117,6 +117,28 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
     assert read_measurements(tmp_path / "out.csv") == rows
 
 
+def test_groups_are_an_optional_column(table, tmp_path: Path) -> None:
+    rows = [Measurement("a", 1.0, None, "B", 2.0, "B", "session 1"), Measurement("b", 1.0, None, "B", 2.0, "B")]
+    write_measurements(tmp_path / "out.csv", rows)
+    assert (tmp_path / "out.csv").read_text().splitlines()[0].endswith(",group")
+    assert read_measurements(tmp_path / "out.csv") == rows
+
+
+@pytest.mark.parametrize(
+    ("groups", "drawn"),
+    [
+        ([f"session {place // 4}" for place in range(48)], {"drawn": "groups", "groups": 12}),
+        ([f"session {place // 24}" for place in range(48)], {"drawn": "images", "groups": 2}),
+        ([None] * 48, {"drawn": "images", "groups": 0}),
+    ],
+)
+def test_it_says_what_the_intervals_draw(groups: list[str | None], drawn: dict[str, object]) -> None:
+    rng = np.random.default_rng(1)
+    angles = rng.uniform(0.0, 60.0, (48, 2))
+    rows = [Measurement(str(k), angles[k, 0], angles[k, 0], "B", angles[k, 1], "B", groups[k]) for k in range(48)]
+    assert evaluate(rows)["intervals"] == drawn
+
+
 def rows_of(*cells: tuple) -> list[Measurement]:
     return [Measurement(str(place), *values) for place, values in enumerate(cells)]
 
