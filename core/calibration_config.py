@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from core.servo_config import JOINT_NAMES, TENDONS
+from core.servo_config import JOINT_NAMES, TENDONS, JointName
 
 SizePx = Annotated[tuple[int, int], Field(description="width and height of the pictures")]
 _ANGLE = Field(ge=-360.0, le=360.0)
@@ -44,6 +44,10 @@ class ScaleConfig(_Section):
     uncertainty_share: float = Field(ge=0.0, description="standard error of the scale, as a share of it")
     plane: tuple[float, float, float, float, float, float, float, float, float] | None = None
 
+    def working_px_per_mm(self, working_size_px: int) -> float:
+        """Working pixels per millimetre in the middle of the picture, whose longer side is `working_size_px` then."""
+        return working_size_px / (self.mm_per_px * max(self.size_px))
+
 
 class TendonConfig(_Section):
     """Where the head goes when a tendon is pulled. Angles in the image: 0 to the right, 90 down."""
@@ -79,11 +83,22 @@ class ZeroConfig(_Section):
     pretension_mm: float = Field(ge=0.0, le=5.0)
 
 
+class PortConfig(_Section):
+    """Where the robot is inserted, as shares of the (straightened) picture's width and height."""
+
+    x_share: float = Field(ge=0.0, le=1.0)
+    y_share: float = Field(ge=0.0, le=1.0)
+
+
 class CalibrationConfig(_Section):
     """All that was calibrated; None: it was not."""
 
     made_utc: datetime
+    assumed: tuple[JointName, ...] | None = Field(
+        None, description="joints whose servos one camera cannot tell apart, and nobody has confirmed: their ids decided"
+    )
     lens: LensConfig | None = None
     scale: ScaleConfig | None = None
     steering: SteeringConfig | None = None
     zero: ZeroConfig | None = None
+    port: PortConfig | None = None

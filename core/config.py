@@ -82,6 +82,10 @@ class PathConfig(_Section):
     min_length_px: float = Field(12.0, ge=2.0, le=500.0, description="shorter candidates are no robot")
     border_px: float = Field(6.0, ge=0.0, le=100.0, description="an end this near to the image border counts as the entry")
     port_px: float = Field(25.0, ge=0.0, le=300.0, description="an end this near to the insertion port counts as the entry")
+    port_x_share: float | None = Field(
+        None, ge=0.0, le=1.0, description="insertion port: share of the picture's width; a rig's own goes before it"
+    )
+    port_y_share: float | None = Field(None, ge=0.0, le=1.0, description="the same of its height; one is missing: not known")
     junction_turn_px: float = Field(
         40.0, ge=0.0, le=500.0, description="a right-angled turn at a junction costs a branch this length"
     )
@@ -215,6 +219,9 @@ class WindowConfig(_Section):
     """How the windows look, and where they keep pictures."""
 
     theme: Literal["dark", "light", "system"] = Field("dark", description="of all windows; system = as the desktop has it")
+    language: Literal["auto", "en", "zh"] = Field(
+        "auto", description="of all windows; auto = as the system says, en = English, zh = Chinese (simplified)"
+    )
     pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; None: LumenPilot in Pictures")
 
 

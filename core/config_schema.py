@@ -167,6 +167,8 @@ def settings_by_key() -> dict[str, Setting]:
 def effect_of(key: str) -> Effect:
     """When a change of this setting acts. What perception decides by is read anew for every frame; the network is not."""
     top, _, rest = key.partition(".")
+    if key == "window.language":
+        return Effect.PROGRAM
     if top == "window" or (top == "perception" and rest not in _LOADED_ONCE):
         return Effect.NOW
     return Effect.PROGRAM if top in _AT_START else Effect.RIG

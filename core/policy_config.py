@@ -16,7 +16,7 @@ class _Section(BaseModel):
 class PursuitConfig(_Section):
     """Look-ahead along the route."""
 
-    pixels_per_mm: float = Field(3.0, gt=0.1, le=50.0, description="of the camera's view, roughly: speeds are in mm/s")
+    pixels_per_mm: float = Field(3.0, gt=0.1, le=50.0, description="of the view, roughly; a calibrated rig has its own scale")
     look_ahead_px: float = Field(10.0, ge=4.0, le=200.0, description="distance of the look-ahead point from a resting head")
     look_ahead_s: float = Field(0.15, ge=0.0, le=5.0, description="so much way at the present speed is added to it")
     heading_px: float = Field(16.0, ge=4.0, le=100.0, description="end of the robot whose direction is the head's")

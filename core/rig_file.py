@@ -17,9 +17,9 @@ from typing import Any, Literal, Self
 import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from core.calibration_config import CalibrationConfig
+from core.calibration_config import CalibrationConfig, PortConfig
 from core.camera_config import CameraConfig
-from core.config import Config, RigConfig, TwinConfig
+from core.config import Config, PerceptionConfig, RigConfig, TwinConfig
 from core.errors import UserError
 from core.profiles import settings_folder
 from core.servo_config import ServosConfig
@@ -225,6 +225,41 @@ def calibration_of(config: Config) -> CalibrationConfig | None:
     if config.rig.file is None or config.rig.source is not None or config.rig.camera not in RESERVED:
         return None
     return read_rig(Path(config.rig.file)).calibration
+
+
+def scaled(config: Config, known: CalibrationConfig | None) -> Config:
+    """The configuration with the measured scale in the place of ``policy.pursuit.pixels_per_mm``; unchanged without one."""
+    if known is None or known.scale is None:
+        return config
+    zoom = known.scale.working_px_per_mm(config.perception.working_size_px)
+    pursuit = config.policy.pursuit.model_copy(update={"pixels_per_mm": zoom})
+    return config.model_copy(update={"policy": config.policy.model_copy(update={"pursuit": pursuit})})
+
+
+def ported(perception: PerceptionConfig, known: CalibrationConfig | None) -> PerceptionConfig:
+    """Perception that knows the rig's insertion port; unchanged where the rig does not tell it."""
+    if known is None or known.port is None:
+        return perception
+    place = {"port_x_share": known.port.x_share, "port_y_share": known.port.y_share}
+    return perception.model_copy(update={"path": perception.path.model_copy(update=place)})
+
+
+def as_calibrated(config: Config) -> Config:
+    """The configuration with what the rig file knows better: scale and insertion port.
+
+    Raises
+    ------
+    RigFileError
+    """
+    known = calibration_of(config)
+    return scaled(config, known).model_copy(update={"perception": ported(config.perception, known)})
+
+
+def set_port(path: Path, port: PortConfig | None) -> None:
+    """Keep the insertion port in a rig file; None: nobody knows it. Raises RigFileError."""
+    rig = read_rig(path)
+    known = rig.calibration or CalibrationConfig(made_utc=datetime.now(UTC).replace(microsecond=0))
+    write_rig(rig.model_copy(update={"calibration": known.model_copy(update={"port": port})}), path)
 
 
 def _first_problem(error: ValidationError) -> str:

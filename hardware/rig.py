@@ -9,6 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from core.calibration_config import ZeroConfig
 from core.config import Config, RigConfig
 from core.control.guarded_robot import GuardedRobot
 from core.devices import Camera, DeviceError
@@ -74,7 +75,8 @@ def open_rig(config: Config) -> Rig:
     if kind is RigKind.PLAYBACK:
         return _open_playback(config)
     calibration = calibration_of(config)
-    rig = _open_twin(config) if kind is RigKind.SIM else _open_live(config)
+    zero = calibration.zero if calibration is not None else None
+    rig = _open_twin(config) if kind is RigKind.SIM else _open_live(config, zero)
     if calibration is None or calibration.lens is None:
         return rig
     return replace(rig, camera=StraightenedCamera(rig.camera, calibration.lens))
@@ -104,7 +106,7 @@ def _open_playback(config: Config) -> Rig:
     return Rig(source.name, RigKind.PLAYBACK, camera, None)
 
 
-def _open_live(config: Config) -> Rig:
+def _open_live(config: Config, zero: ZeroConfig | None) -> Rig:
     """A real camera, with the servos when the rig has some. They are checked, but neither zeroed nor armed."""
     rig = config.rig
     if rig.robot == "twin":
@@ -117,7 +119,7 @@ def _open_live(config: Config) -> Rig:
     with ExitStack() as undo:
         camera.open()
         undo.callback(camera.close)
-        robot = _real_servos(config) if rig.robot == "servos" else None
+        robot = _real_servos(config, zero) if rig.robot == "servos" else None
         undo.pop_all()
     return Rig(rig.name, RigKind.LIVE, camera, robot)
 
@@ -133,10 +135,10 @@ def real_camera(config: Config) -> Camera:
     return webcam_camera(config.camera)
 
 
-def _real_servos(config: Config) -> ServoRobot:
+def _real_servos(config: Config, zero: ZeroConfig | None) -> ServoRobot:
     from hardware.servos.servo_robot import ServoRobot
 
-    robot = ServoRobot(config.servos, config.safety, name=config.rig.name)
+    robot = ServoRobot(config.servos, config.safety, name=config.rig.name, kept_zero=zero)
     robot.connect()
     return robot
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -15,7 +16,7 @@ from core.calibration_config import CalibrationConfig, LensConfig, ScaleConfig, 
 from core.config import Config
 from core.devices import DeviceError
 from core.rig_file import RigFile, make_rig
-from core.servo_config import JOINT_NAMES, ServosConfig
+from core.servo_config import JOINT_NAMES, JointName, ServosConfig
 from core.types import Image, Point
 from hardware import servo_wizard
 from hardware.calibration_bench import CalibrationBench
@@ -54,6 +55,8 @@ class RigDraft:
         self.found: FoundServos | None = None
         self.findings: dict[int, Finding] = {}
         self.assignments: tuple[Assignment, ...] = ()
+        self.port = known.port if known is not None else None
+        self._assumed_earlier = known.assumed if known is not None else None
         self.zeros: servo_wizard.Zeros | None = None
         self.notes: list[str] = []
         self._head_px: Point | None = None
@@ -163,9 +166,20 @@ class RigDraft:
         self.set_assignments(assigned)
         if any(one.assumed for one in assigned):
             self.notes.append(
-                "up and down cannot be told apart by one camera: the order of their ids decided; swap them if it is wrong"
+                "up and down are assumed by the order of their ids: one camera cannot tell them apart; swap them if it is wrong"
             )
         return assigned
+
+    @property
+    def assumed(self) -> tuple[JointName, ...]:
+        """Joints whose servos nobody has told apart: the order of their ids decided."""
+        if not self.assignments:
+            return self._assumed_earlier or ()
+        return tuple(one.name for one in self.assignments if one.assumed)
+
+    def confirm(self) -> None:
+        """Somebody has looked: what was assumed is right."""
+        self.set_assignments([replace(one, seen="seen by eye", assumed=False) if one.assumed else one for one in self.assignments])
 
     def set_assignments(self, assignments: Sequence[Assignment]) -> None:
         """Take over who is who. Raises NotIdentified when a servo has two names, or a name no servo."""
@@ -221,10 +235,12 @@ class RigDraft:
         """All that was found."""
         return CalibrationConfig(
             made_utc=datetime.now(UTC).replace(microsecond=0),
+            assumed=self.assumed or None,
             lens=self.lens,
             scale=self.scale,
             steering=self.steering,
             zero=self.zero,
+            port=self.port,
         )
 
     def rig_file(self, name: str) -> RigFile:

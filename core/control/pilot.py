@@ -7,6 +7,7 @@ keeps the operator's hand from the robot. What was advised, asked for, commanded
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Hashable, Sequence
@@ -37,6 +38,8 @@ from core.types import Advice, Command, Frame, RobotStatus, Scene
 PERIOD_S = 0.02
 _ARRIVED_S = 0.5
 _MOST_ALERTS = 200
+_SETTLED_S = 1.0
+"""What the servos were asked for shows in their status this long after it is done, at the latest."""
 _OVER_WITH_A_FRAME = frozenset(cause.value for cause in (Cause.POSE_STALE, Cause.POSE_LOST, Cause.CAMERA_SILENT, Cause.CAMERA_LOST))
 """What blanks the advice of the frame before says nothing against that of the frame that has come."""
 _NOT_WORTH_A_WORD = frozenset(
@@ -72,6 +75,7 @@ class Pilot:
         self._reports = FrameReports(config.policy.pursuit)
         self._state = _start_of(left_over, clock())
         self._permitted: Source | None = None
+        self._busy_s = -math.inf
         self._hand, self._drive, self._follow = Hand(config.hand), Drive(config.policy.drive), Follow()
         self._latency = CommandLatency()
         self._must_rest = False
@@ -100,6 +104,7 @@ class Pilot:
             self._robot.stop()
         elif act is Act.ACKNOWLEDGE:
             self._requests.acknowledge()
+        self._busy_s = self._clock()
         self._inbox.post(act)
 
     def switch_on(self) -> None:
@@ -165,6 +170,12 @@ class Pilot:
         """The newest view."""
         with self._lock:
             return self._view
+
+    @property
+    def can_move(self) -> bool:
+        """False when it is certain that nothing moves: ADVISORY, servos off, and nothing asked of them for a moment."""
+        busy, view, is_settled = self._requests.busy, self.view, self._clock() - self._busy_s > _SETTLED_S
+        return bool(busy) or not is_settled or view.mode is not Mode.ADVISORY or view.servos_on
 
     def news(self) -> DriveNews:
         """The newest view, and alerts and changes since the last call."""
@@ -241,7 +252,7 @@ class Pilot:
     # ---- parts of a turn
 
     def _may_request(self, *, although_latched: bool = False) -> bool:
-        """Whether the servos are free for a request; if not, an alert says why. One at a time."""
+        """Whether the servos are free for a request, which follows; if not, an alert says why. One at a time."""
         view = self.view
         reasons: list[Hindrance] = []
         if view.mode in ARMED_MODES:
@@ -251,6 +262,8 @@ class Pilot:
         for reason in reasons:
             with self._lock:
                 self._alerts.append(Alert(reason, ALERTS[reason]))
+        if not reasons:
+            self._busy_s = self._clock()
         return not reasons and not self._requests.busy
 
     def _hear(self, inputs: Inputs, sent: SentMotion | None, seen: Seen | None, now_s: float) -> None:
@@ -261,6 +274,7 @@ class Pilot:
         elif (report := self._robot.report()) is not None:
             events.append(report)
         if self._requests.busy:
+            self._busy_s = now_s
             events.append(ServosBusy())
         if inputs.deadman_news is not None:
             events.append(DeadmanReport(inputs.deadman_news))

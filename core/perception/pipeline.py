@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from core.config import PerceptionConfig
+from core.config import PathConfig, PerceptionConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton
 from core.perception.centerline import find as find_centerline
 from core.perception.evidence import Calibration, collect
@@ -147,7 +147,7 @@ class Pipeline:
         found, skeletons, graph = scene.masks, scene.skeletons, scene.vessel_graph
         assert found is not None and skeletons is not None and graph is not None
         with watch.stage("path"):
-            path = robot_path.find(skeletons, found, config, previous, graph)
+            path = robot_path.find(skeletons, found, config, previous, graph, _port(config.path, image))
         if isinstance(path, Refusal):
             return replace(scene, refusal=path)
         with watch.stage("pose"):
@@ -217,6 +217,14 @@ class Pipeline:
         if refusal is not None:
             return replace(scene, refusal=refusal)
         return replace(scene, pose=measure(robot_vector, vessel_vector, config.pose, confidence))
+
+
+def _port(config: PathConfig, image: Image) -> Point | None:
+    """The insertion port in the working image; None where nobody has told it."""
+    if config.port_x_share is None or config.port_y_share is None:
+        return None
+    height, width = image.shape[:2]
+    return config.port_x_share * (width - 1), config.port_y_share * (height - 1)
 
 
 def open_pipeline(config: PerceptionConfig) -> Pipeline:

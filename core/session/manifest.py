@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from core.calibration_config import CalibrationConfig
 from core.config import Config
 from core.errors import UserError
 from core.learning.model_file import ModelError, model_folder, read_model_info
@@ -94,6 +95,13 @@ class Manifest(BaseModel):
     ended: str = ""
     counts: Counts = Counts()
     recovered: Loss | None = None
+
+    @property
+    def known(self) -> CalibrationConfig | None:
+        """The rig's calibration; None when it had none, or none that this version understands."""
+        with contextlib.suppress(ValidationError):
+            return CalibrationConfig.model_validate(self.calibration) if self.calibration is not None else None
+        return None
 
 
 def about_rig(config: Config, kind: Kind, rig: str, calibration: dict[str, Any] | None = None) -> About:

@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 
+from core.calibration.kept_zero import zero_advice
+from core.calibration_config import ZeroConfig
 from core.control.bus_watch import BusReport
 from core.control.gate import Source
 from core.control.guarded_robot import SentMotion
@@ -34,6 +36,7 @@ class ServoRobot:
     name : for people.
     truth : tells the status instead of the servos, where the robot is simulated.
     on_close : called once, after the servos were let go.
+    kept_zero : of the rig file; arming without a zero then says whether the servos have lost their turns since.
 
     Notes
     -----
@@ -51,10 +54,11 @@ class ServoRobot:
         name: str = "servo robot",
         truth: Callable[[], RobotStatus] | None = None,
         on_close: Callable[[], None] | None = None,
+        kept_zero: ZeroConfig | None = None,
     ) -> None:
         self._servos, self._safety = servos, safety
         self._name = name
-        self._truth, self._on_close = truth, on_close
+        self._truth, self._on_close, self._kept_zero = truth, on_close, kept_zero
         self._lock = threading.Lock()
         self._link: BusLink | None = None
         self._supervised = False
@@ -115,8 +119,19 @@ class ServoRobot:
         NotReady
             With all reasons: not zeroed, a fault that was not acknowledged or is still there.
         """
-        self._connected().request("arm", _ARM_S)
+        try:
+            self._connected().request("arm", _ARM_S)
+        except NotReady as error:
+            raise NotReady(f"{error}{self._about_kept_zero()}") from None
         self._live()
+
+    def _about_kept_zero(self) -> str:
+        """What the rig file's zero says of joints that are not zeroed; "" where it has none, or all are."""
+        status = self.bus_status()
+        if self._kept_zero is None or status is None or all(status.zeroed) or len(self._states) != len(self._servos.joints):
+            return ""
+        ticks = [reading.ticks for reading in self._states if isinstance(reading, ServoState)]
+        return f" ({zero_advice(self._servos, self._kept_zero, ticks)})"
 
     def disarm(self) -> None:
         """Hold, and follow no more orders. The torque stays on."""

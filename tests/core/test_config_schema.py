@@ -47,6 +47,7 @@ def test_every_setting_says_what_it_means_and_every_number_its_range() -> None:
         ("servos.joints.3.sign", Kind.CHOICE, "", "-1, 1", Effect.RIG),
         ("rig.camera", Kind.CHOICE, "", "twin, realsense, webcam, video_file, image_folder", Effect.PROGRAM),
         ("window.theme", Kind.CHOICE, "", "dark, light, system", Effect.NOW),
+        ("window.language", Kind.CHOICE, "", "auto, en, zh", Effect.PROGRAM),
         ("safety.pose_hold_s", Kind.NUMBER, "s", "0.05 to 0.15 s", Effect.RIG),
     ],
 )

@@ -45,6 +45,25 @@ def test_switching_on_checks_the_servos_and_gives_the_operator_the_hand(bench: B
     assert bench.pilot.view.against_arming == ()
 
 
+def test_it_is_certain_that_nothing_moves_only_while_the_servos_are_off(bench: Bench) -> None:
+    bench.seconds(0.1)
+    assert not bench.pilot.can_move
+    bench.pilot.switch_on()
+    assert bench.pilot.can_move, "from the request on, before any turn has seen it"
+    bench.seconds(2.0)
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.can_move
+    bench.pilot.ask(Act.STOP)
+    bench.seconds(2.0)
+    assert bench.pilot.view.mode is Mode.STOPPED
+    assert bench.pilot.can_move, "STOP can be said again"
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.seconds(0.1)
+    assert bench.pilot.can_move, "the servos may still be at it"
+    bench.seconds(2.0)
+    assert not bench.pilot.can_move
+
+
 def test_servos_that_are_not_in_order_are_named(bench: Bench) -> None:
     bench.robot.problem = "servo 3 is an XL430, not an XM430-W350"
     bench.on()

@@ -287,3 +287,26 @@ def test_other_thresholds_act_with_the_same_networks_and_no_memory(pipeline: Pip
     assert scenes[1].pose.state is PoseState.A, "everything is allowed"
     assert scenes[0].pose == scenes[2].pose, "the first one is as it was"
     assert other.engine == pipeline.engine
+
+
+@pytest.mark.parametrize("size", [SIZE, (1280, 960)])
+@pytest.mark.parametrize(("port_x", "head_x"), [(150.0, 450.0), (450.0, 150.0)])
+def test_the_end_at_the_insertion_port_is_the_tail(
+    network: DrawnNetwork, port_x: float, head_x: float, size: tuple[int, int]
+) -> None:
+    """A robot whose ends both lie inside the image; the port is told as a share of the picture, whatever its size."""
+    network.draw(VESSEL[(VESSEL[:, 0] >= 150) & (VESSEL[:, 0] <= 450)] + [0.0, 3.0])
+    port_y = VESSEL[np.argmin(np.abs(VESSEL[:, 0] - port_x)), 1]
+    place = {"port_x_share": port_x / (SIZE[0] - 1), "port_y_share": port_y / (SIZE[1] - 1)}
+    path = CONFIG.path.model_copy(update=place)
+    scene = Pipeline(network, CONFIG.model_copy(update={"path": path})).perceive_single(frame(size=size))
+    assert scene.path is not None
+    assert scene.path.head[0] == pytest.approx(head_x, abs=6.0)
+    assert scene.path.entry_on_border
+
+
+def test_half_a_port_is_none(network: DrawnNetwork) -> None:
+    path = CONFIG.path.model_copy(update={"port_x_share": 0.5})
+    found = Pipeline(network, CONFIG.model_copy(update={"path": path})).perceive_single(frame())
+    assert found.path is not None
+    assert found.path.head[0] == pytest.approx(300, abs=1.5)

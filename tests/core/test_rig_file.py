@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from core.calibration_config import CalibrationConfig, LensConfig, ScaleConfig
+from core.calibration_config import CalibrationConfig, LensConfig, PortConfig, ScaleConfig
 from core.config import Config, load_config
 from core.rig_file import (
     RigFileError,
+    as_calibrated,
     calibration_of,
     check_rig_name,
     find_rig,
@@ -19,10 +20,12 @@ from core.rig_file import (
     read_rig,
     rig_path,
     rigs_folder,
+    scaled,
+    set_port,
     with_rig,
     write_rig,
 )
-from core.session.manifest import about_rig
+from core.session.manifest import Manifest, about_rig
 
 MADE = datetime(2025, 3, 4, 5, 6, 7, tzinfo=UTC)
 LENS = LensConfig(k1=-0.1, center_px=(319.5, 239.5), size_px=(640, 480), residual_px=0.1, pictures=3)
@@ -61,6 +64,52 @@ def test_the_configuration_takes_the_rig_over() -> None:
     assert config.servos == REAL.servos
     assert config.advice.slow_mm_s == 2.0
     assert calibration_of(config) == KNOWN
+
+
+@pytest.mark.parametrize(
+    ("mm_per_px", "size_px", "working_px", "px_per_mm"),
+    [
+        (0.2, (640, 480), 640, 5.0),
+        (0.2, (1280, 720), 640, 2.5),  # half a source pixel is a working pixel
+        (0.2, (640, 480), 320, 2.5),
+    ],
+)
+def test_the_measured_scale_goes_before_the_configured_one(
+    mm_per_px: float, size_px: tuple[int, int], working_px: int, px_per_mm: float
+) -> None:
+    config = load_config(overrides={"perception": {"working_size_px": working_px}, "policy": {"pursuit": {"pixels_per_mm": 7.0}}})
+    scale = SCALE.model_copy(update={"mm_per_px": mm_per_px, "size_px": size_px})
+    found = scaled(config, KNOWN.model_copy(update={"scale": scale}))
+    assert found.policy.pursuit.pixels_per_mm == pytest.approx(px_per_mm)
+    assert found.policy.pursuit.look_ahead_px == config.policy.pursuit.look_ahead_px
+    assert scaled(config, None) is config
+    assert scaled(config, CalibrationConfig(made_utc=MADE, lens=LENS)).policy.pursuit.pixels_per_mm == 7.0
+
+
+def test_the_insertion_port_is_kept_in_the_rig_file_and_reaches_perception() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", None))
+    set_port(path, PortConfig(x_share=0.1, y_share=0.6))
+    config = with_rig(load_config(), read_rig(path), path)
+    found = as_calibrated(config).perception.path
+    assert (found.port_x_share, found.port_y_share) == (0.1, 0.6)
+    assert config.perception.path.port_x_share is None, "it is the rig's, not the user's"
+    set_port(path, None)
+    assert as_calibrated(config).perception == config.perception
+    path = write_rig(make_rig(REAL, "bench 2", KNOWN))
+    set_port(path, PortConfig(x_share=0.1, y_share=0.6))
+    assert read_rig(path).calibration == KNOWN.model_copy(update={"port": PortConfig(x_share=0.1, y_share=0.6)})
+
+
+def test_a_port_of_the_configuration_holds_for_rigs_that_tell_none() -> None:
+    config = load_config(overrides={"perception": {"path": {"port_x_share": 0.2, "port_y_share": 0.3}}})
+    assert as_calibrated(config).perception.path.port_x_share == 0.2
+
+
+def test_a_session_tells_its_calibration_again() -> None:
+    manifest = Manifest(id="x", kind="LIVE", started_utc=MADE, started_monotonic_s=0.0)
+    assert manifest.known is None
+    assert manifest.model_copy(update={"calibration": KNOWN.model_dump(mode="json")}).known == KNOWN
+    assert manifest.model_copy(update={"calibration": {"of": "a newer version"}}).known is None
 
 
 def test_a_session_keeps_the_calibration() -> None:

@@ -12,10 +12,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
 
+from core.calibration_config import ZeroConfig
 from core.config import Config
 from core.control.faults import Cause
 from core.control.gate import RejectReason, Source
@@ -38,6 +40,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CONFIG, SAFETY = ServosConfig(watchdog_s=2.5, heartbeat_timeout_s=3.0), SafetyConfig()
 FORWARD = Command(advance_mm_s=5.0)
 PATIENCE_S = 10.0
+NO_SLACK: dict[str, Any] = {"slack_mm": (0.0,) * 4, "pretension_mm": 0.3}
 
 
 @pytest.fixture(autouse=True)
@@ -427,6 +430,25 @@ def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot) -> N
         armed.arm()
     armed.zero(["delivery_1"])
     armed.arm()
+
+
+def test_arming_tells_that_the_rigs_zero_was_lost_with_the_power(servos: SoftServoBus) -> None:
+    """The register of right was a whole turn farther when the rig was calibrated."""
+    kept = ZeroConfig(ticks=tuple(1000 + joint.id + 4096 * (joint.id == 1) for joint in CONFIG.joints), **NO_SLACK)
+    robot = ServoRobot(CONFIG.model_copy(update={"port": servos.port}), SAFETY, kept_zero=kept)
+    robot.connect()
+    try:
+        _seen(robot, lambda status: len(status.servos) == 7)
+        with pytest.raises(NotReady, match=r"zero before arming \(the zero of the rig file does not hold.*turns \(right by -1\)"):
+            robot.arm()
+        robot.zero()
+        robot.arm()
+        robot.stop()
+        with pytest.raises(NotReady) as refused:
+            robot.arm()
+        assert "rig file" not in str(refused.value), "the joints are zeroed"
+    finally:
+        robot.close()
 
 
 def test_fault_26_the_port_vanishes_and_comes_back(servos: SoftServoBus, armed: ServoRobot) -> None:

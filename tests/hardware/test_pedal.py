@@ -286,12 +286,13 @@ def test_it_says_released_first_and_then_follows_the_foot(soft: SoftPedal, liste
     assert listener.reports[0] == PedalReport(False, False, listener.reports[0].time_s)
     assert pedal.problem is None
     listener.hears(3)
+    began_s = time.monotonic()
     for _ in range(3):
         listener.since(soft.press, _pressed)
         listener.since(soft.release, _released)
     times = [report.time_s for report in listener.reports]
     assert times == sorted(times)
-    assert abs(times[-1] - time.monotonic()) < 5.0
+    assert began_s <= times[-1] <= time.monotonic()
 
 
 @pytest.mark.real_time
