@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := help
-.PHONY: help run test lint setup install uninstall clean
+.PHONY: help run test lint translations setup install uninstall clean
 
 # Tools are started as modules, so that a checkout that was moved still works (the scripts in .venv/bin name their old place).
 PY := .venv/bin/python
@@ -28,6 +28,9 @@ lint: setup  ## ruff and mypy only
 	$(PY) -m ruff check || failed=1
 	$(PY) -m mypy || failed=1
 	[[ -z $$failed ]]
+
+translations: setup  ## renew the texts of resources/translations from the code, and make the .qm files
+	@$(PY) scripts/translations.py
 
 setup:  ## make or renew .venv; returns at once when it is up to date
 	@PYTHON='$(PYTHON)' bash scripts/set_up.sh

@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QMessageBox, QWidget
 
+from app.language import tr
 from core.config import RESOURCES
 
 ICON = RESOURCES / "icons" / "lumenpilot.svg"
@@ -34,14 +35,17 @@ def show_about(parent: QWidget) -> QMessageBox:
     """A small dialog; the window behind it goes on, and Space still stops the robot."""
     box = QMessageBox(parent)
     box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-    box.setWindowTitle("About LumenPilot")
+    box.setWindowTitle(tr("About LumenPilot"))
     box.setIconPixmap(program_icon().pixmap(_SIZE_PX, _SIZE_PX))
     box.setText(f"<b>LumenPilot</b> {program_version()}")
     box.setInformativeText(
-        "Teleoperation assist for a tendon-driven interventional robot: it finds vessel and robot in the picture, tells how the "
-        "robot's head lies against the vessel's centerline, advises, and on request drives.\n\n"
-        "For research benches. It is not a medical device; STOP is a stop, not an emergency stop.\n\n"
-        "MIT licence. Typeface: Inter, SIL Open Font Licence."
+        tr(
+            "Teleoperation assist for a tendon-driven interventional robot: it finds vessel and robot in the picture, tells how "
+            "the "
+            "robot's head lies against the vessel's centerline, advises, and on request drives.\n\n"
+            "For research benches. It is not a medical device; STOP is a stop, not an emergency stop.\n\n"
+            "MIT licence. Typeface: Inter, SIL Open Font Licence."
+        )
     )
     box.setStandardButtons(QMessageBox.StandardButton.Close)
     box.setModal(False)

@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 
 from app.child_process import ChildProcess, command_of
+from app.language import mark, tr, tr_text
 from app.recovery_desk import Offers
 from app.widgets.offer_strip import Answer, Offer
 from core.study.annotation_store import DEFAULT_NAME
@@ -46,15 +47,23 @@ class AfterSession(QObject):
         self._evaluation: ChildProcess | None = None
         self._windows: list[ChildProcess] = []
 
-    def offer(self, session: Path, text: str = "Session saved") -> None:
+    def offer(self, session: Path, text: str = mark("Session saved")) -> None:
         """A session has ended, or was recovered; `text` says which."""
         self.session = session
         answers = (
-            Answer("Evaluate", lambda: self.evaluate(session), "The algorithm against angles measured by hand, as a report"),
-            Answer("Annotate", lambda: self.annotate(session), f"Measure by hand: {FRAMES} pictures, evenly over the session"),
-            Answer("Play", lambda: self.play(session), "The player, with everything as it was understood"),
+            Answer(
+                tr("Evaluate"), lambda: self.evaluate(session), tr("The algorithm against angles measured by hand, as a report")
+            ),
+            Answer(
+                tr("Annotate"),
+                lambda: self.annotate(session),
+                tr("Measure by hand: {frames} pictures, evenly over the session", frames=FRAMES),
+            ),
+            Answer(tr("Play"), lambda: self.play(session), tr("The player, with everything as it was understood")),
         )
-        self._offers.offer(Offer(_OFFER, text, f"{session.name}, in {session.parent}", answers))
+        self._offers.offer(
+            Offer(_OFFER, tr_text(text), tr("{name}, in {parent}", name=session.name, parent=session.parent), answers)
+        )
 
     def withdraw(self) -> None:
         """Another recording has begun: what is offered is no longer the matter."""
@@ -73,20 +82,26 @@ class AfterSession(QObject):
     def annotate(self, session: Path) -> None:
         """The annotation tool on pictures evenly over the session."""
         self._open(
-            f"Opening the annotation tool: {session.name}", "annotate", str(session), "--frames", str(FRAMES), "--order", "even"
+            tr("Opening the annotation tool: {name}", name=session.name),
+            "annotate",
+            str(session),
+            "--frames",
+            str(FRAMES),
+            "--order",
+            "even",
         )
 
     def play(self, session: Path) -> None:
         """The player."""
-        self._open(f"Opening the player: {session.name}", "play", str(session))
+        self._open(tr("Opening the player: {name}", name=session.name), "play", str(session))
 
     def evaluate(self, session: Path) -> None:
         """The report; without anything measured by hand yet, the annotation tool, for that comes first."""
         if self._evaluation is not None:
-            self.said.emit("An evaluation is running already", False)
+            self.said.emit(tr("An evaluation is running already"), False)
             return
         if not (session / DEFAULT_NAME).is_file():
-            self._needs_annotations(session, "Nothing is measured by hand yet")
+            self._needs_annotations(session, tr("Nothing is measured by hand yet"))
             return
         out = session / "evaluation"
         told: dict[str, Any] = {}
@@ -94,7 +109,7 @@ class AfterSession(QObject):
         child.told.connect(lambda record: self._on_told(session, record, told))
         child.ended.connect(lambda code, line: self._on_evaluated(session, told, code, line))
         self._evaluation = child
-        self._show_share(session, -1.0, "loading the network")
+        self._show_share(session, -1.0, tr("loading the network"))
         child.start()
 
     def _on_told(self, session: Path, record: dict[str, Any], told: dict[str, Any]) -> None:
@@ -102,19 +117,25 @@ class AfterSession(QObject):
             told.update(record)
             return
         done, total = record["done"], record["total"]
-        left = f", {record['left_s']:.0f} s left" if record.get("left_s") else ""
-        self._show_share(session, done / total if total else -1.0, f"{done:.0f} of {total or 0:.0f} {record['what']}{left}")
+        left = tr(", {left:.0f} s left", left=record["left_s"]) if record.get("left_s") else ""
+        self._show_share(
+            session,
+            done / total if total else -1.0,
+            tr("{done:.0f} of {total:.0f} {what}{left}", done=done, total=total or 0, what=tr_text(record["what"]), left=left),
+        )
 
     def _show_share(self, session: Path, share: float, detail: str) -> None:
-        cancel = Answer("Cancel", self._cancel, "Stop; a report of before stays")
-        self._offers.offer(Offer(_WORK, f"Evaluating {session.name}", detail, (cancel,), share=share, dismissed=self._cancel))
+        cancel = Answer(tr("Cancel"), self._cancel, tr("Stop; a report of before stays"))
+        self._offers.offer(
+            Offer(_WORK, tr("Evaluating {name}", name=session.name), detail, (cancel,), share=share, dismissed=self._cancel)
+        )
 
     def _cancel(self) -> None:
         child, self._evaluation = self._evaluation, None
         if child is not None:
             child.leave()
             child.kill()
-            self.said.emit("Evaluation cancelled", False)
+            self.said.emit(tr("Evaluation cancelled"), False)
 
     def _on_evaluated(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
         self._evaluation = None
@@ -122,16 +143,27 @@ class AfterSession(QObject):
         if code == 0:
             report = session / "evaluation" / REPORT
             shown = self._show_file(report)
-            judged = f"{told.get('answered', 0)} of {told.get('measured', 0)} pictures answered"
-            self.said.emit(f"Evaluated: {judged}. {'Report opened' if shown else 'The report is'}: {report}", False)
+            judged = tr(
+                "{answered} of {measured} pictures answered", answered=told.get("answered", 0), measured=told.get("measured", 0)
+            )
+            self.said.emit(
+                (
+                    tr("Evaluated: {judged}. Report opened: {report}", judged=judged, report=report)
+                    if shown
+                    else tr("Evaluated: {judged}. The report is: {report}", judged=judged, report=report)
+                ),
+                False,
+            )
         elif "no finished annotation" in line:
-            self._needs_annotations(session, "No picture is measured to the end yet: both lines and a state, or can't tell")
+            self._needs_annotations(session, tr("No picture is measured to the end yet: both lines and a state, or can't tell"))
         else:
-            self.said.emit(f"Not evaluated: {line or f'exit code {code}'}", True)
+            self.said.emit(tr("Not evaluated: {why}", why=tr_text(line) or tr("exit code {code}", code=code)), True)
 
     def _needs_annotations(self, session: Path, why: str) -> None:
-        measure = Answer("Annotate", lambda: self.annotate(session), f"{FRAMES} pictures, evenly over the session")
-        detail = f"The annotation tool takes {FRAMES} pictures, evenly over the session. Then evaluate again."
+        measure = Answer(
+            tr("Annotate"), lambda: self.annotate(session), tr("{frames} pictures, evenly over the session", frames=FRAMES)
+        )
+        detail = tr("The annotation tool takes {frames} pictures, evenly over the session. Then evaluate again.", frames=FRAMES)
         self._offers.offer(Offer(_OFFER, why, detail, (measure,)))
 
     def _open(self, words: str, *arguments: str) -> None:
@@ -145,4 +177,4 @@ class AfterSession(QObject):
         self._windows.remove(child)
         child.deleteLater()
         if code != 0:
-            self.said.emit(line or f"That window ended with exit code {code}", True)
+            self.said.emit(tr_text(line) or tr("That window ended with exit code {code}", code=code), True)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from app.annotate_sources import default_store, image_files
+from app.language import tr
 from app.learning_commands import progress_bar
 from core.config import Config, load_config
 from core.profiles import own_config
@@ -106,7 +107,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         images = _listed(files, store)
         rater = options.study.rater or _user()
         items = _queue(store, images, rater, options.study, config)
-        application = make_application(own_config().window.theme)
+        application = make_application(own_config().window)
 
         from app.annotation_desk import AnnotationDesk
         from app.annotator_window import AnnotatorWindow
@@ -114,7 +115,11 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
 
         desk = AnnotationDesk(store, items, config.perception, blind=bool(options.study.name))
         _tell(store.problems)
-        who = f"study {options.study.name}, rater {rater}, blind" if options.study.name else f"rater {rater}"
+        who = (
+            tr("study {name}, rater {rater}, blind", name=options.study.name, rater=rater)
+            if options.study.name
+            else tr("rater {rater}", rater=rater)
+        )
         window = AnnotatorWindow(desk, who)
         bar = window.bar
         switches = {name: Switch(partial(bar.is_on, key), lambda _on, which=key: bar.toggle(which)) for name, key in _KEPT}

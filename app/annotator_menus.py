@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from app.annotation_tool import Tool
+from app.language import tr
 from app.menus import MenuEntry, add_help_menu, add_menu
 from core.types import PoseState
 
@@ -21,77 +22,77 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
     canvas, bar, light = window.canvas, window.bar, window.light
     add_menu(
         window,
-        "&File",
+        tr("&File"),
         [
-            MenuEntry("Where is it &saved?", window.tell_saved, ("Ctrl+S",)),
+            MenuEntry(tr("Where is it &saved?"), window.tell_saved, ("Ctrl+S",)),
             None,
-            MenuEntry("&Train on my annotations...", window.train),
+            MenuEntry(tr("&Train on my annotations..."), window.train),
             None,
-            MenuEntry("&Quit", window.close, ("Ctrl+Q",)),
+            MenuEntry(tr("&Quit"), window.close, ("Ctrl+Q",)),
         ],
     )
     view = add_menu(
         window,
-        "&View",
+        tr("&View"),
         [
-            MenuEntry("Zoom &in", partial(canvas.zoom, _ZOOM_STEP), ("+", "=")),
-            MenuEntry("Zoom &out", partial(canvas.zoom, 1 / _ZOOM_STEP), ("-",)),
-            MenuEntry("&Close-up of the head", canvas.close_up, ("Z",)),
-            MenuEntry("&Whole picture", canvas.fit, ("F", "0")),
+            MenuEntry(tr("Zoom &in"), partial(canvas.zoom, _ZOOM_STEP), ("+", "=")),
+            MenuEntry(tr("Zoom &out"), partial(canvas.zoom, 1 / _ZOOM_STEP), ("-",)),
+            MenuEntry(tr("&Close-up of the head"), canvas.close_up, ("Z",)),
+            MenuEntry(tr("&Whole picture"), canvas.fit, ("F", "0")),
             None,
-            MenuEntry("More contrast", partial(light.step, 1), (".",)),
-            MenuEntry("Less contrast", partial(light.step, -1), (",",)),
-            MenuEntry("Brighter", partial(light.step, 0, 1), (">",)),
-            MenuEntry("Darker", partial(light.step, 0, -1), ("<",)),
-            MenuEntry("Picture as it is", light.reset, ("/",)),
+            MenuEntry(tr("More contrast"), partial(light.step, 1), (".",)),
+            MenuEntry(tr("Less contrast"), partial(light.step, -1), (",",)),
+            MenuEntry(tr("Brighter"), partial(light.step, 0, 1), (">",)),
+            MenuEntry(tr("Darker"), partial(light.step, 0, -1), ("<",)),
+            MenuEntry(tr("Picture as it is"), light.reset, ("/",)),
             None,
-            MenuEntry("&Loupe", partial(bar.toggle, "L"), ("L",)),
-            MenuEntry("&Masks", partial(bar.toggle, "K"), ("K",)),
-            MenuEntry("&Algorithm", window.toggle_proposal, ("H",)),
+            MenuEntry(tr("&Loupe"), partial(bar.toggle, "L"), ("L",)),
+            MenuEntry(tr("&Masks"), partial(bar.toggle, "K"), ("K",)),
+            MenuEntry(tr("&Algorithm"), window.toggle_proposal, ("H",)),
             None,
-            MenuEntry("&Full screen", window.toggle_full_screen, ("F11",), checked=False),
+            MenuEntry(tr("&Full screen"), window.toggle_full_screen, ("F11",), checked=False),
         ],
     )
-    states = [MenuEntry(f"State {s.value}", partial(window.set_state, s), (s.value,)) for s in PoseState]
+    states = [MenuEntry(tr("State {state}", state=s.value), partial(window.set_state, s), (s.value,)) for s in PoseState]
     edits = add_menu(
         window,
-        "&Edit",
+        tr("&Edit"),
         [
-            MenuEntry("&Undo", window.undo, ("Ctrl+Z",)),
-            MenuEntry("&Redo", window.redo, ("Ctrl+Shift+Z", "Ctrl+Y")),
+            MenuEntry(tr("&Undo"), window.undo, ("Ctrl+Z",)),
+            MenuEntry(tr("&Redo"), window.redo, ("Ctrl+Shift+Z", "Ctrl+Y")),
             None,
             *states,
-            MenuEntry("Can't tell", window.toggle_cannot_tell, ("X",)),
-            MenuEntry("&Note", window.edit_note, ("F2",)),
+            MenuEntry(tr("Can't tell"), window.toggle_cannot_tell, ("X",)),
+            MenuEntry(tr("&Note"), window.edit_note, ("F2",)),
             None,
-            MenuEntry("Take the &algorithm's", window.take_proposal, ("G",)),
-            MenuEntry("&Simplify outlines", window.simplify, ("S",)),
+            MenuEntry(tr("Take the &algorithm's"), window.take_proposal, ("G",)),
+            MenuEntry(tr("&Simplify outlines"), window.simplify, ("S",)),
         ],
     )
     for action in edits[:2]:
         action.setAutoRepeat(True)
-    tools = [MenuEntry(t.value.label, partial(window.take_tool, t), (t.value.key,)) for t in Tool]
+    tools = [MenuEntry(tr(t.value.label), partial(window.take_tool, t), (t.value.key,)) for t in Tool]
     add_menu(
         window,
-        "&Tools",
+        tr("&Tools"),
         [
             *tools,
             None,
-            MenuEntry("&Brush", partial(bar.toggle, "T"), ("T",)),
-            MenuEntry("Brush smaller", partial(canvas.resize_brush, 1 / _BRUSH_STEP), ("[",)),
-            MenuEntry("Brush larger", partial(canvas.resize_brush, _BRUSH_STEP), ("]",)),
+            MenuEntry(tr("&Brush"), partial(bar.toggle, "T"), ("T",)),
+            MenuEntry(tr("Brush smaller"), partial(canvas.resize_brush, 1 / _BRUSH_STEP), ("[",)),
+            MenuEntry(tr("Brush larger"), partial(canvas.resize_brush, _BRUSH_STEP), ("]",)),
         ],
     )
     go = add_menu(
         window,
-        "&Go",
+        tr("&Go"),
         [
-            MenuEntry("&Next", partial(window.step, 1), ("N", "PgDown")),
-            MenuEntry("&Previous", partial(window.step, -1), ("P", "PgUp")),
-            MenuEntry("Next &without an answer", window.go_open, ("U",)),
-            MenuEntry("&First", partial(window.open, 0), ("Home",)),
-            MenuEntry("&Last", partial(window.open, len(window.desk.items) - 1), ("End",)),
-            MenuEntry("Lis&t", window.queue.take_focus, ("F6",)),
+            MenuEntry(tr("&Next"), partial(window.step, 1), ("N", "PgDown")),
+            MenuEntry(tr("&Previous"), partial(window.step, -1), ("P", "PgUp")),
+            MenuEntry(tr("Next &without an answer"), window.go_open, ("U",)),
+            MenuEntry(tr("&First"), partial(window.open, 0), ("Home",)),
+            MenuEntry(tr("&Last"), partial(window.open, len(window.desk.items) - 1), ("End",)),
+            MenuEntry(tr("Lis&t"), window.queue.take_focus, ("F6",)),
         ],
     )
     for action in (*go[:2], *view[:2], *view[4:8]):

@@ -14,6 +14,7 @@ from app.annotation_desk import AnnotationDesk
 from app.annotation_tool import Tool
 from app.annotator_menus import add_annotator_menus
 from app.heartbeat import Heartbeat
+from app.language import tr, tr_text
 from app.menus import action_of
 from app.training_dialog import TrainingDialog
 from app.training_source import collect_from_store
@@ -27,6 +28,7 @@ from app.widgets.card import Card
 from app.widgets.columns import Columns
 from app.widgets.light_sliders import LightSliders
 from app.widgets.toast import Toast
+from app.wording import refusal_text
 from core.study.annotations import Annotation, Readout, turn_annotation
 from core.types import PoseState
 
@@ -56,8 +58,8 @@ class AnnotatorWindow(QMainWindow):
         self.header = AnnotationHeader(who)
         self.light = LightSliders()
         self.note = QLineEdit()
-        self.note.setPlaceholderText("Note on this image  (F2)")
-        self.note.setAccessibleName("Note")
+        self.note.setPlaceholderText(tr("Note on this image  (F2)"))
+        self.note.setAccessibleName(tr("Note"))
         self.note.setMaxLength(2000)
         theme.set_sheet(
             self.note,
@@ -69,7 +71,7 @@ class AnnotatorWindow(QMainWindow):
         self.toast = Toast(self.canvas)
         self._make_menus()
         self._wire()
-        self.setWindowTitle("LumenPilot \N{EM DASH} annotate")
+        self.setWindowTitle(tr("LumenPilot \N{EM DASH} annotate"))
         self.setMinimumSize(*theme.MIN_WINDOW)
         self.resize(theme.start_size(self.screen()))
 
@@ -95,7 +97,7 @@ class AnnotatorWindow(QMainWindow):
     def _names(self) -> list[str]:
         """In a blind study nothing tells that an image was there before."""
         if self._desk.blind:
-            return [f"image {place}" for place in range(1, len(self._desk.items) + 1)]
+            return [tr("image {place}", place=place) for place in range(1, len(self._desk.items) + 1)]
         return [item.image.path.name for item in self._desk.items]
 
     def _lay_out(self) -> None:
@@ -109,8 +111,8 @@ class AnnotatorWindow(QMainWindow):
         column = QVBoxLayout(side)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(theme.GAP)
-        column.addWidget(Card("Angle to the vessel", self.readout))
-        column.addWidget(Card("Images", self.queue), 1)
+        column.addWidget(Card(tr("Angle to the vessel"), self.readout))
+        column.addWidget(Card(tr("Images"), self.queue), 1)
         column.addWidget(self.note)
         column.addWidget(Card("", self.light))
         side.setMinimumWidth(_SIDE_WIDTH[0])
@@ -129,7 +131,7 @@ class AnnotatorWindow(QMainWindow):
         escape.setShortcut(QKeySequence(Qt.Key.Key_Escape))
         escape.triggered.connect(self._on_escape)
         self.addAction(escape)
-        hint = QLabel("F1  keys")
+        hint = QLabel(tr("F1  keys"))
         hint.setObjectName("card_note")
         hint.setContentsMargins(0, 0, 14, 0)
         self.menuBar().setCornerWidget(hint)
@@ -162,11 +164,11 @@ class AnnotatorWindow(QMainWindow):
         self._keep_note()
         if place != self._desk.index:
             self.canvas.blank()
-            self.readout.show_annotation(Annotation(), Readout(missing="loading"))
+            self.readout.show_annotation(Annotation(), Readout(missing=tr("loading")))
         self.queue.show_current(place)
         self._desk.open(place)
-        name = self._names()[place] if not self._desk.blind else f"Image {place + 1}"
-        self.header.show_title(f"{name}   ({place + 1} of {len(self._desk.items)})")
+        name = self._names()[place] if not self._desk.blind else tr("Image {place}", place=place + 1)
+        self.header.show_title(tr("{name}   ({place} of {count})", name=name, place=place + 1, count=len(self._desk.items)))
 
     def _choose(self, place: int) -> None:
         self.canvas.setFocus()
@@ -181,16 +183,18 @@ class AnnotatorWindow(QMainWindow):
         elif step > 0:
             left = len(self._desk.items) - self._desk.finished
             self.toast.show_message(
-                f"The last image. {left} without an answer: U goes there" if left else "The last image. All are done"
+                tr("The last image. {left} without an answer: U goes there", left=left)
+                if left
+                else tr("The last image. All are done")
             )
         else:
-            self.toast.show_message("The first image")
+            self.toast.show_message(tr("The first image"))
 
     def go_open(self) -> None:
         """To the next item without an answer."""
         place = self._desk.next_open(self._desk.index)
         if place is None:
-            self.toast.show_message("All images have an answer")
+            self.toast.show_message(tr("All images have an answer"))
         else:
             self.open(place)
 
@@ -226,7 +230,7 @@ class AnnotatorWindow(QMainWindow):
         if is_edit:
             self.header.show_unsaved(self._desk.unsaved, line)
         elif not self._desk.is_open:
-            self.readout.show_annotation(Annotation(), Readout(missing="this image cannot be shown"))
+            self.readout.show_annotation(Annotation(), Readout(missing=tr("this image cannot be shown")))
         self.bar.set_switch("H", False)
         self.toast.show_message(line, is_fault=True)
 
@@ -260,8 +264,8 @@ class AnnotatorWindow(QMainWindow):
         elif annotation.cannot_tell or (pose is not None and annotation.state is not None):
             self.step(1)
         else:
-            missing = self._desk.measure(annotation).missing
-            self.toast.show_message(f"Not complete: {missing}; or X, can't tell")
+            missing = tr_text(self._desk.measure(annotation).missing)
+            self.toast.show_message(tr("Not complete: {missing}; or X, can't tell", missing=missing))
 
     def set_state(self, state: PoseState) -> None:
         """The rater's word on the pose."""
@@ -281,13 +285,15 @@ class AnnotatorWindow(QMainWindow):
         """Back one edit, and say which."""
         action = self._desk.history.undo_action
         self._desk.undo()
-        self.toast.show_message(f"Undone: {action}" if action else "Nothing to undo")
+        self.toast.show_message(tr("Undone: {action}", action=tr_text(action)) if action else tr("Nothing to undo"))
 
     def redo(self) -> None:
         """Forward one edit, and say which."""
         can_redo = self._desk.history.can_redo
         self._desk.redo()
-        self.toast.show_message(f"Done again: {self._desk.history.undo_action}" if can_redo else "Nothing to redo")
+        self.toast.show_message(
+            tr("Done again: {action}", action=tr_text(self._desk.history.undo_action)) if can_redo else tr("Nothing to redo")
+        )
 
     def edit_note(self) -> None:
         """Write the note; Enter or Escape goes back to the picture."""
@@ -305,7 +311,7 @@ class AnnotatorWindow(QMainWindow):
         if self.canvas.tool.is_mask:
             self.canvas.simplify_masks()
         else:
-            self.toast.show_message("Simplify is for masks: 3 or 4 first")
+            self.toast.show_message(tr("Simplify is for masks: 3 or 4 first"))
 
     # ---- tools and switches
 
@@ -334,7 +340,7 @@ class AnnotatorWindow(QMainWindow):
     def toggle_proposal(self) -> None:
         """Show or hide what the algorithm says."""
         if self._desk.blind:
-            self.toast.show_message("A blind study: what the algorithm says is hidden")
+            self.toast.show_message(tr("A blind study: what the algorithm says is hidden"))
         else:
             self.bar.toggle("H")
 
@@ -343,7 +349,7 @@ class AnnotatorWindow(QMainWindow):
             self.canvas.show_proposal(None)
             return
         if self._desk.proposal is None:
-            self.toast.show_message("Asking the algorithm")
+            self.toast.show_message(tr("Asking the algorithm"))
         self._desk.propose()
 
     def _show_proposal(self) -> None:
@@ -355,11 +361,17 @@ class AnnotatorWindow(QMainWindow):
         if proposal.pose is not None:
             pose = proposal.pose
             self.toast.show_message(
-                f"Algorithm: \N{GREEK SMALL LETTER THETA} {pose.theta_deg:.1f}°, state {pose.state.value}, "
-                f"confidence {proposal.confidence:.2f}. G takes it over"
+                tr(
+                    "Algorithm: θ {theta:.1f}°, state {state}, confidence {confidence:.2f}. G takes it over",
+                    theta=pose.theta_deg,
+                    state=pose.state.value,
+                    confidence=proposal.confidence,
+                )
             )
         else:
-            self.toast.show_message(f"The algorithm gives no pose: {proposal.refusal}")
+            self.toast.show_message(
+                tr("The algorithm gives no pose: {why}", why=refusal_text(proposal.refusal) if proposal.refusal is not None else "")
+            )
 
     def take_proposal(self) -> None:
         """Lines with a line tool, the tool's masks with a mask tool; undo brings the own ones back."""
@@ -375,14 +387,14 @@ class AnnotatorWindow(QMainWindow):
             if taken:
                 self._desk.edit(f"take the algorithm's {target.value} mask", replace(annotation, masks=(*kept, *taken)))
             else:
-                self.toast.show_message(f"The algorithm found no {target.value}")
+                self.toast.show_message(tr("The algorithm found no {what}", what=tr_text(target.value)))
         elif shown.robot or shown.vessel:
             self.canvas.close_line()
             self._desk.edit(
                 "take the algorithm's lines", replace(annotation, robot=shown.robot, vessel=shown.vessel, cannot_tell=False)
             )
         else:
-            self.toast.show_message("The algorithm has no lines here")
+            self.toast.show_message(tr("The algorithm has no lines here"))
         self.bar.set_switch("H", False)
         self.canvas.show_proposal(None)
 
@@ -401,7 +413,7 @@ class AnnotatorWindow(QMainWindow):
 
     def tell_saved(self) -> None:
         """Where the annotations are."""
-        self.toast.show_message(f"Every edit is saved at once, in {self._desk.store_path}")
+        self.toast.show_message(tr("Every edit is saved at once, in {path}", path=self._desk.store_path))
 
     def _on_escape(self) -> None:
         if self.help.isVisible():
@@ -436,10 +448,15 @@ class AnnotatorWindow(QMainWindow):
         event.accept()
 
     def _may_lose(self) -> bool:
-        box = QMessageBox(QMessageBox.Icon.Warning, "Not saved", f"{self._desk.unsaved} edits could not be written.", parent=self)
-        box.setInformativeText("Free some space or put the disk back, and they are written by themselves.")
-        stay = box.addButton("Stay", QMessageBox.ButtonRole.RejectRole)
-        box.addButton("Leave without them", QMessageBox.ButtonRole.DestructiveRole)
+        box = QMessageBox(
+            QMessageBox.Icon.Warning,
+            tr("Not saved"),
+            tr("{count} edits could not be written.", count=self._desk.unsaved),
+            parent=self,
+        )
+        box.setInformativeText(tr("Free some space or put the disk back, and they are written by themselves."))
+        stay = box.addButton(tr("Stay"), QMessageBox.ButtonRole.RejectRole)
+        box.addButton(tr("Leave without them"), QMessageBox.ButtonRole.DestructiveRole)
         box.setDefaultButton(stay)
         box.exec()
         return box.clickedButton() is not stay

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from app.cells import number
+from app.language import tr, tr_text
 from core.control.gate_checks import RejectReason
 
 if TYPE_CHECKING:
@@ -73,10 +74,12 @@ class ClampLog:
             return
         self._cycle = status.cycle
         for clamp in status.clamps:
-            text = f"{number(clamp.asked_mm, 2)} \N{RIGHTWARDS ARROW} {number(clamp.allowed_mm, 2)} mm, {clamp.limit.value}"
+            text = (
+                f"{number(clamp.asked_mm, 2)} \N{RIGHTWARDS ARROW} {number(clamp.allowed_mm, 2)} mm, {tr_text(clamp.limit.value)}"
+            )
             self._tell((clamp.joint, clamp.limit), clamp.joint, text, 1, status.time_s, clock)
         for joint in status.at_end:
-            self._tell((joint, "end"), joint, "stopped at the end of its envelope", 1, status.time_s, clock)
+            self._tell((joint, "end"), joint, tr("stopped at the end of its envelope"), 1, status.time_s, clock)
         for reason, count in status.rejections.items():
             more = count - self._rejections.get(reason, 0)
             if more > 0 and reason not in _IDLE:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QThread, Signal
 
+from app.language import tr
 from app.overlay_picture import draw_overlay
 from core.errors import UserError
 from core.session.export import export_mp4
@@ -64,16 +65,18 @@ class ClipExporter(QThread):
                     self._check()
                 written = export_mp4(reader, clip.out, self._draw, first=clip.first, last=clip.last, on_row=self._on_row)
         except _Stopped:
-            self.ended.emit("Clip cancelled; nothing was kept", False)
+            self.ended.emit(tr("Clip cancelled; nothing was kept"), False)
         except UserError as error:
-            self.ended.emit(f"Clip not saved: {error}", True)
+            self.ended.emit(tr("Clip not saved: {why}", why=error), True)
         except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible fault
             _log.error("the clip was not written", exc_info=error)
-            self.ended.emit(f"Clip not saved: unexpected {type(error).__name__}: {' '.join(str(error).split())}", True)
+            self.ended.emit(
+                tr("Clip not saved: unexpected {kind}: {why}", kind=type(error).__name__, why=" ".join(str(error).split())), True
+            )
         else:
             lost = clip.last - clip.first - written
-            note = f", {lost} pictures are lost" if lost > 0 else ""
-            self.ended.emit(f"Clip saved: {clip.out} ({written} pictures{note})", False)
+            note = tr(", {count} pictures are lost", count=lost) if lost > 0 else ""
+            self.ended.emit(tr("Clip saved: {file} ({count} pictures{note})", file=clip.out, count=written, note=note), False)
 
     def _draw(self, tick: Tick) -> Image:
         return draw_overlay(tick.frame.image, tick.scene, tick.advice, stamp=f"{self._clip.kind} PLAYBACK")

@@ -12,6 +12,7 @@ from app.alert_sounds import AlertSounds
 from app.deadman_key import DeadmanKey
 from app.engine_thread import EngineThread
 from app.jog_keys import JogKeys, Motion
+from app.language import tr, tr_text
 from app.next_step import Step
 from app.recorder import Recorder
 from app.widgets.event_log import EventKind
@@ -55,7 +56,7 @@ class DriveDesk(QObject):
     def __init__(self, window: QWidget, thread: EngineThread, panels: DrivePanels, recorder: Recorder) -> None:
         super().__init__(window)
         self._thread, self._panels, self._recorder = thread, panels, recorder
-        self.jog = JogKeys(window)
+        self.jog = JogKeys(window, lambda: self.can_move)
         self.deadman = DeadmanKey(window)
         self.sounds = AlertSounds(self)
         self._shown: DriveView | None = None
@@ -72,6 +73,12 @@ class DriveDesk(QObject):
     def view(self) -> DriveView | None:
         """What is on the screen."""
         return self._shown
+
+    @property
+    def can_move(self) -> bool:
+        """Whether anything can move now, or is about to; without a rig nothing can."""
+        pilot = self._thread.pilot
+        return pilot is not None and pilot.can_move
 
     def start(self) -> None:
         """Look at the pilot from now on; each look is a sign of life of the window."""
@@ -111,7 +118,7 @@ class DriveDesk(QObject):
             pilot.ask(act)
             self._panels.log(EventKind.OPERATOR, act.value)
         elif act is Act.STOP:
-            self._panels.log(EventKind.OPERATOR, "stop: no rig is open, so nothing moves")
+            self._panels.log(EventKind.OPERATOR, tr("stop: no rig is open, so nothing moves"))
 
     @Slot()
     def stop(self) -> None:
@@ -125,28 +132,31 @@ class DriveDesk(QObject):
         pilot = self._thread.pilot
         if pilot is not None:
             pilot.switch_on()
-            self._panels.log(EventKind.OPERATOR, "servos on")
+            self._panels.log(EventKind.OPERATOR, tr("servos on"))
 
     @Slot(int)
     def reboot(self, servo_id: int) -> None:
         pilot = self._thread.pilot
         if pilot is not None:
             pilot.reboot(servo_id)
-            self._panels.log(EventKind.OPERATOR, f"restart servo {servo_id}")
+            self._panels.log(EventKind.OPERATOR, tr("restart servo {servo_id}", servo_id=servo_id))
 
     @Slot(object)
     def zero(self, names: Sequence[JointName] | None) -> None:
         pilot = self._thread.pilot
         if pilot is not None:
             pilot.zero(names)
-            self._panels.log(EventKind.OPERATOR, f"zero {', '.join(names) if names else 'all servos'}")
+            self._panels.log(
+                EventKind.OPERATOR,
+                tr("zero {what}", what=", ".join(tr_text(name) for name in names) if names else tr("all servos")),
+            )
 
     @Slot()
     def torque_off(self) -> None:
         pilot = self._thread.pilot
         if pilot is not None:
             pilot.torque_off()
-            self._panels.log(EventKind.OPERATOR, "torque off")
+            self._panels.log(EventKind.OPERATOR, tr("torque off"))
 
     def drive(self, jog: Jog) -> None:
         """Move the robot as held keys do; to be repeated."""
@@ -154,7 +164,10 @@ class DriveDesk(QObject):
 
     def log_target(self, target: Point | None) -> None:
         self._recorder.target(target)
-        self._panels.log(EventKind.TARGET, "cleared" if target is None else f"set to {target[0]:.0f}, {target[1]:.0f} px")
+        self._panels.log(
+            EventKind.TARGET,
+            tr("cleared") if target is None else tr("set to {x:.0f}, {y:.0f} px", x=target[0], y=target[1]),
+        )
 
     @Slot(object)
     def press(self, motion: Motion) -> None:
@@ -201,8 +214,8 @@ class DriveDesk(QObject):
         if before is None or before.mode is not news.view.mode:
             self._panels.log(EventKind.MODE, news.view.mode.value)
         for alert in news.alerts:
-            detail = f": {alert.detail}" if alert.detail else ""
-            self._panels.log(EventKind.ALERT, f"{alert.spec.text}{detail}")
+            detail = f": {tr_text(alert.detail)}" if alert.detail else ""
+            self._panels.log(EventKind.ALERT, f"{tr(alert.spec.text)}{detail}")
             self._recorder.alert(alert, news.view.time_s)
             if alert.sound is not None:
                 self.sounds.play(alert.sound)

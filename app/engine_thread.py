@@ -80,6 +80,11 @@ class EngineThread(QThread):
         self._order: OpenEngine | None = None
         self._engine: EngineLike | None = None
 
+    def end_engine(self) -> None:
+        """From now on no tick of the running engine is handed over; it is closed soon."""
+        with self._lock:
+            self._changed.set()
+
     def start_engine(self, open_engine: OpenEngine) -> None:
         """Close what runs and open this engine instead; of several orders in a row the last one wins."""
         with self._lock:
@@ -165,8 +170,11 @@ class EngineThread(QThread):
             tick = engine.step(STEP_TIMEOUT_S)
             if tick is None:
                 continue
-            if (on_tick := self.on_tick) is not None:
-                on_tick(tick)
+            with self._lock:
+                if self._changed.is_set():  # what this engine saw last must not be taken for the next one's
+                    return
+                if (on_tick := self.on_tick) is not None:
+                    on_tick(tick)
             if self.ticks.put(tick):
                 self.tick_ready.emit()
 

@@ -10,6 +10,7 @@ from enum import Enum
 from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, Qt
 
 from app import palette
+from app.language import mark, tr
 
 MOST_ROWS = 2000
 Index = QModelIndex | QPersistentModelIndex
@@ -32,12 +33,12 @@ class KindLook:
 class EventKind(Enum):
     """What an event is about. GATE: a command that was clamped or rejected."""
 
-    MODE = KindLook("mode", "SKY", "Modes")
-    ALERT = KindLook("alert", "VERMILLION", "Alerts")
-    GATE = KindLook("gate", "YELLOW", "Gate: clamped and rejected")
-    OPERATOR = KindLook("operator", "TEXT", "Operator")
-    TARGET = KindLook("target", "TARGET", "Targets")
-    NOTE = KindLook("note", "TEXT_FAINT", "Notes")
+    MODE = KindLook(mark("mode"), "SKY", mark("Modes"))
+    ALERT = KindLook(mark("alert"), "VERMILLION", mark("Alerts"))
+    GATE = KindLook(mark("gate"), "YELLOW", mark("Gate: clamped and rejected"))
+    OPERATOR = KindLook(mark("operator"), "TEXT", mark("Operator"))
+    TARGET = KindLook(mark("target"), "TARGET", mark("Targets"))
+    NOTE = KindLook(mark("note"), "TEXT_FAINT", mark("Notes"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ class LoggedEvent:
     def line(self) -> str:
         """As it is copied."""
         times = f" \N{MULTIPLICATION SIGN}{self.times}" if self.times > 1 else ""
-        return f"{self.at:%H:%M:%S}  {self.kind.value.word:<8}  {self.text}{times}"
+        return f"{self.at:%H:%M:%S}  {tr(self.kind.value.word):<8}  {self.text}{times}"
 
 
 class EventModel(QAbstractListModel):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from app.language import tr
 from core.learning.model_file import INFO, MODELS, ModelError, ModelInfo, own_models, read_model_info
 
 
@@ -43,15 +44,21 @@ def figures_line(info: ModelInfo) -> str:
     figures: dict[str, Any] = info.figures
     parts = []
     if "vessel_dice" in figures and "robot_dice" in figures:
-        parts.append(f"Dice vessel {_figure(figures, 'vessel_dice')}, robot {_figure(figures, 'robot_dice')}")
-        what = "held-out pictures" if figures.get("held_out") else f"pictures of {figures.get('set', 'a test set')}"
-        parts[0] += f" on {figures.get('frames', '?')} {what}"
+        parts.append(
+            tr("Dice vessel {vessel}, robot {robot}", vessel=_figure(figures, "vessel_dice"), robot=_figure(figures, "robot_dice"))
+        )
+        what = (
+            tr("held-out pictures")
+            if figures.get("held_out")
+            else tr("pictures of {name}", name=figures.get("set", tr("a test set")))
+        )
+        parts[0] += tr(" on {count} {what}", count=figures.get("frames", "?"), what=what)
     else:
-        parts.append("not measured")
+        parts.append(tr("not measured"))
     if "state_agreement" in figures:
-        parts.append(f"state {100 * figures['state_agreement']:.0f} %")
+        parts.append(tr("state {share:.0f} %", share=100 * figures["state_agreement"]))
     if info.calibration is None:
-        parts.append("confidence not calibrated")
+        parts.append(tr("confidence not calibrated"))
     return ", ".join(parts)
 
 

@@ -1,14 +1,18 @@
-"""Keys that move the robot by hand: hold to move, release to stop. Space stops everything, whatever has the focus."""
+"""Keys that move the robot by hand: hold to move, release to stop. STOP stops everything, whatever has the focus."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QAbstractSpinBox, QLineEdit, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QAbstractSpinBox, QLineEdit, QWidget
 
 from app.held_input import HeldInput
+from app.language import mark
+from app.stop_key import is_stop
+from app.widgets.scroll_keys import SCROLL_KEYS
 from core.control.hand import AT_REST, Jog
 
 PERIOD_MS = 33
@@ -17,15 +21,15 @@ PERIOD_MS = 33
 class Motion(Enum):
     """One direction that can be held."""
 
-    STEER_LEFT = "steer left"
-    STEER_RIGHT = "steer right"
-    ADVANCE = "advance"
-    RETRACT = "retract"
-    PITCH_UP = "pitch up"
-    PITCH_DOWN = "pitch down"
-    DELIVER = "sheath forward"
-    WITHDRAW = "sheath back"
-    STRAIGHTEN = "straighten the head"
+    STEER_LEFT = mark("steer left")
+    STEER_RIGHT = mark("steer right")
+    ADVANCE = mark("advance")
+    RETRACT = mark("retract")
+    PITCH_UP = mark("pitch up")
+    PITCH_DOWN = mark("pitch down")
+    DELIVER = mark("sheath forward")
+    WITHDRAW = mark("sheath back")
+    STRAIGHTEN = mark("straighten the head")
 
 
 KEYS: dict[Motion, tuple[Qt.Key, ...]] = {
@@ -40,7 +44,6 @@ KEYS: dict[Motion, tuple[Qt.Key, ...]] = {
     Motion.STRAIGHTEN: (Qt.Key.Key_X,),
 }
 _MOTION_OF_KEY = {key: motion for motion, keys in KEYS.items() for key in keys}
-_STOP_KEY = Qt.Key.Key_Space
 _OTHER_MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 
 
@@ -49,15 +52,16 @@ class JogKeys(HeldInput):
 
     Everything held is released when the window loses the focus, so nothing moves unattended. ``changed`` carries the jog; it comes
     at each press and release and every 33 ms while something is held, since its silence counts as let go. ``stop_pressed`` comes
-    from Space in any window of the program that has the focus.
+    from a key of STOP in any window of the program that has the focus; ``can_move`` is asked when Space is pressed in a text field.
     """
 
     changed = Signal(object)
     held_changed = Signal(object)
     stop_pressed = Signal()
 
-    def __init__(self, window: QWidget) -> None:
+    def __init__(self, window: QWidget, can_move: Callable[[], bool] = lambda: True) -> None:
         super().__init__(window, PERIOD_MS)
+        self._can_move = can_move
         self._held: dict[object, Motion] = {}
         self._speed = 1.0
 
@@ -107,7 +111,7 @@ class JogKeys(HeldInput):
         if not isinstance(watched, QWidget):
             return False
         key = Qt.Key(event.key())
-        if key == _STOP_KEY:  # wherever it goes to: menus, lists and dialogs too, and with whatever is held beside it
+        if is_stop(watched, event, self._can_move()):  # wherever it goes to: menus, lists and dialogs too
             if not event.isAutoRepeat():
                 self.stop_pressed.emit()
                 self.release_all()
@@ -116,7 +120,10 @@ class JogKeys(HeldInput):
             return False
         motion = _MOTION_OF_KEY.get(key)
         # A field keeps its letters and arrows, and what it does not use must not reach the robot by way of its parent.
-        if motion is None or isinstance(self._window.focusWidget(), QAbstractSpinBox | QLineEdit):
+        focus = self._window.focusWidget()
+        if motion is None or isinstance(focus, QAbstractSpinBox | QLineEdit):
+            return False
+        if isinstance(focus, QAbstractItemView) and key in SCROLL_KEYS:
             return False
         if not event.isAutoRepeat():
             self.press(key, motion)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMainWindow, QMenu
 
+from app.language import tr
 from app.menus import KEY_HINT, plain
 
 KeyTable = tuple[str, tuple[tuple[str, str], ...]]
@@ -35,6 +36,12 @@ def key_names(sequences: Sequence[QKeySequence | str | int]) -> str:
     """All keys that do the same. One that only adds Shift to another (for a hand that holds the deadman) is left out."""
     names = [key_name(sequence) for sequence in sequences]
     return _BETWEEN.join(name for name in names if name.removeprefix("Shift+") == name or name.removeprefix("Shift+") not in names)
+
+
+def shown(table: KeyTable) -> KeyTable:
+    """A table that stands in the code, in the language of the window."""
+    title, rows = table
+    return tr(title), tuple((tr(key), tr(text)) for key, text in rows)
 
 
 def menu_tables(window: QMainWindow) -> tuple[KeyTable, ...]:

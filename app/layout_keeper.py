@@ -10,6 +10,7 @@ from PySide6.QtCore import QByteArray, QEvent, QObject, QSettings
 from PySide6.QtWidgets import QMainWindow, QTabWidget
 
 from app import theme
+from app.language import tr
 from app.menus import MenuEntry, add_menu
 from app.widgets.columns import Columns
 from app.widgets.overlay_bar import OverlayBar
@@ -54,7 +55,7 @@ class LayoutKeeper(QObject):
         super().__init__(window)
         self._window, self._name, self._parts = window, name, parts
         self._default = self._values()
-        add_menu(window, "&View", [MenuEntry("&Reset layout", self.reset)])
+        add_menu(window, tr("&View"), [MenuEntry(tr("&Reset layout"), self.reset)])
         self._restore()
         window.installEventFilter(self)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -10,10 +11,10 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMainWindow, QMenu, QTabWidget
 
 from app.about import show_about
+from app.language import tr
 
 KEY_HINT = "key_hint"
 """Property of an action: the key that does the same and is handled elsewhere."""
-_LAST = "Help"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +51,8 @@ def add_menu(window: QMainWindow, title: str, entries: Sequence[MenuEntry | None
 
 
 def plain(text: str) -> str:
-    """The text of an action as it is read: without mnemonic and without a hint."""
-    return text.partition("\t")[0].replace("&", "")
+    """The text of an action as it is read: without mnemonic, "&File" or "文件(&F)", and without a hint."""
+    return re.sub(r"\(&\w\)", "", text.partition("\t")[0]).replace("&", "")
 
 
 def mnemonic(text: str) -> str:
@@ -68,8 +69,9 @@ def _menu_of(window: QMainWindow, title: str) -> QMenu:
         assert isinstance(menu, QMenu)
         return menu
     menu = QMenu(title, bar)
-    if _LAST in there:
-        bar.insertMenu(there[_LAST], menu)
+    last = plain(tr("&Help"))
+    if last in there:
+        bar.insertMenu(there[last], menu)
     else:
         bar.addMenu(menu)
     return menu
@@ -93,19 +95,24 @@ def _with_mnemonic(text: str, taken: set[str]) -> str:
     """`text` with the first free letter marked: those that begin a word first. `taken` gets it."""
     if mnemonic(text):
         return text
-    starts = [k for k, letter in enumerate(text) if letter.isalnum() and (k == 0 or text[k - 1] == " ")]
+    starts = [k for k, letter in enumerate(text) if _is_key(letter) and (k == 0 or text[k - 1] == " ")]
     for k in (*starts, *range(len(text))):
         letter = text[k].lower()
-        if letter.isalnum() and letter not in taken:
+        if _is_key(letter) and letter not in taken:
             taken.add(letter)
             return f"{text[:k]}&{text[k:]}"
     return text
 
 
+def _is_key(letter: str) -> bool:
+    """Chinese letters are on no keyboard."""
+    return letter.isascii() and letter.isalnum()
+
+
 def add_help_menu(window: QMainWindow, show_keys: Callable[[], object], more: Sequence[MenuEntry | None] = ()) -> None:
     """The last menu, the same in all windows; `more` stands between the keys and what the program is."""
-    about = MenuEntry("&About LumenPilot", partial(show_about, window))
-    add_menu(window, "&Help", [MenuEntry("&Keys", show_keys, ("F1",)), *more, None, about])
+    about = MenuEntry(tr("&About LumenPilot"), partial(show_about, window))
+    add_menu(window, tr("&Help"), [MenuEntry(tr("&Keys"), show_keys, ("F1",)), *more, None, about])
 
 
 def action_of(window: QMainWindow, key: str) -> QAction:

@@ -10,6 +10,7 @@ from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMainWindow, QMenu
 
 from app.installed_models import InstalledModel, installed_models
+from app.language import tr, tr_text
 from app.menus import MenuEntry, add_menu
 from app.recovery_desk import Offers
 from app.widgets.offer_strip import Answer, Offer
@@ -45,7 +46,7 @@ class ModelMenu(QObject):
         super().__init__(window)
         self._window, self._offers = window, offers
         self._current, self._hindrance, self._cost = current, hindrance, cost
-        (self._train,) = add_menu(window, "&Model", [MenuEntry("&Train on my annotations...", train)])
+        (self._train,) = add_menu(window, tr("&Model"), [MenuEntry(tr("&Train on my annotations..."), train)])
         menu = self._train.associatedObjects()
         self._menu = next(one for one in menu if isinstance(one, QMenu))
         self._menu.setToolTipsVisible(True)
@@ -72,7 +73,7 @@ class ModelMenu(QObject):
         self._actions.append(separator)
 
     def _add(self, model: InstalledModel, is_current: bool) -> None:
-        own = ", own" if model.is_own else ""
+        own = tr(", own") if model.is_own else ""
         action = QAction(f"{model.name.replace('&', '&&')}{own}:  {model.figures}", self._menu)
         action.setCheckable(True)
         action.setChecked(is_current)
@@ -88,14 +89,14 @@ class ModelMenu(QObject):
         if name == current:
             return
         if why := self._hindrance():
-            self.said.emit(f"The model stays {current}: {why}", True)
+            self.said.emit(tr("The model stays {current}: {why}", current=current, why=tr_text(why)), True)
             return
-        use = Answer(f"Use {name}", partial(self._take, name))
-        text = f"Use model {name} instead of {current}?"
-        self._offers.offer(Offer(_KEY, text, self._cost(), (use, Answer("No", lambda: None))))
+        use = Answer(tr("Use {name}", name=name), partial(self._take, name))
+        text = tr("Use model {name} instead of {current}?", name=name, current=current)
+        self._offers.offer(Offer(_KEY, text, self._cost(), (use, Answer(tr("No"), lambda: None))))
 
     def _take(self, name: str) -> None:
         if why := self._hindrance():  # since the question was asked
-            self.said.emit(f"The model stays {self._current()}: {why}", True)
+            self.said.emit(tr("The model stays {current}: {why}", current=self._current(), why=tr_text(why)), True)
         else:
             self.chosen.emit(name)

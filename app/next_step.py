@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from app.language import mark, tr, tr_text
 from core.control.alerts import ALERTS, AlertKey
 from core.control.drive_view import DriveView
 from core.control.faults import AREA, REACTION, Area, Fault, Reaction
@@ -27,12 +28,16 @@ class StepWords:
 class Step(Enum):
     """A request of the operator that has a button. STOP is no step: it is always there."""
 
-    SERVOS_ON = StepWords("Servos on", "F3", "Check all servos and switch their torque on: then you can move the robot by hand")
-    ACKNOWLEDGE = StepWords("Acknowledge", "F4", "I have read why the program stopped; nothing moves by this")
-    ARM = StepWords("Arm", "F6", "Allow the program to be handed over to; nothing moves by this")
-    HAND_OVER = StepWords("Hand over", "F7", "The program drives to the destination for as long as the deadman is held")
-    TAKE_BACK = StepWords("Take back", "F8", "You steer again, at once; moving the controls does the same")
-    DISARM = StepWords("Disarm", "Shift+F6", "The program may not be handed over to any more; you go on steering by hand")
+    SERVOS_ON = StepWords(
+        mark("Servos on"), "F3", mark("Check all servos and switch their torque on: then you can move the robot by hand")
+    )
+    ACKNOWLEDGE = StepWords(mark("Acknowledge"), "F4", mark("I have read why the program stopped; nothing moves by this"))
+    ARM = StepWords(mark("Arm"), "F6", mark("Allow the program to be handed over to; nothing moves by this"))
+    HAND_OVER = StepWords(mark("Hand over"), "F7", mark("The program drives to the destination for as long as the deadman is held"))
+    TAKE_BACK = StepWords(mark("Take back"), "F8", mark("You steer again, at once; moving the controls does the same"))
+    DISARM = StepWords(
+        mark("Disarm"), "Shift+F6", mark("The program may not be handed over to any more; you go on steering by hand")
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +62,7 @@ class NextStep:
     @property
     def text(self) -> str:
         """The one line."""
-        more = f" (+{len(self.reasons) - 1} more)" if len(self.reasons) > 1 else ""
+        more = tr(" (+{count} more)", count=len(self.reasons) - 1) if len(self.reasons) > 1 else ""
         return f"{sentence(self.headline)} {sentence(self.rest)}{more}".strip()
 
     @property
@@ -66,23 +71,23 @@ class NextStep:
         return "\n".join(f"{sentence(ALERTS[key].text)} {sentence(ALERTS[key].what_to_do)}" for key in self.reasons)
 
 
-NO_ROBOT = NextStep(Step.SERVOS_ON, False, "This rig has no robot", "pictures and advice only")
-NOT_YET = NextStep(Step.SERVOS_ON, False, "Waiting for the rig", "")
+NO_ROBOT = NextStep(Step.SERVOS_ON, False, mark("This rig has no robot"), mark("pictures and advice only"))
+NOT_YET = NextStep(Step.SERVOS_ON, False, mark("Waiting for the rig"), "")
 
 
 def who_drives(view: DriveView | None) -> str:
     """In few words, for the badge."""
     if view is None:
-        return "pictures only"
+        return tr("pictures only")
     if view.mode is Mode.HOLD:
-        return "interrupted"
+        return tr("interrupted")
     if view.mode is Mode.STOPPED:
-        return "nothing moves"
+        return tr("nothing moves")
     if view.permitted is Source.PROGRAM:
-        return "the program drives"
+        return tr("the program drives")
     if view.permitted is Source.OPERATOR:
-        return "you steer"
-    return "nothing moves" if view.servos_on or view.latched is not None else "servos are off"
+        return tr("you steer")
+    return tr("nothing moves") if view.servos_on or view.latched is not None else tr("servos are off")
 
 
 def next_step(view: DriveView) -> NextStep:
@@ -90,26 +95,29 @@ def next_step(view: DriveView) -> NextStep:
     if view.latched is not None or view.mode is Mode.STOPPED:
         return _acknowledge(view)
     if view.mode is Mode.AUTONOMOUS:
-        rest = f"let go and it holds; move the controls or press {Step.TAKE_BACK.value.key} to steer yourself"
-        return NextStep(Step.TAKE_BACK, True, "The program drives", rest, other=Step.DISARM)
+        rest = tr("let go and it holds; move the controls or press {key} to steer yourself", key=Step.TAKE_BACK.value.key)
+        return NextStep(Step.TAKE_BACK, True, tr("The program drives"), rest, other=Step.DISARM)
     if view.mode is Mode.HOLD:
         return _interrupted(view)
     if view.busy:
-        return NextStep(Step.SERVOS_ON, False, sentence(view.busy).rstrip("."), "this takes a moment")
+        return NextStep(Step.SERVOS_ON, False, sentence(view.busy).rstrip(".。"), tr("this takes a moment"))
     if not view.servos_on:
         faults = tuple(fault.cause for fault in view.active if AREA[fault.cause] is Area.SERVOS and _holds(fault))
-        rest = f"press {Step.SERVOS_ON.value.key}: they are checked, then hold where they are"
-        return _refused(Step.SERVOS_ON, faults) if faults else NextStep(Step.SERVOS_ON, True, "The servos are off", rest)
+        rest = tr("press {key}: they are checked, then hold where they are", key=Step.SERVOS_ON.value.key)
+        return _refused(Step.SERVOS_ON, faults) if faults else NextStep(Step.SERVOS_ON, True, tr("The servos are off"), rest)
     if view.mode is Mode.ARMED:
         return _hand_over(view)
     if view.against_arming:
         return _refused(Step.ARM, view.against_arming)
-    return NextStep(Step.ARM, True, "You steer", f"press {Step.ARM.value.key} to arm; then you can hand over to the program")
+    return NextStep(
+        Step.ARM, True, tr("You steer"), tr("press {key} to arm; then you can hand over to the program", key=Step.ARM.value.key)
+    )
 
 
 def sentence(text: str) -> str:
     """`text` with a capital letter and a full stop; empty stays empty."""
-    return f"{text[0].upper()}{text[1:]}." if text else ""
+    shown = tr_text(text)
+    return tr("{sentence}.", sentence=f"{shown[0].upper()}{shown[1:]}") if shown else ""
 
 
 def _holds(fault: Fault) -> bool:
@@ -124,7 +132,9 @@ def _refused(step: Step, reasons: tuple[AlertKey, ...], other: Step | None = Non
 
 def _acknowledge(view: DriveView) -> NextStep:
     if view.latched is None:
-        return NextStep(Step.ACKNOWLEDGE, True, "Stopped", f"press {Step.ACKNOWLEDGE.value.key}, then switch the servos on")
+        return NextStep(
+            Step.ACKNOWLEDGE, True, tr("Stopped"), tr("press {key}, then switch the servos on", key=Step.ACKNOWLEDGE.value.key)
+        )
     cause = view.latched.cause
     # a fault of servos in use that is still there latches again at once
     remains = view.servos_on and AREA[cause] is Area.SERVOS and any(fault.cause is cause for fault in view.active)
@@ -135,8 +145,11 @@ def _hand_over(view: DriveView) -> NextStep:
     if view.against_hand_over:
         return _refused(Step.HAND_OVER, view.against_hand_over, Step.DISARM)
     key = Step.HAND_OVER.value.key
-    held, loose = f"press {key}: the program drives while you hold", f"hold {DEADMAN_KEY}, then press {key} to hand over"
-    return NextStep(Step.HAND_OVER, True, "Ready", held if view.deadman else loose, other=Step.DISARM)
+    held, loose = (
+        tr("press {key}: the program drives while you hold", key=key),
+        tr("hold {deadman}, then press {key} to hand over", deadman=DEADMAN_KEY, key=key),
+    )
+    return NextStep(Step.HAND_OVER, True, tr("Ready"), held if view.deadman else loose, other=Step.DISARM)
 
 
 def _interrupted(view: DriveView) -> NextStep:
@@ -145,5 +158,5 @@ def _interrupted(view: DriveView) -> NextStep:
     if causes:
         first = ALERTS[causes[0]]
         return NextStep(Step.TAKE_BACK, True, first.text, first.what_to_do, causes, Step.DISARM)
-    rest = f"hold {DEADMAN_KEY} and press {again} to go on, or {back} to take back"
-    return NextStep(Step.TAKE_BACK, True, "Interrupted", rest, other=Step.DISARM)
+    rest = tr("hold {deadman} and press {again} to go on, or {back} to take back", deadman=DEADMAN_KEY, again=again, back=back)
+    return NextStep(Step.TAKE_BACK, True, tr("Interrupted"), rest, other=Step.DISARM)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal
 
+from app.language import tr
 from core.config import Config
 from core.control.hand import Jog
 from core.control.modes import Act
@@ -67,9 +68,9 @@ class OperatorDevices(QObject):
         if problem is not None:
             self.said.emit(str(problem), True)
         elif name is not None and name != before:
-            self.said.emit(f"Gamepad: {name}", False)
+            self.said.emit(tr("Gamepad: {name}", name=name), False)
         elif name is None and before is not None:
-            self.said.emit(f"Gamepad lost: {before}", True)
+            self.said.emit(tr("Gamepad lost: {name}", name=before), True)
 
     def _on_pedal(self, report: PedalReport) -> None:
         pilot = self._pilot()
@@ -82,4 +83,4 @@ class OperatorDevices(QObject):
             pilot.ask(Act.STOP)
 
     def _on_pedal_problem(self, problem: PedalError | None) -> None:
-        self.said.emit("Foot pedal: ready" if problem is None else str(problem), problem is not None)
+        self.said.emit(tr("Foot pedal: ready") if problem is None else str(problem), problem is not None)

@@ -9,6 +9,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
 
 from app import palette, theme
+from app.language import tr
 from app.pace import Pace
 from app.widgets.advice_line import AdviceLine
 from app.widgets.alert_strip import AlertStrip
@@ -37,11 +38,11 @@ from app.widgets.toast import Toast
 from app.widgets.trend_plot import TrendPlot
 from app.wording import REASON_TEXT
 from core.calibration.scale import mm_per_working_px
-from core.calibration_config import ScaleConfig
+from core.calibration_config import CalibrationConfig, ScaleConfig
 from core.config import Config, PoseConfig
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
-from core.rig_file import RigFileError, calibration_of
+from core.rig_file import RigFileError, calibration_of, scaled
 from core.types import Frame, PoseState, Scene, Tick
 from hardware.rig import RigKind
 from hardware.servos.bus_messages import BusStatus
@@ -96,6 +97,13 @@ class OperatorPanels(QWidget):
         self._lay_out(stage)
         self.help = operator_help(stage)  # the banner stays in sight
 
+    def show_kind(self, kind: RigKind, *, has_servos: bool) -> None:
+        """Another rig is being opened: what the banner says, and whether there are phantoms to choose."""
+        self.banner.show_kind(kind, has_servos=has_servos)
+        if self.picker is not None:
+            self.picker.setVisible(kind is RigKind.SIM)
+            self.picker.setEnabled(kind is RigKind.SIM)
+
     def set_limits(self, limits: PoseConfig) -> None:
         """Other limits of the pose states, on all dials."""
         self._limits = limits
@@ -103,17 +111,18 @@ class OperatorPanels(QWidget):
         self.gauge.set_allowed(limits.theta_allow_deg)
         self.bars.set_allowed(limits.d_allow_px)
         self.trends.set_limits(limits)
-        self._allowed[0].setText(f"allowed {limits.theta_allow_deg:g}°")
-        self._allowed[1].setText(f"allowed {limits.d_allow_px:g} px")
+        self._allowed[0].setText(tr("allowed {limit:g}°", limit=limits.theta_allow_deg))
+        self._allowed[1].setText(tr("allowed {limit:g} px", limit=limits.d_allow_px))
 
     def set_config(self, config: Config) -> None:
         """What the panels know of the configuration, for a rig that is being opened with another one."""
         self.set_limits(config.perception.pose)
-        self.live.set_scale(config.policy.pursuit.pixels_per_mm)
-        self.clearance.set_scale(config.policy.pursuit.pixels_per_mm)
+        known = _calibration_of(config)
+        self.live.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)
+        self.clearance.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)
         self.jog.max_pull_mm = config.servos.max_pull_mm
         self._servo_config = config.servos
-        self._scale = _scale_of(config)
+        self._scale = known.scale if known is not None else None
         if self.picker is not None:
             self.picker.show_name(config.twin.phantom)
 
@@ -158,9 +167,9 @@ class OperatorPanels(QWidget):
             self.bars.show_pose(pose, renew_text=renew_text)
             self.jog.show_status(tick.status)
             self.clearance.show_scene(scene, tick.status)
-        why_none = self._blanked or "the pose is not steady yet"
+        why_none = self._blanked or tr("the pose is not steady yet")
         if scene.refusal is not None:
-            why_none = REASON_TEXT[scene.refusal.reason].title.lower()
+            why_none = tr(REASON_TEXT[scene.refusal.reason].title).lower()
         self.advice.show_advice(tick.advice, state, why_none, renew_text=renew_text)
         self.trends.add(scene)
         self.performance.add(tick, max_block_ms)
@@ -222,26 +231,34 @@ class OperatorPanels(QWidget):
             card.show()
         else:
             self._right.removeWidget(card)
-            self.pages.insertTab(1, card, "Trends")
+            self.pages.insertTab(1, card, tr("Trends"))
 
     def _right_side(self) -> QWidget:
         limits = self._limits
-        self._allowed = _note(f"allowed {limits.theta_allow_deg:g}°"), _note(f"allowed {limits.d_allow_px:g} px")
-        angle = Card("Angle to the vessel", self.gauge, self._allowed[0])
-        distances = Card("Distances", self.bars, self._allowed[1])
+        self._allowed = (
+            _note(tr("allowed {limit:g}°", limit=limits.theta_allow_deg)),
+            _note(tr("allowed {limit:g} px", limit=limits.d_allow_px)),
+        )
+        angle = Card(tr("Angle to the vessel"), self.gauge, self._allowed[0])
+        distances = Card(tr("Distances"), self.bars, self._allowed[1])
         self._legend = _note(_trend_legend(True))
         self.trends.distances_shown.connect(self._show_legend)
-        trends = Card("Last 30 seconds", self.trends, self._legend)
-        hands = _row(Card("Move the robot", self.jog, "hold"), Card("Performance", self.performance))
+        trends = Card(tr("Last 30 seconds"), self.trends, self._legend)
+        hands = _row(Card(tr("Move the robot"), self.jog, tr("hold")), Card(tr("Performance"), self.performance))
         side = QWidget()
         self.pages = QTabWidget()
         self.pages.setDocumentMode(True)
         self.pages.tabBar().setDrawBase(False)
         self.pages.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.pages.setAccessibleName("Pages")
-        self.pages.tabBar().setAccessibleName("Pages")
+        self.pages.setAccessibleName(tr("Pages"))
+        self.pages.tabBar().setAccessibleName(tr("Pages"))
         self.pages.tabBar().setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the arrows move the robot
-        for page, name in ((hands, "Drive"), (self.servos, "Servos"), (self.commands, "Commands"), (self.events, "Log")):
+        for page, name in (
+            (hands, tr("Drive")),
+            (self.servos, tr("Servos")),
+            (self.commands, tr("Commands")),
+            (self.events, tr("Log")),
+        ):
             self.pages.addTab(page, name)
         self._trends_card = trends
         self._right = _column((Card("", self.badge), 0), (_row(angle, distances), 3), (self.clearance, 0), (self.pages, 3))
@@ -252,13 +269,12 @@ class OperatorPanels(QWidget):
         return side
 
 
-def _scale_of(config: Config) -> ScaleConfig | None:
-    """What a pixel is in millimetres; None when nobody has measured it. A rig file that is broken is told by who opens the rig."""
+def _calibration_of(config: Config) -> CalibrationConfig | None:
+    """What is known of the rig; None when nobody has measured it. A rig file that is broken is told by who opens the rig."""
     try:
-        known = calibration_of(config)
+        return calibration_of(config)
     except RigFileError:
         return None
-    return known.scale if known is not None else None
 
 
 def _note(text: str) -> QLabel:

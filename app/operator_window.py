@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import time
@@ -10,12 +11,13 @@ from functools import partial
 
 from PySide6.QtCore import QEvent, Qt, QTimer, QUrl, Signal, Slot
 from PySide6.QtGui import QAction, QCloseEvent, QDesktopServices, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QComboBox, QLabel, QLineEdit, QMainWindow
+from PySide6.QtWidgets import QAbstractButton, QAbstractItemView, QAbstractSpinBox, QComboBox, QLabel, QLineEdit, QMainWindow
 
 from app import theme
 from app.drive_desk import DriveDesk
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
 from app.heartbeat import Heartbeat
+from app.language import tr, tr_text
 from app.menus import MenuEntry, add_help_menu, add_menu, turn_page
 from app.next_step import Step
 from app.operator_panels import OperatorPanels
@@ -30,8 +32,9 @@ from core.config import Config, PerceptionConfig
 from core.control.hand import Jog
 from core.control.pilot import Pilot
 from core.devices import DeviceError
+from core.rig_file import RigFileError, as_calibrated
 from core.types import Point, Scene, Tick
-from hardware.rig import RigKind
+from hardware.rig import RigKind, kind_of
 
 OpenEngineFor = Callable[[Config], EngineLike]
 
@@ -72,9 +75,9 @@ class OperatorWindow(QMainWindow):
         self._tick: Tick | None = None
         self._is_stale = False
         self._target: Point | None = None
+        self._place_asked: Callable[[Point], object] | None = None
         self._shown_s = 0.0
         self._due_s = 0.0
-        self._stale_after_s = PLAYBACK_STALE_AFTER_S if kind is RigKind.PLAYBACK else STALE_AFTER_S
         self._is_shut = False
         self._thread = EngineThread(self)
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
@@ -92,7 +95,7 @@ class OperatorWindow(QMainWindow):
         self._tour.ended.connect(self._panels.live.setFocus)
         self._make_menus()
         self._wire()
-        self.setWindowTitle(f"LumenPilot \N{EM DASH} {kind.value}")
+        self._show_kind()
         self.setMinimumSize(*theme.MIN_WINDOW)
         self.resize(theme.start_size(self.screen()))
 
@@ -156,47 +159,47 @@ class OperatorWindow(QMainWindow):
     def _make_menus(self) -> None:
         panels = self._panels
         file_entries = [
-            MenuEntry("&Snapshot", self._take_snapshot, ("P", "Ctrl+S")),
-            MenuEntry("&Open pictures folder", self._open_pictures),
+            MenuEntry(tr("&Snapshot"), self._take_snapshot, ("P", "Ctrl+S")),
+            MenuEntry(tr("&Open pictures folder"), self._open_pictures),
             None,
-            MenuEntry("&Record, or end the recording", self._recorder.toggle, ("F9",)),
-            MenuEntry("Save the &last seconds", self._recorder.save_last, ("F10",)),
+            MenuEntry(tr("&Record, or end the recording"), self._recorder.toggle, ("F9",)),
+            MenuEntry(tr("Save the &last seconds"), self._recorder.save_last, ("F10",)),
             None,
-            MenuEntry("&Quit", self.close, ("Ctrl+Q",)),
+            MenuEntry(tr("&Quit"), self.close, ("Ctrl+Q",)),
         ]
         toggle = panels.overlay_bar.toggle
-        layers = [MenuEntry(layer.value.label, partial(toggle, layer), (layer.value.key,), checked=True) for layer in Layer]
+        layers = [MenuEntry(tr(layer.value.label), partial(toggle, layer), (layer.value.key,), checked=True) for layer in Layer]
         view_entries = [
-            MenuEntry("&All overlays on or off", self._toggle_all_layers, ("0",)),
+            MenuEntry(tr("&All overlays on or off"), self._toggle_all_layers, ("0",)),
             None,
-            MenuEntry("&Whole picture", panels.live.fit, ("F",)),
+            MenuEntry(tr("&Whole picture"), panels.live.fit, ("F",)),
             None,
-            MenuEntry("&Next page", partial(turn_page, panels.pages, 1), ("Ctrl+Tab",)),
-            MenuEntry("&Previous page", partial(turn_page, panels.pages, -1), ("Ctrl+Shift+Tab",)),
+            MenuEntry(tr("&Next page"), partial(turn_page, panels.pages, 1), ("Ctrl+Tab",)),
+            MenuEntry(tr("&Previous page"), partial(turn_page, panels.pages, -1), ("Ctrl+Shift+Tab",)),
             None,
-            MenuEntry("&Full screen", self._toggle_full_screen, ("F11",), checked=False),
+            MenuEntry(tr("&Full screen"), self._toggle_full_screen, ("F11",), checked=False),
         ]
         robot_entries = [
-            MenuEntry("S&TOP", self._desk.stop, hint="Space"),
+            MenuEntry(tr("S&TOP"), self._desk.stop, hint="Space"),
             None,
-            *(MenuEntry(step.value.name, partial(self.take, step), _keys_of(step)) for step in Step),
+            *(MenuEntry(tr(step.value.name), partial(self.take, step), _keys_of(step)) for step in Step),
             None,
-            MenuEntry("&Clear target", self._clear_target, hint="Esc"),
+            MenuEntry(tr("&Clear target"), self._clear_target, hint="Esc"),
             None,
             *(panels.picker.menu_entries() if panels.picker is not None else ()),
-            MenuEntry("Start the &rig again", self._restart, ("F5",)),
+            MenuEntry(tr("Start the &rig again"), self._restart, ("F5",)),
         ]
-        add_menu(self, "&File", file_entries)
-        view_actions = add_menu(self, "&View", [*layers, *view_entries])
-        add_menu(self, "&Robot", robot_entries)
-        add_help_menu(self, panels.help.toggle, [MenuEntry("&Tour", self.show_tour)])
+        add_menu(self, tr("&File"), file_entries)
+        view_actions = add_menu(self, tr("&View"), [*layers, *view_entries])
+        add_menu(self, tr("&Robot"), robot_entries)
+        add_help_menu(self, panels.help.toggle, [MenuEntry(tr("&Tour"), self.show_tour)])
         self._layer_actions = dict(zip(Layer, view_actions[: len(Layer)], strict=True))
         self._full_screen = view_actions[-1]
         escape = QAction(self)
         escape.setShortcut(QKeySequence(Qt.Key.Key_Escape))
         escape.triggered.connect(self._on_escape)
         self.addAction(escape)
-        hint = QLabel("F1  keys")
+        hint = QLabel(tr("F1  keys"))
         hint.setObjectName("card_note")
         hint.setContentsMargins(0, 0, 14, 0)
         self.menuBar().setCornerWidget(hint)
@@ -247,9 +250,18 @@ class OperatorWindow(QMainWindow):
     # ---- the rig
 
     def use_config(self, config: Config) -> None:
-        """Open the rig anew with another configuration."""
+        """Open the rig anew with another configuration; it may be a rig of another kind."""
+        if kind_of(config.rig) is not kind_of(self._config.rig):
+            self._kind = kind_of(config.rig)
+        self._thread.end_engine()  # before the banner changes: nothing of the old rig is shown or recorded under it
         self._config = config
+        self._show_kind()
         self._restart()
+
+    def _show_kind(self) -> None:
+        self._stale_after_s = PLAYBACK_STALE_AFTER_S if self._kind is RigKind.PLAYBACK else STALE_AFTER_S
+        self._panels.show_kind(self._kind, has_servos=self._config.rig.robot != "none")
+        self.setWindowTitle(f"LumenPilot \N{EM DASH} {tr(self._kind.value)}")
 
     def lend(self, why: str) -> None:
         """Close the rig, so that somebody else can have camera and servos; it stands as FAULT with `why` until ``use_config``."""
@@ -269,10 +281,17 @@ class OperatorWindow(QMainWindow):
         False when nothing is perceived now.
         """
         self._panels.set_limits(perception.pose)
-        is_running = self._thread.set_perception(perception)
+        config = self._as_calibrated(self._config.model_copy(update={"perception": perception}))
+        is_running = self._thread.set_perception(config.perception)
         if is_running:  # not before: a session that ends because of it would be one of nothing
-            self._recorder.open_rig(self._config.model_copy(update={"perception": perception}))
+            self._recorder.open_rig(config, self._kind)
         return is_running
+
+    def _as_calibrated(self, config: Config) -> Config:
+        """With what the rig file knows better; whoever opens the rig tells what is wrong with that file."""
+        with contextlib.suppress(RigFileError):
+            return as_calibrated(config)
+        return config
 
     @property
     def last_tick(self) -> Tick | None:
@@ -301,7 +320,7 @@ class OperatorWindow(QMainWindow):
         self._panels.set_config(self._config)
         self._desk.reset()
         self._clear_target()
-        self._recorder.open_rig(self._config)
+        self._recorder.open_rig(self._as_calibrated(self._config), self._kind)
         self._show_phase(Phase.STARTING)
         self._thread.start_engine(partial(self._open_engine, self._config))
 
@@ -345,19 +364,22 @@ class OperatorWindow(QMainWindow):
 
     def _tell_phase(self, phase: Phase, message: str) -> None:
         panels = self._panels
-        what = panels.picker.title if panels.picker is not None else self._config.rig.source or self._config.rig.name
+        rig, picker = self._config.rig, panels.picker
+        what = picker.title if picker is not None and self._kind is RigKind.SIM else rig.source or rig.name
         if phase is Phase.STARTING:
-            self._blank("Starting", what)
-            panels.notice.show_notice(NoticeKind.PROGRESS, f"Starting: {what}", "Opening camera and robot, loading the network")
+            self._blank(tr("Starting"), what)
+            panels.notice.show_notice(
+                NoticeKind.PROGRESS, tr("Starting: {what}", what=what), tr("Opening camera and robot, loading the network")
+            )
         elif phase is Phase.RUNNING:
-            self._blank("Waiting for the first picture", "")
-            panels.notice.show_notice(NoticeKind.PROGRESS, "Waiting for the first picture", what)
+            self._blank(tr("Waiting for the first picture"), "")
+            panels.notice.show_notice(NoticeKind.PROGRESS, tr("Waiting for the first picture"), what)
         elif phase is Phase.ENDED:
-            self._blank("Recording is over", "F5 plays it again")
-            panels.notice.show_notice(NoticeKind.WARNING, "Recording is over", message, restartable=True)
+            self._blank(tr("Recording is over"), tr("F5 plays it again"))
+            panels.notice.show_notice(NoticeKind.WARNING, tr("Recording is over"), message, restartable=True)
         elif phase is Phase.FAULT:
-            self._blank("Fault", message)
-            panels.notice.show_notice(NoticeKind.FAULT, "The rig stopped", message, restartable=True)
+            self._blank(tr("Fault"), message)
+            panels.notice.show_notice(NoticeKind.FAULT, tr("The rig stopped"), message, restartable=True)
 
     def _blank(self, title: str, why: str) -> None:
         self._panels.blank(title, why)
@@ -385,7 +407,7 @@ class OperatorWindow(QMainWindow):
         self._shown_s = now
         self._is_stale = False
         if self._tick is None:
-            self._panels.jog.set_enabled(tick.status is not None, "" if tick.status is not None else "This rig has no robot")
+            self._panels.jog.set_enabled(tick.status is not None, "" if tick.status is not None else tr("This rig has no robot"))
         self._tick = self._last_tick = tick
         self._panels.notice.clear()
         self._panels.show_tick(tick, self._heartbeat.max_block_ms)
@@ -397,24 +419,33 @@ class OperatorWindow(QMainWindow):
         if self._phase is Phase.RUNNING and self._tick is not None and age_s > self._stale_after_s:
             self._is_stale = True
             problem = self._thread.problem
-            self._panels.blank("No new picture", problem or "Check the camera; F5 starts the rig again")
-            notice = f"No new picture for {age_s:.0f} s"
-            detail = problem or "The camera or the program is behind"
+            self._panels.blank(tr("No new picture"), tr_text(problem) or tr("Check the camera; F5 starts the rig again"))
+            notice = tr("No new picture for {seconds:.0f} s", seconds=age_s)
+            detail = tr_text(problem) or tr("The camera or the program is behind")
             self._panels.notice.show_notice(NoticeKind.WARNING, notice, detail, restartable=problem is not None)
 
     # ---- the operator
 
     @Slot(float, float)
     def choose_target(self, x: float, y: float) -> None:
-        """The operator's destination, in source pixels."""
+        """The operator's destination, in source pixels; or what a click was asked for with ``ask_for_place``."""
         self._panels.live.setFocus()
+        if self._place_asked is not None:
+            asked, self._place_asked = self._place_asked, None
+            asked((x, y))
+            return
         if self._thread.set_target((x, y)):
             self._target = (x, y)
             self._desk.log_target(self._target)
             self._panels.live.show_target(self._target)
 
+    def ask_for_place(self, then: Callable[[Point], object] | None) -> None:
+        """The next click into the picture is for `then`, in source pixels, and no destination; None: it is one again."""
+        self._place_asked = then
+
     @Slot()
     def _clear_target(self) -> None:
+        self._place_asked = None
         if self._target is not None:
             self._target = None
             self._desk.log_target(None)
@@ -433,10 +464,11 @@ class OperatorWindow(QMainWindow):
     def _take_snapshot(self) -> None:
         if self._tick is None or self._is_stale:
             has_old = self._is_stale or self._phase in (Phase.ENDED, Phase.FAULT)
-            why = "the picture is not live" if has_old else "there is no picture yet"
-            self._panels.toast.show_message(f"No snapshot: {why}", is_fault=True)
+            why = tr("the picture is not live") if has_old else tr("there is no picture yet")
+            self._panels.toast.show_message(tr("No snapshot: {why}", why=why), is_fault=True)
             return
-        phantom = self._panels.picker.name if self._panels.picker is not None else None
+        picker = self._panels.picker
+        phantom = picker.name if picker is not None and self._kind is RigKind.SIM else None
         self._snapshots.write(self._tick, Origin(self._kind.value, phantom, self._config.perception.segmentation.model))
 
     @Slot(str)
@@ -446,12 +478,12 @@ class OperatorWindow(QMainWindow):
     def _open_pictures(self) -> None:
         folder = self._snapshots.folder
         if not folder.is_dir() or not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self._panels.toast.show_message(f"Snapshots go to {folder}")
+            self._panels.toast.show_message(tr("Snapshots go to {folder}", folder=folder))
 
     @Slot()
     def _on_escape(self) -> None:
         field = self.focusWidget()
-        if isinstance(field, QAbstractSpinBox | QLineEdit | QComboBox):
+        if isinstance(field, QAbstractSpinBox | QLineEdit | QComboBox | QAbstractItemView):
             if self._panels.picker is not None:
                 self._panels.picker.abandon()
             field.clearFocus()

@@ -7,6 +7,7 @@ import numpy as np
 
 from app import palette
 from app.brush import SHIFT, Brush, fitting_size, put_text, text_width, to_fixed
+from app.language import english_texts
 from app.palette import ON_PICTURE
 from app.scene_shapes import SceneShapes, scene_shapes
 from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
@@ -44,7 +45,9 @@ def draw_overlay(image: Image, scene: Scene, advice: Advice | None = None, *, lo
         _draw_inset(brush, corner, image, scene, shapes)
     if stamp:
         brush.stamp(stamp)
-    return np.concatenate([canvas, _caption(scene, advice, canvas.shape[1])])
+    with english_texts():  # its letters are, and a picture is kept
+        caption = _caption(scene, advice, canvas.shape[1])
+    return np.concatenate([canvas, caption])
 
 
 def _tinted(image: Image, scene: Scene, zoom: float) -> Image:

@@ -25,8 +25,9 @@ def run_play(session: Path, against: Path | None = None) -> int:
     reader = SessionReader(session)
     try:
         config = recorded_config(reader.manifest)
-        application = make_application(own_config().window.theme)
+        application = make_application(own_config().window)
 
+        from app.language import language_problem
         from app.layout_keeper import LayoutKeeper, Parts, overlay_switches
         from app.player_window import PlayerWindow
         from app.widgets.overlays import Layer
@@ -39,6 +40,8 @@ def run_play(session: Path, against: Path | None = None) -> int:
         timer = _quit_on_signal(application)
         window.show()
         window.start()
+        if language_problem():
+            window.say(language_problem(), is_fault=True)
         code = application.exec()
         timer.stop()
         return code

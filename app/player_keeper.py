@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal, Slot
 
 from app.clip_export import Clip, ClipExporter, clip_path
+from app.language import tr
 from app.replayed import Replayed
 from app.snapshot import Origin, SnapshotWriter
 from app.work_thread import WorkThread
@@ -71,7 +72,7 @@ class PlayerKeeper(QObject):
     def write_clip(self, places: tuple[int, int], times_s: tuple[float, float]) -> None:
         """Rows from the first to the last of `places` (included), named by their times."""
         if self._clip is not None:
-            self.said.emit("A clip is being written already; Esc cancels it", False)
+            self.said.emit(tr("A clip is being written already; Esc cancels it"), False)
             return
         out = clip_path(self._folder, self._reader.folder, *times_s)
         self._clip = ClipExporter(Clip(self._reader.folder, out, places[0], places[1] + 1, self._kind), self)

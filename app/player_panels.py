@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QPlainTextEdit, QTabWidget, QVBoxLayout, QWidget
 
 from app import palette, theme
+from app.language import tr, tr_text
 from app.pace import Pace
 from app.palette import ON_PICTURE
 from app.provenance import Provenance
@@ -36,7 +37,9 @@ from app.widgets.theta_gauge import ThetaGauge
 from app.widgets.timeline import TimelineView
 from app.widgets.toast import Toast
 from app.wording import REASON_TEXT
+from core.calibration.scale import mm_per_working_px
 from core.config import Config
+from core.rig_file import scaled
 from core.session.manifest import Manifest
 from core.session.recorded import RecordedRow
 from core.types import Point, PoseState, Scene, Tick
@@ -53,14 +56,16 @@ class PlayerPanels(QWidget):
 
     def __init__(self, config: Config, manifest: Manifest | None, name: str, *, with_other: bool = False) -> None:
         super().__init__()
-        limits, pixels_per_mm = config.perception.pose, config.policy.pursuit.pixels_per_mm
+        known = manifest.known if manifest is not None else None
+        limits, pixels_per_mm = config.perception.pose, scaled(config, known).policy.pursuit.pixels_per_mm
+        self._scale = known.scale if known is not None else None
         self.banner = SimBanner(RigKind.PLAYBACK)
         self.banner.setFixedWidth(_BANNER_WIDTH)
         self.plate = RecordedPlate(manifest, name)
         self.mode = ModeBadge()
         self.live = LiveView(pixels_per_mm)
-        self.live.setAccessibleName("Recorded picture")
-        self.live.setAccessibleDescription("Played back, not live")
+        self.live.setAccessibleName(tr("Recorded picture"))
+        self.live.setAccessibleDescription(tr("Played back, not live"))
         self.live.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.other = LiveView(pixels_per_mm) if with_other else None
         self.compared = QLabel("", self)
@@ -100,10 +105,11 @@ class PlayerPanels(QWidget):
         self.live.show_target(target)
         self.badge.show_scene(scene, renew_text=renew_text)
         self.gauge.show_pose(pose, renew_text=renew_text)
+        self.bars.set_scale(mm_per_working_px(self._scale, scene))
         self.bars.show_pose(pose, renew_text=renew_text)
-        why_none = row.drive.blanked if row.drive is not None and row.drive.blanked else "none was recorded"
+        why_none = row.drive.blanked if row.drive is not None and row.drive.blanked else tr("none was recorded")
         if scene.refusal is not None:
-            why_none = REASON_TEXT[scene.refusal.reason].title.lower()
+            why_none = tr(REASON_TEXT[scene.refusal.reason].title).lower()
         self.advice.show_advice(tick.advice, state, why_none, renew_text=renew_text)
         self.clearance.show_scene(scene, tick.status)
         self._show_drive(row)
@@ -112,9 +118,9 @@ class PlayerPanels(QWidget):
 
     def show_lost(self, row: RecordedRow | None, place: int) -> None:
         """A row that cannot be read, or whose picture is lost."""
-        title = "This picture is lost" if row is not None else "This row is damaged"
-        self._blank(title, f"Row {place + 1}; the problems page names it")
-        self.notice.show_notice(NoticeKind.WARNING, title, "Go on with the arrow keys")
+        title = tr("This picture is lost") if row is not None else tr("This row is damaged")
+        self._blank(title, tr("Row {row}; the problems page names it", row=place + 1))
+        self.notice.show_notice(NoticeKind.WARNING, title, tr("Go on with the arrow keys"))
         if row is not None:
             self._show_drive(row)
 
@@ -152,9 +158,9 @@ class PlayerPanels(QWidget):
 
     def show_problems(self, problems: Sequence[str]) -> None:
         """All that was found to be wrong; the page's name counts them."""
-        self.problems.setPlainText("\n".join(problems) or "Nothing was found to be wrong.")
+        self.problems.setPlainText("\n".join(tr_text(problem) for problem in problems) or tr("Nothing was found to be wrong."))
         count = len(problems)
-        self.pages.setTabText(self.pages.indexOf(self.problems), f"\N{WARNING SIGN} Problems {count}" if count else "Problems")
+        self.pages.setTabText(self.pages.indexOf(self.problems), tr("⚠ Problems {count}", count=count) if count else tr("Problems"))
 
     def _style(self) -> None:
         # a frame in the banner's colour and its word in the corner: also a part of the screen must not look live
@@ -165,16 +171,16 @@ class PlayerPanels(QWidget):
                 room = view.layout()
                 assert room is not None
                 room.setContentsMargins(2, 2, 2, 2)
-        mark, loupe = _CornerMark("PLAYBACK", self.live), self.live.findChild(HeadLoupe)
+        corner, loupe = _CornerMark(tr("PLAYBACK"), self.live), self.live.findChild(HeadLoupe)
         if isinstance(loupe, HeadLoupe):
-            mark.stackUnder(loupe)
-        for page, name in ((self.values, "Recorded values"), (self.problems, "Problems of the session")):
+            corner.stackUnder(loupe)
+        for page, name in ((self.values, tr("Recorded values")), (self.problems, tr("Problems of the session"))):
             page.setReadOnly(True)
             page.setTabChangesFocus(True)
             page.setAccessibleName(name)
             theme.set_sheet(page, "QPlainTextEdit { background: @PANEL; color: @TEXT_DIM; border: none; font-size: 13px; }")
-        self.note.setPlaceholderText("Note at this time; Enter keeps it, Esc does not")
-        self.note.setAccessibleName("Note")
+        self.note.setPlaceholderText(tr("Note at this time; Enter keeps it, Esc does not"))
+        self.note.setAccessibleName(tr("Note"))
         self.note.setMaxLength(2000)
         theme.set_sheet(
             self.note,
@@ -187,7 +193,7 @@ class PlayerPanels(QWidget):
         header.setSpacing(14)
         header.addWidget(self.banner)
         header.addWidget(self.plate, 1)
-        self._mode_note = QLabel("mode then")
+        self._mode_note = QLabel(tr("mode then"))
         self._mode_note.setObjectName("card_note")
         header.addWidget(self._mode_note)
         header.addWidget(self.mode)
@@ -214,13 +220,13 @@ class PlayerPanels(QWidget):
         """The recorded picture, and beside it what a replay saw in it."""
         if self.other is None:
             return self.live
-        self.other.setAccessibleName("The same picture perceived again")
-        self.other.setAccessibleDescription("Played back, not live")
+        self.other.setAccessibleName(tr("The same picture perceived again"))
+        self.other.setAccessibleDescription(tr("Played back, not live"))
         for view in (self.live, self.other):
             view.setMinimumSize(300, 225)
-        _CornerMark("PERCEIVED AGAIN", self.other)
+        _CornerMark(tr("PERCEIVED AGAIN"), self.other)
         theme.set_sheet(self.compared, "color: @TEXT; font-size: 14px;")
-        self.compared.setAccessibleName("Recorded against perceived again")
+        self.compared.setAccessibleName(tr("Recorded against perceived again"))
         holder = QWidget()
         column = QVBoxLayout(holder)
         column.setContentsMargins(0, 0, 0, 0)
@@ -239,8 +245,8 @@ class PlayerPanels(QWidget):
             return
         blank = Scene(tick.frame.index, tick.frame.captured_s, tick.scene.source_size, 1.0)
         self.other.show_frame(tick.frame, other or blank)
-        line = compared_line(tick.scene, other) if other is not None else "this row was not"
-        again = f'<span style="color:{palette.SKY}">\N{HORIZONTAL BAR} perceived again:</span>'
+        line = compared_line(tick.scene, other) if other is not None else tr("this row was not")
+        again = f'<span style="color:{palette.SKY}">\N{HORIZONTAL BAR} {tr("perceived again:")}</span>'
         self.compared.setText(f"{again} {escape(line)}")
 
     def set_layer(self, layer: Layer, on: bool) -> None:
@@ -260,18 +266,18 @@ class PlayerPanels(QWidget):
         row = QHBoxLayout(dials)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(theme.GAP)
-        row.addWidget(Card("Angle to the vessel", self.gauge, f"allowed {limits.theta_allow_deg:g}°"), 1)
-        row.addWidget(Card("Distances", self.bars, f"allowed {limits.d_allow_px:g} px"), 1)
+        row.addWidget(Card(tr("Angle to the vessel"), self.gauge, tr("allowed {limit:g}°", limit=limits.theta_allow_deg)), 1)
+        row.addWidget(Card(tr("Distances"), self.bars, tr("allowed {limit:g} px", limit=limits.d_allow_px)), 1)
         self.pages = QTabWidget()
         self.pages.setDocumentMode(True)
-        self.pages.setAccessibleName("Pages")
-        self.pages.tabBar().setAccessibleName("Pages")
+        self.pages.setAccessibleName(tr("Pages"))
+        self.pages.tabBar().setAccessibleName(tr("Pages"))
         self.pages.tabBar().setDrawBase(False)
         for page, name in (
-            (self.events, "Events"),
-            (self.commands, "Commands"),
-            (self.values, "Values"),
-            (self.problems, "Problems"),
+            (self.events, tr("Events")),
+            (self.commands, tr("Commands")),
+            (self.values, tr("Values")),
+            (self.problems, tr("Problems")),
         ):
             self.pages.addTab(page, name)
         side = QWidget()

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QAbstractButton, QLabel, QMainWindow
 from app import theme
 from app.decode_thread import Decoded, DecodeThread
 from app.heartbeat import Heartbeat
+from app.language import tr
 from app.menus import action_of
 from app.play_clock import PlayClock
 from app.player_keeper import PlayerKeeper
@@ -81,12 +82,12 @@ class PlayerWindow(QMainWindow):
         escape.setShortcut(QKeySequence(Qt.Key.Key_Escape))
         escape.triggered.connect(self._on_escape)
         self.addAction(escape)
-        hint = QLabel("F1  keys")
+        hint = QLabel(tr("F1  keys"))
         hint.setObjectName("card_note")
         hint.setContentsMargins(0, 0, 14, 0)
         self.menuBar().setCornerWidget(hint)
         self._wire()
-        self.setWindowTitle(f"LumenPilot \N{EM DASH} PLAYBACK of {reader.folder.name}")
+        self.setWindowTitle(tr("LumenPilot \N{EM DASH} PLAYBACK of {name}", name=reader.folder.name))
         self.setMinimumSize(*theme.MIN_WINDOW)
         self.resize(theme.start_size(self.screen()))
 
@@ -138,7 +139,7 @@ class PlayerWindow(QMainWindow):
     def _wire(self) -> None:
         panels, bar = self.panels, self.panels.bar
         self._decode.decoded.connect(self._on_decoded)
-        self._decode.failed.connect(lambda line: panels.show_nothing("Playing ended", line, NoticeKind.FAULT))
+        self._decode.failed.connect(lambda line: panels.show_nothing(tr("Playing ended"), line, NoticeKind.FAULT))
         self._keeper.said.connect(self.say)
         self._keeper.events_read.connect(self._on_events)
         self._keeper.noted.connect(self._on_noted)
@@ -170,7 +171,7 @@ class PlayerWindow(QMainWindow):
         """Show the first row as soon as it is known."""
         self.panels.live.setFocus()
         self._heartbeat.start()
-        self.panels.show_nothing("Opening", self._reader.folder.name)
+        self.panels.show_nothing(tr("Opening"), self._reader.folder.name)
         self._keeper.read_events()
         if self._against is not None:
             self._keeper.read_replayed(self._against)
@@ -190,8 +191,10 @@ class PlayerWindow(QMainWindow):
             self._show_course()
         if is_all and not len(self._course) and not self._is_empty:
             self._is_empty = True
-            loose = "there are pictures, but no rows: repair it with: session recover" if self._reader.videos else "it is empty"
-            self.panels.show_nothing("Nothing to play", loose, NoticeKind.WARNING)
+            loose = (
+                tr("there are pictures, but no rows: repair it with: session recover") if self._reader.videos else tr("it is empty")
+            )
+            self.panels.show_nothing(tr("Nothing to play"), loose, NoticeKind.WARNING)
         elif self._asked < 0 and len(self._course):
             self._ask(0)
         self._show_problems()
@@ -208,12 +211,12 @@ class PlayerWindow(QMainWindow):
         problems = list(self._reader.problems)
         missing = self._reader.missing_rows
         if missing:
-            problems.append(f"{missing} rows are missing between those that are there")
+            problems.append(tr("{count} rows are missing between those that are there", count=missing))
         manifest = self._reader.manifest
         if manifest is not None and manifest.counts.dropped:
-            problems.append(f"{manifest.counts.dropped} frames could not be recorded: the recorder was behind")
+            problems.append(tr("{count} frames could not be recorded: the recorder was behind", count=manifest.counts.dropped))
         if manifest is not None and not manifest.closed:
-            problems.append("the session did not end properly; session recover makes a repaired copy")
+            problems.append(tr("the session did not end properly; session recover makes a repaired copy"))
         if len(problems) != self._problem_count:
             self._problem_count = len(problems)
             self.panels.show_problems(problems)
@@ -222,20 +225,20 @@ class PlayerWindow(QMainWindow):
     def _on_events(self, events: tuple[Event, ...], is_written: bool) -> None:
         self._events = events
         if is_written:
-            self.say("This session is still being recorded: what came later is not shown")
+            self.say(tr("This session is still being recorded: what came later is not shown"))
         self._show_course()
 
     @Slot(object)
     def _on_noted(self, event: Event) -> None:
         self._events = tuple(sorted((*self._events, event), key=lambda one: one.time_s))
-        self.say("Note kept")
+        self.say(tr("Note kept"))
         self._show_course()
 
     @Slot(object)
     def _on_replayed(self, replayed: Replayed) -> None:
         self._replayed = replayed
         if replayed.skipped:
-            self.say(f"{replayed.skipped} results of the replay cannot be read", is_fault=True)
+            self.say(tr("{count} results of the replay cannot be read", count=replayed.skipped), is_fault=True)
         self._course = self._compared(self._course)
         self.set_jump_kind(JumpKind.REPLAY)
         self._show_course()
@@ -277,7 +280,7 @@ class PlayerWindow(QMainWindow):
     def _on_turn(self) -> None:
         goes_on = self._clock.turn(self._course, self._course.duration_s)
         if self._clock.passed_s > 0.0:
-            self.say(f"Passed over a gap: {self._clock.passed_s:.1f} s without frames")
+            self.say(tr("Passed over a gap: {seconds:.1f} s without frames", seconds=self._clock.passed_s))
         self._ask(self._course.place_at(self._clock.position_s))
         self._show_position()
         if not goes_on:
@@ -315,7 +318,8 @@ class PlayerWindow(QMainWindow):
         self.pause()
         found = neighbour(places_of(self._jump_kind, self._course, self._events), max(0, self._asked), step)
         if found is None:
-            self.say(f"No {self._jump_kind.value.lower()} {'after' if step > 0 else 'before'} this frame")
+            kind = tr(self._jump_kind.value).lower()
+            self.say(tr("No {kind} after this frame", kind=kind) if step > 0 else tr("No {kind} before this frame", kind=kind))
         else:
             self.go(found)
 
@@ -327,7 +331,7 @@ class PlayerWindow(QMainWindow):
     def next_jump_kind(self) -> None:
         kinds = list(JumpKind)
         self.set_jump_kind(kinds[(kinds.index(self._jump_kind) + 1) % len(kinds)])
-        self.say(f"N and P: {self._jump_kind.value.lower()}")
+        self.say(tr("N and P: {kind}", kind=tr(self._jump_kind.value).lower()))
 
     @Slot(float)
     def set_speed(self, speed: float) -> None:
@@ -403,7 +407,7 @@ class PlayerWindow(QMainWindow):
     def export_clip(self) -> None:
         """The selection as a video with overlays, into the pictures' folder; playing goes on."""
         if not len(self._course):
-            self.say("No clip: there are no frames", is_fault=True)
+            self.say(tr("No clip: there are no frames"), is_fault=True)
             return
         first_s, last_s = self._selection or (0.0, self._course.duration_s)
         self._keeper.write_clip((self._course.place_at(first_s), self._course.place_at(last_s)), (first_s, last_s))
@@ -413,7 +417,7 @@ class PlayerWindow(QMainWindow):
         """The picture that is shown, plain, with overlays, and its values."""
         tick = self._shown.tick if self._shown is not None else None
         if tick is None:
-            self.say("No snapshot: there is no picture", is_fault=True)
+            self.say(tr("No snapshot: there is no picture"), is_fault=True)
         else:
             self._keeper.take_snapshot(tick)
 

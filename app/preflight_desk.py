@@ -11,6 +11,7 @@ from typing import Any
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
 
 from app.child_process import ChildProcess, module_of
+from app.language import tr, tr_text
 from app.next_step import Step, sentence
 from core.config import Config
 from core.control.alerts import ALERTS
@@ -59,16 +60,21 @@ class Preflight:
         """In one line."""
         good = sum(finding.level is Level.GOOD for finding in self.findings)
         if self.problem:
-            return f"The checks could not be made: {self.problem}"
+            return tr("The checks could not be made: {problem}", problem=self.problem)
         if self.is_running:
-            return f"Checking: {len(self.findings)} looked at"
+            return tr("Checking: {count} looked at", count=len(self.findings))
         if self.against:
             count = len(self.against)
-            return f"Not ready: {count} of {len(self.findings)} checks {'stands' if count == 1 else 'stand'} against driving"
+            whole = len(self.findings)
+            if count == 1:
+                return tr("Not ready: 1 of {whole} checks stands against driving", whole=whole)
+            return tr("Not ready: {count} of {whole} checks stand against driving", count=count, whole=whole)
         if not self.is_fresh:
-            return "Not checked yet"
+            return tr("Not checked yet")
         warned = len(self.findings) - good
-        return f"Ready: {good} of {len(self.findings)} checks good" + (f", {warned} to know of" if warned else "")
+        return tr("Ready: {good} of {count} checks good", good=good, count=len(self.findings)) + (
+            tr(", {warned} to know of", warned=warned) if warned else ""
+        )
 
 
 def live_findings(view: DriveView | None) -> tuple[Finding, ...]:
@@ -76,16 +82,16 @@ def live_findings(view: DriveView | None) -> tuple[Finding, ...]:
     if view is None:
         return ()
     found = []
-    for area, name in ((Area.CAMERA, "camera's pictures"), (Area.SERVOS, "servos' answers")):
+    for area, name in ((Area.CAMERA, tr("camera's pictures")), (Area.SERVOS, tr("servos' answers"))):
         faults = [fault for fault in view.active if AREA[fault.cause] is area]
         held = [fault for fault in faults if REACTION[fault.cause] >= Reaction.HOLD]
         worst = (held or faults or [None])[0]
         if worst is None:
-            found.append(Finding(name, Level.GOOD, "no fault"))
+            found.append(Finding(name, Level.GOOD, tr("no fault")))
             continue
         spec = ALERTS[worst.cause]
-        detail = f"{spec.text} ({worst.detail})" if worst.detail else spec.text
-        found.append(Finding(name, Level.BAD if held else Level.WARNING, detail, spec.what_to_do))
+        detail = f"{tr(spec.text)} ({tr_text(worst.detail)})" if worst.detail else tr(spec.text)
+        found.append(Finding(name, Level.BAD if held else Level.WARNING, detail, tr(spec.what_to_do)))
     return tuple(found)
 
 
@@ -171,14 +177,21 @@ class PreflightDesk(QObject):
             return True
         if now.against:
             first = now.against[0]
-            more = f" (+{len(now.against) - 1} more)" if len(now.against) > 1 else ""
-            self.asked.emit(f"Not armed. {sentence(f'{first.name}: {first.detail}')} What to do: {first.fix}{more}")
+            more = tr(" (+{count} more)", count=len(now.against) - 1) if len(now.against) > 1 else ""
+            self.asked.emit(
+                tr(
+                    "Not armed. {what} What to do: {fix}{more}",
+                    what=sentence(f"{tr_text(first.name)}: {tr_text(first.detail)}"),
+                    fix=tr_text(first.fix),
+                    more=more,
+                )
+            )
             if not now.is_fresh and not now.is_running:
                 self.begin()
         else:
             if not now.is_running:
                 self.begin()
-            self.asked.emit("Not armed yet: the checks before driving take some seconds, then arm again")
+            self.asked.emit(tr("Not armed yet: the checks before driving take some seconds, then arm again"))
         return False
 
     def close(self) -> None:
@@ -208,13 +221,13 @@ class PreflightDesk(QObject):
         if code == 0 and self._checks:
             self._checked, self._done_s = self._of, self._clock()
         else:
-            self._problem = line or f"they ended with exit code {code}"
+            self._problem = line or tr("they ended with exit code {code}", code=code)
         self.changed.emit()
 
     @Slot()
     def _on_too_long(self) -> None:
         self._give_up()
-        self._problem = f"no answer within {_LONGEST_MS / 1000:.0f} s"
+        self._problem = tr("no answer within {seconds:.0f} s", seconds=_LONGEST_MS / 1000)
         self.changed.emit()
 
 

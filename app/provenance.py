@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.cells import NONE, Cell, Tone, number
+from app.language import mark, tr, tr_text
 from app.wording import SPEED_WORD, side
 from core.control.drive_view import DriveView
 from core.control.gate_checks import Source
 from core.types import Advice, Command
 
-HEADINGS = ("bend", "pitch", "advance mm/s", "sheath mm/s")
-LABELS = ("Advised", "You asked", "Program", "Sent")
+HEADINGS = (mark("bend"), mark("pitch"), mark("advance mm/s"), mark("sheath mm/s"))
+LABELS = (mark("Advised"), mark("You asked"), mark("Program"), mark("Sent"))
 _SAME_BEND, _SAME_MM_S = 0.03, 0.5
 _LASTING = 3
 """Renewals in a row: the speed of a single cycle of the bus swings with its period."""
@@ -45,18 +46,18 @@ class Provenance:
             ProvenanceRow(LABELS[1], _motion(view.asked, _tone(by_operator)), drives=by_operator),
             ProvenanceRow(LABELS[2], _motion(view.commanded, _tone(by_program)), drives=by_program)
             if view.commanded is not None
-            else ProvenanceRow(LABELS[2], note="does not drive"),
+            else ProvenanceRow(LABELS[2], note=tr("does not drive")),
             self._sent(view.sent, wanted),
         )
 
     def _sent(self, sent: Command | None, wanted: Command | None) -> ProvenanceRow:
         if sent is None:
             self._differing = [0, 0, 0, 0]
-            return ProvenanceRow(LABELS[3], note="no motion: holding")
+            return ProvenanceRow(LABELS[3], note=tr("no motion: holding"))
         differs = _differs(sent, wanted) if wanted is not None else (False,) * 4
         self._differing = [count + 1 if now else 0 for count, now in zip(self._differing, differs, strict=True)]
         cells = tuple(
-            Cell(f"\N{NOT EQUAL TO} {cell.text}", Tone.WARN, "limited by the gate") if count >= _LASTING else cell
+            Cell(f"\N{NOT EQUAL TO} {cell.text}", Tone.WARN, tr("limited by the gate")) if count >= _LASTING else cell
             for cell, count in zip(_motion(sent, Tone.PLAIN), self._differing, strict=True)
         )
         return ProvenanceRow(LABELS[3], cells)
@@ -68,27 +69,29 @@ def _tone(drives: bool) -> Tone:
 
 def _advised(view: DriveView) -> ProvenanceRow:
     if view.advice is None:
-        return ProvenanceRow(LABELS[0], note=f"no advice: {view.blanked}" if view.blanked else "no advice")
+        return ProvenanceRow(
+            LABELS[0], note=tr("no advice: {why}", why=tr_text(str(view.blanked))) if view.blanked else tr("no advice")
+        )
     none = Cell(NONE, Tone.FAINT)
     return ProvenanceRow(LABELS[0], (Cell(_turn(view.advice)), none, Cell(_speed(view.advice)), none))
 
 
 def _turn(advice: Advice) -> str:
     if abs(advice.steer_deg) < 0.5:
-        return "straight"
-    return f"{abs(advice.steer_deg):.0f}° {side(advice.steer_deg)}"
+        return tr("straight")
+    return tr("{angle:.0f}° {side}", angle=abs(advice.steer_deg), side=side(advice.steer_deg))
 
 
 def _speed(advice: Advice) -> str:
-    return f"{number(advice.advance_mm_s, 1)} {SPEED_WORD[advice.speed].lower()}"
+    return f"{number(advice.advance_mm_s, 1)} {tr(SPEED_WORD[advice.speed]).lower()}"
 
 
 def _motion(command: Command | None, tone: Tone) -> tuple[Cell, ...]:
     if command is None:
         return ()
     return (
-        Cell(_share(command.bend, "right", "left"), tone),
-        Cell(_share(command.pitch, "up", "down"), tone),
+        Cell(_share(command.bend, tr("right"), tr("left")), tone),
+        Cell(_share(command.pitch, tr("up"), tr("down")), tone),
         Cell(number(command.advance_mm_s, 1), tone),
         Cell(number(command.delivery_mm_s, 1), tone),
     )

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from app.cells import number
+from app.language import tr, tr_text
+from app.wording import refusal_text
 from core.session.recorded import RecordedRow
 
 _TENDONS = ("right", "left", "up", "down")
@@ -15,32 +17,48 @@ _MOST_LINES = 200
 def value_lines(row: RecordedRow) -> list[str]:
     """Frame, latency by stage, robot, drive, and the servo bus as it was."""
     scene, status, drive = row.scene, row.status, row.drive
-    camera = f"{row.dropped_frames} skipped for newer ones, {row.camera_lost} lost by the camera"
-    dropped = f"{camera}, {row.dropped_rows} by the recorder"
+    camera = tr("{skipped} skipped for newer ones, {lost} lost by the camera", skipped=row.dropped_frames, lost=row.camera_lost)
+    dropped = tr("{camera}, {count} by the recorder", camera=camera, count=row.dropped_rows)
     size = f"{row.size[0]} \N{MULTIPLICATION SIGN} {row.size[1]}"
     lines = [
-        f"frame {row.index} of the camera, captured at {row.captured_s:.3f} s, {size} px",
-        f"{row.frames_per_second:.1f} frames per second, {dropped}",
+        tr("frame {index} of the camera, captured at {time:.3f} s, {size} px", index=row.index, time=row.captured_s, size=size),
+        tr("{rate:.1f} frames per second, {dropped}", rate=row.frames_per_second, dropped=dropped),
     ]
     stages = dict(scene.latency_ms)
     total_ms = stages.pop("total", None)
     if total_ms is not None:
-        lines.append(f"perception {total_ms:.1f} ms: " + ", ".join(f"{name} {ms:.1f}" for name, ms in stages.items()))
+        lines.append(
+            tr("perception {total:.1f} ms: ", total=total_ms)
+            + ", ".join(f"{tr_text(name)} {ms:.1f}" for name, ms in stages.items())
+        )
     if scene.pose is not None:
-        lines.append(f"confidence {scene.pose.confidence:.2f}, crossed {'yes' if scene.pose.crossed else 'no'}")
+        lines.append(
+            tr(
+                "confidence {confidence:.2f}, crossed {crossed}",
+                confidence=scene.pose.confidence,
+                crossed=tr("yes") if scene.pose.crossed else tr("no"),
+            )
+        )
     elif scene.refusal is not None:
-        lines.append(f"no pose: {scene.refusal}")
+        lines.append(tr("no pose: {why}", why=refusal_text(scene.refusal)))
     if scene.route_problem:
-        lines.append(f"no way to the target: {scene.route_problem}")
+        lines.append(tr("no way to the target: {why}", why=tr_text(scene.route_problem)))
     if status is not None:
-        lines.append(f"insertion {status.insertion_mm:.1f} mm, sheath {status.delivery_mm:.1f} mm")
+        lines.append(
+            tr("insertion {insertion:.1f} mm, sheath {sheath:.1f} mm", insertion=status.insertion_mm, sheath=status.delivery_mm)
+        )
         pulls = zip(_TENDONS, status.tendon_pull_mm, status.tendon_force_mn, strict=True)
-        lines.append("tendons: " + ", ".join(f"{name} {number(pull, 2)} mm {number(force, 0)} mN" for name, pull, force in pulls))
+        lines.append(
+            tr("tendons: ")
+            + ", ".join(f"{tr_text(name)} {number(pull, 2)} mm {number(force, 0)} mN" for name, pull, force in pulls)
+        )
     if drive is not None:
-        lines += [f"fault: {fault.cause}: {fault.detail}" for fault in drive.active]
-        lines += [f"against arming: {reason}" for reason in drive.against_arming]
+        lines += [
+            tr("fault: {cause}: {detail}", cause=tr_text(str(fault.cause)), detail=tr_text(fault.detail)) for fault in drive.active
+        ]
+        lines += [tr("against arming: {reason}", reason=tr_text(str(reason))) for reason in drive.against_arming]
     if row.bus is not None:
-        lines += ["", "servo bus", *_flat(row.bus)]
+        lines += ["", tr("servo bus"), *_flat(row.bus)]
     return lines[:_MOST_LINES]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
 
 from app.engine_thread import EngineThread
+from app.language import tr, tr_text
 from core.config import Config
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
@@ -49,8 +50,9 @@ class Recorder(QObject):
         """How it is going."""
         return self._writer.status() if self._writer is not None else RecordStatus()
 
-    def open_rig(self, config: Config) -> None:
+    def open_rig(self, config: Config, kind: RigKind) -> None:
         """Another rig is being opened: what is being recorded ends, for a session never mixes two rigs."""
+        self._kind = kind
         about = about_rig(config, self._kind.value, config.rig.name)
         if self._writer is None:
             self._writer = SessionWriter(config.record, about)
@@ -79,7 +81,7 @@ class Recorder(QObject):
         if self._writer is None:
             return
         if self._writer.status().ring_s <= 0.0:
-            self.said.emit("Nothing to save yet: record.ring_s is 0, or the rig has just been opened", True)
+            self.said.emit(tr("Nothing to save yet: record.ring_s is 0, or the rig has just been opened"), True)
             return
         self._writer.save_last()
 
@@ -134,6 +136,6 @@ class Recorder(QObject):
             for fault in faults_between(before, now):
                 pilot.report(fault)
         if now.problem and now.problem != before.problem:
-            self.said.emit(f"Recording stopped: {now.problem}", True)
+            self.said.emit(tr("Recording stopped: {problem}", problem=tr_text(now.problem)), True)
         if now.saved is not None and now.saved != before.saved:
-            self.said.emit(f"Session saved: {now.saved}", False)
+            self.said.emit(tr("Session saved: {saved}", saved=now.saved), False)

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from PySide6.QtCore import QObject, Signal
 
 from app.child_process import ChildProcess, command_of
+from app.language import tr, tr_text
 from app.widgets.offer_strip import Answer, Offer
 from app.work_thread import WorkThread
 from core.session.recovery import CutSession, find_cut_sessions
@@ -102,11 +103,11 @@ class RecoveryDesk(QObject):
             return
         self._waiting, self._found = list(found), len(found)
         if not found and self._says_none:
-            self.said.emit(f"No cut session in {self._folder}", False)
+            self.said.emit(tr("No cut session in {folder}", folder=self._folder), False)
         self._measure_next()
 
     def _on_look_failed(self, _key: object, line: str) -> None:
-        self.said.emit(f"Cut sessions could not be looked for: {line}", True)
+        self.said.emit(tr("Cut sessions could not be looked for: {line}", line=line), True)
 
     # ---- one after the other
 
@@ -122,22 +123,26 @@ class RecoveryDesk(QObject):
         self._child = None
         lost = told.get("lost")
         if code != 0 or not isinstance(lost, dict):
-            never = Answer("Never", lambda: self._decline(session), "Do not ask again for this one")
-            text = "A recording was cut, and it cannot be recovered"
+            never = Answer(tr("Never"), lambda: self._decline(session), tr("Do not ask again for this one"))
+            text = tr("A recording was cut, and it cannot be recovered")
             self._offers.offer(Offer(_KEY, text, line or session.name, (never,), is_fault=True, dismissed=self._next))
             return
-        place = f" ({self._found - len(self._waiting) + 1} of {self._found})" if self._found > 1 else ""
-        text = f"A recording was cut{place}: {loss_words(lost)}"
-        kept = f"{told.get('pictures', 0)} pictures are whole"
+        place = (
+            tr(" ({place} of {count})", place=self._found - len(self._waiting) + 1, count=self._found) if self._found > 1 else ""
+        )
+        text = tr("A recording was cut{place}: {loss}", place=place, loss=loss_words(lost))
+        kept = tr("{count} pictures are whole", count=told.get("pictures", 0))
         self._offers.offer(
             Offer(
                 _KEY,
                 text,
-                f"{session.name}; {kept}. The damaged original stays as it is.",
+                tr("{name}; {kept}. The damaged original stays as it is.", name=session.name, kept=kept),
                 (
-                    Answer("Recover", lambda: self._recover(session), f"Make a whole copy beside {session}"),
-                    Answer("Not now", self._next, "Ask again at the next start"),
-                    Answer("Never", lambda: self._decline(session), "Do not ask again for this one"),
+                    Answer(
+                        tr("Recover"), lambda: self._recover(session), tr("Make a whole copy beside {session}", session=session)
+                    ),
+                    Answer(tr("Not now"), self._next, tr("Ask again at the next start")),
+                    Answer(tr("Never"), lambda: self._decline(session), tr("Do not ask again for this one")),
                 ),
                 dismissed=self._next,
             )
@@ -151,7 +156,7 @@ class RecoveryDesk(QObject):
         try:
             self._declined.add(session.name)
         except OSError as error:
-            self.said.emit(f"That you do not want to be asked could not be kept ({error.strerror})", True)
+            self.said.emit(tr("That you do not want to be asked could not be kept ({why})", why=error.strerror), True)
         self._next()
 
     def _recover(self, session: Path) -> None:
@@ -169,17 +174,17 @@ class RecoveryDesk(QObject):
     def _show_share(self, session: Path, record: dict[str, Any]) -> None:
         done, total = record.get("done"), record.get("total")
         share = min(1.0, done / total) if done is not None and total else -1.0
-        self._offers.offer(Offer(_KEY, "Recovering a copy", session.name, share=share))
+        self._offers.offer(Offer(_KEY, tr("Recovering a copy"), session.name, share=share))
 
     def _on_recovered(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
         self._child = None
         self._offers.withdraw(_KEY)
         if code == 0 and "session" in told:
             words = loss_words(told["lost"])
-            self.said.emit(f"Recovered: {told['session']}; {words}", False)
-            self.recovered.emit(Path(told["session"]), f"Recovered; {words}")
+            self.said.emit(tr("Recovered: {session}; {words}", session=told["session"], words=words), False)
+            self.recovered.emit(Path(told["session"]), tr("Recovered; {words}", words=words))
         else:
-            self.said.emit(f"Not recovered: {line or f'exit code {code}'}", True)
+            self.said.emit(tr("Not recovered: {why}", why=tr_text(line) or tr("exit code {code}", code=code)), True)
         self._next()
 
     def _run(
@@ -194,5 +199,10 @@ class RecoveryDesk(QObject):
 def loss_words(lost: dict[str, Any]) -> str:
     """A loss as people say it."""
     if not lost["rows"] and not lost["pictures"]:
-        return "nothing of it is lost"
-    return f"{lost['seconds']:.1f} s are lost ({lost['rows']} rows, {lost['pictures']} pictures)"
+        return tr("nothing of it is lost")
+    return tr(
+        "{seconds:.1f} s are lost ({rows} rows, {pictures} pictures)",
+        seconds=lost["seconds"],
+        rows=lost["rows"],
+        pictures=lost["pictures"],
+    )

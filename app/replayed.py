@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.language import tr
 from app.wording import signed_degrees
 from core.errors import UserError
 from core.session.checked import Damaged, choice, count, group, number, point, points, text
@@ -133,10 +134,10 @@ def _refusal(value: Any) -> Refusal:
 def compared_line(before: Scene, after: Scene) -> str:
     """Both in one line, after against before."""
     change = Change(0, 0, 0.0, seen(before), seen(after))
-    states = f"state {change.before.state or '-'} \N{RIGHTWARDS ARROW} {change.after.state or '-'}"
+    states = tr("state {before} \N{RIGHTWARDS ARROW} {after}", before=change.before.state or "-", after=change.after.state or "-")
     if after.pose is None:
-        return f"{states}: no pose, {after.refusal}"
-    line = f"{states}, theta {signed_degrees(after.pose.theta_signed_deg, 1)}"
+        return tr("{states}: no pose, {why}", states=states, why=after.refusal)
+    line = f"{states}, {tr('theta')} {signed_degrees(after.pose.theta_signed_deg, 1)}"
     if change.theta_deg is not None:
         line += f" ({signed_degrees(change.theta_deg, 1)})"
-    return line + (f", head {change.head_px:.1f} px away" if change.head_px is not None else "")
+    return line + (tr(", head {distance:.1f} px away", distance=change.head_px) if change.head_px is not None else "")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.language import mark, tr, tr_text
 from app.window_command import window_config
 from core.calibration.board import BoardError, BoardSpec
 from core.config import Config
@@ -126,37 +127,76 @@ def quick_sight(config: Config) -> See:
 def describe(rig: RigFile) -> str:
     """One line for people."""
     camera = {
-        "twin": "bench twin",
+        "twin": tr("bench twin"),
         "realsense": f"RealSense {rig.camera.serial or ''}",
-        "webcam": f"webcam {rig.camera.device or ''}",
+        "webcam": tr("webcam {device}", device=rig.camera.device or ""),
     }
-    robot = {"twin": "its own servos", "servos": f"servos on {rig.servos.port}", "none": "no servos"}[rig.robot]
-    return f"{camera[rig.kind].strip()}, {robot}; {_calibrated(rig)}; made {rig.made_utc:%Y-%m-%d}"
+    servos = {"twin": tr("its own servos"), "servos": tr("servos on {port}", port=rig.servos.port), "none": tr("no servos")}
+    return tr(
+        "{camera}, {servos}; {calibrated}; made {made:%Y-%m-%d}",
+        camera=camera[rig.kind].strip(),
+        servos=servos[rig.robot],
+        calibrated=_calibrated(rig),
+        made=rig.made_utc,
+    )
 
 
 def calibration_lines(rig: RigFile) -> list[str]:
     """What was calibrated, a line each."""
     known = rig.calibration
     if known is None:
-        return ["not calibrated"]
+        return [tr("not calibrated")]
     lines = []
     if known.lens is not None:
-        lines.append(f"lens: k1 {known.lens.k1:+.4f}, k2 {known.lens.k2:+.4f}, {known.lens.residual_px:.2f} px left over")
+        lines.append(
+            tr(
+                "lens: k1 {k1:+.4f}, k2 {k2:+.4f}, {left:.2f} px left over",
+                k1=known.lens.k1,
+                k2=known.lens.k2,
+                left=known.lens.residual_px,
+            )
+        )
     if known.scale is not None:
         scale = known.scale
         share = 100 * scale.uncertainty_share
-        lines.append(f"scale: {scale.mm_per_px:.4f} mm/px in the middle, \N{PLUS-MINUS SIGN}{share:.2f} % (by {scale.method})")
-    servos = ", ".join(f"{joint.name} {'+' if joint.sign > 0 else '-'}{joint.id}" for joint in rig.servos.joints)
-    lines.append(f"servos (direction and id): {servos}")
+        text = tr(
+            "scale: {scale:.4f} mm/px in the middle, \N{PLUS-MINUS SIGN}{share:.2f} % (by {method})",
+            scale=scale.mm_per_px,
+            share=share,
+            method=tr_text(scale.method),
+        )
+        lines.append(text)
+    servos = ", ".join(f"{tr_text(joint.name)} {'+' if joint.sign > 0 else '-'}{joint.id}" for joint in rig.servos.joints)
+    lines.append(tr("servos (direction and id): {servos}", servos=servos))
+    if known.assumed:
+        lines.append(
+            tr(
+                "assumed: {joints} by the order of their ids, since one camera cannot tell them apart; look at the head, and swap "
+                "them in the rig wizard if it goes the other way",
+                joints=tr(" and ").join(tr_text(name) for name in known.assumed),
+            )
+        )
     if known.steering is not None:
         ways = ", ".join(
-            f"{tendon.name} {'out of the picture' if tendon.direction_deg is None else f'{tendon.direction_deg:.0f}°'}"
+            f"{tr_text(tendon.name)} {tr('out of the picture') if tendon.direction_deg is None else f'{tendon.direction_deg:.0f}°'}"
             for tendon in known.steering.tendons
         )
-        lines.append(f"steering, 0° to the right and 90° down in the picture: {ways}; roll {known.steering.roll_deg:+.0f}°")
+        lines.append(
+            tr(
+                "steering, 0° to the right and 90° down in the picture: {ways}; roll {roll:+.0f}°",
+                ways=ways,
+                roll=known.steering.roll_deg,
+            )
+        )
     if known.zero is not None:
         slack = ", ".join(f"{value:+.2f}" for value in known.zero.slack_mm)
-        lines.append(f"zero: wires were slack by {slack} mm; pretension {known.zero.pretension_mm:g} mm")
+        lines.append(
+            tr(
+                "zero: wires were slack by {slack} mm; pretension {pretension:g} mm",
+                slack=slack,
+                pretension=known.zero.pretension_mm,
+            )
+        )
     return lines
 
 
@@ -177,17 +217,20 @@ def _start(options: CalibrateOptions) -> tuple[Config, RigFile | None]:
     return with_rig(window_config(None, options.config_path, None)[0], rig, path), rig
 
 
+_PARTS = (mark("lens"), mark("scale"), mark("steering"), mark("zero"))
+
+
 def _brief(rig: RigFile | None) -> dict[str, Any]:
     if rig is None:
         return {"kind": None, "robot": None, "made_utc": None, "calibrated": []}
     known = rig.calibration
-    done = [part for part in ("lens", "scale", "steering", "zero") if known is not None and getattr(known, part) is not None]
+    done = [part for part in _PARTS if known is not None and getattr(known, part) is not None]
     return {"kind": rig.kind, "robot": rig.robot, "made_utc": rig.made_utc.isoformat(), "calibrated": done}
 
 
 def _calibrated(rig: RigFile) -> str:
     parts = _brief(rig)["calibrated"]
-    return f"calibrated: {', '.join(parts)}" if parts else "not calibrated"
+    return tr("calibrated: {parts}", parts=", ".join(tr(part) for part in parts)) if parts else tr("not calibrated")
 
 
 def _say(line: str) -> None:

@@ -5,25 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Slot
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu
 
 from app.engine_thread import Phase
+from app.language import mark, tr, tr_text
 from app.menus import MenuEntry, add_menu
 from app.operator_window import OperatorWindow
 from app.rig_command import describe, quick_sight
 from app.rig_wizard import RigWizard
 from app.wizard_desk import MakeSight, OpenBench, WizardDesk
-from core.calibration_config import CalibrationConfig
+from core.calibration_config import CalibrationConfig, PortConfig
 from core.config import Config
 from core.control.modes import ARMED_MODES, Mode
-from core.rig_file import ListedRig, RigFileError, calibration_of, find_rig, list_rigs, with_rig
+from core.rig_file import ListedRig, RigFileError, calibration_of, find_rig, list_rigs, set_port, with_rig
+from core.types import Point
 from hardware.rig import RigKind, kind_of
 from hardware.rig_search import FoundCamera, search, with_camera
 
-_LENT = "the rig wizard has camera and servos; the rig is opened again when it is closed"
+_LENT = mark("the rig wizard has camera and servos; the rig is opened again when it is closed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,30 +49,37 @@ class RigDesk(QObject):
 
     Parameters
     ----------
-    window : gets the menu; a rig of its kind (twin, live) is opened in it.
-    switch : opens a rig of another kind by its name, in a window of its own; this one is closed by it.
+    window : gets the menu; the chosen rig, of whatever kind, is opened in it.
     open_bench, make_sight : what the wizard works with.
     """
 
     def __init__(
         self,
         window: OperatorWindow,
-        switch: Callable[[str], None],
         open_bench: OpenBench = _open_bench,  # type: ignore[assignment]
         make_sight: MakeSight = quick_sight,
     ) -> None:
         super().__init__(window)
-        self._window, self._switch = window, switch
+        self._window = window
         self._open_bench, self._make_sight = open_bench, make_sight
         self._wish: _Wish | None = None
         self._saved = ""
         self.wizard: RigWizard | None = None
-        new, _ = add_menu(window, "Ri&g", [MenuEntry("&New rig...", self.new), MenuEntry("&Calibrate...", self.calibrate)])
+        new = add_menu(
+            window,
+            tr("Ri&g"),
+            [
+                MenuEntry(tr("&New rig..."), self.new),
+                MenuEntry(tr("&Calibrate..."), self.calibrate),
+                MenuEntry(tr("Set the insertion &port..."), self.ask_port),
+                MenuEntry(tr("&Forget the insertion port"), self.forget_port),
+            ],
+        )[0]
         self._menu = next(one for one in new.associatedObjects() if isinstance(one, QMenu))
         self._menu.setToolTipsVisible(True)
         self._group = QActionGroup(self)
         self._rigs: list[QAction] = []
-        self._cameras = QMenu("C&amera", self._menu)
+        self._cameras = QMenu(tr("C&amera"), self._menu)
         self._menu.addMenu(self._cameras)
         self._menu.addSeparator()
         self._menu.aboutToShow.connect(self.renew)
@@ -122,7 +132,7 @@ class RigDesk(QObject):
     def _renew_cameras(self) -> None:
         self._cameras.clear()
         for camera in search().cameras:
-            self._cameras.addAction(camera.title.replace("&", "&&"), partial(self.choose_camera, camera))
+            self._cameras.addAction(tr_text(camera.title).replace("&", "&&"), partial(self.choose_camera, camera))
 
     # ---- choosing
 
@@ -136,40 +146,75 @@ class RigDesk(QObject):
         except RigFileError as error:
             self._refuse(str(error))
             return
-        config = with_rig(self._window.config, rig, path)
-        if kind_of(config.rig) is kind_of(self._window.config.rig):
-            self._window.use_config(config)
-            self.renew()
-        else:
-            self._switch(rig.name)
+        self._window.use_config(with_rig(self._window.config, rig, path))
+        self.renew()
 
     def choose_camera(self, camera: FoundCamera) -> None:
         """Another camera in the present rig; what was calibrated with the old one does not hold good for it."""
         if why := self.hindrance():
             self._refuse(why)
             return
-        config = with_camera(self._window.config, camera)
-        if kind_of(config.rig) is kind_of(self._window.config.rig):
-            self._window.use_config(config)
-        else:
-            self._switch(camera.kind)
+        self._window.use_config(with_camera(self._window.config, camera))
 
     def hindrance(self) -> str:
         """Why neither rig nor camera may be taken away now; "" when they may."""
         view = self._window.desk.view
         if view is not None and view.mode in ARMED_MODES:
-            return "the robot is armed: disarm it first"
+            return tr("the robot is armed: disarm it first")
         if view is not None and (view.mode is Mode.STOPPED or view.latched is not None):
-            return "a stop or fault is not acknowledged: acknowledge it first"
+            return tr("a stop or fault is not acknowledged: acknowledge it first")
         if view is not None and view.busy:
-            return f"wait: {view.busy}"
+            return tr("wait: {what}", what=tr_text(view.busy))
         if self._window.recorder.status.recording:
-            return "a session is being recorded: end it first"
+            return tr("a session is being recorded: end it first")
         return ""
 
     def _refuse(self, why: str) -> None:
-        self._window.say(f"The rig stays as it is: {why}", is_fault=True)
+        self._window.say(tr("The rig stays as it is: {why}", why=why), is_fault=True)
         self.renew()
+
+    # ---- the insertion port
+
+    @Slot()
+    def ask_port(self) -> None:
+        """The next click into the picture says where the robot is inserted: that end of it is its tail."""
+        if self._rig_path() is not None:
+            self._window.ask_for_place(self._set_port)
+            self._window.say(tr("Click where the robot is inserted; Esc leaves it as it is"))
+
+    @Slot()
+    def forget_port(self) -> None:
+        """Nobody knows any more where the robot is inserted."""
+        self._keep_port(None, tr("The insertion port is forgotten"))
+
+    def _set_port(self, place: Point) -> None:
+        tick = self._window.last_tick
+        if tick is None:
+            return
+        width, height = tick.scene.source_size
+        x, y = (min(1.0, max(0.0, value / (size - 1))) for value, size in zip(place, (width, height), strict=True))
+        said = tr("The insertion port is at {x:.0f}, {y:.0f} px from now on", x=place[0], y=place[1])
+        self._keep_port(PortConfig(x_share=x, y_share=y), said)
+
+    def _keep_port(self, port: PortConfig | None, said: str) -> None:
+        path = self._rig_path()
+        if path is None:
+            return
+        try:
+            set_port(path, port)
+        except RigFileError as error:
+            self._refuse(str(error))
+            return
+        self._window.preview(self._window.config.perception)
+        self._window.say(said)
+
+    def _rig_path(self) -> Path | None:
+        """The rig file that keeps the port; None, said, when there is none or the robot is in use."""
+        file = self._window.config.rig.file
+        why = self.hindrance() if file is not None else tr("it has no file: save one first (menu Rig, New rig)")
+        if why:
+            self._refuse(why)
+        return Path(file) if file is not None and not why else None
 
     # ---- the wizard
 
@@ -195,7 +240,7 @@ class RigDesk(QObject):
             return
         why = self.hindrance()
         if kind_of(config.rig) is RigKind.PLAYBACK:
-            why = "a recording is played: start with a camera or the twin"
+            why = tr("a recording is played: start with a camera or the twin")
         if why:
             self._refuse(why)
             return
@@ -227,7 +272,7 @@ class RigDesk(QObject):
             wizard.deleteLater()
         saved, self._saved = self._saved, ""
         if saved:
-            self._window.say(f"Rig {saved} saved")
+            self._window.say(tr("Rig {name} saved", name=saved))
             self.choose(saved)
         else:
             self._window.use_config(self._window.config)

@@ -14,6 +14,7 @@ from core.control.policies import make_policy
 from core.learning.model_file import ModelError
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
 from core.perception.segmentation import cores
+from core.rig_file import as_calibrated
 from core.types import Frame, Point, Scene
 from hardware.rig import Rig, RigKind, open_rig
 from hardware.servos.bus_messages import BusStatus
@@ -65,6 +66,7 @@ class EngineMaker:
 
     def __call__(self, config: Config) -> RigEngine:
         """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame, with why."""
+        config = as_calibrated(config)
         perceive, model = self._perception(leaving_a_core(config.perception))
         network = perceive if isinstance(perceive, Pipeline) else None
         # Pictures that have nothing to do with each other have no past.

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QListWidgetItem, QStackedWidget, QVBoxLayout, QWidget
 
 from app import theme
+from app.language import tr, tr_text
+from app.stop_key import StopKeys
 from app.widgets.card import Card
 from app.widgets.stop_button import StopButton
 from app.widgets.wizard_camera import CameraPage
@@ -28,7 +30,8 @@ _LOOK_EVERY_MS = 50
 class RigWizard(QDialog):
     """Makes or calibrates a rig. ``saved`` carries its name.
 
-    Next leads through the pages in their order, and is called Skip on a page whose step was not done. Space is STOP.
+    Next leads through the pages in their order, and is called Skip on a page whose step was not done. Space is STOP, except in a
+    text field while no job runs.
 
     Parameters
     ----------
@@ -42,11 +45,11 @@ class RigWizard(QDialog):
         super().__init__(parent)
         self.desk = desk
         desk.setParent(self)
-        self.setWindowTitle(f"Calibrate {rig_name}" if rig_name else "New rig")
+        self.setWindowTitle(tr("Calibrate {name}", name=rig_name) if rig_name else tr("New rig"))
         self.setModal(True)
         self.resize(_SIZE)
         self.picture = WizardPicture()
-        self.picture.show_text("No camera yet")
+        self.picture.show_text(tr("No camera yet"))
         self.camera_page = CameraPage(desk, self.picture, rig_name)
         self.scale_page = ScalePage(desk, self.picture)
         self.port_page = PortPage(desk, self.picture)
@@ -66,14 +69,12 @@ class RigWizard(QDialog):
         self.steps = QListWidget()
         self.stack = QStackedWidget()
         self.stop_button = StopButton()
-        self.back_button, self.next_button = button("&Back", self.back), button("&Next", self.next)
-        self.cancel_button = button("Cancel", self.reject)
+        self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
+        self.cancel_button = button(tr("Cancel"), self.reject)
         self.line = note("")
         self._lay_out()
         self.stop_button.asked.connect(desk.stop)
-        stop = QShortcut(QKeySequence(Qt.Key.Key_Space), self)
-        stop.setAutoRepeat(False)
-        stop.activated.connect(desk.stop)
+        self._stop_keys = StopKeys(self, lambda: desk.is_busy, desk.stop)  # servos are open while a job runs only
         desk.said.connect(self._say)
         desk.failed.connect(lambda line: self._say(line, is_fault=True))
         desk.changed.connect(self._refresh)
@@ -114,6 +115,7 @@ class RigWizard(QDialog):
     def done(self, result: int) -> None:
         """The dialog closes, whichever way: nothing moves any more, camera and port are free."""
         self._timer.stop()
+        self._stop_keys.detach()
         self.desk.close()
         super().done(result)
 
@@ -125,11 +127,11 @@ class RigWizard(QDialog):
 
     def _lay_out(self) -> None:
         self.steps.setFixedWidth(_STEPS_PX)
-        self.steps.setAccessibleName("Steps")
+        self.steps.setAccessibleName(tr("Steps"))
         self.steps.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.steps.setSelectionMode(QListWidget.SelectionMode.NoSelection)
         for page in self.pages:
-            item = QListWidgetItem(page.name)
+            item = QListWidgetItem(tr(page.name))
             item.setSizeHint(QSize(_STEPS_PX - 8, _STEP_LINE_PX))
             self.steps.addItem(item)
             self.stack.addWidget(page)
@@ -169,16 +171,19 @@ class RigWizard(QDialog):
         for row, other in enumerate(self.pages):
             item = self.steps.item(row)
             mark = "\N{CHECK MARK}" if other.is_done else "\N{BULLET}" if other is page else "  "
-            item.setText(f" {mark}  {other.name}")
+            item.setText(f" {mark}  {tr(other.name)}")
             font = item.font()
             font.setBold(other is page)
             item.setFont(font)
         is_last = page is self.summary_page
-        self.next_button.setText("&Save" if is_last else "&Next" if page.is_done or page is self.camera_page else "&Skip")
+        self.next_button.setText(
+            tr("&Save") if is_last else tr("&Next") if page.is_done or page is self.camera_page else tr("&Skip")
+        )
         self.next_button.setEnabled(page.may_leave and not busy and (not is_last or self.desk.draft is not None))
         self.back_button.setEnabled(self.stack.currentIndex() > 0 and not busy)
         if busy:
-            self._say(f"{self.desk.busy[0].upper()}{self.desk.busy[1:]} ...")
+            busy = tr_text(self.desk.busy)
+            self._say(f"{busy[0].upper()}{busy[1:]} ...")
         elif self.message.endswith(" ..."):
             self._say("")
         self._look(anew=True)
@@ -186,7 +191,7 @@ class RigWizard(QDialog):
     @Slot(str)
     def _say(self, text: str, is_fault: bool = False) -> None:
         theme.set_sheet(self.line, "color: @FAULT;" if is_fault else "color: @TEXT;")
-        self.line.setText(text)
+        self.line.setText(tr_text(text))
         self.line.setAccessibleName(text)
 
     def _look(self, anew: bool = False) -> None:
@@ -216,6 +221,6 @@ class RigWizard(QDialog):
         except RigFileError as error:
             self._say(str(error), is_fault=True)
             return
-        self._say(f"Saved: {path}")
+        self._say(tr("Saved: {path}", path=path))
         self.saved.emit(rig.name)
         self.accept()

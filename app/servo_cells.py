@@ -7,6 +7,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from app.cells import NONE, SIGN, Cell, Row, Tone, Track, number
+from app.language import mark, tr, tr_text
 from core.safety_config import SafetyConfig
 from core.servo_config import JointConfig, JointName, ServosConfig
 from hardware.servos.status_block import HardwareError, MissingServo, ServoReading, ServoState
@@ -23,31 +24,37 @@ _TRACK_STEPS = 200.0
 class Column(Enum):
     """The columns in order: heading and explanation."""
 
-    JOINT = ("Joint", "Joint, and id of its servo on the bus")
-    POSITION = ("Position mm", "Where the joint is, and where that is within its envelope; darker ends: there it is slowed down")
-    GOAL = ("Goal mm", "The goal that the servo has taken")
-    CURRENT = ("mA", "Motor current in mA")
-    TEMPERATURE = ("°C", "Temperature of the servo in °C")
-    VOLTAGE = ("V", "Supply voltage at the servo in V")
-    TORQUE = ("Torque", "Whether the motor holds")
-    ZERO = ("Zero", "Whether the joint has been zeroed since the servo was switched on")
-    ERROR = ("Error", "What the servo reports, or that it does not answer")
+    JOINT = (mark("Joint"), mark("Joint, and id of its servo on the bus"))
+    POSITION = (
+        mark("Position mm"),
+        mark("Where the joint is, and where that is within its envelope; darker ends: there it is slowed down"),
+    )
+    GOAL = (mark("Goal mm"), mark("The goal that the servo has taken"))
+    CURRENT = ("mA", mark("Motor current in mA"))
+    TEMPERATURE = ("°C", mark("Temperature of the servo in °C"))
+    VOLTAGE = ("V", mark("Supply voltage at the servo in V"))
+    TORQUE = (mark("Torque"), mark("Whether the motor holds"))
+    ZERO = (mark("Zero"), mark("Whether the joint has been zeroed since the servo was switched on"))
+    ERROR = (mark("Error"), mark("What the servo reports, or that it does not answer"))
 
 
 _ERROR_WORDS = {
-    HardwareError.OVERLOAD: ("overload", "overload: the motor was pulled too hard for too long; free the wire"),
-    HardwareError.OVERHEATING: ("overheating", "overheating: let the servo cool down"),
-    HardwareError.INPUT_VOLTAGE: ("input voltage", "input voltage out of range: check the power supply"),
-    HardwareError.ELECTRICAL_SHOCK: ("electric shock", "electric shock on the circuit, or too little power for the motor"),
-    HardwareError.ENCODER: ("encoder", "encoder: the servo does not know where it is; have it repaired"),
+    HardwareError.OVERLOAD: (mark("overload"), mark("overload: the motor was pulled too hard for too long; free the wire")),
+    HardwareError.OVERHEATING: (mark("overheating"), mark("overheating: let the servo cool down")),
+    HardwareError.INPUT_VOLTAGE: (mark("input voltage"), mark("input voltage out of range: check the power supply")),
+    HardwareError.ELECTRICAL_SHOCK: (
+        mark("electric shock"),
+        mark("electric shock on the circuit, or too little power for the motor"),
+    ),
+    HardwareError.ENCODER: (mark("encoder"), mark("encoder: the servo does not know where it is; have it repaired")),
 }
 
 
 def error_words(error: HardwareError) -> str:
     """The error bits as a few words, worst first; empty when there is none."""
-    words = [short for flag, (short, _) in _ERROR_WORDS.items() if error & flag]
+    words = [tr(short) for flag, (short, _) in _ERROR_WORDS.items() if error & flag]
     rest = int(error) & ~sum(int(flag) for flag in _ERROR_WORDS)
-    return ", ".join(words + ([f"error {rest}"] if rest else []))
+    return ", ".join(words + ([tr("error {number}", number=rest)] if rest else []))
 
 
 def servo_rows(status: BusStatus | None, servos: ServosConfig, safety: SafetyConfig) -> tuple[Row, ...]:
@@ -76,10 +83,12 @@ def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, ser
         _position(joint, state),
         Cell(_mm(joint, state.goal_mm), Tone.FAINT if not armed else Tone.PLAIN),
         Cell(NONE if state.current_ma is None else number(state.current_ma, 0)),
-        _signed_cell(f"{state.temperature_c:.0f}", heat, f"warning from {warm:g} °C, limit {hot:g} °C"),
-        _signed_cell(f"{state.voltage_v:.1f}", volts, f"warning from {sags:g} V, limit {low:g} V"),
-        Cell("on", Tone.PLAIN) if state.torque else _signed_cell("off", Tone.BAD if armed else Tone.FAINT),
-        Cell("yes", Tone.PLAIN) if zeroed else _signed_cell("no", Tone.WARN, "zero the joint, with slack wires, before arming"),
+        _signed_cell(f"{state.temperature_c:.0f}", heat, tr("warning from {warm:g} °C, limit {hot:g} °C", warm=warm, hot=hot)),
+        _signed_cell(f"{state.voltage_v:.1f}", volts, tr("warning from {sags:g} V, limit {low:g} V", sags=sags, low=low)),
+        Cell(tr("on"), Tone.PLAIN) if state.torque else _signed_cell(tr("off"), Tone.BAD if armed else Tone.FAINT),
+        Cell(tr("yes"), Tone.PLAIN)
+        if zeroed
+        else _signed_cell(tr("no"), Tone.WARN, tr("zero the joint, with slack wires, before arming")),
         error,
     )
 
@@ -88,15 +97,19 @@ def _unknown(joint: JointConfig, reading: MissingServo | None) -> Row:
     blank = (Cell(NONE, Tone.FAINT),) * (len(Column) - 2)
     if reading is None:
         return (Cell(_name(joint), Tone.FAINT), *blank, Cell(NONE, Tone.FAINT))
-    short = "restarted" if reading.restarted else "silent"
-    tip = "the servo restarted: zero its joint again" if reading.restarted else f"{reading.reason}, {reading.misses} times in a row"
+    short = tr("restarted") if reading.restarted else tr("silent")
+    tip = (
+        tr("the servo restarted: zero its joint again")
+        if reading.restarted
+        else tr("{reason}, {misses} times in a row", reason=tr_text(reading.reason), misses=reading.misses)
+    )
     return (Cell(_name(joint), Tone.BAD), *blank, Cell(short, Tone.BAD, tip))
 
 
 def _position(joint: JointConfig, state: ServoState) -> Cell:
     at = state.position_mm
     if at is None:
-        return Cell(NONE, Tone.FAINT, "not known before the joint is zeroed")
+        return Cell(NONE, Tone.FAINT, tr("not known before the joint is zeroed"))
     span = joint.high_mm - joint.low_mm
     margin = joint.warn_margin_mm
     if not joint.low_mm <= at <= joint.high_mm:
@@ -113,17 +126,22 @@ def _position(joint: JointConfig, state: ServoState) -> Cell:
         share(joint.low_mm + margin),
         share(joint.high_mm - margin),
     )
-    tip = f"envelope {joint.low_mm:g} to {joint.high_mm:g} mm, slow within {margin:g} mm of its ends"
+    tip = tr(
+        "envelope {low_mm:g} to {high_mm:g} mm, slow within {margin:g} mm of its ends",
+        low_mm=joint.low_mm,
+        high_mm=joint.high_mm,
+        margin=margin,
+    )
     return Cell(SIGN[tone] + _mm(joint, at), tone, tip, track)
 
 
 def _error(state: ServoState) -> Cell:
     if state.error:
-        tips = [long for flag, (_, long) in _ERROR_WORDS.items() if state.error & flag]
-        return Cell(error_words(state.error), Tone.BAD, "\n".join(tips) or "see the servo's manual: hardware error status")
+        tips = [tr(long) for flag, (_, long) in _ERROR_WORDS.items() if state.error & flag]
+        return Cell(error_words(state.error), Tone.BAD, "\n".join(tips) or tr("see the servo's manual: hardware error status"))
     if state.watchdog_tripped:
-        return Cell("bus watchdog", Tone.BAD, "nobody talked to the servo: arm again")
-    return Cell("none", Tone.FAINT)
+        return Cell(tr("bus watchdog"), Tone.BAD, tr("nobody talked to the servo: arm again"))
+    return Cell(tr("none"), Tone.FAINT)
 
 
 def _signed_cell(text: str, tone: Tone, tip: str = "") -> Cell:
@@ -131,7 +149,7 @@ def _signed_cell(text: str, tone: Tone, tip: str = "") -> Cell:
 
 
 def _name(joint: JointConfig) -> str:
-    return f"{joint.name.replace('_', ' ')} \N{MIDDLE DOT} {joint.id}"
+    return f"{tr_text(joint.name).replace('_', ' ')} \N{MIDDLE DOT} {joint.id}"
 
 
 def _mm(joint: JointConfig, value_mm: float | None) -> str:
@@ -163,7 +181,7 @@ class PairBalance:
     def word(self) -> str:
         if self.sum_mm is None or self.tone < Tone.WARN:
             return ""
-        return "slack" if self.sum_mm < self.wanted_mm else "too tight"
+        return tr("slack") if self.sum_mm < self.wanted_mm else tr("too tight")
 
 
 def pair_balances(status: BusStatus | None, servos: ServosConfig) -> tuple[PairBalance, PairBalance]:
@@ -195,19 +213,24 @@ def _balance(status: BusStatus | None, servos: ServosConfig, place: int) -> Pair
 def bus_line(status: BusStatus | None, silence_s: float | None = None) -> Cell:
     """Phase, timing and counts of the bus in one line; `silence_s` is how long ago it was heard, when that is too long."""
     if status is None:
-        return Cell("no servo bus: nothing is known about the servos", Tone.FAINT)
+        return Cell(tr("no servo bus: nothing is known about the servos"), Tone.FAINT)
     if silence_s is not None:
-        return Cell(f"!! nothing heard from the servo bus for {silence_s:.0f} s", Tone.BAD)
+        return Cell(tr("!! nothing heard from the servo bus for {seconds:.0f} s", seconds=silence_s), Tone.BAD)
     slow = status.times.period_p99_ms > _CYCLE_P99_LIMIT_MS
-    timing = f"cycle {status.times.period_p50_ms:.1f} ms, {'! ' if slow else ''}p99 {status.times.period_p99_ms:.1f} ms"
+    timing = tr(
+        "cycle {half:.1f} ms, {sign}p99 {most:.1f} ms",
+        half=status.times.period_p50_ms,
+        sign="! " if slow else "",
+        most=status.times.period_p99_ms,
+    )
     parts = [
-        f"bus {status.phase.value}",
-        timing if status.times.period_p50_ms > 0.0 else "cycle not measured yet",
-        f"bad packets {status.bad_packets}",
-        f"clamps {status.clamp_count}",
+        tr("bus {phase}", phase=tr_text(status.phase.value)),
+        timing if status.times.period_p50_ms > 0.0 else tr("cycle not measured yet"),
+        tr("bad packets {count}", count=status.bad_packets),
+        tr("clamps {count}", count=status.clamp_count),
     ]
     whole = f"  {chr(0xB7)}  ".join(parts)
-    tip = f"{whole}\ncycle: half of the periods of the last ten seconds were shorter than the first, 99 % than p99"
+    tip = f"{whole}\n" + tr("cycle: half of the periods of the last ten seconds were shorter than the first, 99 % than p99")
     if broken := [f"{r.name} {error_words(r.error)}" for r in status.servos if isinstance(r, ServoState) and r.error]:
         return Cell(f"!! {'; '.join(broken)}", Tone.BAD, tip)  # for which a narrow table has no room
     return Cell(whole, Tone.WARN if slow else Tone.PLAIN, tip)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import palette
+from app.language import mark, tr, tr_text
 from core.session.events import Event, EventKind
 from core.session.row_index import Timeline
 from core.study.replay import event_target
@@ -23,7 +24,7 @@ class Shape(Enum):
 
     FLAG = "flag"
     TRIANGLE = "triangle"
-    HOLLOW_TRIANGLE = "hollow triangle"
+    HOLLOW_TRIANGLE = mark("hollow triangle")
     DIAMOND = "diamond"
     SQUARE = "square"
     RING = "ring"
@@ -45,15 +46,15 @@ class MarkLook:
 
 
 MARK_LOOK: dict[EventKind, MarkLook] = {
-    EventKind.DROPPED: MarkLook("dropped", "FAULT", Shape.CROSS),
-    EventKind.LOST: MarkLook("lost by the camera", "FAULT", Shape.HOLLOW_TRIANGLE),
-    EventKind.MODE: MarkLook("mode", "SKY", Shape.SQUARE),
-    EventKind.ALERT: MarkLook("alert", "YELLOW", Shape.HOLLOW_TRIANGLE),
-    EventKind.CLEARED: MarkLook("cleared", "TEXT_DIM", Shape.HOLLOW_TRIANGLE),
-    EventKind.TARGET: MarkLook("target", "TARGET", Shape.RING),
-    EventKind.OVERRIDE: MarkLook("override", "ORANGE", Shape.DIAMOND),
-    EventKind.FAULT: MarkLook("fault", "FAULT", Shape.TRIANGLE),
-    EventKind.NOTE: MarkLook("note", "TEXT", Shape.FLAG),
+    EventKind.DROPPED: MarkLook(mark("dropped"), "FAULT", Shape.CROSS),
+    EventKind.LOST: MarkLook(mark("lost by the camera"), "FAULT", Shape.HOLLOW_TRIANGLE),
+    EventKind.MODE: MarkLook(mark("mode"), "SKY", Shape.SQUARE),
+    EventKind.ALERT: MarkLook(mark("alert"), "YELLOW", Shape.HOLLOW_TRIANGLE),
+    EventKind.CLEARED: MarkLook(mark("cleared"), "TEXT_DIM", Shape.HOLLOW_TRIANGLE),
+    EventKind.TARGET: MarkLook(mark("target"), "TARGET", Shape.RING),
+    EventKind.OVERRIDE: MarkLook(mark("override"), "ORANGE", Shape.DIAMOND),
+    EventKind.FAULT: MarkLook(mark("fault"), "FAULT", Shape.TRIANGLE),
+    EventKind.NOTE: MarkLook(mark("note"), "TEXT", Shape.FLAG),
 }
 """Kinds that have a mark; arming and disarming are told by their mode, the file names of the video by nobody."""
 LISTED = tuple(kind for kind in EventKind if kind is not EventKind.VIDEO)
@@ -62,15 +63,15 @@ LISTED = tuple(kind for kind in EventKind if kind is not EventKind.VIDEO)
 class JumpKind(Enum):
     """What N and P go to, in the order of the chooser."""
 
-    STATE = "State change"
-    FAULT = "Fault"
-    OVERRIDE = "Override"
-    NOTE = "Note"
-    MODE = "Mode"
-    TARGET = "Target"
-    GAP = "Gap"
-    REPLAY = "Difference"
-    ANY = "Any event"
+    STATE = mark("State change")
+    FAULT = mark("Fault")
+    OVERRIDE = mark("Override")
+    NOTE = mark("Note")
+    MODE = mark("Mode")
+    TARGET = mark("Target")
+    GAP = mark("Gap")
+    REPLAY = mark("Difference")
+    ANY = mark("Any event")
 
 
 _EVENTS_OF = {
@@ -158,9 +159,10 @@ def target_at(events: Sequence[Event], scene: Scene, time_s: float) -> Point | N
 
 def event_line(event: Event) -> str:
     """What happened, in words."""
-    word = MARK_LOOK[event.kind].word if event.kind in MARK_LOOK else event.kind.value
+    word = tr(MARK_LOOK[event.kind].word if event.kind in MARK_LOOK else event.kind.value)
     detail = event.data.get("detail")
-    text = event.text + (f" ({detail})" if isinstance(detail, str) and detail else "")
+    said = event.text if event.kind is EventKind.NOTE else tr_text(event.text)  # a note is the user's own
+    text = said + (f" ({tr_text(detail)})" if isinstance(detail, str) and detail else "")
     return f"{word}: {text}" if text else word
 
 

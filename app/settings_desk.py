@@ -13,6 +13,8 @@ from PySide6.QtWidgets import QApplication
 
 from app import theme
 from app.engine_thread import Phase
+from app.language import font_problem, tr, wanted
+from app.language_menu import LanguageMenu, next_start_text
 from app.menus import MenuEntry, add_menu
 from app.next_step import Step
 from app.operator_window import OperatorWindow
@@ -20,7 +22,7 @@ from app.settings_dialog import SettingsDialog
 from app.settings_model import SettingsDraft, with_changes
 from app.work_thread import WorkThread
 from core.config import Config, ConfigError, PerceptionConfig
-from core.config_schema import Effect
+from core.config_schema import Effect, with_value
 from core.config_write import write_settings
 from core.control.modes import ARMED_MODES
 from core.profiles import Profiles
@@ -61,7 +63,9 @@ class SettingsDesk(QObject):
         self._timer = QTimer(self)
         self._timer.setInterval(_LOOK_EVERY_MS)
         self._timer.timeout.connect(self._look)
-        add_menu(window, "&File", [MenuEntry("S&ettings...", self.open, ("Ctrl+,",))])
+        add_menu(window, tr("&File"), [MenuEntry(tr("S&ettings..."), self.open, ("Ctrl+,",))])
+        self._languages = LanguageMenu(window, file.config.window.language)
+        self._languages.chosen.connect(self.choose_language)
         window.amend_config = self._amend
         window.may_take = partial(self._may_take, window.may_take)
         window.phase_changed.connect(self._on_phase)
@@ -102,6 +106,17 @@ class SettingsDesk(QObject):
         self._stills.stop(finish=False)
         self._stills.wait()
 
+    @Slot(str)
+    def choose_language(self, code: str) -> None:
+        """Keep another language of the windows, for the next start of the program."""
+        config = with_value(self._saved.model_dump(mode="json"), "window.language", code)
+        if self.dialog is not None:
+            self._window.say(tr("Save or cancel the settings first"), is_fault=True)
+        elif self._keep(Config.model_validate(config)) is not None:
+            problem = font_problem(wanted(code))
+            self._window.say(problem or next_start_text(code), is_fault=bool(problem))
+        self._languages.show_choice(self._saved.window.language)
+
     # ---- trying out
 
     @Slot(object)
@@ -124,7 +139,7 @@ class SettingsDesk(QObject):
             return
         if self._window.recorder.status.recording:
             self._wants_back = True
-            self._window.say("The session goes on with the thresholds that it was begun with")
+            self._window.say(tr("The session goes on with the thresholds that it was begun with"))
             return
         tried, self._tried, self._wants_back = self._tried, None, False
         _take_theme(self._window.config)
@@ -151,7 +166,7 @@ class SettingsDesk(QObject):
 
     def _may_take(self, others: Callable[[Step], bool], step: Step) -> bool:
         if self.is_trying and step in (Step.ARM, Step.HAND_OVER):
-            self._window.say("Not while settings are tried out: save or cancel them first", is_fault=True)
+            self._window.say(tr("Not while settings are tried out: save or cancel them first"), is_fault=True)
             return False
         return others(step)
 
@@ -163,20 +178,31 @@ class SettingsDesk(QObject):
         config = dialog.draft.config if dialog is not None else None
         if dialog is None or config is None or self._why_locked():
             return
-        try:
-            note = write_settings(self._file.path, config, self._file.text)
-        except ConfigError as error:
-            dialog.show_notice(str(error), is_fault=True)
+        before, note = self._saved, self._keep(config)
+        if note is None:
             return
-        before, self._saved, self._tried = self._saved, config, None
-        self._file = SettingsFile(self._file.path, {}, _text_of(self._file))
+        self._tried = None
         self._window.take_settings(with_changes(self._window.config, before, config, _NOW))
         _take_theme(self._window.config)
-        self._window.say(f"Settings saved in {self._file.path}" + (f". {note}" if note else ""))
+        self._window.say(tr("Settings saved in {path}", path=self._file.path) + (f". {note}" if note else ""))
         dialog.draft.mark_saved()
         dialog.accept()
         if restart:
             self._window.use_config(self._window.config)
+
+    def _keep(self, config: Config) -> str | None:
+        """Write the file; a note about the old one, None when it could not be written."""
+        try:
+            note = write_settings(self._file.path, config, self._file.text)
+        except ConfigError as error:
+            if self.dialog is not None:
+                self.dialog.show_notice(str(error), is_fault=True)
+            else:
+                self._window.say(str(error), is_fault=True)
+            return None
+        self._saved = config
+        self._file = SettingsFile(self._file.path, {}, _text_of(self._file))
+        return note
 
     def _amend(self, config: Config) -> Config:
         """What waited for a rig to be opened."""
@@ -196,9 +222,9 @@ class SettingsDesk(QObject):
     def _why_locked(self) -> str:
         view = self._window.desk.view
         if view is not None and view.mode in ARMED_MODES:
-            return "The robot is armed: settings can be changed when it is disarmed"
+            return tr("The robot is armed: settings can be changed when it is disarmed")
         if self._window.recorder.status.recording:
-            return "A session is being recorded: settings can be changed when it has ended"
+            return tr("A session is being recorded: settings can be changed when it has ended")
         return ""
 
     @Slot()

@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 )
 
 from app import theme
+from app.language import tr
 from app.settings_model import SettingsDraft, search
 from app.widgets.profile_row import ProfileRow
 from app.widgets.setting_page import SettingPage
@@ -72,14 +73,14 @@ class SettingsDialog(QDialog):
         self.page = SettingPage(draft)
         self.profile_row = ProfileRow()
         self.status, self.notice = QLabel(), QLabel()
-        self.reset_all, self.cancel = QPushButton("Reset all"), QPushButton("Cancel")
-        self.save, self.save_and_restart = QPushButton("Save"), QPushButton("Save, and start the rig again")
+        self.reset_all, self.cancel = QPushButton(tr("Reset all")), QPushButton(tr("Cancel"))
+        self.save, self.save_and_restart = QPushButton(tr("Save")), QPushButton(tr("Save, and start the rig again"))
         self._items: dict[str, QTreeWidgetItem] = {}
         self._search_soon = QTimer(self)
         self._search_soon.setSingleShot(True)
         self._search_soon.setInterval(_SEARCH_AFTER_MS)
         self.setObjectName("settings")
-        self.setWindowTitle("LumenPilot \N{EM DASH} settings")
+        self.setWindowTitle(tr("LumenPilot \N{EM DASH} settings"))
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._lay_out()
         self._fill_tree()
@@ -159,7 +160,7 @@ class SettingsDialog(QDialog):
         self._changed()
 
     def _ask_reset_all(self) -> None:
-        self.profile_row.ask("Put all settings back to their defaults?", "Reset all", self._reset_everything)
+        self.profile_row.ask(tr("Put all settings back to their defaults?"), tr("Reset all"), self._reset_everything)
 
     def _reset_everything(self) -> None:
         self.draft.load(self.draft.default)
@@ -182,9 +183,15 @@ class SettingsDialog(QDialog):
                 if item.text(1) == mark and item.toolTip(0):
                     continue
                 item.setText(1, mark)
-                words = "something is not allowed" if is_wrong else f"{count} differ from the default" if count else "as by default"
+                words = (
+                    tr("something is not allowed")
+                    if is_wrong
+                    else tr("{count} differ from the default", count=count)
+                    if count
+                    else tr("as by default")
+                )
                 item.setToolTip(0, f"{section.key}: {words}")
-                item.setData(0, Qt.ItemDataRole.AccessibleTextRole, f"{section.title}, {words}")
+                item.setData(0, Qt.ItemDataRole.AccessibleTextRole, f"{tr(section.title)}, {words}")
         effects = self.draft.effects()
         may_save = not self._locked and self.draft.config is not None and self.draft.is_dirty
         self.save.setEnabled(may_save)
@@ -200,15 +207,15 @@ class SettingsDialog(QDialog):
         if problem is not None:
             return f'\N{WARNING SIGN}  <a href="{problem[0]}">{problem[0]}</a>: {problem[1]}'
         if not self.draft.is_dirty:
-            return f"Saved in {self._path}"
+            return tr("Saved in {path}", path=self._path)
         count = len(self.draft.unsaved_keys())
-        parts = [f"{count} not saved"]
+        parts = [tr("{count} not saved", count=count)]
         if Effect.NOW in effects:
-            parts.append("the picture shows it already; Cancel puts it back")
+            parts.append(tr("the picture shows it already; Cancel puts it back"))
         if Effect.RIG in effects:
-            parts.append("some act when the rig is started again")
+            parts.append(tr("some act when the rig is started again"))
         if Effect.PROGRAM in effects:
-            parts.append("some at the next start of the program")
+            parts.append(tr("some at the next start of the program"))
         return "; ".join(parts)
 
     # ---- searching
@@ -219,7 +226,7 @@ class SettingsDialog(QDialog):
             self.show_section(self._section)
             return
         self.tree.clearSelection()
-        self.page.show_groups(search(words), f"Nothing has {words} in its name, meaning or unit")
+        self.page.show_groups(search(words), tr("Nothing has {words} in its name, meaning or unit", words=words))
 
     def _on_tree(self) -> None:
         item = self.tree.currentItem()
@@ -250,21 +257,23 @@ class SettingsDialog(QDialog):
 
     def _ask_save_profile(self, name: str) -> None:
         if self._profiles.exists(name):
-            self.profile_row.ask(f"There is a profile {name} already. Replace it?", "Replace", partial(self._save_profile, name))
+            self.profile_row.ask(
+                tr("There is a profile {name} already. Replace it?", name=name), tr("Replace"), partial(self._save_profile, name)
+            )
         else:
             self._save_profile(name)
 
     def _save_profile(self, name: str) -> None:
         config = self.draft.config
         if config is None:
-            self.show_notice("First mend what is not allowed", is_fault=True)
+            self.show_notice(tr("First mend what is not allowed"), is_fault=True)
             return
-        self._do(lambda: self._profiles.save(name, config)[1] or f"Saved as profile {name}")
+        self._do(lambda: self._profiles.save(name, config)[1] or tr("Saved as profile {name}", name=name))
 
     def _delete_profile(self, profile: Profile) -> None:
         def delete() -> str:
             self._profiles.delete(profile)
-            return f"Profile {profile.name} deleted"
+            return tr("Profile {name} deleted", name=profile.name)
 
         self._do(delete)
 
@@ -319,7 +328,7 @@ class SettingsDialog(QDialog):
 
     def _fill_tree(self) -> None:
         def add(parent: QTreeWidget | QTreeWidgetItem, section: Section) -> None:
-            item = QTreeWidgetItem(parent, [section.title, ""])
+            item = QTreeWidgetItem(parent, [tr(section.title), ""])
             item.setData(0, _KEY_ROLE, section.key)
             item.setSizeHint(0, QSize(0, _ROW_PX))
             item.setTextAlignment(1, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -332,20 +341,20 @@ class SettingsDialog(QDialog):
         self._items["perception"].setExpanded(True)
 
     def _lay_out(self) -> None:
-        self.search.setPlaceholderText("Search name, meaning, unit  (Ctrl+F)")
-        self.search.setAccessibleName("Search settings")
+        self.search.setPlaceholderText(tr("Search name, meaning, unit  (Ctrl+F)"))
+        self.search.setAccessibleName(tr("Search settings"))
         self.search.setClearButtonEnabled(True)
         self.tree.setColumnCount(2)
         self.tree.setHeaderHidden(True)
         self.tree.header().setStretchLastSection(False)
         self.tree.header().setSectionResizeMode(0, self.tree.header().ResizeMode.Stretch)
         self.tree.header().setSectionResizeMode(1, self.tree.header().ResizeMode.ResizeToContents)
-        self.tree.setAccessibleName("Sections")
+        self.tree.setAccessibleName(tr("Sections"))
         self.tree.setIndentation(14)
         self.notice.setWordWrap(True)
         self.status.setWordWrap(True)
         self.status.setObjectName("setting_meaning")
-        self.status.setAccessibleName("State of the settings")
+        self.status.setAccessibleName(tr("State of the settings"))
         top = QHBoxLayout()
         top.setSpacing(20)
         top.addWidget(self.search, 2)

@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from app.language import tr, tr_text
 from core.config import Config, load_config
 from core.config_schema import Effect, Kind, Section, Setting, schema, settings_by_key, value_at, with_value
 from core.config_write import changed_keys
@@ -164,10 +165,10 @@ def parse(setting: Setting, entry: object) -> tuple[Any, str]:
     if setting.kind is Kind.SWITCH:
         return bool(entry), ""
     if setting.kind is Kind.CHOICE:
-        return (entry, "") if entry in setting.choices else (None, f"must be one of: {setting.range_text}")
+        return (entry, "") if entry in setting.choices else (None, tr("must be one of: {range}", range=tr_text(setting.range_text)))
     text = as_text(entry).strip()
     if not text:
-        return (None, "") if setting.is_optional else (None, f"must not be empty{_wanted(setting)}")
+        return (None, "") if setting.is_optional else (None, tr("must not be empty{allowed}", allowed=_wanted(setting)))
     if setting.kind is Kind.TEXT:
         return text, ""
     return _number(setting, text)
@@ -179,21 +180,21 @@ def _number(setting: Setting, text: str) -> tuple[Any, str]:
     try:
         value = float(text)
     except ValueError:
-        return None, f"not a number{_wanted(setting)}"
+        return None, tr("not a number{allowed}", allowed=_wanted(setting))
     if not math.isfinite(value):
-        return None, f"not a finite number{_wanted(setting)}"
+        return None, tr("not a finite number{allowed}", allowed=_wanted(setting))
     if setting.kind is Kind.WHOLE and not value.is_integer():
-        return None, f"must be a whole number{_wanted(setting)}"
+        return None, tr("must be a whole number{allowed}", allowed=_wanted(setting))
     bounds = setting.bounds
     is_low = bounds.low is not None and (value <= bounds.low if bounds.low_open else value < bounds.low)
     is_high = bounds.high is not None and (value >= bounds.high if bounds.high_open else value > bounds.high)
     if is_low or is_high:
-        return None, f"must be {setting.range_text}"
+        return None, tr("must be {range}", range=tr_text(setting.range_text))
     return int(value) if setting.kind is Kind.WHOLE else value, ""
 
 
 def _wanted(setting: Setting) -> str:
-    return f"; allowed: {setting.range_text}" if setting.range_text else ""
+    return tr("; allowed: {range}", range=tr_text(setting.range_text)) if setting.range_text else ""
 
 
 def _own_message(data: dict[str, Any], key: str) -> str:
@@ -204,13 +205,13 @@ def _own_message(data: dict[str, Any], key: str) -> str:
         for found in error.errors():
             if ".".join(str(part) for part in found["loc"]) == key:
                 if found["type"] == "string_pattern_mismatch":
-                    return f"has not the right form: {settings_by_key()[key].description}"
+                    return tr("has not the right form: {description}", description=tr(settings_by_key()[key].description))
                 return _sentence(found["msg"])
     return ""
 
 
 def _sentence(message: str) -> str:
-    return message.removeprefix("Value error, ")
+    return tr_text(message.removeprefix("Value error, "))
 
 
 def as_text(value: object) -> str:
@@ -234,7 +235,8 @@ def search(words: str) -> list[tuple[Section, list[Setting]]]:
 
 
 def _haystack(section: Section, setting: Setting) -> str:
-    parts = (section.title, setting.key.replace(".", " "), setting.title, setting.description, setting.unit, setting.range_text)
+    shown = (section.title, setting.title, setting.description)
+    parts = (*shown, *(tr(text) for text in shown), setting.key.replace(".", " "), setting.unit, setting.range_text)
     return " ".join(parts).casefold()
 
 

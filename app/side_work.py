@@ -12,6 +12,7 @@ from app.after_session import AfterSession, open_file
 from app.annotate_sources import default_store
 from app.crash_report import Crash, CrashWatch, crash_of_last_run
 from app.engine_thread import Phase
+from app.language import tr
 from app.menus import MenuEntry, add_menu
 from app.model_menu import ModelMenu
 from app.next_step import Step
@@ -80,22 +81,22 @@ class SideWork(QObject):
     def _add_menus(self) -> None:
         window = self._window
         session = [
-            MenuEntry("&Evaluate the newest session", partial(self._with_newest, self.after.evaluate)),
-            MenuEntry("&Annotate the newest session", partial(self._with_newest, self.after.annotate)),
-            MenuEntry("&Play the newest session", partial(self._with_newest, self.after.play)),
-            MenuEntry("&Open another session...", self._choose_session),
+            MenuEntry(tr("&Evaluate the newest session"), partial(self._with_newest, self.after.evaluate)),
+            MenuEntry(tr("&Annotate the newest session"), partial(self._with_newest, self.after.annotate)),
+            MenuEntry(tr("&Play the newest session"), partial(self._with_newest, self.after.play)),
+            MenuEntry(tr("&Open another session..."), self._choose_session),
             None,
-            MenuEntry("Look for &cut sessions", partial(self.recovery.look, again=True)),
+            MenuEntry(tr("Look for &cut sessions"), partial(self.recovery.look, again=True)),
         ]
-        add_menu(window, "&Session", session)
-        add_menu(window, "&Robot", [MenuEntry("Chec&ks before driving...", self.checks.open_list, ("F2",))])
+        add_menu(window, tr("&Session"), session)
+        add_menu(window, tr("&Robot"), [MenuEntry(tr("Chec&ks before driving..."), self.checks.open_list, ("F2",))])
 
     def start(self) -> None:
         """Look for what the last run left behind."""
         QTimer.singleShot(_LOOK_AFTER_MS, self, self.recovery.look)
         crash = crash_of_last_run(self._state / "crashes")
         if crash is not None and crash.report is not None:
-            self._offer_report("The last run of the program crashed", crash)
+            self._offer_report(tr("The last run of the program crashed"), crash)
 
     def close(self) -> None:
         """The window closes."""
@@ -119,16 +120,16 @@ class SideWork(QObject):
     def _with_newest(self, step: object) -> None:
         session = self.after.session
         if session is None:
-            self._window.say("No session yet: F9 records one", False)
+            self._window.say(tr("No session yet: F9 records one"), False)
         elif callable(step):
             step(session)
 
     def _choose_session(self) -> None:
         folder = sessions_folder(self._window.config.record.folder)
-        dialog = QFileDialog(self._window, "A recorded session", str(folder))
+        dialog = QFileDialog(self._window, tr("A recorded session"), str(folder))
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-        dialog.fileSelected.connect(lambda path: self.after.offer(Path(path), "Session"))
+        dialog.fileSelected.connect(lambda path: self.after.offer(Path(path), tr("Session")))
         dialog.finished.connect(dialog.deleteLater)
         dialog.show()  # not open(): the STOP button must stay within reach
 
@@ -150,18 +151,18 @@ class SideWork(QObject):
     def _against_another_model(self) -> str:
         view = self._window.desk.view
         if view is not None and view.mode in ARMED_MODES:
-            return "the program is armed; disarm first (Shift+F6)"
+            return tr("the program is armed; disarm first (Shift+F6)")
         return ""
 
     def _cost_of_another_model(self) -> str:
-        ends = " The recording ends." if self._is_recording else ""
-        return f"The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}"
+        ends = tr(" The recording ends.") if self._is_recording else ""
+        return tr("The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}", ends=ends)
 
     def _use_model(self, name: str) -> None:
         config = self._window.config
         segmentation = config.perception.segmentation.model_copy(update={"model": name})
         perception = config.perception.model_copy(update={"segmentation": segmentation})
-        self._window.say(f"Model {name} from now on, until the program ends", False)
+        self._window.say(tr("Model {name} from now on, until the program ends", name=name), False)
         self._window.use_config(config.model_copy(update={"perception": perception}))
 
     def train(self) -> None:
@@ -172,7 +173,7 @@ class SideWork(QObject):
             return
         session = self.after.session
         start = default_store([session]).parent if session is not None else sessions_folder(self._window.config.record.folder)
-        dialog = QFileDialog(self._window, "Annotations to train on", str(start), "Annotations (*.sqlite)")
+        dialog = QFileDialog(self._window, tr("Annotations to train on"), str(start), tr("Annotations (*.sqlite)"))
         dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
         dialog.fileSelected.connect(lambda path: self.open_training(Path(path)))
         dialog.finished.connect(dialog.deleteLater)
@@ -188,7 +189,7 @@ class SideWork(QObject):
         self.training.show()
 
     def _on_installed(self, name: str) -> None:
-        self._window.say(f"Model {name} is installed; choose it in the Model menu", False)
+        self._window.say(tr("Model {name} is installed; choose it in the Model menu", name=name), False)
 
     # ---- crashes
 
@@ -200,20 +201,28 @@ class SideWork(QObject):
         self._window.recorder.stop("the program met an unforeseen error")
 
     def _show_crash(self, crash: Crash) -> None:
-        where = f"The report is {crash.report}" if crash.report is not None else "The report could not be written"
+        where = (
+            tr("The report is {report}", report=crash.report) if crash.report is not None else tr("The report could not be written")
+        )
         box = QMessageBox(
-            QMessageBox.Icon.Critical, "Unforeseen error", f"The program met an error: {crash.what}", parent=self._window
+            QMessageBox.Icon.Critical,
+            tr("Unforeseen error"),
+            tr("The program met an error: {what}", what=crash.what),
+            parent=self._window,
         )
         box.setInformativeText(
-            f"The servos were stopped, and a recording that ran was ended and is whole.\n\n{where}.\n\n"
-            "Best close the program and start it again. Space is still STOP."
+            tr(
+                "The servos were stopped, and a recording that ran was ended and is whole.\n\n{where}.\n\nBest close the program "
+                "and start it again. Space is still STOP.",
+                where=where,
+            )
         )
-        leave = box.addButton("Close the program", QMessageBox.ButtonRole.AcceptRole)
+        leave = box.addButton(tr("Close the program"), QMessageBox.ButtonRole.AcceptRole)
         if crash.report is not None:
-            show = box.addButton("Show the report", QMessageBox.ButtonRole.ActionRole)
+            show = box.addButton(tr("Show the report"), QMessageBox.ButtonRole.ActionRole)
             show.clicked.disconnect()  # it answers nothing: the box stays
             show.clicked.connect(partial(open_file, crash.report))
-        box.addButton("Go on", QMessageBox.ButtonRole.RejectRole)
+        box.addButton(tr("Go on"), QMessageBox.ButtonRole.RejectRole)
         box.setDefaultButton(leave)
         box.setModal(False)
         box.buttonClicked.connect(lambda button: self._window.close() if button is leave else None)
@@ -223,5 +232,7 @@ class SideWork(QObject):
     def _offer_report(self, text: str, crash: Crash) -> None:
         report = crash.report
         assert report is not None
-        show = Answer("Show the report", partial(open_file, report), str(report))
-        self._offers.offer(Offer(_CRASH, text, f"{crash.what}. The report: {report}", (show,), is_fault=True))
+        show = Answer(tr("Show the report"), partial(open_file, report), str(report))
+        self._offers.offer(
+            Offer(_CRASH, text, tr("{what}. The report: {report}", what=crash.what, report=report), (show,), is_fault=True)
+        )

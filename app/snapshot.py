@@ -12,6 +12,7 @@ import cv2
 import platformdirs
 from PySide6.QtCore import QObject, QRunnable, QThreadPool, Signal
 
+from app.language import tr
 from app.overlay_picture import draw_overlay
 from app.scene_json import scene_to_json
 from core.types import Image, Tick
@@ -107,9 +108,13 @@ class _Job(QRunnable):
         try:
             path = write_snapshot(folder, self._tick, self._origin, self._now)
         except OSError as error:
-            self._writer.failed.emit(f"Snapshot not saved: {error.filename or folder}: {error.strerror or error}")
+            self._writer.failed.emit(
+                tr("Snapshot not saved: {file}: {why}", file=error.filename or folder, why=error.strerror or error)
+            )
         except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible line
             _log.error("the snapshot was not written", exc_info=error)
-            self._writer.failed.emit(f"Snapshot not saved: unexpected {type(error).__name__}: {' '.join(str(error).split())}")
+            self._writer.failed.emit(
+                tr("Snapshot not saved: unexpected {kind}: {why}", kind=type(error).__name__, why=" ".join(str(error).split()))
+            )
         else:
-            self._writer.saved.emit(f"Snapshot saved: {path} (with _overlay.png and .json)")
+            self._writer.saved.emit(tr("Snapshot saved: {path} (with _overlay.png and .json)", path=path))

@@ -37,7 +37,9 @@ _SEEN = 3.0
 """Contrast from which on a plain shape is seen (WCAG 2.1)."""
 _CHOSEN = "lumenpilot_theme"
 _SHEET = "lumenpilot_sheet"
-_FAMILIES = ["Inter", "Segoe UI", "Noto Sans", "DejaVu Sans", "sans-serif"]
+_FAMILIES = ["Inter", "Segoe UI", "Noto Sans", "DejaVu Sans"]
+_CHINESE_FAMILIES = ["Noto Sans CJK SC", "Source Han Sans SC", "Microsoft YaHei", "PingFang SC", "WenQuanYi Micro Hei"]
+"""For letters that the others do not have; without a name the system may take Japanese shapes of them."""
 
 
 def colour(name: str, alpha: float = 1.0) -> QColor:
@@ -58,7 +60,7 @@ def edge_of(name: str) -> QPen:
 def font(size: Size | int = Size.BODY, weight: QFont.Weight = QFont.Weight.Normal) -> QFont:
     """The interface font with digits of equal width, so that nothing moves when a number changes. Copy it before you change it."""
     result = QFont()
-    result.setFamilies(_FAMILIES)
+    result.setFamilies([*_FAMILIES, *_CHINESE_FAMILIES, "sans-serif"])
     result.setPixelSize(size if isinstance(size, int) else _PIXELS[size])
     result.setWeight(weight)
     result.setFeature(QFont.Tag("tnum"), 1)

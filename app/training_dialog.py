@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from app import theme
 from app.installed_models import InstalledModel, installed_models
+from app.language import tr, tr_text
 from app.training_job import STEPS, Collect, Phase, TrainingJob, TrainingState, Wish, name_problem
 from app.widgets.before_after import BeforeAfter
 from app.widgets.card import Card
@@ -38,16 +39,16 @@ class TrainingDialog(QDialog):
     def __init__(self, collect: Collect, source: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.job = TrainingJob(collect, self)
-        self.setWindowTitle("Train on my annotations")
+        self.setWindowTitle(tr("Train on my annotations"))
         self.setModal(False)
         self.resize(_SIZE)
         self.name, self.init, self.steps = QLineEdit(), QComboBox(), QSpinBox()
-        self.start, self.stop = QPushButton("&Train"), QPushButton("&Stop, keep what was learnt")
-        self.hide_button = QPushButton("&Close")
+        self.start, self.stop = QPushButton(tr("&Train")), QPushButton(tr("&Stop, keep what was learnt"))
+        self.hide_button = QPushButton(tr("&Close"))
         self.curves, self.pictures = TrainingCurves(), BeforeAfter()
         self._bar, self._line = QProgressBar(), QLabel()
         self._fill_form()
-        heading = QLabel(f"Masks from {source}")
+        heading = QLabel(tr("Masks from {source}", source=source))
         heading.setObjectName("card_title")
         column = QVBoxLayout(self)
         column.setContentsMargins(16, 12, 16, 12)
@@ -79,16 +80,16 @@ class TrainingDialog(QDialog):
     def _fill_form(self) -> None:
         self.name.setMaxLength(40)
         self.name.setText(_free_name())
-        self.name.setAccessibleName("Name of the new model")
+        self.name.setAccessibleName(tr("Name of the new model"))
         for model in installed_models():
             if not model.problem:
                 self.init.addItem(_title(model), model.name)
-        self.init.setAccessibleName("Model to start from")
+        self.init.setAccessibleName(tr("Model to start from"))
         self.steps.setRange(10, 20_000)
         self.steps.setSingleStep(100)
         self.steps.setValue(STEPS)
-        self.steps.setSuffix(" steps")
-        self.steps.setAccessibleName("Steps of training")
+        self.steps.setSuffix(tr(" steps"))
+        self.steps.setAccessibleName(tr("Steps of training"))
         self._line.setWordWrap(True)
         self._line.setMinimumHeight(38)
         self._bar.setTextVisible(False)
@@ -99,7 +100,11 @@ class TrainingDialog(QDialog):
 
     def _form(self) -> QHBoxLayout:
         row = QHBoxLayout()
-        for word, field, stretch in (("New model", self.name, 2), ("starts from", self.init, 3), ("for", self.steps, 1)):
+        for word, field, stretch in (
+            (tr("New model"), self.name, 2),
+            (tr("starts from"), self.init, 3),
+            (tr("for"), self.steps, 1),
+        ):
             label = QLabel(word)
             label.setBuddy(field)
             row.addWidget(label)
@@ -135,23 +140,32 @@ class TrainingDialog(QDialog):
 
 def _words(state: TrainingState) -> str:
     if state.phase is Phase.IDLE:
-        return (
+        return tr(
             "The masks become two sets: one to learn from, and a fifth of the pictures that stays out and shows whether it helped. "
             "It runs at low priority, and the new model is used only when you choose it."
         )
     if state.phase is not Phase.RUNNING or not state.step:
-        return state.line
-    left = f", {_duration(state.left_s)} left" if state.left_s is not None else ""
+        return tr_text(state.line)
+    left = tr(", {duration} left", duration=_duration(state.left_s)) if state.left_s is not None else ""
     _, loss, vessel, robot = state.curve[-1]
-    return f"Step {state.step} of {state.steps}{left}. Loss {loss:.3f}, Dice vessel {vessel:.2f}, robot {robot:.2f}. {state.line}"
+    return tr(
+        "Step {step} of {steps}{left}. Loss {loss:.3f}, Dice vessel {vessel:.2f}, robot {robot:.2f}. {line}",
+        step=state.step,
+        steps=state.steps,
+        left=left,
+        loss=loss,
+        vessel=vessel,
+        robot=robot,
+        line=tr_text(state.line),
+    )
 
 
 def _duration(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
+    return f"{seconds:.0f} s" if seconds < 90 else tr("{minutes:.0f} min", minutes=seconds / 60)
 
 
 def _title(model: InstalledModel) -> str:
-    return f"{model.name} (own)" if model.is_own else model.name
+    return tr("{name} (own)", name=model.name) if model.is_own else model.name
 
 
 def _free_name() -> str:

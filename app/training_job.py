@@ -16,6 +16,7 @@ import platformdirs
 from PySide6.QtCore import QObject, Signal
 
 from app.child_process import ChildProcess, command_of
+from app.language import tr, tr_text
 from app.work_thread import WorkThread
 from core.learning.model_file import MODELS, own_models
 from core.study.annotation_images import FoundImage
@@ -89,9 +90,9 @@ class Wish:
 def name_problem(name: str) -> str:
     """Why a model cannot be called so; empty when it can."""
     if not _NAME.fullmatch(name):
-        return "a name is letters, digits, - and _, 40 at most"
+        return tr("a name is letters, digits, - and _, 40 at most")
     if (MODELS / name).exists() or (own_models() / name).exists():
-        return f"there is a model {name} already; choose another name"
+        return tr("there is a model {name} already; choose another name", name=name)
     return ""
 
 
@@ -131,10 +132,10 @@ class TrainingJob(QObject):
         if self.state.is_busy:
             return
         if problem := name_problem(wish.name):
-            self._show(TrainingState(Phase.FAILED, f"Not started: {problem}", steps=wish.steps))
+            self._show(TrainingState(Phase.FAILED, tr("Not started: {why}", why=tr_text(problem)), steps=wish.steps))
             return
         self._wish, self._told = wish, _Told()
-        self._show(TrainingState(Phase.PREPARING, "Collecting the masks", wish.name, wish.steps))
+        self._show(TrainingState(Phase.PREPARING, tr("Collecting the masks"), wish.name, wish.steps))
         collect = self._collect
         out = self._folder / f"{wish.name}_{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
 
@@ -153,7 +154,7 @@ class TrainingJob(QObject):
     def stop(self) -> None:
         """End it soon; what was learnt until then becomes the model."""
         if self._child is not None and self.state.phase is Phase.RUNNING:
-            line = "Stopping; what was learnt is kept, which takes some seconds"
+            line = tr("Stopping; what was learnt is kept, which takes some seconds")
             self._show(replace(self.state, phase=Phase.STOPPING, line=line))
             self._child.ask_to_end()
 
@@ -170,7 +171,7 @@ class TrainingJob(QObject):
         self.changed.emit(state)
 
     def _on_not_prepared(self, _key: object, line: str) -> None:
-        self._show(TrainingState(Phase.FAILED, f"Not started: {line}", self._wish.name, self._wish.steps))
+        self._show(TrainingState(Phase.FAILED, tr("Not started: {why}", why=tr_text(line)), self._wish.name, self._wish.steps))
 
     def _on_prepared(self, _key: object, frames: OwnFrames) -> None:
         wish, out = self._wish, own_models() / self._wish.name
@@ -180,7 +181,11 @@ class TrainingJob(QObject):
         child.told.connect(self._on_told)
         child.ended.connect(self._on_ended)
         self._child = child
-        counted = f"{frames.train_count} pictures to learn from, {frames.held_out_count} held out to judge by"
+        counted = tr(
+            "{learning} pictures to learn from, {held_out} held out to judge by",
+            learning=frames.train_count,
+            held_out=frames.held_out_count,
+        )
         self._show(replace(self.state, phase=Phase.RUNNING, line=counted, frames=frames))
         child.start()
 
@@ -207,19 +212,26 @@ class TrainingJob(QObject):
             self._show(replace(self.state, phase=Phase.DONE, line=self._outcome(), left_s=None))
             self.installed.emit(self._wish.name)
         else:
-            why = line or (f"it was ended by signal {-code}" if code < 0 else f"exit code {code}")
-            self._show(replace(self.state, phase=Phase.FAILED, line=f"Training failed: {why}", left_s=None))
+            why = line or (tr("it was ended by signal {number}", number=-code) if code < 0 else tr("exit code {code}", code=code))
+            self._show(replace(self.state, phase=Phase.FAILED, line=tr("Training failed: {why}", why=why), left_s=None))
 
     def _outcome(self) -> str:
         """What came of it, in one line."""
         done, steps = self._told.records.get("steps_done"), self._told.records.get("steps")
-        early = f" after {done} of {steps} steps" if done != steps else ""
+        early = tr(" after {done} of {steps} steps", done=done, steps=steps) if done != steps else ""
         looks = self.state.looks
         if len(looks) < 2:
-            return f"Model {self._wish.name} is installed{early}; choose it in the Model menu"
+            return tr("Model {name} is installed{early}; choose it in the Model menu", name=self._wish.name, early=early)
         first, last = looks[0], looks[-1]
-        vessel = f"vessel {first.vessel_dice:.2f} \N{RIGHTWARDS ARROW} {last.vessel_dice:.2f}"
-        robot = f"robot {first.robot_dice:.2f} \N{RIGHTWARDS ARROW} {last.robot_dice:.2f}"
+        vessel = tr("vessel {before:.2f} → {after:.2f}", before=first.vessel_dice, after=last.vessel_dice)
+        robot = tr("robot {before:.2f} → {after:.2f}", before=first.robot_dice, after=last.robot_dice)
         worse = last.vessel_dice + last.robot_dice < first.vessel_dice + first.robot_dice
-        verdict = "It is WORSE than before on the held-out pictures" if worse else "Choose it in the Model menu"
-        return f"Model {self._wish.name} is installed{early}. Dice on held-out pictures: {vessel}, {robot}. {verdict}"
+        verdict = tr("It is WORSE than before on the held-out pictures") if worse else tr("Choose it in the Model menu")
+        return tr(
+            "Model {name} is installed{early}. Dice on held-out pictures: {vessel}, {robot}. {verdict}",
+            name=self._wish.name,
+            early=early,
+            vessel=vessel,
+            robot=robot,
+            verdict=verdict,
+        )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.rig_engine import EngineMaker
 from app.sources import VIDEO_ENDINGS
-from core.config import Config, load_config, merge
+from core.config import Config, WindowConfig, load_config, merge
 from core.devices import DeviceError
 from core.errors import UserError
 from core.profiles import settings_of_windows
@@ -82,15 +82,16 @@ def make_window(config: Config, kind: RigKind, maker: EngineMaker | None = None)
     """The window, not shown yet. There must be an application."""
     from app.operator_window import OperatorWindow
 
-    return OperatorWindow(config, maker or EngineMaker(), kind, list(PHANTOM_TITLES.items()) if kind is RigKind.SIM else [])
+    return OperatorWindow(config, maker or EngineMaker(), kind, list(PHANTOM_TITLES.items()))
 
 
-def make_application(theme_name: str = "dark") -> QApplication:
-    """The one application object, with theme ("dark", "light" or "system") and names."""
+def make_application(look: WindowConfig | None = None) -> QApplication:
+    """The one application object, with names, theme and language; both as `look` has them, else dark and English."""
     from PySide6.QtWidgets import QApplication
 
     from app import theme
     from app.about import program_icon
+    from app.language import ENGLISH, use_language
 
     sys.setswitchinterval(_SWITCH_S)
     application = QApplication.instance() or QApplication([sys.argv[0]])
@@ -98,7 +99,8 @@ def make_application(theme_name: str = "dark") -> QApplication:
     application.setApplicationName("LumenPilot")
     application.setDesktopFileName("lumenpilot")  # the desktop entry that `make install` writes
     application.setWindowIcon(program_icon())
-    theme.apply_theme(application, theme_name)
+    use_language(application, look.language if look is not None else ENGLISH)
+    theme.apply_theme(application, look.theme if look is not None else theme.Theme.DARK)
     return application
 
 
@@ -107,6 +109,7 @@ def run_window(
 ) -> int:
     """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
     from app.crash_report import CrashWatch, state_folder
+    from app.language import language_problem
     from app.layout_keeper import LayoutKeeper, Parts, overlay_switches
     from app.operator_devices import OperatorDevices
     from app.rig_desk import RigDesk
@@ -119,7 +122,7 @@ def run_window(
     file = settings_of_windows(config_path)
     is_own = config_path is None and not until_first_frame  # what is measured does not depend on who measures
     config, kind = window_config(rig, config_path, source, file.data if is_own else None)
-    application = make_application(config.window.theme)
+    application = make_application(config.window)
     maker = EngineMaker()
     window = make_window(config, kind, maker)
     watch = CrashWatch(state_folder() / "crashes", lambda: window.config.model_dump(mode="json"))
@@ -130,8 +133,7 @@ def run_window(
         panels = window.panels
         switches = overlay_switches(panels.overlay_bar)
         LayoutKeeper(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
-    wanted: list[str] = []
-    rigs = RigDesk(window, lambda name: (wanted.append(name), window.close()) and None)
+    rigs = RigDesk(window)
     devices = OperatorDevices(config, lambda: window.pilot, window, rigs.stop)
     devices.said.connect(window.say)
     application.aboutToQuit.connect(settings.close)
@@ -145,22 +147,15 @@ def run_window(
     devices.start()
     side_work.start()
     settings.start()
+    if language_problem():
+        window.say(language_problem(), is_fault=True)
     if until_first_frame:
         timers.append(_leave_after_first_frame(window))
     else:
         tour_at_start(window, asked=tour)
     code = application.exec()
     watch.remove()
-    if wanted:
-        _start_anew(wanted[-1], config_path)
     return code
-
-
-def _start_anew(rig: str, config_path: Path | None) -> None:
-    """Another kind of rig: the program begins again with it, as if it had been asked for on the command line."""
-    named = ["--config", str(config_path)] if config_path is not None else []
-    sys.stdout.flush()
-    os.execv(sys.executable, [sys.executable, sys.argv[0], "gui", "--rig", rig, *named])
 
 
 def _check_display() -> None:

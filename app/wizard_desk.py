@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal, Slot
 
+from app.language import tr
 from app.work_thread import WorkThread
 from core.calibration_config import CalibrationConfig
 from core.config import Config
@@ -87,7 +88,7 @@ class WizardDesk(QObject):
             self._bench.warm_up()
             self.draft = RigDraft(self._bench, config, self._known, self.said.emit)
 
-        self.run("opening the camera", job, then)
+        self.run(tr("opening the camera"), job, then)
 
     @Slot()
     def stop(self) -> None:

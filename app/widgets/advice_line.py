@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr, tr_text
 from app.tool_tips import tip
 from app.wording import advice_headline
 from core.types import Advice, PoseState, Speed
@@ -26,18 +27,18 @@ class AdviceLine(QWidget):
         super().__init__()
         self._advice: Advice | None = None
         self._state: PoseState | None = None
-        self._why_none = "waiting for the first picture"
+        self._why_none = tr("waiting for the first picture")
         self.setFixedHeight(68)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Advice")
+        self.setAccessibleName(tr("Advice"))
         self.setToolTip(tip("advice"))
 
     @property
     def text(self) -> str:
         """Headline and reason as shown."""
         if self._advice is None:
-            return f"No advice: {self._why_none}"
-        return f"{advice_headline(self._advice)}: {self._advice.why}"
+            return tr("No advice: {why}", why=tr_text(self._why_none))
+        return f"{advice_headline(self._advice)}: {tr_text(self._advice.why)}"
 
     def sizeHint(self) -> QSize:
         return QSize(600, 68)
@@ -86,7 +87,7 @@ class AdviceLine(QWidget):
         painter.setPen(QColor(palette.TEXT_DIM))
         why_font = theme.font(15)
         painter.setFont(why_font)
-        why = theme.elide(why_font, advice.why, int(width))
+        why = theme.elide(why_font, tr_text(advice.why), int(width))
         painter.drawText(QRectF(left, frame.top() + 40, width, 22), place, why)
 
 

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QFont, QFontMetrics, QMouseEvent, QPainter, QP
 from PySide6.QtWidgets import QWidget
 
 from app import palette, theme
+from app.language import tr, tr_text
 from app.next_step import sentence
 from app.widgets.signs import Sign, paint_sign
 from core.control.alerts import Alert, Priority
@@ -52,9 +53,9 @@ class ShownAlert:
 
     @property
     def text(self) -> str:
-        detail = f" ({self.alert.detail})" if self.alert.detail else ""
+        detail = f" ({tr_text(self.alert.detail)})" if self.alert.detail else ""
         times = f" \N{MULTIPLICATION SIGN}{self.times}" if self.times > 1 else ""
-        return f"{self.alert.spec.text}{detail}{times}. {sentence(self.alert.spec.what_to_do)}"
+        return f"{sentence(f'{tr(self.alert.spec.text)}{detail}{times}')} {sentence(self.alert.spec.what_to_do)}"
 
 
 class AlertRow(QWidget):
@@ -74,7 +75,7 @@ class AlertRow(QWidget):
             self.entry, self._hidden = entry, hidden
             if entry is not None:
                 self.setAccessibleName(entry.text)
-                self.setToolTip(f"{entry.text}\nClick to dismiss")
+                self.setToolTip(f"{entry.text}\n{tr('Click to dismiss')}")
             self.update()
         self.setVisible(entry is not None)
 
@@ -142,7 +143,7 @@ class AlertRow(QWidget):
         if self.entry is not None and self.entry.times > 1:
             notes.append(f"\N{MULTIPLICATION SIGN}{self.entry.times}")
         if self._hidden:
-            notes.append(f"+{self._hidden} more")
+            notes.append(tr("+{count} more", count=self._hidden))
         return "   ".join(notes)
 
     def _paint_words(self, painter: QPainter, room: QRectF, entry: ShownAlert, ink: QColor, dim: QColor) -> None:
@@ -175,5 +176,5 @@ def _lines(entry: ShownAlert, *, full: bool) -> tuple[tuple[tuple[str, QFont], .
     """The texts of each line with their fonts; the first one is the alert's name."""
     spec, what_to_do = entry.alert.spec, sentence(entry.alert.spec.what_to_do)
     if not full:
-        return (((spec.text, theme.bold(15)), (what_to_do, theme.font(13))),)
-    return ((spec.text, theme.bold(16)), (entry.alert.detail, theme.font(13))), ((what_to_do, theme.font(14)),)
+        return (((tr(spec.text), theme.bold(15)), (what_to_do, theme.font(13))),)
+    return ((tr(spec.text), theme.bold(16)), (tr_text(entry.alert.detail), theme.font(13))), ((what_to_do, theme.font(14)),)

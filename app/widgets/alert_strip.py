@@ -10,6 +10,7 @@ from PySide6.QtCore import QEvent, QObject, QTimer, Slot
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent
 from PySide6.QtWidgets import QWidget
 
+from app.language import tr
 from app.widgets.alert_row import COMPACT, FULL, AlertRow, ShownAlert
 from core.control.alerts import Alert, AlertKey, Priority
 from core.control.drive_view import DriveView
@@ -138,7 +139,7 @@ class AlertStrip(QWidget):
             row.setGeometry(0, top, width, heights[k])
             row.show_entry(entries[k], hidden if k == len(heights) - 1 else 0)
             top += heights[k] + _GAP
-        self.setAccessibleName("Alerts: " + " ".join(self.texts) if heights else "No alerts")
+        self.setAccessibleName(tr("Alerts: ") + " ".join(self.texts) if heights else tr("No alerts"))
         if not heights:
             self._timer.stop()
             self.hide()

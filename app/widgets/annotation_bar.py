@@ -8,16 +8,17 @@ from PySide6.QtWidgets import QAbstractButton, QButtonGroup, QHBoxLayout, QLabel
 
 from app import palette, theme
 from app.annotation_tool import BRUSH_HINT, Tool
+from app.language import mark, tr
 from app.palette import ON_PICTURE
 
 _DRAWN = ("ROBOT", "VESSEL")
 """Roles that the picture shows in their own colours."""
 _SEEN = 3.0
 _SWITCHES = (
-    ("L", "Loupe", "TEXT", "The surroundings of the cursor, magnified"),
-    ("K", "Masks", "VESSEL", "Show the drawn masks"),
-    ("T", "Brush", "ORANGE", "Paint the mask instead of moving its points"),
-    ("H", "Algorithm", "TEXT", "Show what the algorithm says; hidden in a blind study"),
+    ("L", mark("Loupe"), "TEXT", mark("The surroundings of the cursor, magnified")),
+    ("K", mark("Masks"), "VESSEL", mark("Show the drawn masks")),
+    ("T", mark("Brush"), "ORANGE", mark("Paint the mask instead of moving its points")),
+    ("H", mark("Algorithm"), "TEXT", mark("Show what the algorithm says; hidden in a blind study")),
 )
 
 
@@ -36,7 +37,12 @@ class AnnotationBar(QWidget):
         self._tools: dict[Tool, _Chip] = {}
         group = QButtonGroup(self)
         for tool in Tool:
-            chip = _Chip(tool.value.key, tool.value.label, tool.value.role, f"{tool.value.label}  (key {tool.value.key})")
+            chip = _Chip(
+                tool.value.key,
+                tr(tool.value.label),
+                tool.value.role,
+                tr("{meaning}  (key {key})", meaning=tr(tool.value.label), key=tool.value.key),
+            )
             chip.clicked.connect(lambda _on=False, which=tool: self.tool_chosen.emit(which))
             group.addButton(chip)
             row.addWidget(chip)
@@ -46,7 +52,7 @@ class AnnotationBar(QWidget):
         for key, label, colour, meaning in _SWITCHES:
             if key == "H" and blind:
                 continue
-            chip = _Chip(key, label, colour, f"{meaning}  (key {key})")
+            chip = _Chip(key, tr(label), colour, tr("{meaning}  (key {key})", meaning=tr(meaning), key=key))
             chip.setChecked(key in "LK")
             chip.toggled.connect(lambda on, which=key: self.switched.emit(which, on))
             row.addWidget(chip)
@@ -70,7 +76,7 @@ class AnnotationBar(QWidget):
         self._tools[tool].setChecked(True)
         self.set_switch("T", brush_on)
         self._switches["T"].setEnabled(tool.is_mask)
-        hint = BRUSH_HINT if brush_on else tool.value.hint
+        hint = tr(BRUSH_HINT) if brush_on else tool.value.hint
         self._hint.setText(hint.partition(" · G ")[0] if self._blind else hint)
 
     def set_switch(self, key: str, on: bool) -> None:

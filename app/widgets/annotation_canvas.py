@@ -23,6 +23,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from app import theme
 from app.annotation_hand import AnnotationHand, Edit, Measure, Reach
 from app.annotation_tool import Tool
+from app.language import mark, tr
 from app.palette import ON_PICTURE
 from app.picture_view import PictureView, render
 from app.widgets.annotation_loupe import AnnotationLoupe, paint_cross
@@ -43,14 +44,14 @@ _ARROWS = {
     Qt.Key.Key_Down: (0.0, 1.0),
 }
 CANVAS_KEYS = (
-    ("Enter", "end the line, take the state, go on"),
-    ("Tab", "select the next point"),
-    ("\N{LEFTWARDS ARROW} \N{RIGHTWARDS ARROW} \N{UPWARDS ARROW} \N{DOWNWARDS ARROW}", "move it by 1 px; Ctrl 0.1, Shift 10"),
-    ("Insert", "no point selected: set one at the cross"),
-    ("Del", "take the point out"),
-    ("Shift+Del", "the whole line"),
-    ("Space+drag", "move the picture"),
-    ("Esc", "let go of the line or the point"),
+    ("Enter", mark("end the line, take the state, go on")),
+    ("Tab", mark("select the next point")),
+    ("\N{LEFTWARDS ARROW} \N{RIGHTWARDS ARROW} \N{UPWARDS ARROW} \N{DOWNWARDS ARROW}", mark("move it by 1 px; Ctrl 0.1, Shift 10")),
+    ("Insert", mark("no point selected: set one at the cross")),
+    ("Del", mark("take the point out")),
+    ("Shift+Del", mark("the whole line")),
+    (mark("Space+drag"), mark("move the picture")),
+    ("Esc", mark("let go of the line or the point")),
 )
 """The keys that the picture hears itself: all others are in the menus."""
 
@@ -77,8 +78,8 @@ class AnnotationCanvas(QWidget):
         self.setMouseTracking(True)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setCursor(Qt.CursorShape.CrossCursor)
-        self.setAccessibleName("Picture to annotate")
-        self.setAccessibleDescription("Click sets points; arrow keys move the selected point or the cross, Insert sets a point")
+        self.setAccessibleName(tr("Picture to annotate"))
+        self.setAccessibleDescription(tr("Click sets points; arrow keys move the selected point or the cross, Insert sets a point"))
         self._hand = AnnotationHand()
         self._loupe = AnnotationLoupe()
         self._levels: tuple[Image, ...] = ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from app import theme
+from app.language import tr
 
 
 class AnnotationHeader(QWidget):
@@ -19,7 +20,7 @@ class AnnotationHeader(QWidget):
         self._who = QLabel(who)
         theme.set_sheet(self._who, "color: @TEXT_DIM; font-size: 13px;")
         self._saved = QLabel()
-        self._saved.setAccessibleName("State of the file")
+        self._saved.setAccessibleName(tr("State of the file"))
         row = QHBoxLayout(self)
         row.setContentsMargins(4, 2, 4, 0)
         row.setSpacing(18)
@@ -37,11 +38,17 @@ class AnnotationHeader(QWidget):
         self._title.setToolTip(text)
 
     def show_saved(self, is_saved: bool) -> None:
-        self._show("\N{CHECK MARK}  saved" if is_saved else "saving", "ALLOWED" if is_saved else "TEXT_DIM", "")
+        self._show(tr("\N{CHECK MARK}  saved") if is_saved else tr("saving"), "ALLOWED" if is_saved else "TEXT_DIM", "")
 
     def show_unsaved(self, count: int, why: str) -> None:
         """Edits that could not be written, and why."""
-        self._show(f"\N{WARNING SIGN}  NOT SAVED: {count} edit{'s' if count != 1 else ''}", "FAULT", why)
+        self._show(
+            tr("\N{WARNING SIGN}  NOT SAVED: 1 edit")
+            if count == 1
+            else tr("\N{WARNING SIGN}  NOT SAVED: {count} edits", count=count),
+            "FAULT",
+            why,
+        )
 
     def _show(self, text: str, role: str, tip: str) -> None:
         self._saved.setText(text)

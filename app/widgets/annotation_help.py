@@ -6,24 +6,25 @@ from collections.abc import Sequence
 
 from PySide6.QtWidgets import QMainWindow, QWidget
 
-from app.key_sheet import KeyTable, menu_tables
+from app.key_sheet import KeyTable, menu_tables, shown
+from app.language import mark
 from app.widgets.annotation_canvas import CANVAS_KEYS
 from app.widgets.key_page import KeyPage
 
 _MOUSE = (
-    "In the picture, by mouse",
+    mark("In the picture, by mouse"),
     (
-        ("Click, drag", "set a point; move one"),
-        ("Double click", "end the line, take the state, go on"),
-        ("Right click", "take a point out; the brush: take away"),
-        ("Wheel", "zoom at the cursor"),
+        (mark("Click, drag"), mark("set a point; move one")),
+        (mark("Double click"), mark("end the line, take the state, go on")),
+        (mark("Right click"), mark("take a point out; the brush: take away")),
+        (mark("Wheel"), mark("zoom at the cursor")),
     ),
 )
 
 
 def annotation_keys(window: QMainWindow) -> Sequence[KeyTable]:
     """The keys of the picture, of the menus, and the mouse."""
-    return (("In the picture", CANVAS_KEYS), _MOUSE, *menu_tables(window))
+    return (shown((mark("In the picture"), CANVAS_KEYS)), shown(_MOUSE), *menu_tables(window))
 
 
 def annotation_help(parent: QWidget) -> KeyPage:

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QListView, QSizePolicy, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QVBoxLayout, QWidget
 
 from app import palette, theme
+from app.language import tr
 from core.study.annotations import Status
 
 _ROW = 30
@@ -50,7 +51,7 @@ class QueueModel(QAbstractListModel):
         if role == Qt.ItemDataRole.UserRole + 1:
             return self._has_masks(row)
         if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
-            masks = ", with masks" if self._has_masks(row) else ""
+            masks = tr(", with masks") if self._has_masks(row) else ""
             return f"{row + 1}: {self._names[row]}: {self._status(row).value}{masks}"
         return None
 
@@ -110,7 +111,7 @@ class QueueList(QWidget):
         self._view.setFrameShape(QListView.Shape.NoFrame)
         self._view.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         theme.set_sheet(self._view, _STYLE)
-        self._view.setAccessibleName("Images")
+        self._view.setAccessibleName(tr("Images"))
         self._view.activated.connect(lambda index: self.chosen.emit(index.row()))
         self._view.clicked.connect(lambda index: self.chosen.emit(index.row()))
         self._progress = _ProgressBar()
@@ -146,12 +147,14 @@ class _ProgressBar(QWidget):
         self._finished, self._count = 0, 0
         self.setFixedHeight(34)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Progress")
+        self.setAccessibleName(tr("Progress"))
 
     @property
     def text(self) -> str:
         left = self._count - self._finished
-        return f"{self._finished} of {self._count} done" + (f", {left} left" if left else "")
+        return tr("{finished} of {count} done", finished=self._finished, count=self._count) + (
+            tr(", {left} left", left=left) if left else ""
+        )
 
     def show_progress(self, finished: int, count: int) -> None:
         self._finished, self._count = finished, count

@@ -9,6 +9,7 @@ from PySide6.QtGui import QPainterPath as Path
 
 from app import theme
 from app.annotation_hand import Drawing, handle_lines
+from app.language import tr
 from app.palette import ON_PICTURE
 from app.scene_shapes import foot
 from app.widgets.pencil import Pencil
@@ -96,7 +97,7 @@ def _draw_proposal(pencil: Pencil, proposal: Annotation, readout: Readout | None
         outline = np.array((*mask.points, mask.points[0]))
         pencil.polylines((outline,), _MASK_COLOUR[mask.target], 1.2, Qt.PenStyle.DotLine)
     if readout is not None and readout.vessel_vector is not None and readout.pose is not None and proposal.robot:
-        pencil.tag(proposal.robot[-1], f"algorithm: \N{GREEK SMALL LETTER THETA} {readout.pose.theta_deg:.1f}°", ON_PICTURE.TEXT)
+        pencil.tag(proposal.robot[-1], tr("algorithm: θ {theta:.1f}°", theta=readout.pose.theta_deg), ON_PICTURE.TEXT)
 
 
 def _fill_masks(

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr, tr_text
 from app.tool_tips import tip
 from app.widgets.state_badge import paint_state
 from app.wording import STATE_TITLE, side
@@ -27,7 +28,7 @@ class AnnotationReadout(QWidget):
         self._is_preview = False
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Readout")
+        self.setAccessibleName(tr("Readout"))
         self.setToolTip(tip("theta", "d_head", "d_tail", "crossed", "lines_used", "state"))
 
     @property
@@ -40,24 +41,25 @@ class AnnotationReadout(QWidget):
         """The line beside the badge."""
         annotation, pose = self._annotation, self._readout.pose
         if annotation.cannot_tell:
-            return "Can't tell"
+            return tr("Can't tell")
         if annotation.state is not None:
-            return STATE_TITLE[annotation.state]
-        return "No state yet" if pose is not None else "No state"
+            return tr(STATE_TITLE[annotation.state])
+        return tr("No state yet") if pose is not None else tr("No state")
 
     @property
     def advice_text(self) -> str:
         """What the lines say of the state, or what is missing."""
         annotation, pose = self._annotation, self._readout.pose
         if annotation.cannot_tell:
-            return "X takes it back"
+            return tr("X takes it back")
         if pose is None:
-            return self._readout.missing[:1].upper() + self._readout.missing[1:]
+            missing = tr_text(self._readout.missing)
+            return missing[:1].upper() + missing[1:]
         if annotation.state is None:
-            return f"The lines say {pose.state.value}: Enter takes it, or press A B C D"
+            return tr("The lines say {state}: Enter takes it, or press A B C D", state=pose.state.value)
         if annotation.state is not pose.state:
-            return f"The lines say {pose.state.value}, by the rule"
-        return "The lines say the same"
+            return tr("The lines say {state}, by the rule", state=pose.state.value)
+        return tr("The lines say the same")
 
     def sizeHint(self) -> QSize:
         return QSize(320, _HEIGHT)
@@ -65,7 +67,7 @@ class AnnotationReadout(QWidget):
     def show_annotation(self, annotation: Annotation, readout: Readout, *, is_preview: bool = False) -> None:
         """`is_preview`: a point is still moving."""
         self._annotation, self._readout, self._is_preview = annotation, readout, is_preview
-        self.setAccessibleDescription(f"theta {self.angle_text}; {self.state_text}; {self.advice_text}")
+        self.setAccessibleDescription(f"{tr('theta')} {self.angle_text}; {self.state_text}; {self.advice_text}")
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -92,7 +94,7 @@ class AnnotationReadout(QWidget):
         painter.setFont(theme.font(12))
         painter.setPen(QColor(palette.TEXT_DIM))
         painter.drawText(
-            QRectF(left, 36, self.width() - left, 18), Qt.AlignmentFlag.AlignVCenter, "moving" if self._is_preview else ""
+            QRectF(left, 36, self.width() - left, 18), Qt.AlignmentFlag.AlignVCenter, tr("moving") if self._is_preview else ""
         )
 
     def _paint_distances(self, painter: QPainter) -> None:
@@ -100,8 +102,8 @@ class AnnotationReadout(QWidget):
         cells = (
             ("d_head", f"{pose.d_head_px:.1f} px" if pose else _DASH, palette.D_HEAD),
             ("d_tail", f"{pose.d_tail_px:.1f} px" if pose else _DASH, palette.D_TAIL),
-            ("crossed", ("yes" if pose.crossed else "no") if pose else _DASH, palette.TEXT),
-            ("lines used", self._lengths() if readout.robot_vector is not None else _DASH, palette.TEXT),
+            (tr("crossed"), (tr("yes") if pose.crossed else tr("no")) if pose else _DASH, palette.TEXT),
+            (tr("lines used"), self._lengths() if readout.robot_vector is not None else _DASH, palette.TEXT),
         )
         width = self.width() / len(cells)
         for place, (name, value, colour) in enumerate(cells):

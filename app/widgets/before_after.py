@@ -9,6 +9,7 @@ from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette
+from app.language import tr
 
 
 class _Picture(QLabel):
@@ -34,7 +35,7 @@ class _Picture(QLabel):
 
     def _fit(self) -> None:
         if self._pixmap.isNull():
-            self.setText("not yet")
+            self.setText(tr("not yet"))
             return
         smooth = Qt.TransformationMode.SmoothTransformation
         self.setPixmap(self._pixmap.scaled(self.size(), Qt.AspectRatioMode.KeepAspectRatio, smooth))
@@ -48,17 +49,17 @@ class BeforeAfter(QWidget):
         self._before: tuple[str, ...] = ()
         self._after: tuple[str, ...] = ()
         self._place = 0
-        self._left, self._right = _Picture("Before"), _Picture("After")
+        self._left, self._right = _Picture(tr("Before")), _Picture(tr("After"))
         self._title = QLabel()
         self._title.setObjectName("card_note")
-        self._next = QPushButton("&Next picture")
+        self._next = QPushButton(tr("&Next picture"))
         self._next.setAutoDefault(False)
         self._next.clicked.connect(self._on_next)
         head = QHBoxLayout()
         head.addWidget(self._title, 1)
         head.addWidget(self._next)
         pictures = QHBoxLayout()
-        for word, picture in (("Before", self._left), ("After", self._right)):
+        for word, picture in ((tr("Before"), self._left), (tr("After"), self._right)):
             column = QVBoxLayout()
             label = QLabel(word)
             label.setObjectName("card_title")
@@ -91,7 +92,13 @@ class BeforeAfter(QWidget):
         for picture, paths in ((self._left, self._before), (self._right, self._after)):
             picture.show_file(Path(paths[self._place]) if self._place < len(paths) else None)
         colours = palette.ON_PICTURE
-        vessel, robot = (f'<span style="color:{c}">{n}</span>' for c, n in ((colours.VESSEL, "vessel"), (colours.ROBOT, "robot")))
-        found = f"colour: found ({vessel}, {robot})"
-        which = f"Held-out picture {self._place + 1} of {count}; {found}, line: drawn by hand" if count else "Held-out pictures"
+        vessel, robot = (
+            f'<span style="color:{c}">{n}</span>' for c, n in ((colours.VESSEL, tr("vessel")), (colours.ROBOT, tr("robot")))
+        )
+        found = tr("colour: found ({vessel}, {robot})", vessel=vessel, robot=robot)
+        which = (
+            tr("Held-out picture {place} of {count}; {found}, line: drawn by hand", place=self._place + 1, count=count, found=found)
+            if count
+            else tr("Held-out pictures")
+        )
         self._title.setText(which)

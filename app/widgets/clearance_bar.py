@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
 from app.cells import number
+from app.language import tr
 from app.pace import Pace
 from app.tool_tips import tip
 from app.wording import REASON_TEXT
@@ -53,13 +54,13 @@ class ClearanceBar(QWidget):
         self._breaches = BreachWatch()
         self._forces = Ladder(FORCE_MARKS_N, _FORCE_BAND_N)
         self._pace = Pace(_TEXT_EVERY_S)
-        self._room = _room_block(None, 0, "no picture yet")
+        self._room = _room_block(None, 0, tr("no picture yet"))
         self._force: _Block | None = None
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMinimumWidth(230)
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Room to the wall")
+        self.setAccessibleName(tr("Room to the wall"))
         self.setToolTip(tip("clearance", "force"))
 
     def set_scale(self, pixels_per_mm: float | None) -> None:
@@ -117,37 +118,52 @@ class ClearanceBar(QWidget):
 
 
 def _room_block(clearance: Clearance | None, level: int, why_unknown: str) -> _Block:
-    marks = ((0.0, "wall"), (1.0, "centerline"))
+    marks = ((0.0, tr("wall")), (1.0, tr("centerline")))
     if clearance is None:
-        return _Block((f"Room to the wall: {why_unknown}", why_unknown, "Room: not known", "not known"), None, 0, marks)
+        return _Block(
+            (tr("Room to the wall: {why}", why=why_unknown), why_unknown, tr("Room: not known"), tr("not known")),
+            None,
+            0,
+            marks,
+        )
     # how far the head seems to be in the wall is an error of the picture, as long as it is no breach
     least = -math.inf if level == 2 else 0.0
     room = f"{number(max(least, clearance.room_px), 0)} px"
     both = room if clearance.room_mm is None else f"{room}, {number(max(least, clearance.room_mm), 1)} mm"
     if level == 2:
-        texts = (f"BREACH: the head is in the wall  ({both})", f"BREACH: in the wall  ({room})", f"BREACH {room}", "BREACH")
+        texts = (
+            tr("BREACH: the head is in the wall  ({both})", both=both),
+            tr("BREACH: in the wall  ({room})", room=room),
+            tr("BREACH {room}", room=room),
+            tr("BREACH"),
+        )
     elif level == 1:
-        word = "at the wall" if clearance.room_px < _AT_WALL_PX else "near the wall"
-        texts = (f"Room to the wall  {both}, {word}", f"Room  {both}, {word}", f"{room}, {word}", word)
+        word = tr("at the wall") if clearance.room_px < _AT_WALL_PX else tr("near the wall")
+        texts = (
+            tr("Room to the wall  {both}, {word}", both=both, word=word),
+            tr("Room  {both}, {word}", both=both, word=word),
+            f"{room}, {word}",
+            word,
+        )
     else:
-        texts = (f"Room to the wall  {both}", f"Room  {both}", f"Room  {room}", room)
+        texts = (tr("Room to the wall  {both}", both=both), tr("Room  {both}", both=both), tr("Room  {room}", room=room), room)
     return _Block(texts, max(0.0, min(1.0, clearance.share)), level, marks)
 
 
 def _force_block(force_n: float, level: int) -> _Block:
     number = f"{force_n:.2f} N"
-    word, short = (("", ""), ("leans on the wall", "leans"), ("PRESSES TOO HARD", "TOO HARD"))[level]
-    texts: tuple[str, ...] = (f"Wall force  {number}", f"Force  {number}", number)
+    word, short = (("", ""), (tr("leans on the wall"), tr("leans")), (tr("PRESSES TOO HARD"), tr("TOO HARD")))[level]
+    texts: tuple[str, ...] = (tr("Wall force  {number}", number=number), tr("Force  {number}", number=number), number)
     if level:
-        texts = (f"Wall force  {number}, {word}", f"{number}, {word}", f"{number} {short}", number)
+        texts = (tr("Wall force  {number}, {word}", number=number, word=word), f"{number}, {word}", f"{number} {short}", number)
     marks = tuple((limit_n / _FORCE_RANGE_N, f"{limit_n:g} N") for limit_n in FORCE_MARKS_N)
     return _Block(texts, force_n / _FORCE_RANGE_N, level, marks)
 
 
 def _why_unknown(scene: Scene | None) -> str:
     if scene is None:
-        return "not known"
-    return REASON_TEXT[scene.refusal.reason].title.lower() if scene.refusal is not None else "no pose"
+        return tr("not known")
+    return tr(REASON_TEXT[scene.refusal.reason].title).lower() if scene.refusal is not None else tr("no pose")
 
 
 def _kind(block: _Block | None) -> tuple[int, str] | None:

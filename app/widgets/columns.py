@@ -7,6 +7,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QSplitter, QWidget
 
 from app import theme
+from app.language import tr
 
 _LEAST, _MOST = 0.2, 0.9
 
@@ -22,8 +23,8 @@ class Columns(QSplitter):
         self.setChildrenCollapsible(False)
         self.setHandleWidth(theme.GAP)
         handle = self.handle(1)
-        handle.setToolTip("Drag to give one side more room")
-        handle.setAccessibleName("Border between the columns")
+        handle.setToolTip(tr("Drag to give one side more room"))
+        handle.setAccessibleName(tr("Border between the columns"))
         self.splitterMoved.connect(self._on_moved)
 
     @property

@@ -12,9 +12,11 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QLabel, QTableView
 
 from app import palette, theme
 from app.clamp_log import ClampLog, LogEntry, rejected_commands
+from app.language import mark, tr, tr_text
 from app.pace import Pace
 from app.provenance import Provenance
 from app.widgets.provenance_table import ProvenanceTable
+from app.widgets.scroll_keys import ScrolledTable
 from core.control.drive_view import DriveView
 
 if TYPE_CHECKING:
@@ -22,8 +24,11 @@ if TYPE_CHECKING:
 
 _SHOW_EVERY_S = 0.2
 _ROW = 17
-_WIDTHS = {"When": 66, "Joint": 68, "What the gate did": 0, "\N{MULTIPLICATION SIGN}": 46}
-_LOG_STYLE = "QTableView { background: @PANEL; border: none; font-size: 12px; }"
+_WIDTHS = {mark("When"): 66, mark("Joint"): 68, mark("What the gate did"): 0, "\N{MULTIPLICATION SIGN}": 46}
+_LOG_STYLE = """
+QTableView { background: @PANEL; border: 1px solid @PANEL; font-size: 12px; }
+QTableView:focus { border: 1px solid @SKY; }
+"""
 
 _Index = QModelIndex | QPersistentModelIndex
 
@@ -62,7 +67,7 @@ class CommandPanel(QWidget):
         column.addWidget(self._table, 3)
         column.addWidget(self._heading)
         column.addWidget(self._view, 2)
-        self.setAccessibleName("Commands")
+        self.setAccessibleName(tr("Commands"))
 
     @property
     def text(self) -> str:
@@ -89,10 +94,9 @@ class CommandPanel(QWidget):
             self._heading.setText(heading)
 
     def _make_view(self) -> QTableView:
-        view = QTableView()
+        view = ScrolledTable(_ROW)
         view.setModel(self._model)
         theme.set_sheet(view, _LOG_STYLE)
-        view.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the arrow keys belong to the robot
         view.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         view.setShowGrid(False)
         view.setWordWrap(False)
@@ -110,7 +114,7 @@ class CommandPanel(QWidget):
             if width:
                 view.setColumnWidth(place, width)
         view.setMinimumHeight(3 * _ROW)
-        view.setAccessibleName("What the gate limited and rejected")
+        view.setAccessibleName(tr("What the gate limited and rejected"))
         return view
 
 
@@ -150,7 +154,7 @@ class ClampModel(QAbstractTableModel):
         entry, column = self._shown[index.row()], index.column()
         texts = (
             entry.clock,
-            "rejected" if entry.is_rejection else entry.joint,
+            tr("rejected") if entry.is_rejection else tr_text(entry.joint),
             entry.text,
             f"\N{MULTIPLICATION SIGN}{entry.count}" if entry.count > 1 else "",
         )
@@ -169,14 +173,14 @@ class ClampModel(QAbstractTableModel):
 
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         if orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
-            return tuple(_WIDTHS)[section]
+            return tr(tuple(_WIDTHS)[section])
         return None
 
 
 def _heading(status: BusStatus | None) -> str:
     if status is None:
-        return "Gate: no servo bus"
+        return tr("Gate: no servo bus")
     rejected = rejected_commands(status)
     if not status.clamp_count and not rejected:
-        return "Gate: nothing limited or rejected yet"
-    return f"Gate: {status.clamp_count} goals limited, {rejected} commands rejected"
+        return tr("Gate: nothing limited or rejected yet")
+    return tr("Gate: {clamped} goals limited, {rejected} commands rejected", clamped=status.clamp_count, rejected=rejected)

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QFontMetrics, QHideEvent, QMouseEvent, QPainte
 from PySide6.QtWidgets import QApplication, QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr
 from app.next_step import DEADMAN_KEY
 from app.tool_tips import tip
 from app.widgets.signs import key_cap_width, paint_key_cap
@@ -31,7 +32,7 @@ class DeadmanField(QWidget):
         self.setMinimumSize(96, 44)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setAccessibleName(f"Deadman: hold to drive ({DEADMAN_KEY})")
+        self.setAccessibleName(tr("Deadman: hold to drive ({key})", key=DEADMAN_KEY))
         self.setToolTip(tip("deadman"))
         self._describe()
 
@@ -47,7 +48,7 @@ class DeadmanField(QWidget):
     @property
     def word(self) -> str:
         """What the program sees of the deadman."""
-        return {None: "none", False: "not held", True: "held"}[self._deadman]
+        return {None: tr("none"), False: tr("not held"), True: tr("held")}[self._deadman]
 
     def sizeHint(self) -> QSize:
         return QSize(136, 54)
@@ -133,8 +134,8 @@ class DeadmanField(QWidget):
         painter.setBrush(back)
         painter.drawRoundedRect(frame, frame.height() / 2.6, frame.height() / 2.6)
         painter.setPen(ink)
-        painter.setFont(theme.fitted(theme.bold(16), "Hold to drive", int(frame.width() - 20)))
-        painter.drawText(frame.adjusted(0, 4, 0, -22), Qt.AlignmentFlag.AlignCenter, "Hold to drive")
+        painter.setFont(theme.fitted(theme.bold(16), tr("Hold to drive"), int(frame.width() - 20)))
+        painter.drawText(frame.adjusted(0, 4, 0, -22), Qt.AlignmentFlag.AlignCenter, tr("Hold to drive"))
         self._paint_state(painter, QPointF(frame.center().x(), frame.bottom() - 14), ink)
         painter.end()
 

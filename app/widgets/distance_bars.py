@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr
 from app.tool_tips import tip
 from app.wording import side
 from core.types import Pose
@@ -30,7 +31,7 @@ class DistanceBars(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMinimumSize(200, 100)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("Distances from the centerline")
+        self.setAccessibleName(tr("Distances from the centerline"))
         self.setToolTip(tip("d_head", "d_tail", "crossed"))
 
     def set_allowed(self, d_allow_px: float) -> None:

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
     QLabel,
-    QListView,
     QMenu,
     QStyle,
     QStyledItemDelegate,
@@ -24,10 +23,13 @@ from PySide6.QtWidgets import (
 
 from app import palette, theme
 from app.event_model import MOST_ROWS, EventKind, EventModel, Index, LoggedEvent
+from app.language import tr, tr_text
 from app.widgets.quiet_combo import QuietCombo
+from app.widgets.scroll_keys import ScrolledList
 
 SAME_WITHIN = timedelta(seconds=2.0)
 _ROW_HEIGHT = 24
+_STYLE = "QListView { border: 1px solid @PANEL; } QListView:focus { border: 1px solid @SKY; }"
 
 
 class EventLog(QWidget):
@@ -41,13 +43,13 @@ class EventLog(QWidget):
         self._model = EventModel()
         self._view = _EventList(self._model)
         self._view.customContextMenuRequested.connect(self._open_menu)
-        self._filter = QuietCombo("Kind of events shown")
-        self._filter.setToolTip("Which events are listed")
-        self._filter.addItem("Everything", None)
+        self._filter = QuietCombo(tr("Kind of events shown"))
+        self._filter.setToolTip(tr("Which events are listed"))
+        self._filter.addItem(tr("Everything"), None)
         for kind in EventKind:
-            self._filter.addItem(kind.value.plural, kind)
+            self._filter.addItem(tr(kind.value.plural), kind)
         self._filter.activated.connect(self._on_filter)
-        label = QLabel("Show")
+        label = QLabel(tr("Show"))
         label.setObjectName("card_title")
         head = QHBoxLayout()
         head.setSpacing(6)
@@ -58,7 +60,7 @@ class EventLog(QWidget):
         column.setSpacing(4)
         column.addLayout(head)
         column.addWidget(self._view, 1)
-        self.setAccessibleName("Event log")
+        self.setAccessibleName(tr("Event log"))
 
     @property
     def lines(self) -> list[str]:
@@ -69,7 +71,7 @@ class EventLog(QWidget):
     def add(self, kind: EventKind, text: str) -> None:
         """Something happened now; a repetition of the newest event within two seconds raises its count instead."""
         now, newest = self._now(), self._newest
-        event = LoggedEvent(now, kind, " ".join(text.split()))
+        event = LoggedEvent(now, kind, tr_text(" ".join(text.split())))
         is_same = newest is not None and (newest.kind, newest.text) == (kind, event.text) and abs(now - newest.at) <= SAME_WITHIN
         if newest is not None and is_same:
             event = replace(event, times=newest.times + 1)
@@ -119,26 +121,25 @@ class EventLog(QWidget):
     def _open_menu(self, place: QPoint) -> None:
         menu = QMenu(self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.addAction("Copy all", self.copy_all)
+        menu.addAction(tr("Copy all"), self.copy_all)
         menu.popup(self._view.viewport().mapToGlobal(place))
 
 
-class _EventList(QListView):
+class _EventList(ScrolledList):
     """Rows of equal height. Whoever has scrolled down keeps the lines that he reads."""
 
     def __init__(self, model: EventModel) -> None:
-        super().__init__()
+        super().__init__(_ROW_HEIGHT)
         self.setModel(model)
         self.setItemDelegate(_EventPainter(self))
         self.setUniformItemSizes(True)
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # its keys would be the robot's
-        self.setFrameShape(QListView.Shape.NoFrame)
+        theme.set_sheet(self, _STYLE)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.setMinimumHeight(2 * _ROW_HEIGHT)
-        self.setAccessibleName("Events, newest first")
+        self.setAccessibleName(tr("Events, newest first"))
 
     def keep_place(self) -> None:
         """A line was put in above."""
@@ -173,8 +174,8 @@ class _EventPainter(QStyledItemDelegate):
         painter.setBrush(QColor(look.colour))
         painter.drawRoundedRect(QRectF(room.left(), room.center().y() - 4, 8, 8), 2, 2)
         painter.setPen(QColor(palette.TEXT_DIM))
-        painter.drawText(room.adjusted(14, 0, 0, 0), centre, look.word)
-        room.adjust(14 + QFontMetrics(small).horizontalAdvance("operator") + 10, 0, 0, 0)
+        painter.drawText(room.adjusted(14, 0, 0, 0), centre, tr(look.word))
+        room.adjust(14 + QFontMetrics(small).horizontalAdvance(tr("operator")) + 10, 0, 0, 0)
         if event.times > 1:
             times = f"\N{MULTIPLICATION SIGN}{event.times}"
             painter.drawText(room, Qt.AlignmentFlag.AlignRight | centre, times)

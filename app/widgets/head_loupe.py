@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPaintEvent, Q
 from PySide6.QtWidgets import QWidget
 
 from app import theme
+from app.language import tr
 from app.palette import ON_PICTURE
 from app.widgets.overlays import OverlayItem
 from core.types import Image, Point, Scene
@@ -35,7 +36,7 @@ class HeadLoupe(QWidget):
         self._to_widget = QTransform()
         self._corner = 0
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.setAccessibleName("Magnified head")
+        self.setAccessibleName(tr("Magnified head"))
         self.hide()
 
     def show_head(self, image: Image, scene: Scene, head_in_view: QPointF) -> None:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QSizePolicy, QVBoxLayout, 
 
 from app import palette, theme
 from app.jog_keys import Motion
+from app.language import tr
 from app.tool_tips import tip
 from app.widgets.quiet_combo import QuietCombo
 from core.types import RobotStatus
@@ -32,25 +33,25 @@ class JogPanel(QWidget):
         grid = QGridLayout()
         grid.setSpacing(4)
         for motion, row, column, arrow, key, text in (
-            (Motion.PITCH_DOWN, 0, 0, None, "Q", "dip"),
-            (Motion.ADVANCE, 0, 1, _UP, "W", "advance"),
-            (Motion.PITCH_UP, 0, 2, None, "E", "lift"),
-            (Motion.STEER_LEFT, 1, 0, _LEFT, "A", "left"),
-            (Motion.RETRACT, 1, 1, _DOWN, "S", "retract"),
-            (Motion.STEER_RIGHT, 1, 2, _RIGHT, "D", "right"),
-            (Motion.DELIVER, 0, 3, None, "PgUp", "sheath +"),
-            (Motion.WITHDRAW, 1, 3, None, "PgDn", "sheath \N{MINUS SIGN}"),
+            (Motion.PITCH_DOWN, 0, 0, None, "Q", tr("dip")),
+            (Motion.ADVANCE, 0, 1, _UP, "W", tr("advance")),
+            (Motion.PITCH_UP, 0, 2, None, "E", tr("lift")),
+            (Motion.STEER_LEFT, 1, 0, _LEFT, "A", tr("left")),
+            (Motion.RETRACT, 1, 1, _DOWN, "S", tr("retract")),
+            (Motion.STEER_RIGHT, 1, 2, _RIGHT, "D", tr("right")),
+            (Motion.DELIVER, 0, 3, None, "PgUp", tr("sheath +")),
+            (Motion.WITHDRAW, 1, 3, None, "PgDn", tr("sheath \N{MINUS SIGN}")),
         ):
             cap = _Cap(arrow, key, text)
-            cap.setAccessibleName(motion.value)
-            cap.setToolTip(f"{motion.value}: hold to move, release to stop")
+            cap.setAccessibleName(tr(motion.value))
+            cap.setToolTip(tr("{motion}: hold to move, release to stop", motion=tr(motion.value)))
             cap.pressed.connect(lambda which=motion: self.pressed.emit(which))
             cap.released.connect(lambda which=motion: self.released.emit(which))
             grid.addWidget(cap, row, column)
             self._caps[motion] = cap
-        straighten = _Cap(None, "X", "straighten", wide=True)
-        straighten.setAccessibleName(Motion.STRAIGHTEN.value)
-        straighten.setToolTip("bring bend and pitch back to the middle: hold to move, release to stop")
+        straighten = _Cap(None, "X", tr("straighten"), wide=True)
+        straighten.setAccessibleName(tr(Motion.STRAIGHTEN.value))
+        straighten.setToolTip(tr("bring bend and pitch back to the middle: hold to move, release to stop"))
         straighten.pressed.connect(lambda: self.pressed.emit(Motion.STRAIGHTEN))
         straighten.released.connect(lambda: self.released.emit(Motion.STRAIGHTEN))
         grid.addWidget(straighten, 2, 0, 1, 2)
@@ -62,7 +63,7 @@ class JogPanel(QWidget):
         rows.setSpacing(4)
         rows.addLayout(grid, 1)
         rows.addWidget(self._readout)
-        self.setAccessibleName("Keys that move the robot")
+        self.setAccessibleName(tr("Keys that move the robot"))
 
     @property
     def readout(self) -> str:
@@ -84,8 +85,8 @@ class JogPanel(QWidget):
 
     def _speed_choice(self) -> QComboBox:
         """Full speed, or a share of it for fine work."""
-        choice = QuietCombo("Speed of the keys")
-        choice.setToolTip("Speed of all motions by hand, of the configured full speed")
+        choice = QuietCombo(tr("Speed of the keys"))
+        choice.setToolTip(tr("Speed of all motions by hand, of the configured full speed"))
         for share in (1.0, 0.5, 0.2):
             choice.addItem(f"{100 * share:.0f} %", share)
         choice.currentIndexChanged.connect(lambda place: self.speed_changed.emit(choice.itemData(place)))
@@ -192,13 +193,15 @@ class _Readout(QWidget):
         self._bend = self._pitch = 0.0
         self._insertion_mm: float | None = None
         self.setFixedHeight(18)
-        self.setAccessibleName("Bend and insertion")
+        self.setAccessibleName(tr("Bend and insertion"))
         self.setAccessibleDescription(self.text)
         self.setToolTip(tip("bend", "insertion"))
 
     @property
     def text(self) -> str:
-        return f"bend {self._bend:.2f}, pitch {self._pitch:.2f}, in {self._inserted} mm"
+        return tr(
+            "bend {bend:.2f}, pitch {pitch:.2f}, in {inserted} mm", bend=self._bend, pitch=self._pitch, inserted=self._inserted
+        )
 
     @property
     def _inserted(self) -> str:
@@ -217,7 +220,7 @@ class _Readout(QWidget):
         painter.setFont(theme.font(theme.Size.LABEL))
         painter.setPen(QColor(palette.TEXT_DIM))
         middle = Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(QRectF(0, 0, 36, self.height()), middle, "bend")
+        painter.drawText(QRectF(0, 0, 36, self.height()), middle, tr("bend"))
         track = QRectF(38, self.height() / 2 - 4, self.width() - 38 - 96, 8)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(palette.RAISED))
@@ -228,5 +231,5 @@ class _Readout(QWidget):
         painter.drawRect(QRectF(min(center, end), track.top(), max(2.0, abs(end - center)), track.height()))
         painter.setPen(QColor(palette.TEXT_DIM))
         right = Qt.AlignmentFlag.AlignRight | middle
-        painter.drawText(QRectF(self.width() - 94, 0, 94, self.height()), right, f"in {self._inserted} mm")
+        painter.drawText(QRectF(self.width() - 94, 0, 94, self.height()), right, tr("in {inserted} mm", inserted=self._inserted))
         painter.end()

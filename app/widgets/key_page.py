@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QMainWindow, QWidget
 
 from app import palette, theme
 from app.key_sheet import KeyTable
+from app.language import tr
 
 TablesOf = Callable[[QMainWindow], Sequence[KeyTable]]
 _MOST_WIDTH, _MOST_COLUMNS, _EDGE, _GUTTER = 1280, 4, 28, 22
@@ -40,7 +41,7 @@ class KeyPage(QWidget):
         self._tables_of = tables_of
         self._tables: tuple[KeyTable, ...] = ()
         self.hide()
-        self.setAccessibleName("Keys")
+        self.setAccessibleName(tr("Keys"))
         parent.installEventFilter(self)
 
     @property
@@ -81,10 +82,10 @@ class KeyPage(QWidget):
         painter.setPen(QColor(palette.TEXT))
         painter.setFont(theme.bold(22))
         corner = Qt.AlignmentFlag.AlignTop
-        painter.drawText(page.adjusted(_EDGE, 18, 0, 0), Qt.AlignmentFlag.AlignLeft | corner, "Keys")
+        painter.drawText(page.adjusted(_EDGE, 18, 0, 0), Qt.AlignmentFlag.AlignLeft | corner, tr("Keys"))
         painter.setPen(QColor(palette.TEXT_FAINT))
         painter.setFont(theme.font(12))
-        painter.drawText(page.adjusted(0, 24, -_EDGE, 0), Qt.AlignmentFlag.AlignRight | corner, "F1 or Esc closes this page")
+        painter.drawText(page.adjusted(0, 24, -_EDGE, 0), Qt.AlignmentFlag.AlignRight | corner, tr("F1 or Esc closes this page"))
         left = page.left() + _EDGE
         for column, width in zip(layout.columns, _widths(layout.columns, page.width() - 2 * _EDGE), strict=True):
             _paint_column(painter, QRectF(left, page.top() + _TITLE, width, 0), column, layout.scale)

@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QSlider, QWidget
 
 from app import theme
+from app.language import tr
 
 _STEP = 10
 
@@ -20,8 +21,10 @@ class LightSliders(QWidget):
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setVerticalSpacing(2)
-        self._contrast, self._brightness = self._slider("Contrast", ", ."), self._slider("Brightness", "< >")
-        for row, (name, keys, slider) in enumerate((("Contrast", ", .", self._contrast), ("Brightness", "< >", self._brightness))):
+        self._contrast, self._brightness = self._slider(tr("Contrast"), ", ."), self._slider(tr("Brightness"), "< >")
+        for row, (name, keys, slider) in enumerate(
+            ((tr("Contrast"), ", .", self._contrast), (tr("Brightness"), "< >", self._brightness))
+        ):
             for column, text, role in ((0, name, "TEXT_DIM"), (2, keys, "TEXT_FAINT")):
                 label = QLabel(text)
                 theme.set_sheet(label, f"color: @{role}; font-size: 12px;")
@@ -34,7 +37,7 @@ class LightSliders(QWidget):
         slider.setPageStep(_STEP)
         slider.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         slider.setAccessibleName(name)
-        slider.setToolTip(f"{name} of the picture on the screen  (keys {keys}; / resets both)")
+        slider.setToolTip(tr("{name} of the picture on the screen  (keys {keys}; / resets both)", name=name, keys=keys))
         slider.valueChanged.connect(self._tell)
         return slider
 

@@ -11,6 +11,7 @@ from PySide6.QtGui import QImage, QPainter, QResizeEvent, QTransform
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette
+from app.language import tr
 from app.pace import Pace
 from app.palette import ON_PICTURE
 from app.scene_shapes import scene_shapes
@@ -43,8 +44,8 @@ class LiveView(QWidget):
         self._pixels_per_mm = pixels_per_mm
         self.setMinimumSize(480, 320)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("Live picture")
-        self.setAccessibleDescription("Click sets the target, right click clears it")
+        self.setAccessibleName(tr("Live picture"))
+        self.setAccessibleDescription(tr("Click sets the target, right click clears it"))
         self._size: tuple[int, int] | None = None
         self._scene: Scene | None = None
         self._target: Point | None = None

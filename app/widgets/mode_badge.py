@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QFont, QFontMetrics, QPainter, QPainterPath, Q
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import mark, tr
 from app.next_step import who_drives
 from app.widgets.signs import Sign, octagon, paint_sign
 from core.control.drive_view import DriveView
@@ -33,11 +34,11 @@ class ModeLook:
 
 
 MODE_LOOK = {
-    Mode.ADVISORY: ModeLook("SKY", False, Sign.WHEEL, "you steer, the program only advises"),
-    Mode.ARMED: ModeLook("ORANGE", False, Sign.READY, "you steer; the program may be handed over to"),
-    Mode.AUTONOMOUS: ModeLook("GREEN", True, Sign.DRIVES, "the program drives while the deadman is held"),
-    Mode.HOLD: ModeLook("YELLOW", True, Sign.PAUSE, "the program's motion is interrupted; the robot holds"),
-    Mode.STOPPED: ModeLook("VERMILLION", True, Sign.STOP, "nothing moves until the stop is acknowledged"),
+    Mode.ADVISORY: ModeLook("SKY", False, Sign.WHEEL, mark("you steer, the program only advises")),
+    Mode.ARMED: ModeLook("ORANGE", False, Sign.READY, mark("you steer; the program may be handed over to")),
+    Mode.AUTONOMOUS: ModeLook("GREEN", True, Sign.DRIVES, mark("the program drives while the deadman is held")),
+    Mode.HOLD: ModeLook("YELLOW", True, Sign.PAUSE, mark("the program's motion is interrupted; the robot holds")),
+    Mode.STOPPED: ModeLook("VERMILLION", True, Sign.STOP, mark("nothing moves until the stop is acknowledged")),
 }
 
 
@@ -70,7 +71,7 @@ class ModeBadge(QWidget):
         if (mode, who) == (self._mode, self._who):
             return
         self._mode, self._who = mode, who
-        self.setAccessibleName(f"Mode: {mode.value}")
+        self.setAccessibleName(tr("Mode: {mode}", mode=tr(mode.value)))
         self.setAccessibleDescription(who)
         self.setToolTip("\n".join(_meaning(each, each is mode) for each in Mode))
         self.update()
@@ -90,20 +91,20 @@ class ModeBadge(QWidget):
         painter.end()
 
     def _paint_words(self, painter: QPainter, room: QRectF, ink: QColor, who_ink: QColor) -> None:
-        name_font = QFont(theme.bold(15))
+        name, name_font = tr(self._mode.value), QFont(theme.bold(15))
         name_font.setLetterSpacing(QFont.SpacingType.AbsoluteSpacing, 0.4)
         painter.setFont(name_font)
         painter.setPen(ink)
-        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, self._mode.value)
-        left = QFontMetrics(name_font).horizontalAdvance(self._mode.value) + 9
+        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, name)
+        left = QFontMetrics(name_font).horizontalAdvance(name) + 9
         painter.setFont(theme.fitted(theme.font(13), self._who, int(room.width() - left)))
         painter.setPen(who_ink)
         painter.drawText(room.adjusted(left, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, self._who)
 
 
 def _meaning(mode: Mode, is_now: bool) -> str:
-    mark = "\N{RIGHTWARDS ARROW} " if is_now else ""
-    return f"{mark}{mode.value}: {MODE_LOOK[mode].meaning}"
+    arrow = "\N{RIGHTWARDS ARROW} " if is_now else ""
+    return f"{arrow}{tr(mode.value)}: {tr(MODE_LOOK[mode].meaning)}"
 
 
 def _outline(frame: QRectF, mode: Mode) -> QPainterPath:

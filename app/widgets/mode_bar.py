@@ -11,6 +11,7 @@ from PySide6.QtGui import QAbstractTextDocumentLayout, QColor, QPainter, QPaintE
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr
 from app.next_step import NO_ROBOT, NOT_YET, NextStep, Step, next_step, sentence
 from app.widgets.deadman_field import DeadmanField
 from app.widgets.mode_badge import MODE_LOOK
@@ -67,7 +68,7 @@ class ModeBar(QWidget):
         self.second.asked.connect(self._on_step)
         self.stop.asked.connect(self.stop_asked)
         self.deadman.held_changed.connect(self.deadman_changed)
-        self.setAccessibleName("Who drives")
+        self.setAccessibleName(tr("Who drives"))
         self._set_usable(False)
         self._show_step(NOT_YET)
 
@@ -111,7 +112,7 @@ class ModeBar(QWidget):
         why = step.all_reasons or step.text
         self.main.show_step(step.step, step.granted, why)
         if step.other is not None:
-            self.second.show_step(step.other, True, step.other.value.meaning)
+            self.second.show_step(step.other, True, tr(step.other.value.meaning))
         self.second.setVisible(step.other is not None)
         self._text.show_step(step)
         self.setAccessibleDescription(step.text)
@@ -175,7 +176,7 @@ class _Line(QWidget):
         self._document.setDocumentMargin(0)
         self.fits = True
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("What is next")
+        self.setAccessibleName(tr("What is next"))
 
     def follow_theme(self) -> None:
         self._fit()
@@ -202,7 +203,11 @@ class _Line(QWidget):
     def _try(self, rest: list[str], size_px: int) -> bool:
         """Set the line with `rest` in this size; whether it fits."""
         step = self._step
-        more = f" <b>+{len(step.reasons) - 1}&nbsp;more</b>" if len(step.reasons) > 1 else ""
+        more = (
+            " <b>" + tr("+{count} more", count=len(step.reasons) - 1).replace(" ", "&nbsp;") + "</b>"
+            if len(step.reasons) > 1
+            else ""
+        )
         headline = f'<b style="color:{_headline_colour(step)}">{escape(sentence(step.headline))}</b>'
         self._document.setDefaultFont(theme.font(size_px))
         self._document.setHtml(f"{headline} {escape(' '.join(rest))}{more}")

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
 from app import palette, theme
+from app.language import tr, tr_text
 
 
 class NoticeKind(Enum):
@@ -34,7 +35,7 @@ class Notice(QWidget):
         self._timer = QTimer(self)
         self._timer.setInterval(50)
         self._timer.timeout.connect(self._move_bar)
-        self._button = QPushButton("Start again  (F5)")
+        self._button = QPushButton(tr("Start again  (F5)"))
         self._button.clicked.connect(self.restart)
         column = QVBoxLayout(self)
         column.setContentsMargins(24, 24, 24, 20)
@@ -51,7 +52,7 @@ class Notice(QWidget):
         return QSize(520, 170)
 
     def show_notice(self, kind: NoticeKind, title: str, detail: str = "", *, restartable: bool = False) -> None:
-        self._kind, self._title, self._detail = kind, title, detail
+        self._kind, self._title, self._detail = kind, tr_text(title), tr_text(detail)
         self._button.setVisible(restartable)
         self.setAccessibleName(self.text)
         if kind is NoticeKind.PROGRESS:

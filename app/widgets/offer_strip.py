@@ -12,6 +12,7 @@ from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette
+from app.language import tr
 
 _WIDEST_PX = 900
 _MARGIN_PX = 12
@@ -137,7 +138,7 @@ class OfferStrip(QFrame):
             self._bar.setRange(0, 1000 if offer.share >= 0.0 else 0)
             self._bar.setValue(round(1000 * max(0.0, offer.share)))
         waiting = len(self._offers) - 1
-        self._more.setText(f"+{waiting} more")
+        self._more.setText(tr("+{count} more", count=waiting))
         self._more.setVisible(waiting > 0)
         edge = _INK.FAULT if offer.is_fault else _INK.SKY
         self.setStyleSheet(f"OfferStrip {{ background: {_INK.RAISED}; border: 1px solid {edge}; border-radius: 8px; }}")
@@ -158,8 +159,8 @@ class OfferStrip(QFrame):
         self._buttons = []
         for place, answer in enumerate(offer.answers):
             self._add_button(answer.name, answer.meaning or answer.name, place == 0)
-        cross = self._add_button("\N{MULTIPLICATION SIGN}", "Close this", False)
-        cross.setAccessibleName("Close this offer")
+        cross = self._add_button("\N{MULTIPLICATION SIGN}", tr("Close this"), False)
+        cross.setAccessibleName(tr("Close this offer"))
         cross.setFixedWidth(30)
 
     def _add_button(self, name: str, meaning: str, is_main: bool) -> QPushButton:

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QWidget
 
 from app import palette, theme
+from app.language import tr
 from app.palette import ON_PICTURE
 from app.widgets.overlays import Layer
 
@@ -41,7 +42,7 @@ class OverlayBar(QWidget):
             chip.toggled.connect(lambda on, which=layer: self.toggled.emit(which, on))
             row.addWidget(chip, chip.sizeHint().width())
             self._chips[layer] = chip
-        self.setAccessibleName("Overlays")
+        self.setAccessibleName(tr("Overlays"))
 
     def is_on(self, layer: Layer) -> bool:
         return self._chips[layer].isChecked()
@@ -62,13 +63,13 @@ class _Chip(QAbstractButton):
         self._layer = layer
         self.setCheckable(True)
         self.setChecked(True)
-        self.setText(layer.value.label)
+        self.setText(tr(layer.value.label))
         self.setFixedHeight(30)
         self.setMinimumWidth(54)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setToolTip(f"{layer.value.meaning}  (key {layer.value.key})")
-        self.setAccessibleName(f"Overlay {layer.value.label}")
+        self.setToolTip(tr("{meaning}  (key {key})", meaning=tr(layer.value.meaning), key=layer.value.key))
+        self.setAccessibleName(tr("Overlay {label}", label=tr(layer.value.label)))
 
     def sizeHint(self) -> QSize:
         return QSize(40 + QFontMetrics(theme.font(12)).horizontalAdvance(self.text()), 30)

@@ -11,6 +11,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
 
+from app.language import mark
 from app.palette import ON_PICTURE
 from app.scene_shapes import SceneShapes
 from app.widgets.pencil import Pencil
@@ -32,16 +33,20 @@ class LayerText:
 class Layer(Enum):
     """The overlays that can be switched, in the order of their keys."""
 
-    MASKS = LayerText("1", "Masks", "What the network took for vessel (blue) and robot (orange)")
-    VESSEL = LayerText("2", "Centerline", "The vessel's centerline, from its skeleton")
-    ROBOT = LayerText("3", "Robot", "The robot's path from tail to head; dotted where a gap was repaired")
-    HEAD = LayerText("4", "Head", "The robot's head")
-    VECTORS = LayerText("5", "Vectors", "Fitted lines of robot (40 px, yellow) and vessel (light blue), and theta between them")
-    NEAREST = LayerText("6", "Nearest", "The centerline point nearest to the head")
-    DISTANCES = LayerText("7", "Distances", "d_head and d_tail: from the vessel line to both ends of the robot vector")
-    ROUTE = LayerText("8", "Route", "The operator's target and the way to it")
-    LOUPE = LayerText("9", "Loupe", "The surroundings of the head, magnified, in a corner of the picture")
-    GHOST = LayerText("G", "Ghost", "Where the head goes in the next two seconds if the advice is followed: the broken tube")
+    MASKS = LayerText("1", mark("Masks"), mark("What the network took for vessel (blue) and robot (orange)"))
+    VESSEL = LayerText("2", mark("Centerline"), mark("The vessel's centerline, from its skeleton"))
+    ROBOT = LayerText("3", mark("Robot"), mark("The robot's path from tail to head; dotted where a gap was repaired"))
+    HEAD = LayerText("4", mark("Head"), mark("The robot's head"))
+    VECTORS = LayerText(
+        "5", mark("Vectors"), mark("Fitted lines of robot (40 px, yellow) and vessel (light blue), and theta between them")
+    )
+    NEAREST = LayerText("6", mark("Nearest"), mark("The centerline point nearest to the head"))
+    DISTANCES = LayerText("7", mark("Distances"), mark("d_head and d_tail: from the vessel line to both ends of the robot vector"))
+    ROUTE = LayerText("8", mark("Route"), mark("The operator's target and the way to it"))
+    LOUPE = LayerText("9", mark("Loupe"), mark("The surroundings of the head, magnified, in a corner of the picture"))
+    GHOST = LayerText(
+        "G", mark("Ghost"), mark("Where the head goes in the next two seconds if the advice is followed: the broken tube")
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,6 +11,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr, tr_text
 from app.pace import Pace
 from app.tool_tips import tip
 from core.types import Tick
@@ -34,7 +35,7 @@ class PerformancePanel(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMinimumSize(210, 92)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("Performance")
+        self.setAccessibleName(tr("Performance"))
         self.setToolTip(tip("shown", "engine", "dropped", "gui_block", "latency"))
 
     @property
@@ -97,7 +98,7 @@ class PerformancePanel(QWidget):
     def _paint_table(self, painter: QPainter, top: float) -> None:
         middle = Qt.AlignmentFlag.AlignVCenter
         left, right = Qt.AlignmentFlag.AlignLeft | middle, Qt.AlignmentFlag.AlignRight | middle
-        rows = (("ms per frame", "p50", "p95"), *self._rows)
+        rows = ((tr("ms per frame"), "p50", "p95"), *self._rows)
         height = min(18.0, max(_ROW_MIN, (self.height() - top) / max(len(rows), 1)))
         rows = rows[: int((self.height() - top) / height)]
         for k, (name, half, most) in enumerate(rows):
@@ -105,7 +106,7 @@ class PerformancePanel(QWidget):
             is_total = name == "total"
             painter.setFont(theme.semi_bold(12) if is_total else theme.font(12))
             painter.setPen(QColor(palette.TEXT if is_total else palette.TEXT_FAINT if k == 0 else palette.TEXT_DIM))
-            painter.drawText(QRectF(0, y, self.width() - 110, height), left, name)
+            painter.drawText(QRectF(0, y, self.width() - 110, height), left, tr_text(name))
             painter.drawText(QRectF(self.width() - 110, y, 52, height), right, half)
             painter.drawText(QRectF(self.width() - 56, y, 56, height), right, most)
 
@@ -116,8 +117,8 @@ def _heads(
     """Name, value, and whether it is out of bounds."""
     none = "\N{EN DASH}"
     return (
-        ("shown/s", none if shown is None else f"{shown:.0f}", False),
-        ("frames/s", none if engine is None else f"{engine:.0f}", False),
-        ("dropped", none if dropped is None else f"{dropped}", False),
-        ("block ms", none if block_ms is None else f"{block_ms:.0f}", block_ms is not None and block_ms > _BLOCK_LIMIT_MS),
+        (tr("shown/s"), none if shown is None else f"{shown:.0f}", False),
+        (tr("frames/s"), none if engine is None else f"{engine:.0f}", False),
+        (tr("dropped"), none if dropped is None else f"{dropped}", False),
+        (tr("block ms"), none if block_ms is None else f"{block_ms:.0f}", block_ms is not None and block_ms > _BLOCK_LIMIT_MS),
     )

@@ -8,6 +8,7 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSpinBox, QWidget
 
+from app.language import tr, tr_text
 from app.menus import MenuEntry
 from app.tool_tips import tip
 from app.widgets.quiet_combo import QuietCombo
@@ -24,22 +25,22 @@ class PhantomPicker(QWidget):
     def __init__(self, phantoms: Sequence[tuple[str, str]], current: str) -> None:
         """`phantoms` are (name, title) pairs; `current` is a name or "random:<seed>"."""
         super().__init__()
-        self._combo = QuietCombo("Phantom")
+        self._combo = QuietCombo(tr("Phantom"))
         for name, title in phantoms:
-            self._combo.addItem(title, name)
-        self._combo.addItem("Random \N{HORIZONTAL ELLIPSIS}", _RANDOM)
+            self._combo.addItem(tr_text(title), name)
+        self._combo.addItem(tr("Random \N{HORIZONTAL ELLIPSIS}"), _RANDOM)
         self._combo.setMinimumWidth(190)
         self._combo.setMaxVisibleItems(16)
-        self._combo.setToolTip(f"{tip('phantom')}\nCtrl+P opens the list; so does Enter when Tab has come here")
+        self._combo.setToolTip(tip("phantom") + "\n" + tr("Ctrl+P opens the list; so does Enter when Tab has come here"))
         self._seed = _SeedBox()
-        self._roll = QPushButton("New")
-        self._roll.setToolTip("Another random phantom (key R)")
-        self._roll.setAccessibleName("Another random phantom")
+        self._roll = QPushButton(tr("New"))
+        self._roll.setToolTip(tr("Another random phantom (key R)"))
+        self._roll.setAccessibleName(tr("Another random phantom"))
         self._roll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
-        label = QLabel("Phantom")
+        label = QLabel(tr("Phantom"))
         label.setObjectName("card_title")
         for widget in (label, self._combo, self._seed, self._roll):
             row.addWidget(widget)
@@ -56,7 +57,7 @@ class PhantomPicker(QWidget):
 
     @property
     def title(self) -> str:
-        return f"random {self._seed.value()}" if self._combo.currentData() == _RANDOM else self._combo.currentText()
+        return tr("random {seed}", seed=self._seed.value()) if self._combo.currentData() == _RANDOM else self._combo.currentText()
 
     def show_name(self, name: str) -> None:
         """Show `name` without choosing it again."""
@@ -71,13 +72,15 @@ class PhantomPicker(QWidget):
     def menu_entries(self) -> tuple[MenuEntry, ...]:
         """The same by menu and key."""
         return (
-            MenuEntry("Choose a &phantom", self.open_list, ("Ctrl+P",)),
-            MenuEntry("Another ran&dom phantom", self.roll, ("R",)),
+            MenuEntry(tr("Choose a &phantom"), self.open_list, ("Ctrl+P",)),
+            MenuEntry(tr("Another ran&dom phantom"), self.roll, ("R",)),
         )
 
     @Slot()
     def open_list(self) -> None:
         """The list of phantoms, by keyboard: the arrows choose, Enter takes, Escape leaves."""
+        if not self.isEnabled():
+            return
         self._combo.setFocus()
         self._combo.showPopup()
 
@@ -87,7 +90,9 @@ class PhantomPicker(QWidget):
 
     @Slot()
     def roll(self) -> None:
-        """The random phantom of the next seed."""
+        """The random phantom of the next seed; nothing while a rig without phantoms is open."""
+        if not self.isEnabled():
+            return
         with QSignalBlocker(self._combo), QSignalBlocker(self._seed):
             if self._combo.currentData() == _RANDOM:
                 self._seed.setValue(self._seed.value() % _SEED_MAX + 1)
@@ -116,12 +121,12 @@ class _SeedBox(QSpinBox):
         super().__init__()
         self.setRange(0, _SEED_MAX)
         self.setValue(1)
-        self.setPrefix("seed ")
+        self.setPrefix(tr("seed "))
         self.setFixedWidth(104)
         self.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName("Seed of the random phantom")
+        self.setAccessibleName(tr("Seed of the random phantom"))
         self.setToolTip(tip("seed"))
         self._last = self.value()
         self.valueChanged.connect(self._on_value)

@@ -7,6 +7,7 @@ from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSlider, QSpinBox, QVBoxLayout, QWidget
 
 from app import theme
+from app.language import tr
 from app.play_clock import SPEEDS
 from app.session_marks import JumpKind, clock_text
 from app.widgets.quiet_combo import name_list
@@ -44,7 +45,7 @@ class PlayerBar(QWidget):
         super().__init__()
         theme.set_sheet(self, _STYLE)
         self.slider = QSlider(Qt.Orientation.Horizontal)
-        self.slider.setAccessibleName("Position in milliseconds")
+        self.slider.setAccessibleName(tr("Position in milliseconds"))
         self.slider.setSingleStep(100)
         self.slider.setPageStep(1000)
         self.position = QSpinBox()
@@ -54,33 +55,37 @@ class PlayerBar(QWidget):
         self.position.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
         self.position.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.position.setFixedWidth(124)
-        self.position.setAccessibleName("Go to, in milliseconds")
-        self.position.setToolTip("Position from the first frame; type one and press Enter  (key T)")
-        self.length = _label("of 0:00.000")
+        self.position.setAccessibleName(tr("Go to, in milliseconds"))
+        self.position.setToolTip(tr("Position from the first frame; type one and press Enter  (key T)"))
+        self.length = _label(tr("of {time}", time="0:00.000"))
         self.frame = _label("")
         self.frame.setObjectName("card_note")
-        self.play = self._button("\N{BLACK RIGHT-POINTING TRIANGLE}", "Play or pause  (Space)", self.play_asked.emit, "Play")
+        self.play = self._button(
+            "\N{BLACK RIGHT-POINTING TRIANGLE}", tr("Play or pause  (Space)"), self.play_asked.emit, tr("Play")
+        )
         self.play.setObjectName("play")
         self.play.setFixedWidth(56)
         self.kind = QComboBox()
         for kind in JumpKind:
-            self.kind.addItem(kind.value, kind)
-        name_list(self.kind, "What N and P jump to")
-        self.kind.setToolTip("What N and P jump to  (K: the next kind)")
+            self.kind.addItem(tr(kind.value), kind)
+        name_list(self.kind, tr("What N and P jump to"))
+        self.kind.setToolTip(tr("What N and P jump to  (K: the next kind)"))
         self.kind.setFixedWidth(142)
         self.speed = QComboBox()
         for speed in SPEEDS:
             self.speed.addItem(f"{speed:g}\N{MULTIPLICATION SIGN}", speed)
-        name_list(self.speed, "Speed")
-        self.speed.setToolTip("Speed  ([ slower, ] faster)")
+        name_list(self.speed, tr("Speed"))
+        self.speed.setToolTip(tr("Speed  ([ slower, ] faster)"))
         self.speed.setFixedWidth(78)
-        self.clip = self._button("Clip", "Save the selection as a video, without one the session  (E)", self.clip_asked.emit)
-        self.note = self._button("Note", "Add a note at this time  (M)", self.note_asked.emit)
-        self.snapshot = self._button("Snapshot", "Save this picture  (S)", self.snapshot_asked.emit)
+        self.clip = self._button(
+            tr("Clip"), tr("Save the selection as a video, without one the session  (E)"), self.clip_asked.emit
+        )
+        self.note = self._button(tr("Note"), tr("Add a note at this time  (M)"), self.note_asked.emit)
+        self.snapshot = self._button(tr("Snapshot"), tr("Save this picture  (S)"), self.snapshot_asked.emit)
         self.progress = QProgressBar()
         self.progress.setFixedHeight(24)
-        self.progress.setAccessibleName("Clip being written")
-        self.cancel = self._button("Cancel", "Stop writing the clip  (Esc)", self.cancel_asked.emit, "Cancel the clip")
+        self.progress.setAccessibleName(tr("Clip being written"))
+        self.cancel = self._button(tr("Cancel"), tr("Stop writing the clip  (Esc)"), self.cancel_asked.emit, tr("Cancel the clip"))
         self._lay_out()
         self._wire()
         self.show_progress(None)
@@ -92,7 +97,7 @@ class PlayerBar(QWidget):
             with QSignalBlocker(field):
                 field.setRange(0, max(0, duration_ms))
         self._rows = rows
-        self.length.setText(f"of {clock_text(duration_ms / 1000)}")
+        self.length.setText(tr("of {time}", time=clock_text(duration_ms / 1000)))
 
     def show_position(self, time_ms: int, place: int) -> None:
         """Where playing is. A number that is being typed stays."""
@@ -101,11 +106,11 @@ class PlayerBar(QWidget):
         if not self.position.hasFocus():
             with QSignalBlocker(self.position):
                 self.position.setValue(time_ms)
-        self.frame.setText(f"frame {place + 1} of {self._rows}" if self._rows else "no frames")
+        self.frame.setText(tr("frame {place} of {count}", place=place + 1, count=self._rows) if self._rows else tr("no frames"))
 
     def show_playing(self, on: bool) -> None:
         self.play.setText("\N{DOUBLE VERTICAL BAR}" if on else "\N{BLACK RIGHT-POINTING TRIANGLE}")
-        self.play.setAccessibleName("Pause" if on else "Play")
+        self.play.setAccessibleName(tr("Pause") if on else tr("Play"))
 
     def show_speed(self, speed: float) -> None:
         with QSignalBlocker(self.speed):
@@ -117,7 +122,7 @@ class PlayerBar(QWidget):
 
     def show_selection(self, length_s: float | None) -> None:
         """How long the clip will be."""
-        self.clip.setText("Clip" if length_s is None else f"Clip {length_s:.1f} s")
+        self.clip.setText(tr("Clip") if length_s is None else tr("Clip {seconds:.1f} s", seconds=length_s))
 
     def show_progress(self, share: float | None) -> None:
         """Of the clip that is being written; None: none is."""
@@ -139,10 +144,10 @@ class PlayerBar(QWidget):
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(5)
-        before = self._button("\N{LEFTWARDS ARROW}", "One frame back  (\N{LEFTWARDS ARROW})", lambda: self.step_asked.emit(-1))
-        after = self._button("\N{RIGHTWARDS ARROW}", "One frame on  (\N{RIGHTWARDS ARROW})", lambda: self.step_asked.emit(1))
-        previous = self._button("P", "Previous of the kind beside  (P)", lambda: self.jump_asked.emit(-1))
-        following = self._button("N", "Next of the kind beside  (N)", lambda: self.jump_asked.emit(1))
+        before = self._button("\N{LEFTWARDS ARROW}", tr("One frame back  (\N{LEFTWARDS ARROW})"), lambda: self.step_asked.emit(-1))
+        after = self._button("\N{RIGHTWARDS ARROW}", tr("One frame on  (\N{RIGHTWARDS ARROW})"), lambda: self.step_asked.emit(1))
+        previous = self._button("P", tr("Previous of the kind beside  (P)"), lambda: self.jump_asked.emit(-1))
+        following = self._button("N", tr("Next of the kind beside  (N)"), lambda: self.jump_asked.emit(1))
         for widget in (before, self.play, after):
             row.addWidget(widget)
         row.addSpacing(6)

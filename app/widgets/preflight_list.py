@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from app import palette, theme
+from app.language import mark, tr, tr_text
 from app.preflight_desk import Finding, Preflight, PreflightDesk
 from app.widgets.signs import Sign, paint_sign
 from hardware.driving_checks import Level
@@ -15,9 +16,9 @@ _SIZE = QSize(780, 560)
 _RENEW_MS = 1000
 _TICK = QPolygonF([QPointF(4.0, 12.0), QPointF(9.0, 17.0), QPointF(18.0, 6.0)])
 _LOOK: dict[Level, tuple[Sign | None, str, str]] = {
-    Level.GOOD: (None, "ALLOWED", "good"),
-    Level.WARNING: (Sign.WARNING, "ORANGE", "to know"),
-    Level.BAD: (Sign.BARRED, "FAULT", "NOT READY"),
+    Level.GOOD: (None, "ALLOWED", mark("good")),
+    Level.WARNING: (Sign.WARNING, "ORANGE", mark("to know")),
+    Level.BAD: (Sign.BARRED, "FAULT", mark("NOT READY")),
 }
 
 
@@ -28,7 +29,7 @@ class _Badge(QWidget):
         super().__init__()
         self._level = level
         self.setFixedSize(112, 22)
-        self.setAccessibleName(_LOOK[level][2])
+        self.setAccessibleName(tr(_LOOK[level][2]))
 
     def paintEvent(self, event: QPaintEvent) -> None:
         sign, role, word = _LOOK[self._level]
@@ -42,7 +43,7 @@ class _Badge(QWidget):
             paint_sign(painter, QRectF(2, 2, 18, 18), sign, colour)
         painter.setPen(colour)
         painter.setFont(theme.semi_bold(13))
-        painter.drawText(QRectF(28, 0, 84, 20), Qt.AlignmentFlag.AlignVCenter, word)
+        painter.drawText(QRectF(28, 0, 84, 20), Qt.AlignmentFlag.AlignVCenter, tr(word))
         painter.end()
 
 
@@ -55,7 +56,7 @@ class PreflightList(QDialog):
         super().__init__(parent)
         self._desk = desk
         self._shown: tuple[Finding, ...] = ()
-        self.setWindowTitle("Before driving")
+        self.setWindowTitle(tr("Before driving"))
         self.setModal(False)
         self.resize(_SIZE)
         self._headline = QLabel()
@@ -72,9 +73,9 @@ class PreflightList(QDialog):
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setWidget(self._list)
-        self.again = QPushButton("Check &again")
-        self.arm = QPushButton("A&rm  (F6)")
-        self.leave = QPushButton("&Close")
+        self.again = QPushButton(tr("Check &again"))
+        self.arm = QPushButton(tr("A&rm  (F6)"))
+        self.leave = QPushButton(tr("&Close"))
         self.again.clicked.connect(desk.begin)
         self.arm.clicked.connect(self._on_arm)
         self.leave.clicked.connect(self.close)
@@ -100,7 +101,10 @@ class PreflightList(QDialog):
     @property
     def texts(self) -> list[str]:
         """The lines as shown."""
-        return [f"{_LOOK[one.level][2]} {one.name}: {one.detail} {one.fix}".strip() for one in self._shown]
+        return [
+            f"{tr(_LOOK[one.level][2])} {tr_text(one.name)}: {tr_text(one.detail)} {tr_text(one.fix)}".strip()
+            for one in self._shown
+        ]
 
     @property
     def headline(self) -> str:
@@ -138,9 +142,10 @@ class PreflightList(QDialog):
             self._rows.setRowStretch(row, 0)
         order = {Level.BAD: 0, Level.WARNING: 1, Level.GOOD: 2}
         for place, finding in enumerate(sorted(self._shown, key=lambda one: order[one.level])):
-            name = QLabel(finding.name[0].upper() + finding.name[1:])
+            shown = tr_text(finding.name)
+            name = QLabel(shown[0].upper() + shown[1:])
             name.setFont(theme.semi_bold(theme.Size.BODY))
-            detail = QLabel(finding.detail + (f"\n\N{RIGHTWARDS ARROW} {finding.fix}" if finding.fix else ""))
+            detail = QLabel(tr_text(finding.detail) + (f"\n\N{RIGHTWARDS ARROW} {tr_text(finding.fix)}" if finding.fix else ""))
             detail.setWordWrap(True)
             detail.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)  # a command is made to be copied
             top = Qt.AlignmentFlag.AlignTop
@@ -152,9 +157,9 @@ class PreflightList(QDialog):
 
 def _note(now: Preflight) -> str:
     if now.is_running:
-        return "Nothing moves by this. Some seconds."
+        return tr("Nothing moves by this. Some seconds.")
     if now.age_s is None:
         return ""
     minutes = int(now.age_s // 60)
-    ago = "just now" if minutes < 1 else f"{minutes} min ago"
-    return f"Checked {ago}" + ("" if now.is_fresh else ": too long ago")
+    ago = tr("just now") if minutes < 1 else tr("{minutes} min ago", minutes=minutes)
+    return tr("Checked {ago}", ago=ago) + ("" if now.is_fresh else tr(": too long ago"))

@@ -5,11 +5,12 @@ from __future__ import annotations
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QPushButton, QStackedLayout, QWidget
 
+from app.language import mark, tr
 from app.widgets.question_strip import QuestionStrip
 from app.widgets.quiet_combo import QuietCombo
 from core.profiles import Profile
 
-_OWN = "Own settings"
+_OWN = mark("Own settings")
 
 
 class ProfileRow(QWidget):
@@ -21,13 +22,13 @@ class ProfileRow(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.combo = QuietCombo("Profile")
+        self.combo = QuietCombo(tr("Profile"))
         self.combo.setMinimumWidth(190)
-        self.combo.setToolTip("Takes all settings from a profile; nothing is kept before you save")
-        self.save_button, self.delete_button = QPushButton("Save as"), QPushButton("Delete")
+        self.combo.setToolTip(tr("Takes all settings from a profile; nothing is kept before you save"))
+        self.save_button, self.delete_button = QPushButton(tr("Save as")), QPushButton(tr("Delete"))
         self.name = QLineEdit()
-        self.name.setPlaceholderText("Name of the profile; Enter saves, Esc does not")
-        self.name.setAccessibleName("Name of the profile")
+        self.name.setPlaceholderText(tr("Name of the profile; Enter saves, Esc does not"))
+        self.name.setAccessibleName(tr("Name of the profile"))
         self.name.setMaxLength(60)
         self.question = QuestionStrip()
         self._profiles: tuple[Profile, ...] = ()
@@ -43,9 +44,9 @@ class ProfileRow(QWidget):
         self._profiles = profiles
         with QSignalBlocker(self.combo):
             self.combo.clear()
-            self.combo.addItem(_OWN, None)
+            self.combo.addItem(tr(_OWN), None)
             for profile in profiles:
-                self.combo.addItem(f"{profile.name} (preset)" if profile.is_preset else profile.name, profile.name)
+                self.combo.addItem(tr("{name} (preset)", name=profile.name) if profile.is_preset else profile.name, profile.name)
         self.show_current(current)
 
     def show_current(self, current: Profile | None) -> None:
@@ -53,7 +54,7 @@ class ProfileRow(QWidget):
             self.combo.setCurrentIndex(self._profiles.index(current) + 1 if current in self._profiles else 0)
         profile = self.profile
         self.delete_button.setEnabled(profile is not None and not profile.is_preset)
-        self.delete_button.setToolTip("" if self.delete_button.isEnabled() else "Choose one of your own profiles first")
+        self.delete_button.setToolTip("" if self.delete_button.isEnabled() else tr("Choose one of your own profiles first"))
 
     @property
     def profile(self) -> Profile | None:
@@ -94,14 +95,14 @@ class ProfileRow(QWidget):
     def _ask_delete(self) -> None:
         profile = self.profile
         if profile is not None:
-            self.ask(f"Delete the profile {profile.name}?", "Delete", lambda: self.delete_asked.emit(profile))
+            self.ask(tr("Delete the profile {name}?", name=profile.name), tr("Delete"), lambda: self.delete_asked.emit(profile))
 
     def _lay_out(self) -> None:
         buttons = QWidget()
         row = QHBoxLayout(buttons)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
-        label = QLabel("Profile")
+        label = QLabel(tr("Profile"))
         label.setObjectName("card_title")
         row.addWidget(label)
         row.addWidget(self.combo, 1)

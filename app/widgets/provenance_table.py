@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
 from app.cells import NONE, TONE_ROLE, Tone
+from app.language import tr
 from app.provenance import HEADINGS, LABELS, ProvenanceRow
 from app.tool_tips import tip
 
@@ -28,15 +29,15 @@ class ProvenanceTable(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMinimumSize(300, _ROWS * 17)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("Advice, commands and what was sent")
+        self.setAccessibleName(tr("Advice, commands and what was sent"))
         self.setToolTip(tip("commands", "capture_to_servo", "following"))
 
     @property
     def text(self) -> str:
         """All that is shown, as lines."""
         lines = [
-            f"{'drives: ' if row.drives else ''}{row.label}: "
-            + (row.note or ", ".join(f"{head} {cell.text}" for head, cell in zip(HEADINGS, row.cells, strict=True)))
+            f"{tr('drives: ') if row.drives else ''}{tr(row.label)}: "
+            + (row.note or ", ".join(f"{tr(head)} {cell.text}" for head, cell in zip(HEADINGS, row.cells, strict=True)))
             for row in self._rows
         ]
         return "\n".join([*lines, self.latency_text, self.follow_text])
@@ -44,13 +45,14 @@ class ProvenanceTable(QWidget):
     @property
     def latency_text(self) -> str:
         if self._latency_ms is None:
-            return f"capture \N{RIGHTWARDS ARROW} servo {NONE}"
+            return tr("capture \N{RIGHTWARDS ARROW} servo {time}", time=NONE)
         late = "! " if self._latency_ms > LATENCY_LIMIT_MS else ""
-        return f"capture \N{RIGHTWARDS ARROW} servo {late}{self._latency_ms:.0f} ms"
+        return tr("capture \N{RIGHTWARDS ARROW} servo {time}", time=f"{late}{self._latency_ms:.0f} ms")
 
     @property
     def follow_text(self) -> str:
-        return f"following the advice {NONE if self._follow is None else f'{100 * self._follow:.0f} %'}"
+        share = NONE if self._follow is None else f"{100 * self._follow:.0f} %"
+        return tr("following the advice {share}", share=share)
 
     def sizeHint(self) -> QSize:
         return QSize(440, _ROWS * 20)
@@ -73,7 +75,7 @@ class ProvenanceTable(QWidget):
         painter.setFont(theme.font(11))
         painter.setPen(QColor(palette.TEXT_FAINT))
         for k, heading in enumerate(HEADINGS):
-            painter.drawText(QRectF(_LABEL_WIDTH + k * width, 0, width, height), _LEFT, heading)
+            painter.drawText(QRectF(_LABEL_WIDTH + k * width, 0, width, height), _LEFT, tr(heading))
         for k, row in enumerate(self._rows):
             _paint_row(painter, QRectF(0, (k + 1) * height, self.width(), height), row, width, is_sent=k == len(self._rows) - 1)
         self._paint_measures(painter, QRectF(0, 5 * height, self.width(), height))
@@ -108,7 +110,7 @@ def _paint_row(painter: QPainter, box: QRectF, row: ProvenanceRow, width: float,
     strong = row.drives or is_sent
     painter.setFont(theme.semi_bold(size) if strong else theme.font(size))
     painter.setPen(QColor(palette.SKY if row.drives else palette.TEXT if is_sent else palette.TEXT_DIM))
-    painter.drawText(box.adjusted(16, 0, 0, 0), _LEFT, row.label)
+    painter.drawText(box.adjusted(16, 0, 0, 0), _LEFT, tr(row.label))
     if not row.cells:
         note_font = theme.font(size)
         painter.setFont(note_font)

@@ -9,6 +9,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
 
 from app import theme
+from app.language import tr
 
 _OPEN_MS = 20_000
 BUTTON_STYLE = "padding: 0 9px; min-height: 20px; font-size: 12px;"
@@ -29,7 +30,7 @@ class QuestionStrip(QWidget):
         self._question = QLabel()
         theme.set_sheet(self._question, "color: @ORANGE; font-size: 12px; font-weight: 600;")
         self._yes = QPushButton()
-        self._no = QPushButton("Cancel")
+        self._no = QPushButton(tr("Cancel"))
         for button in (self._yes, self._no):
             button.setStyleSheet(BUTTON_STYLE)
         self._yes.clicked.connect(self._on_yes)
@@ -44,7 +45,7 @@ class QuestionStrip(QWidget):
         row.addWidget(self._question, 1)
         row.addWidget(self._yes)
         row.addWidget(self._no)
-        self.setAccessibleName("Question")
+        self.setAccessibleName(tr("Question"))
 
     @property
     def text(self) -> str:

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr
 from core.session.record_status import RecordStatus
 
 _SIZE = QSize(196, 34)
@@ -20,7 +21,7 @@ class RecordBar(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._status = RecordStatus()
-        self._lines = ("Record", "F9")
+        self._lines = (tr("Record"), "F9")
         self.setFixedSize(_SIZE)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -41,11 +42,15 @@ class RecordBar(QWidget):
             self.update()
 
     def _describe(self) -> None:
-        self.setAccessibleName("Recording" if self._status.recording else "Record")
+        self.setAccessibleName(tr("Recording") if self._status.recording else tr("Record"))
         self.setAccessibleDescription(self.text)
-        free = f"{self._status.disk_free / 1e9:.1f} GB free on the disk" if self._status.disk_free is not None else ""
+        free = (
+            tr("{value:.1f} GB free on the disk", value=self._status.disk_free / 1000000000.0)
+            if self._status.disk_free is not None
+            else ""
+        )
         where = str(self._status.folder) if self._status.folder is not None else ""
-        tip = ["F9 begins or ends a session", "F10 saves the last seconds without having recorded", where, free]
+        tip = [tr("F9 begins or ends a session"), tr("F10 saves the last seconds without having recorded"), where, free]
         self.setToolTip("\n".join(line for line in (*tip, self._status.warning, self._status.problem) if line))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
@@ -84,5 +89,5 @@ def _lines_of(status: RecordStatus) -> tuple[str, str]:
         size = f"{status.bytes / 1e6:.0f} MB" if status.bytes < 1e9 else f"{status.bytes / 1e9:.1f} GB"
         return f"{minutes}:{seconds:02d}", f"{status.dropped} dropped" if status.dropped else size
     if status.problem:
-        return "Record", "stopped: disk?"
-    return "Record", "saving" if status.saving else "F9"
+        return tr("Record"), tr("stopped: disk?")
+    return tr("Record"), "saving" if status.saving else "F9"

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr, tr_text
 from core.session.manifest import Manifest
 
 _KNOWN = ("SIM", "LIVE", "PLAYBACK")
@@ -28,7 +29,7 @@ class RecordedPlate(QWidget):
     @property
     def text(self) -> str:
         """All that is said."""
-        return f"recorded {self._kind}, {self._note}"
+        return tr("recorded {kind}, {note}", kind=tr_text(self._kind), note=self._note)
 
     def sizeHint(self) -> QSize:
         return QSize(420, _HEIGHT)
@@ -37,7 +38,7 @@ class RecordedPlate(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colour = QColor(palette.of(self._kind if self._kind in _KNOWN else "FAULT"))
-        word, word_font = f"recorded {self._kind}", theme.bold(14)
+        word, word_font = tr("recorded {kind}", kind=tr_text(self._kind)), theme.bold(14)
         plate = QRectF(1, 3, QFontMetrics(word_font).horizontalAdvance(word) + 24, _HEIGHT - 6)
         pen = QPen(colour, 2, Qt.PenStyle.DashLine)
         painter.setPen(pen)
@@ -57,8 +58,8 @@ class RecordedPlate(QWidget):
 
 def _note(manifest: Manifest | None, name: str) -> str:
     if manifest is None:
-        return f"{name}: its manifest is damaged"
+        return tr("{name}: its manifest is damaged", name=name)
     started = manifest.started_utc.astimezone()
-    how = "" if manifest.closed else ", cut off"
-    how += ", recovered" if manifest.recovered is not None else ""
-    return f"{started:%Y-%m-%d %H:%M:%S}, rig {manifest.rig or 'unknown'}{how}"
+    how = "" if manifest.closed else tr(", cut off")
+    how += tr(", recovered") if manifest.recovered is not None else ""
+    return tr("{started:%Y-%m-%d %H:%M:%S}, rig {name}{how}", started=started, name=manifest.rig or tr("unknown"), how=how)

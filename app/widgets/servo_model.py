@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QStyledItemDelegat
 
 from app import palette, theme
 from app.cells import TONE_ROLE, Cell, Row, Tone, Track
+from app.language import tr
 from app.servo_cells import Column
 
 _COLUMNS = tuple(Column)
@@ -62,14 +63,14 @@ class ServoModel(QAbstractTableModel):
         if role == Qt.ItemDataRole.ToolTipRole:
             return cell.tip or None
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            return f"{_COLUMNS[index.column()].value[0]} {cell.text}"
+            return f"{tr(_COLUMNS[index.column()].value[0])} {cell.text}"
         if role == Qt.ItemDataRole.UserRole:
             return cell
         return None
 
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         if orientation == Qt.Orientation.Horizontal:
-            heading, meaning = _COLUMNS[section].value
+            heading, meaning = (tr(text) for text in _COLUMNS[section].value)
             if role == Qt.ItemDataRole.DisplayRole:
                 return heading
             if role == Qt.ItemDataRole.ToolTipRole:
@@ -104,7 +105,7 @@ class ServoView(QTableView):
         header.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.setMinimumHeight(_HEADER + 7 * _ROW[0])
-        self.setAccessibleName("Servos")
+        self.setAccessibleName(tr("Servos"))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

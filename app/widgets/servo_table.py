@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 
 from app import theme
 from app.cells import TONE_ROLE, Cell, Tone
+from app.language import tr, tr_text
 from app.pace import Pace
 from app.servo_cells import bus_line, pair_balances, servo_rows
 from app.widgets.question_strip import BUTTON_STYLE, QuestionStrip
@@ -78,14 +79,14 @@ class ServoTable(QWidget):
         self._restart_button, self._zero_button, self._off_button = (
             self._make_button(text, slot)
             for text, slot in (
-                ("Restart servo\N{HORIZONTAL ELLIPSIS}", self._open_restart_menu),
-                ("Zero\N{HORIZONTAL ELLIPSIS}", self._open_zero_menu),
-                ("Torque off\N{HORIZONTAL ELLIPSIS}", self._ask_torque_off),
+                (tr("Restart servo\N{HORIZONTAL ELLIPSIS}"), self._open_restart_menu),
+                (tr("Zero\N{HORIZONTAL ELLIPSIS}"), self._open_zero_menu),
+                (tr("Torque off\N{HORIZONTAL ELLIPSIS}"), self._ask_torque_off),
             )
         )
         self._asked_by: QWidget = self._zero_button
         self._lay_out()
-        self.setAccessibleName("Servos")
+        self.setAccessibleName(tr("Servos"))
         self._show(None, None)
 
     @property
@@ -117,13 +118,15 @@ class ServoTable(QWidget):
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         free = self._reachable and not self._armed
         if joint is not None:
-            restart = menu.addAction(f"Restart servo {joint.id} ({_plain(joint.name)})", partial(self._ask_restart, joint))
-            zero = menu.addAction(f"Zero {_plain(joint.name)}", partial(self._ask_zero, joint.name))
+            restart = menu.addAction(
+                tr("Restart servo {id} ({joint})", id=joint.id, joint=_plain(joint.name)), partial(self._ask_restart, joint)
+            )
+            zero = menu.addAction(tr("Zero {joint}", joint=_plain(joint.name)), partial(self._ask_zero, joint.name))
             restart.setEnabled(free)
             zero.setEnabled(free)
             menu.addSeparator()
-        menu.addAction("Zero all joints", partial(self._ask_zero, None)).setEnabled(free)
-        menu.addAction("Switch all torque off", self._ask_torque_off).setEnabled(self._reachable)
+        menu.addAction(tr("Zero all joints"), partial(self._ask_zero, None)).setEnabled(free)
+        menu.addAction(tr("Switch all torque off"), self._ask_torque_off).setEnabled(self._reachable)
         return menu
 
     # ---- composition
@@ -176,13 +179,15 @@ class ServoTable(QWidget):
 
     def _offer(self) -> None:
         free = self._reachable and not self._armed
-        why = "" if free else "disarm first" if self._armed else "the servo bus is not open"
+        why = "" if free else tr("disarm first") if self._armed else tr("the servo bus is not open")
         self._restart_button.setEnabled(free)
         self._zero_button.setEnabled(free)
         self._off_button.setEnabled(self._reachable)
-        self._restart_button.setToolTip(why or "Restart one servo, which clears its error; its joint must be zeroed again")
-        self._zero_button.setToolTip(why or "The present positions become 0 mm; the wires must be slack")
-        self._off_button.setToolTip("Disarm and let all motors go, which releases the wires' tension" if self._reachable else why)
+        self._restart_button.setToolTip(why or tr("Restart one servo, which clears its error; its joint must be zeroed again"))
+        self._zero_button.setToolTip(why or tr("The present positions become 0 mm; the wires must be slack"))
+        self._off_button.setToolTip(
+            tr("Disarm and let all motors go, which releases the wires' tension") if self._reachable else why
+        )
         self._question.cancel()  # it was asked under other circumstances
 
     # ---- asking
@@ -197,7 +202,7 @@ class ServoTable(QWidget):
 
     def _open_zero_menu(self) -> None:
         joints = [(_plain(joint.name), partial(self._ask_zero, joint.name)) for joint in self._servos.joints]
-        self._open_menu(self._zero_button, [("All joints", partial(self._ask_zero, None)), *joints])
+        self._open_menu(self._zero_button, [(tr("All joints"), partial(self._ask_zero, None)), *joints])
 
     def _open_menu(self, button: QPushButton, entries: list[tuple[str, Callable[[], None]]]) -> None:
         menu = QMenu(self)
@@ -207,16 +212,20 @@ class ServoTable(QWidget):
         menu.popup(button.mapToGlobal(QPoint(0, -menu.sizeHint().height())))
 
     def _ask_restart(self, joint: JointConfig) -> None:
-        question = f"Restart servo {joint.id} ({_plain(joint.name)})? It must be zeroed again."
-        self._ask(self._restart_button, question, "Restart", partial(self.reboot_asked.emit, joint.id))
+        question = tr("Restart servo {id} ({joint})? It must be zeroed again.", id=joint.id, joint=_plain(joint.name))
+        self._ask(self._restart_button, question, tr("Restart"), partial(self.reboot_asked.emit, joint.id))
 
     def _ask_zero(self, name: JointName | None) -> None:
-        what = "All joints become 0 mm here" if name is None else f"{_plain(name).capitalize()} becomes 0 mm here"
+        what = (
+            tr("All joints become 0 mm here") if name is None else tr("{joint} becomes 0 mm here", joint=_plain(name).capitalize())
+        )
         names = None if name is None else [name]
-        self._ask(self._zero_button, f"Are the wires slack? {what}.", "Zero", partial(self.zero_asked.emit, names))
+        self._ask(
+            self._zero_button, tr("Are the wires slack? {what}.", what=what), tr("Zero"), partial(self.zero_asked.emit, names)
+        )
 
     def _ask_torque_off(self) -> None:
-        self._ask(self._off_button, "All motors let go and the wires hang loose.", "Torque off", self.torque_off_asked.emit)
+        self._ask(self._off_button, tr("All motors let go and the wires hang loose."), tr("Torque off"), self.torque_off_asked.emit)
 
     def _ask(self, button: QWidget, question: str, answer: str, action: Callable[[], None]) -> None:
         self._asked_by = button
@@ -236,4 +245,4 @@ class ServoTable(QWidget):
 
 
 def _plain(name: str) -> str:
-    return name.replace("_", " ")
+    return tr_text(name).replace("_", " ")

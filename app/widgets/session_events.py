@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QPainter
 from PySide6.QtWidgets import QAbstractItemView, QListView, QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from app import palette, theme
+from app.language import tr
 from app.session_marks import LISTED, MARK_LOOK, clock_text, event_line
 from app.widgets.timeline_paint import paint_mark
 from core.session.events import Event
@@ -35,7 +36,7 @@ class SessionEvents(QListView):
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setMinimumHeight(2 * _ROW_HEIGHT)
-        self.setAccessibleName("Events of the session")
+        self.setAccessibleName(tr("Events of the session"))
         self.clicked.connect(self._choose)
         self.activated.connect(self._choose)
 

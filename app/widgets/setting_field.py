@@ -7,16 +7,19 @@ from typing import Any
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QCheckBox, QFrame, QGridLayout, QLabel, QLineEdit, QPushButton, QSlider, QWidget
+from PySide6.QtWidgets import QCheckBox, QFrame, QGridLayout, QHBoxLayout, QLabel, QLineEdit, QPushButton, QSlider, QWidget
 
+from app.language import mark, tr, tr_text
 from app.settings_model import as_text
+from app.stop_key import NUMBERS_ONLY
+from app.widgets.browse_button import WANTED, BrowseButton
 from app.widgets.quiet_combo import QuietCombo
 from core.config_schema import Effect, Kind, Setting
 
 _SLIDER_STEPS = 1000
 _CURVED_FROM = 10.0
 """A range this much longer than the default is stretched at its lower end, or the slider could not be set finely there."""
-_UNSET = {Kind.NUMBER: "automatic", Kind.WHOLE: "automatic", Kind.TEXT: "not set"}
+_UNSET = {Kind.NUMBER: mark("automatic"), Kind.WHOLE: mark("automatic"), Kind.TEXT: mark("not set")}
 _NAME_PX, _FIELD_PX, _UNIT_PX = 132, 100, 46
 
 
@@ -32,16 +35,17 @@ class SettingField(QFrame):
         self._default = default
         self._state: tuple[object, ...] = ()
         self.setObjectName("setting")
-        self._name, self._error = QLabel(setting.title), QLabel()
+        self._name, self._error = QLabel(tr(setting.title)), QLabel()
         self._name.setObjectName("setting_name")
         self._name.setWordWrap(True)
         self._error.setObjectName("setting_error")
         self._error.setWordWrap(True)
         self.editor = self._make_editor()
         self.slider = self._make_slider()
-        self.reset_button = QPushButton("Reset")
-        self.reset_button.setToolTip(f"Back to the default: {self.default_text}")
-        self.reset_button.setAccessibleName(f"Reset {setting.title} to {self.default_text}")
+        self.browse_button = BrowseButton(setting.key, tr(setting.title)) if setting.key in WANTED else None
+        self.reset_button = QPushButton(tr("Reset"))
+        self.reset_button.setToolTip(tr("Back to the default: {default}", default=self.default_text))
+        self.reset_button.setAccessibleName(tr("Reset {title} to {default}", title=tr(setting.title), default=self.default_text))
         self.reset_button.clicked.connect(lambda _on=False: self.reset_asked.emit(setting.key))
         self._lay_out()
 
@@ -49,9 +53,9 @@ class SettingField(QFrame):
     def default_text(self) -> str:
         """The default with its unit."""
         if isinstance(self._default, bool):
-            return "on" if self._default else "off"
+            return tr("on") if self._default else tr("off")
         text = as_text(self._default)
-        return f"{text} {self.setting.unit}".strip() if text else _UNSET.get(self.setting.kind, "not set")
+        return f"{text} {tr_text(self.setting.unit)}".strip() if text else tr(_UNSET.get(self.setting.kind, "not set"))
 
     @property
     def error_text(self) -> str:
@@ -71,18 +75,20 @@ class SettingField(QFrame):
         with QSignalBlocker(self.editor):
             if isinstance(self.editor, QCheckBox):
                 self.editor.setChecked(bool(value))
-                self.editor.setText("on" if value else "off")
+                self.editor.setText(tr("on") if value else tr("off"))
             elif isinstance(self.editor, QuietCombo):
                 self.editor.setCurrentIndex(self.editor.findData(value))
             elif self.editor.text() != entry:
                 self.editor.setText(entry)
+        if self.browse_button is not None:
+            self.browse_button.entry = entry
         if self.slider is not None and value is not None and not self.slider.isSliderDown():
             with QSignalBlocker(self.slider):
                 self.slider.setValue(self._place_of(float(value)))
         self._error.setText(f"\N{WARNING SIGN}  {error}" if error else "")
         self._error.setVisible(bool(error))
         self.reset_button.setEnabled(is_changed)
-        self._name.setText(f"\N{BLACK CIRCLE} {self.setting.title}" if is_changed else self.setting.title)
+        self._name.setText(f"\N{BLACK CIRCLE} {tr(self.setting.title)}" if is_changed else tr(self.setting.title))
         self.editor.setAccessibleDescription(f"{error}. {self._note()}" if error else self._note())
         if (bool(self.property("changed")), bool(self.property("wrong"))) != (is_changed, bool(error)):
             self.setProperty("changed", is_changed)
@@ -104,7 +110,7 @@ class SettingField(QFrame):
             editor = _Switch()
             editor.toggled.connect(lambda on: self.edited.emit(setting.key, on))
         elif setting.kind is Kind.CHOICE:
-            editor = QuietCombo(setting.title)
+            editor = QuietCombo(tr(setting.title))
             for choice in setting.choices:
                 editor.addItem(as_text(choice).replace("_", " "), choice)
             combo = editor
@@ -113,7 +119,7 @@ class SettingField(QFrame):
             editor = QLineEdit() if setting.kind is Kind.TEXT else NumberEdit(is_whole=setting.kind is Kind.WHOLE)
             editor.setPlaceholderText(_UNSET[setting.kind] if setting.is_optional else "")
             editor.textEdited.connect(lambda text: self.edited.emit(setting.key, text))
-        editor.setAccessibleName(f"{setting.title}, {setting.unit}" if setting.unit else setting.title)
+        editor.setAccessibleName(f"{tr(setting.title)}, {tr_text(setting.unit)}" if setting.unit else tr(setting.title))
         editor.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         return editor
 
@@ -125,7 +131,7 @@ class SettingField(QFrame):
         slider = _Slider(Qt.Orientation.Horizontal)
         slider.setRange(0, _SLIDER_STEPS)
         slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the field beside it has the arrows
-        slider.setAccessibleName(f"{setting.title}, as a slider")
+        slider.setAccessibleName(tr("{title}, as a slider", title=tr(setting.title)))
         slider.valueChanged.connect(lambda place: self.edited.emit(setting.key, self._value_at(place)))
         return slider
 
@@ -160,8 +166,8 @@ class SettingField(QFrame):
 
     def _lay_out(self) -> None:
         setting = self.setting
-        unit, meaning = QLabel(setting.unit), QLabel(_capital(setting.description))
-        note = QLabel(_together(self._note(), setting.unit))
+        unit, meaning = QLabel(tr_text(setting.unit)), QLabel(_capital(tr(setting.description)))
+        note = QLabel(_together(self._note(), tr_text(setting.unit)))
         unit.setObjectName("setting_note")
         meaning.setObjectName("setting_meaning")
         note.setObjectName("setting_note")
@@ -177,7 +183,13 @@ class SettingField(QFrame):
         grid.setVerticalSpacing(2)
         grid.addWidget(self._name, 0, 0)
         if setting.kind is Kind.TEXT:
-            grid.addWidget(self.editor, 0, 1, 1, 3)
+            row = QHBoxLayout()
+            row.setSpacing(8)
+            row.addWidget(self.editor, 1)
+            if self.browse_button is not None:
+                row.addWidget(self.browse_button)
+                self.browse_button.chosen.connect(lambda path: self.edited.emit(setting.key, path))
+            grid.addLayout(row, 0, 1, 1, 3)
         else:
             self.editor.setFixedWidth(_FIELD_PX if setting.kind is not Kind.CHOICE else _FIELD_PX + 50)
             unit.setMinimumWidth(_UNIT_PX)
@@ -188,20 +200,20 @@ class SettingField(QFrame):
                 grid.addWidget(unit, 0, 2)
             grid.addWidget(self.slider if self.slider is not None else QWidget(), 0, 3)
         grid.addWidget(self.reset_button, 0, 4)
-        row = 1
+        line = 1
         for label in (self._error, meaning, note):
             if label is self._error or label.text():
-                grid.addWidget(label, row, 1, 1, 4)
-                row += 1
+                grid.addWidget(label, line, 1, 1, 4)
+                line += 1
         self._error.hide()
         grid.setColumnStretch(3, 1)
 
     def _note(self) -> str:
-        parts = [f"Default {self.default_text}"]
+        parts = [tr("Default {default}", default=self.default_text)]
         if self.setting.range_text and self.setting.kind is not Kind.CHOICE:
-            parts.append(f"allowed {self.setting.range_text}")
+            parts.append(tr("allowed {range}", range=tr_text(self.setting.range_text)))
         if self.setting.effect is not Effect.NOW:
-            parts.append(self.setting.effect.value)
+            parts.append(tr(self.setting.effect.value))
         return "  \N{MIDDLE DOT}  ".join(parts)
 
 
@@ -211,6 +223,7 @@ class NumberEdit(QLineEdit):
     def __init__(self, *, is_whole: bool) -> None:
         super().__init__()
         self._is_whole = is_whole
+        self.setProperty(NUMBERS_ONLY, True)
         self.setAlignment(Qt.AlignmentFlag.AlignRight)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

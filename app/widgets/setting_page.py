@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
+from app.language import tr
 from app.settings_model import SettingsDraft
 from app.widgets.setting_field import SettingField
 from core.config_schema import Section, Setting
@@ -39,7 +40,7 @@ class SettingPage(QScrollArea):
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setAccessibleName("Settings of the section")
+        self.setAccessibleName(tr("Settings of the section"))
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     def show_groups(self, groups: Sequence[Group], empty: str = "") -> None:
@@ -72,7 +73,7 @@ class SettingPage(QScrollArea):
         for section, button in self._section_buttons.values():
             count = draft.changed_in(section)
             button.setEnabled(count > 0)
-            button.setText(f"Reset section ({count})" if count else "Reset section")
+            button.setText(tr("Reset section ({count})", count=count) if count else tr("Reset section"))
 
     def add_all(self) -> None:
         """Everything that has not come yet."""
@@ -111,15 +112,15 @@ class SettingPage(QScrollArea):
         self._column.insertWidget(self._column.count() - 1, part)
 
     def _add_head(self, section: Section) -> None:
-        title, meaning, error = QLabel(section.title), QLabel(section.description.replace("``", "")), QLabel()
+        title, meaning, error = QLabel(tr(section.title)), QLabel(tr(section.description).replace("``", "")), QLabel()
         title.setObjectName("section_title")
         title.setIndent(0)
         meaning.setObjectName("setting_meaning")
         error.setObjectName("setting_error")
         for label in (meaning, error):
             label.setWordWrap(True)
-        button = QPushButton("Reset section")
-        button.setAccessibleName(f"Reset section {section.title}")
+        button = QPushButton(tr("Reset section"))
+        button.setAccessibleName(tr("Reset section {title}", title=tr(section.title)))
         button.clicked.connect(lambda _on=False: self.section_reset_asked.emit(section))
         head = QWidget()
         row = QHBoxLayout(head)
@@ -149,5 +150,5 @@ def _parts(groups: Sequence[Group], empty: str) -> list[Section | Setting | str]
         if left > 0:
             parts += [section, *settings[:left]]
         left -= len(settings)
-    said = empty if not groups else f"{-left} more: add a word" if left < 0 else ""
+    said = empty if not groups else tr("{count} more: add a word", count=-left) if left < 0 else ""
     return [*parts, said] if said else parts

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPainterPath, QPaintEvent, QP
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import mark, tr
 from hardware.rig import RigKind
 
 
@@ -28,11 +29,17 @@ class BannerText:
 
 
 BANNERS = {
-    RigKind.SIM: BannerText("SIM", "SIM", "simulated bench twin", "Everything here is simulated; no hardware moves"),
-    RigKind.LIVE: BannerText("LIVE", "LIVE", "real servos move", "Commands move real servos. Keep the power cut in reach"),
-    RigKind.PLAYBACK: BannerText("PLAYBACK", "PLAYBACK", "recorded, not live", "Nothing here is happening now"),
+    RigKind.SIM: BannerText(
+        mark("SIM"), "SIM", mark("simulated bench twin"), mark("Everything here is simulated; no hardware moves")
+    ),
+    RigKind.LIVE: BannerText(
+        mark("LIVE"), "LIVE", mark("real servos move"), mark("Commands move real servos. Keep the power cut in reach")
+    ),
+    RigKind.PLAYBACK: BannerText(mark("PLAYBACK"), "PLAYBACK", mark("recorded, not live"), mark("Nothing here is happening now")),
 }
-_LOOK_ONLY = BannerText("LIVE", "LIVE", "real camera, no servos", "A real camera looks; no servos that could move")
+_LOOK_ONLY = BannerText(
+    mark("LIVE"), "LIVE", mark("real camera, no servos"), mark("A real camera looks; no servos that could move")
+)
 
 
 class SimBanner(QWidget):
@@ -40,11 +47,16 @@ class SimBanner(QWidget):
 
     def __init__(self, kind: RigKind, *, has_servos: bool = True) -> None:
         super().__init__()
-        self._text = BANNERS[kind] if has_servos or kind is not RigKind.LIVE else _LOOK_ONLY
         self.setFixedHeight(34)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(f"{self._text.word}: {self._text.meaning}")
-        self.setToolTip(self._text.meaning)
+        self.show_kind(kind, has_servos=has_servos)
+
+    def show_kind(self, kind: RigKind, *, has_servos: bool = True) -> None:
+        """Another rig is being opened."""
+        self._text = BANNERS[kind] if has_servos or kind is not RigKind.LIVE else _LOOK_ONLY
+        self.update()
+        self.setAccessibleName(f"{tr(self._text.word)}: {tr(self._text.meaning)}")
+        self.setToolTip(tr(self._text.meaning))
 
     @property
     def word(self) -> str:
@@ -59,16 +71,16 @@ class SimBanner(QWidget):
         word_font = QFont(theme.bold(18))
         word_font.setLetterSpacing(word_font.SpacingType.AbsoluteSpacing, 2.0)
         painter.setFont(word_font)
-        word_width = painter.fontMetrics().horizontalAdvance(self._text.word) + 20
+        word_width = painter.fontMetrics().horizontalAdvance(tr(self._text.word)) + 20
         plate = QRectF(0, 0, word_width + 48, self.height())
         self._paint_plate(painter, plate)
         painter.setPen(QColor(palette.INK))
-        painter.drawText(plate.adjusted(24, 0, -22, 0), Qt.AlignmentFlag.AlignCenter, self._text.word)
+        painter.drawText(plate.adjusted(24, 0, -22, 0), Qt.AlignmentFlag.AlignCenter, tr(self._text.word))
         note_font = theme.font(theme.Size.BODY)
         painter.setFont(note_font)
         painter.setPen(QColor(palette.TEXT_DIM))
         left = plate.right() + 14
-        note = theme.elide(note_font, self._text.note, int(self.width() - left))
+        note = theme.elide(note_font, tr(self._text.note), int(self.width() - left))
         painter.drawText(QRectF(left, 0, self.width() - left, self.height()), Qt.AlignmentFlag.AlignVCenter, note)
         painter.end()
 

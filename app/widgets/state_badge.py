@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, Q
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr, tr_text
 from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
 from app.tool_tips import tip
 from app.wording import REASON_TEXT, STATE_TITLE, refusal_line, why_line
@@ -16,7 +17,6 @@ from core.config import PoseConfig
 from core.types import PoseState, Scene
 
 _HEIGHT = 104
-_MEANINGS = tip("state", "confidence")
 _WRAPPED = int(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap)
 
 
@@ -27,13 +27,14 @@ class StateBadge(QWidget):
         super().__init__()
         self._limits = limits
         self._state: PoseState | None = None
-        self._title = "Waiting"
+        self._title = tr("Waiting")
         self._why = ""
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Pose state")
-        self.setToolTip(_MEANINGS)
+        self.setAccessibleName(tr("Pose state"))
+        self._meanings = tip("state", "confidence")
+        self.setToolTip(self._meanings)
 
     def set_limits(self, limits: PoseConfig) -> None:
         self._limits = limits
@@ -57,16 +58,16 @@ class StateBadge(QWidget):
         """The state of `scene`, or the reason why it has none. A new letter or title always renews the sentence too."""
         pose = scene.pose
         if pose is not None:
-            self._set(pose.state, STATE_TITLE[pose.state], lambda: why_line(pose, self._limits), renew_text)
+            self._set(pose.state, tr(STATE_TITLE[pose.state]), lambda: why_line(pose, self._limits), renew_text)
         elif scene.refusal is not None:
             refusal = scene.refusal
-            self._set(None, REASON_TEXT[refusal.reason].title, lambda: refusal_line(refusal), renew_text)
+            self._set(None, tr(REASON_TEXT[refusal.reason].title), lambda: refusal_line(refusal), renew_text)
         else:
-            self.show_nothing("No pose", "")
+            self.show_nothing(tr("No pose"), "")
 
     def show_nothing(self, title: str, why: str) -> None:
         """No state, for a cause outside perception: starting, no new picture, fault."""
-        self._set(None, title, lambda: why, True)
+        self._set(None, title, lambda: tr_text(why), True)
 
     def _set(self, state: PoseState | None, title: str, why: Callable[[], str], renew_text: bool) -> None:
         changed = state is not self._state or title != self._title
@@ -78,7 +79,7 @@ class StateBadge(QWidget):
         self._state, self._title, self._why = state, title, text
         self.setAccessibleDescription(f"{self.letter}: {title}. {text}")
         # a long reason may not fit; the tool tip has all of it
-        self.setToolTip(text if state is None and text else _MEANINGS)
+        self.setToolTip(text if state is None and text else self._meanings)
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:

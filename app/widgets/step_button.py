@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy
 
 from app import palette, theme
+from app.language import tr
 from app.next_step import Step
 from app.widgets.signs import paint_key_cap
 
@@ -64,11 +65,11 @@ class StepButton(QAbstractButton):
         """The step, whether it would be granted, and the reasons or what happens."""
         if step is not self._step:
             self._step = step
-            self.setText(step.value.name)
-            self.setAccessibleName(f"{step.value.name} ({step.value.key})")
+            self.setText(tr(step.value.name))
+            self.setAccessibleName(f"{tr(step.value.name)} ({step.value.key})")
         self._granted = granted
         self.setAccessibleDescription(why)
-        self.setToolTip(f"{step.value.meaning}  ({step.value.key})" + ("" if granted else f"\n\n{why}"))
+        self.setToolTip(f"{tr(step.value.meaning)}  ({step.value.key})" + ("" if granted else f"\n\n{why}"))
         self.update()
 
     @Slot()

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy
 
 from app import palette, theme
+from app.language import tr
 from app.next_step import STOP_KEY
 from app.widgets.signs import octagon, paint_key_cap
 
@@ -21,16 +22,20 @@ class StopButton(QAbstractButton):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setText("STOP")
+        self.setText(tr("STOP"))
         self.setMinimumSize(88, 44)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setAccessibleName("STOP")
-        self.setAccessibleDescription(f"Stops the robot at once. Key {STOP_KEY}.")
+        self.setAccessibleName(tr("STOP"))
+        self.setAccessibleDescription(tr("Stops the robot at once. Key {key}.", key=STOP_KEY))
         self.setToolTip(
-            f"Stops the robot at once, in every mode  ({STOP_KEY})\n"
-            "It is no emergency stop: that is the power cut, by hand, beside the robot"
+            tr(
+                "Stops the robot at once, in every mode  ({key})\n"
+                "{key} types a space in a text field only while nothing can move; Ctrl+{key} and Pause stop there, too\n"
+                "It is no emergency stop: that is the power cut, by hand, beside the robot",
+                key=STOP_KEY,
+            )
         )
         self.clicked.connect(self.asked)  # by keyboard or screen reader: a mouse never gets so far
 

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
 from app.cells import NONE, TONE_ROLE, Tone, number
+from app.language import tr, tr_text
 from app.servo_cells import PairBalance
 from app.tool_tips import tip
 
@@ -28,7 +29,7 @@ class TendonBalance(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Balance of the tendon pairs")
+        self.setAccessibleName(tr("Balance of the tendon pairs"))
         self.setToolTip(tip("tendon_balance"))
 
     @property
@@ -56,7 +57,7 @@ class TendonBalance(QWidget):
 
 
 def _title(pair: PairBalance) -> str:
-    return f"{pair.names[0]} + {pair.names[1]}"
+    return f"{tr_text(pair.names[0])} + {tr_text(pair.names[1])}"
 
 
 def _total(pair: PairBalance) -> str:
@@ -64,7 +65,7 @@ def _total(pair: PairBalance) -> str:
 
 
 def _sum(pair: PairBalance) -> str:
-    return f"{_total(pair)} of {pair.wanted_mm:.2f} mm"
+    return tr("{total} of {wanted_mm:.2f} mm", total=_total(pair), wanted_mm=pair.wanted_mm)
 
 
 def _word(pair: PairBalance) -> str:

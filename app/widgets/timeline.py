@@ -24,6 +24,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from app import palette, theme
+from app.language import tr
 from app.session_marks import MARK_LOOK, Course, clock_text, event_line
 from app.tool_tips import tip
 from app.widgets.mode_badge import MODE_LOOK
@@ -83,7 +84,7 @@ class TimelineView(QWidget):
         self.setMinimumSize(320, 112)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.setMouseTracking(True)
-        self.setAccessibleName("Timeline")
+        self.setAccessibleName(tr("Timeline"))
         self.setToolTip(tip("timeline"))
 
     def sizeHint(self) -> QSize:
@@ -127,10 +128,16 @@ class TimelineView(QWidget):
         self._look_at(0.0, np.inf)
 
     def _describe(self) -> None:
-        length = clock_text(self._course.duration_s) if self._course is not None else "empty"
-        chosen = f"; selected {clock_text(self._selection[0])} to {clock_text(self._selection[1])}" if self._selection else ""
-        gaps = f", {len(self._course.gaps)} gaps" if self._course is not None and len(self._course.gaps) else ""
-        self.setAccessibleDescription(f"{length} long, {len(self._events)} marks{gaps}{chosen}")
+        length = clock_text(self._course.duration_s) if self._course is not None else tr("empty")
+        chosen = (
+            tr("; selected {first} to {last}", first=clock_text(self._selection[0]), last=clock_text(self._selection[1]))
+            if self._selection
+            else ""
+        )
+        gaps = tr(", {count} gaps", count=len(self._course.gaps)) if self._course is not None and len(self._course.gaps) else ""
+        self.setAccessibleDescription(
+            tr("{length} long, {count} marks{gaps}{chosen}", length=length, count=len(self._events), gaps=gaps, chosen=chosen)
+        )
 
     def _look_at(self, from_s: float, span_s: float) -> None:
         longest_s = max(self._course.duration_s if self._course is not None else 0.0, _LEAST_SPAN_S)
@@ -310,9 +317,9 @@ class TimelineView(QWidget):
         painter.setFont(theme.font(10))
         painter.setPen(QColor(palette.TEXT_DIM))
         right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(QRectF(0, lanes.theta.center().y() - 8, _LEFT - _NAME, 16), right, "theta")
-        painter.drawText(QRectF(0, lanes.marks.top(), _LEFT - _NAME, lanes.marks.height()), right, "events")
-        painter.drawText(QRectF(0, lanes.states.top() - 2, _LEFT - _NAME, lanes.states.height() + 4), right, "state")
+        painter.drawText(QRectF(0, lanes.theta.center().y() - 8, _LEFT - _NAME, 16), right, tr("theta"))
+        painter.drawText(QRectF(0, lanes.marks.top(), _LEFT - _NAME, lanes.marks.height()), right, tr("events"))
+        painter.drawText(QRectF(0, lanes.states.top() - 2, _LEFT - _NAME, lanes.states.height() + 4), right, tr("state"))
 
     def _paint_selection(self, painter: QPainter, first_s: float, last_s: float) -> None:
         lanes = self._lanes()
@@ -381,11 +388,14 @@ class TimelineView(QWidget):
             return f"{clock_text(event.time_s - course.first_s)}  {event_line(event)}"
         time_s = self._time(x)
         place = course.place_at(time_s)
-        parts = [clock_text(time_s), "no pose"]
+        parts = [clock_text(time_s), tr("no pose")]
         if course.states[place] >= 0:
-            parts[1:] = [f"state {tuple(PoseState)[course.states[place]].value}", signed_degrees(float(course.theta_deg[place]), 1)]
+            parts[1:] = [
+                tr("state {state}", state=tuple(PoseState)[course.states[place]].value),
+                signed_degrees(float(course.theta_deg[place]), 1),
+            ]
         if course.modes[place] >= 0:
-            parts.append(tuple(Mode)[course.modes[place]].value)
+            parts.append(tr(tuple(Mode)[course.modes[place]].value))
         return "  ".join(parts)
 
     def _event_near(self, place: QPointF) -> Event | None:

@@ -6,6 +6,7 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QLabel, QWidget
 
 from app import theme
+from app.language import tr_text
 
 _SHOWN_MS = 6000
 
@@ -28,6 +29,7 @@ class Toast(QLabel):
         self.hide()
 
     def show_message(self, text: str, *, is_fault: bool = False) -> None:
+        text = tr_text(text)
         edge = "@FAULT" if is_fault else "@LINE"
         theme.set_sheet(
             self,

@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPainterPath, QPaintEvent
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QHBoxLayout, QLabel, QPushButton, QTabWidget, QVBoxLayout, QWidget
 
 from app import palette, theme
+from app.language import tr
 
 _CARD_WIDTH = 380
 _MARGIN, _AROUND, _CORNER = 14, 5, 9.0
@@ -208,7 +209,7 @@ class _Shade(QWidget):
         self.light = QRect()
         self._clear: list[QRect] = []
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.setAccessibleName("Tour")
+        self.setAccessibleName(tr("Tour"))
         self.hide()
 
     def cover(self, room: QRect, light: QRect, clear: list[QRect]) -> None:
@@ -247,9 +248,9 @@ class _TourCard(QWidget):
         self._count.setObjectName("card_note")
         for label in (self._title, self._text, self._count):
             label.setTextFormat(Qt.TextFormat.PlainText)
-        self.back = _button("Back", "The stop before  (Backspace)")
-        self.skip = _button("Skip", "End the tour  (Esc); Help, Tour shows it again")
-        self.forward = _button("Next", "The next stop  (Enter)")
+        self.back = _button(tr("Back"), tr("The stop before  (Backspace)"))
+        self.skip = _button(tr("Skip"), tr("End the tour  (Esc); Help, Tour shows it again"))
+        self.forward = _button(tr("Next"), tr("The next stop  (Enter)"))
         row = QHBoxLayout()
         row.setSpacing(8)
         row.addWidget(self._count)
@@ -274,14 +275,14 @@ class _TourCard(QWidget):
     def show_stop(self, stop: TourStop, place: int, count: int) -> None:
         self._title.setText(stop.title)
         self._text.setText(stop.text)
-        self._count.setText(f"{place + 1} of {count}")
+        self._count.setText(tr("{place} of {count}", place=place + 1, count=count))
         is_last = place + 1 == count
-        self.forward.setText("Done" if is_last else "Next")
-        self.forward.setAccessibleName("End the tour" if is_last else "Next stop of the tour")
+        self.forward.setText(tr("Done") if is_last else tr("Next"))
+        self.forward.setAccessibleName(tr("End the tour") if is_last else tr("Next stop of the tour"))
         self.forward.setAccessibleDescription(self.text)  # is read out when it takes the focus
         self.back.setEnabled(place > 0)
         self.skip.setVisible(not is_last)
-        self.setAccessibleName(f"Tour, {place + 1} of {count}")
+        self.setAccessibleName(tr("Tour, {place} of {count}", place=place + 1, count=count))
         self.setAccessibleDescription(self.text)
 
     def wanted_size(self) -> QSize:
@@ -303,5 +304,5 @@ class _TourCard(QWidget):
 def _button(text: str, tip: str) -> QPushButton:
     button = QPushButton(text)
     button.setToolTip(tip)
-    button.setAccessibleName(f"{text}: tour")
+    button.setAccessibleName(tr("{button}: tour", button=text))
     return button

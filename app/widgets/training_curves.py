@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app import palette, theme
+from app.language import tr, tr_text
 from app.training_job import TrainingState
 
 
@@ -17,12 +18,12 @@ class TrainingCurves(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setAccessibleName("Loss and Dice of the training, by step")
+        self.setAccessibleName(tr("Loss and Dice of the training, by step"))
         self.setMinimumHeight(150)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(theme.GAP)
-        self._loss_plot, self._dice_plot = self._plot("loss"), self._plot("Dice")
+        self._loss_plot, self._dice_plot = self._plot(tr("loss")), self._plot("Dice")
         self._dice_plot.setYRange(0.0, 1.0, padding=0.02)
         for plot in (self._loss_plot, self._dice_plot):
             row.addWidget(plot, 1)
@@ -34,7 +35,7 @@ class TrainingCurves(QWidget):
             self._lines[name] = self._dice_plot.plot(pen=_pen(colour, 1.0))
             dots = {"symbol": symbol, "symbolBrush": QColor(colour), "symbolPen": None, "symbolSize": 8}
             pen = _pen(colour, 2.0, Qt.PenStyle.DashLine)
-            self._dots[name] = self._dice_plot.plot(pen=pen, name=f"{name}, held out", **dots)
+            self._dots[name] = self._dice_plot.plot(pen=pen, name=tr("{name}, held out", name=tr_text(name)), **dots)
 
     def _plot(self, unit: str) -> pg.PlotWidget:
         plot = pg.PlotWidget(background=palette.PANEL)
@@ -42,7 +43,7 @@ class TrainingCurves(QWidget):
         plot.setMouseEnabled(False, False)
         plot.hideButtons()
         plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        for side, label in (("left", unit), ("bottom", "step")):
+        for side, label in (("left", unit), ("bottom", tr("step"))):
             axis = plot.getAxis(side)
             axis.setPen(QPen(QColor(palette.LINE)))
             axis.setTextPen(QPen(QColor(palette.TEXT_DIM)))

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QPen, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette, theme
+from app.language import tr
 from app.pace import Pace
 from app.tool_tips import tip
 from core.config import PoseConfig
@@ -45,7 +46,7 @@ class TrendPlot(QWidget):
         self.setMinimumHeight(78)
         self._has_distances = True
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("Trends of theta, d_head and d_tail over the last 30 seconds")
+        self.setAccessibleName(tr("Trends of theta, d_head and d_tail over the last 30 seconds"))
         self.setToolTip(tip("trends"))
         view = pg.GraphicsLayoutWidget()
         view.setFocusPolicy(Qt.FocusPolicy.NoFocus)

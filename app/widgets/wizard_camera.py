@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLineEdit, QListWidget, QListWidgetItem, QSpinBox
 
+from app.language import mark, tr, tr_text
 from app.widgets.wizard_page import WizardPage, button, note, tell
 from app.widgets.wizard_picture import WizardPicture
 from app.wizard_desk import WizardDesk
@@ -17,37 +18,37 @@ from hardware.rig_search import Found, FoundCamera, with_camera
 class CameraPage(WizardPage):
     """``name_edit`` is the rig's name. The camera is opened here, and read until the wizard is closed."""
 
-    name = "Camera"
-    hint = "What is the rig called, and which camera looks at it? Open it: the picture on the right must be sharp and steady."
+    name = mark("Camera")
+    hint = mark("What is the rig called, and which camera looks at it? Open it: the picture on the right must be sharp and steady.")
 
     def __init__(self, desk: WizardDesk, picture: WizardPicture, rig_name: str) -> None:
         super().__init__(desk, picture)
         self.name_edit = QLineEdit(rig_name)
         self.name_edit.setMaxLength(60)
         self.name_edit.setPlaceholderText("bench 1")
-        self.name_edit.setAccessibleName("Name of the rig")
+        self.name_edit.setAccessibleName(tr("Name of the rig"))
         self.name_edit.textChanged.connect(lambda _text: self.desk.changed.emit())
         self.cameras = QListWidget()
-        self.cameras.setAccessibleName("Cameras")
+        self.cameras.setAccessibleName(tr("Cameras"))
         self.cameras.setMinimumHeight(96)
         self.cameras.itemActivated.connect(lambda _item: self._open())
         self.sizes = (
-            _spin(desk.config.camera.width_px, 160, 4096, " px", "Width"),
-            _spin(desk.config.camera.height_px, 120, 4096, " px", "Height"),
+            _spin(desk.config.camera.width_px, 160, 4096, " px", tr("Width")),
+            _spin(desk.config.camera.height_px, 120, 4096, " px", tr("Height")),
         )
-        self.rate = _spin(desk.config.camera.frames_per_second, 5, 240, " /s", "Pictures per second")
+        self.rate = _spin(desk.config.camera.frames_per_second, 5, 240, " /s", tr("Pictures per second"))
         size = QHBoxLayout()
         for field in (*self.sizes, self.rate):
             size.addWidget(field)
         form = QFormLayout()
-        form.addRow("&Name", self.name_edit)
-        form.addRow("Real camera", size)
+        form.addRow(tr("&Name"), self.name_edit)
+        form.addRow(tr("Real camera"), size)
         self.column.addLayout(form)
         self.cameras.setMaximumHeight(190)
         self.column.addWidget(self.cameras)
         row = QHBoxLayout()
-        self.open_button = button("&Open", self._open)
-        self.search_button = button("&Search again", self.search, "Look for cameras and ports once more")
+        self.open_button = button(tr("&Open"), self._open)
+        self.search_button = button(tr("&Search again"), self.search, tr("Look for cameras and ports once more"))
         row.addWidget(self.open_button, 1)
         row.addWidget(self.search_button)
         self.column.addLayout(row)
@@ -77,14 +78,14 @@ class CameraPage(WizardPage):
         """Find cameras and ports."""
         from hardware import rig_search
 
-        self.desk.run("looking for cameras", rig_search.search, self._on_found)
+        self.desk.run(tr("looking for cameras"), rig_search.search, self._on_found)
 
     def refresh(self) -> None:
         for control in (self.open_button, self.search_button, self.cameras):
             control.setEnabled(not self.desk.is_busy)
         lines = [self._name_problem(), *self.found.problems]
         if self.desk.bench is not None and self.rig_name and rig_path(self.rig_name).exists():
-            lines.append(f"There is a rig {self.rig_name}: saving replaces it, and keeps the older one beside it.")
+            lines.append(tr("There is a rig {name}: saving replaces it, and keeps the older one beside it.", name=self.rig_name))
         tell(self.problem, "\n".join(line for line in lines if line))
 
     def _on_found(self, found: object) -> None:
@@ -92,7 +93,7 @@ class CameraPage(WizardPage):
         self.found = found
         self.cameras.clear()
         for camera in found.cameras:
-            item = QListWidgetItem(camera.title)
+            item = QListWidgetItem(tr_text(camera.title))
             item.setData(Qt.ItemDataRole.UserRole, camera)
             self.cameras.addItem(item)
         chosen = next((k for k, camera in enumerate(found.cameras) if _is_of(camera, self.desk.config)), 0)
@@ -108,12 +109,12 @@ class CameraPage(WizardPage):
             config = with_camera(config, camera)
         wanted = {"width_px": self.sizes[0].value(), "height_px": self.sizes[1].value(), "frames_per_second": self.rate.value()}
         settings = CameraConfig.model_validate({**config.camera.model_dump(), **wanted})
-        self.picture.show_text("Opening the camera. The first time the network is loaded, too.")
+        self.picture.show_text(tr("Opening the camera. The first time the network is loaded, too."))
         self.desk.open_camera(config.model_copy(update={"camera": settings}))
 
     def _name_problem(self) -> str:
         if not self.rig_name:
-            return "Give the rig a name."
+            return tr("Give the rig a name.")
         try:
             check_rig_name(self.rig_name)
         except ValueError as error:
@@ -138,5 +139,5 @@ def _spin(value: int, low: int, high: int, unit: str, name: str) -> QSpinBox:
     made.setValue(value)
     made.setSuffix(unit)
     made.setAccessibleName(name)
-    made.setToolTip(f"{name}; only for real cameras")
+    made.setToolTip(tr("{name}; only for real cameras", name=name))
     return made

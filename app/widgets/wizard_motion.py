@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHBoxLayout, QLabel
 
+from app.language import mark, tr, tr_text
 from app.widgets.wizard_page import WizardPage, button, note, put, table, tell
 from app.widgets.wizard_picture import Arrow, Shape, WizardPicture
 from app.wizard_desk import WizardDesk
@@ -21,8 +22,8 @@ _SAME_DEG = 20.0
 class ZeroPage(WizardPage):
     """Where each wire just becomes taut."""
 
-    name = "Zero and pretension"
-    hint = (
+    name = mark("Zero and pretension")
+    hint = mark(
         "Each wire is let go by 1.25 mm and then pulled in steps of 0.25 mm until the head follows, 4 mm and 300 mA at most; "
         "there it is left, taut and without tension: zero. Wires that the camera cannot judge are set by eye."
     )
@@ -30,26 +31,26 @@ class ZeroPage(WizardPage):
 
     def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
         super().__init__(desk, picture)
-        self.find_button = button("&Find by itself", self._find)
+        self.find_button = button(tr("&Find by itself"), self._find)
         self.tendon = QComboBox()
-        self.tendon.addItems([f"tendon {name}" for name in TENDONS])
-        self.tendon.setAccessibleName("Tendon to set by eye")
-        self.tighten = button(f"&Tighten {_NUDGE_MM:g} mm", lambda: self._nudge(_NUDGE_MM))
-        self.loosen = button(f"&Let go {_NUDGE_MM:g} mm", lambda: self._nudge(-_NUDGE_MM))
+        self.tendon.addItems([tr("tendon {name}", name=tr_text(name)) for name in TENDONS])
+        self.tendon.setAccessibleName(tr("Tendon to set by eye"))
+        self.tighten = button(tr("&Tighten {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(_NUDGE_MM))
+        self.loosen = button(tr("&Let go {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(-_NUDGE_MM))
         self.pretension = QDoubleSpinBox()
         self.pretension.setRange(0.0, 2.0)
         self.pretension.setSingleStep(0.05)
         self.pretension.setValue(desk.config.servos.pretension_mm)
         self.pretension.setSuffix(" mm")
-        self.pretension.setAccessibleName("Pretension")
-        self.pretension.setToolTip("Pull of every wire while the robot is straight, so that none hangs")
+        self.pretension.setAccessibleName(tr("Pretension"))
+        self.pretension.setToolTip(tr("Pull of every wire while the robot is straight, so that none hangs"))
         self.pretension.valueChanged.connect(self._set_pretension)
-        self.rows = table(("tendon", "was slack by"), len(TENDONS), "Slack of the tendons")
+        self.rows = table((tr("tendon"), tr("was slack by")), len(TENDONS), tr("Slack of the tendons"))
         for row, name in enumerate(TENDONS):
-            put(self.rows, row, 0, name)
+            put(self.rows, row, 0, tr_text(name))
         self.column.addWidget(self.find_button)
         self.column.addWidget(self.rows, 1)
-        for parts in ((self.tendon, self.tighten, self.loosen), (QLabel("Pretension"), self.pretension)):
+        for parts in ((self.tendon, self.tighten, self.loosen), (QLabel(tr("Pretension")), self.pretension)):
             row_of = QHBoxLayout()
             for part in parts:
                 row_of.addWidget(part)
@@ -71,21 +72,21 @@ class ZeroPage(WizardPage):
         for row in range(len(TENDONS)):
             put(self.rows, row, 1, "" if zeros is None else f"{zeros.slack_mm[row]:+.2f} mm")
         if draft is None or draft.found is None:
-            tell(self.result, "Search the servos first.")
+            tell(self.result, tr("Search the servos first."))
         elif not draft.assignments:
-            tell(self.result, "The servos were not told apart: the configuration's ids and directions are used.")
+            tell(self.result, tr("The servos were not told apart: the configuration's ids and directions are used."))
         else:
-            tell(self.result, "\n".join(zeros.problems) if zeros is not None else "")
+            tell(self.result, "\n".join(tr_text(problem) for problem in zeros.problems) if zeros is not None else "")
 
     def _find(self) -> None:
         if self.desk.draft is not None:
-            self.desk.run("looking where the wires are taut", self.desk.draft.find_zeros)
+            self.desk.run(tr("looking where the wires are taut"), self.desk.draft.find_zeros)
 
     def _nudge(self, way_mm: float) -> None:
         draft = self.desk.draft
         if draft is not None:
             name = TENDONS[self.tendon.currentIndex()]
-            self.desk.run(f"moving tendon {name}", lambda: draft.nudge(name, way_mm))
+            self.desk.run(tr("moving tendon {name}", name=tr_text(name)), lambda: draft.nudge(name, way_mm))
 
     def _set_pretension(self, pretension_mm: float) -> None:
         if self.desk.draft is not None and not self.desk.is_busy:
@@ -95,8 +96,8 @@ class ZeroPage(WizardPage):
 class SteeringPage(WizardPage):
     """Which way the head goes when a tendon pulls."""
 
-    name = "Steering"
-    hint = (
+    name = mark("Steering")
+    hint = mark(
         "The joints are zeroed where they stand. Then each tendon pulls, 0.3 mm at first and 1.2 mm at most, until the head has "
         "shown its way. The robot must have room on both sides."
     )
@@ -104,10 +105,10 @@ class SteeringPage(WizardPage):
 
     def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
         super().__init__(desk, picture)
-        self.learn_button = button("&Learn", self._learn)
-        self.rows = table(("tendon", "direction", "way per mm"), len(TENDONS), "Steering directions")
+        self.learn_button = button(tr("&Learn"), self._learn)
+        self.rows = table((tr("tendon"), tr("direction"), tr("way per mm")), len(TENDONS), tr("Steering directions"))
         for row, name in enumerate(TENDONS):
-            put(self.rows, row, 0, name)
+            put(self.rows, row, 0, tr_text(name))
         self.result = note("")
         self.column.addWidget(self.learn_button)
         self.column.addWidget(self.rows, 1)
@@ -122,20 +123,26 @@ class SteeringPage(WizardPage):
         self.learn_button.setEnabled(draft is not None and draft.found is not None and not self.desk.is_busy)
         steering = draft.steering if draft is not None else None
         if steering is None:
-            tell(self.result, "" if draft is not None and draft.found is not None else "Search the servos first.")
+            tell(self.result, "" if draft is not None and draft.found is not None else tr("Search the servos first."))
             return
         for row, tendon in enumerate(steering.tendons):
-            direction = "out of the picture" if tendon.direction_deg is None else f"{tendon.direction_deg:.0f}°"
+            direction = tr("out of the picture") if tendon.direction_deg is None else f"{tendon.direction_deg:.0f}°"
             put(self.rows, row, 1, direction)
             put(self.rows, row, 2, f"{tendon.px_per_mm:.1f} px/mm")
-        lines = ["Directions in the picture: 0° to the right, 90° down."]
+        lines = [tr("Directions in the picture: 0° to the right, 90° down.")]
         if abs(steering.roll_deg) > 10.0:
             turn = -steering.roll_deg
             lines.append(
-                f"The robot is rolled by {steering.roll_deg:+.0f}°: turn it by {turn:+.0f}° in its holder, and learn again."
+                tr(
+                    "The robot is rolled by {roll:+.0f}°: turn it by {turn:+.0f}° in its holder, and learn again.",
+                    roll=steering.roll_deg,
+                    turn=turn,
+                )
             )
         if steering.disagreement_deg > 8.0:
-            lines.append(f"Way and heading disagree by {steering.disagreement_deg:.0f}°: does the head lie against a wall?")
+            lines.append(
+                tr("Way and heading disagree by {angle:.0f}°: does the head lie against a wall?", angle=steering.disagreement_deg)
+            )
         tell(self.result, "\n".join(lines))
 
     def shapes(self) -> Sequence[Shape]:
@@ -156,4 +163,4 @@ class SteeringPage(WizardPage):
 
     def _learn(self) -> None:
         if self.desk.draft is not None:
-            self.desk.run("learning the steering", self.desk.draft.learn_steering)
+            self.desk.run(tr("learning the steering"), self.desk.draft.learn_steering)

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from app import theme
+from app.language import tr, tr_text
 from app.widgets.wizard_picture import Shape, WizardPicture
 from app.wizard_desk import WizardDesk
 from core.types import Image
@@ -40,10 +41,10 @@ class WizardPage(QWidget):
         self.column = QVBoxLayout(self)
         self.column.setContentsMargins(0, 0, 0, 0)
         self.column.setSpacing(theme.GAP)
-        title = QLabel(self.name)
+        title = QLabel(tr(self.name))
         title.setFont(theme.semi_bold(18))
         self.column.addWidget(title)
-        self.column.addWidget(note(self.hint))
+        self.column.addWidget(note(tr(self.hint)))
 
     @property
     def is_done(self) -> bool:
@@ -84,7 +85,7 @@ def note(text: str) -> QLabel:
 
 def tell(label: QLabel, text: str) -> None:
     """Another text for a note, with the room for all its lines: a table beside it would take that otherwise."""
-    label.setText(text)
+    label.setText(tr_text(text))
     label.setMinimumHeight(label.heightForWidth(_TEXT_PX) if text else 0)
 
 

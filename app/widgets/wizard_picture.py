@@ -11,6 +11,7 @@ from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QP
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
+from app.language import tr
 from core.types import Image, Point
 
 _HEAD_PX = 11.0
@@ -56,7 +57,7 @@ class WizardPicture(QWidget):
         self._text = ""
         self.setMinimumSize(360, 270)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("Camera picture")
+        self.setAccessibleName(tr("Camera picture"))
 
     def sizeHint(self) -> QSize:
         return QSize(560, 420)

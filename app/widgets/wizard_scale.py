@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QDoubleSpinBox, QFileDialog, QHBoxLayout, QLabel
 
 from app.board_print import print_board
+from app.language import mark, tr, tr_text
 from app.widgets.wizard_page import WizardPage, button, note, tell
 from app.widgets.wizard_picture import Cross, Line, Shape, WizardPicture
 from app.wizard_desk import WizardDesk
@@ -20,31 +21,31 @@ from core.types import Image, Point
 class ScalePage(WizardPage):
     """By a printed board (several pictures), or by two clicks on a known length."""
 
-    name = "Scale and lens"
-    hint = (
+    name = mark("Scale and lens")
+    hint = mark(
         "Print the board at 100 %, lay it flat at the height of the robot, and take three pictures or more: in the middle, then "
         "towards the corners. In the twin it is laid for you. Or click on the two ends of a length that you know."
     )
 
     def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
         super().__init__(desk, picture)
-        self.square = _length(18.0, 2.0, 100.0, "Side of a square")
-        self.length = _length(100.0, 1.0, 2000.0, "Length between the two clicks")
-        self.take_button = button("&Take a picture", self._take)
-        self.solve_button = button("&Calculate", self._solve)
-        self.forget_button = button("Begin &anew", self._forget)
-        self.print_button = button("&Print...", self._print, "Save the board as PDF or PNG")
-        self.clicks_button = button("Two clic&ks", self._begin_clicks)
+        self.square = _length(18.0, 2.0, 100.0, tr("Side of a square"))
+        self.length = _length(100.0, 1.0, 2000.0, tr("Length between the two clicks"))
+        self.take_button = button(tr("&Take a picture"), self._take)
+        self.solve_button = button(tr("&Calculate"), self._solve)
+        self.forget_button = button(tr("Begin &anew"), self._forget)
+        self.print_button = button(tr("&Print..."), self._print, tr("Save the board as PDF or PNG"))
+        self.clicks_button = button(tr("Two clic&ks"), self._begin_clicks)
         self.clicks_button.setCheckable(True)
         self.count = QLabel()
         self.result = note("")
         self._view: BoardView | None = None
         self._clicks: list[Point] = []
         for parts in (
-            (QLabel("Board, squares of"), self.square, self.print_button),
+            (QLabel(tr("Board, squares of")), self.square, self.print_button),
             (self.take_button, self.solve_button, self.forget_button),
             (self.count,),
-            (QLabel("Known length"), self.length, self.clicks_button),
+            (QLabel(tr("Known length")), self.length, self.clicks_button),
         ):
             row = QHBoxLayout()
             for part in parts:
@@ -69,19 +70,30 @@ class ScalePage(WizardPage):
             control.setEnabled(draft is not None and not self.desk.is_busy)
         self.solve_button.setEnabled(self.solve_button.isEnabled() and views > 0)
         self.square.setEnabled(self.square.isEnabled() and views == 0)
-        self.count.setText(f"{views} picture{'' if views == 1 else 's'} of the board taken")
+        self.count.setText(
+            tr("1 picture of the board taken") if views == 1 else tr("{count} pictures of the board taken", count=views)
+        )
         tell(self.result, "\n".join(self._lines()))
 
     def _lines(self) -> list[str]:
         draft = self.desk.draft
         if draft is None or draft.scale is None:
-            return ["Not calibrated yet: distances are shown in pixels only."]
+            return [tr("Not calibrated yet: distances are shown in pixels only.")]
         share = 100 * draft.scale.uncertainty_share
-        lines = [f"Scale: {draft.scale.mm_per_px:.4f} mm per pixel, ±{share:.2f} % (by {draft.scale.method})."]
+        lines = [
+            tr(
+                "Scale: {mm_per_px:.4f} mm per pixel, ±{share:.2f} % (by {method}).",
+                mm_per_px=draft.scale.mm_per_px,
+                share=share,
+                method=tr_text(draft.scale.method),
+            )
+        ]
         if draft.lens is None:
-            lines.append("Lens: straight enough; pictures are left as they are.")
+            lines.append(tr("Lens: straight enough; pictures are left as they are."))
         else:
-            lines.append(f"Lens: k1 {draft.lens.k1:+.3f}, k2 {draft.lens.k2:+.3f}; from now on pictures are straightened.")
+            lines.append(
+                tr("Lens: k1 {k1:+.3f}, k2 {k2:+.3f}; from now on pictures are straightened.", k1=draft.lens.k1, k2=draft.lens.k2)
+            )
         return lines
 
     def shapes(self) -> Sequence[Shape]:
@@ -110,7 +122,7 @@ class ScalePage(WizardPage):
         self.clicks_button.setChecked(False)
         self._clicks = []
         draft.spec = BoardSpec(square_mm=self.square.value())
-        self.desk.run("looking for the board", draft.take_board, self._on_taken)
+        self.desk.run(tr("looking for the board"), draft.take_board, self._on_taken)
 
     def _on_taken(self, given: object) -> None:
         image, view = given  # type: ignore[misc]
@@ -131,7 +143,7 @@ class ScalePage(WizardPage):
         self.desk.changed.emit()
 
     def _print(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, "Save the board", "lumenpilot_board.pdf", "PDF (*.pdf);;PNG (*.png)")
+        name, _ = QFileDialog.getSaveFileName(self, tr("Save the board"), "lumenpilot_board.pdf", tr("PDF (*.pdf);;PNG (*.png)"))
         if name:
             self.save_board(Path(name))
 
@@ -142,14 +154,14 @@ class ScalePage(WizardPage):
         except UserError as error:
             self.desk.failed.emit(str(error))
         else:
-            self.desk.said.emit(f"{path}: print it on {paper} at 100 %, and measure its line of 100 mm")
+            self.desk.said.emit(tr("{path}: print it on {paper} at 100 %, and measure its line of 100 mm", path=path, paper=paper))
 
     # ---- two clicks
 
     def _begin_clicks(self) -> None:
         self.still, self._view, self._clicks = None, None, []
         if self.clicks_button.isChecked():
-            self.desk.said.emit("click on both ends of the known length")
+            self.desk.said.emit(tr("click on both ends of the known length"))
         self.desk.changed.emit()
 
     def _solve_clicks(self) -> None:

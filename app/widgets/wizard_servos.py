@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QTableWidget
 
+from app.language import mark, tr, tr_text
 from app.widgets.wizard_page import WizardPage, button, note, put, table, tell
 from app.widgets.wizard_picture import WizardPicture
 from app.wizard_desk import WizardDesk
@@ -17,22 +18,26 @@ from hardware.rig_search import with_port
 from hardware.servos.search import find_ports
 
 _JOINT_TEXT: dict[JointName, str] = {
-    "right": "tendon right",
-    "left": "tendon left",
-    "up": "tendon up",
-    "down": "tendon down",
-    "advance": "robot forward",
-    "delivery_1": "catheter, first",
-    "delivery_2": "catheter, second",
+    "right": mark("tendon right"),
+    "left": mark("tendon left"),
+    "up": mark("tendon up"),
+    "down": mark("tendon down"),
+    "advance": mark("robot forward"),
+    "delivery_1": mark("catheter, first"),
+    "delivery_2": mark("catheter, second"),
 }
+_UP_OR_DOWN = mark(
+    "One camera cannot tell up from down. Choose tendon up, wiggle it and look from the side: does the head rise when the wire is "
+    "pulled? Without an answer the order of their ids counts, and the rig file says that it is assumed."
+)
 _DIRECTIONS = (("+", 1), ("\N{MINUS SIGN}", -1))
 
 
 class PortPage(WizardPage):
     """Which port the servos hang on, and who answers there."""
 
-    name = "Port and servos"
-    hint = (
+    name = mark("Port and servos")
+    hint = mark(
         "Where do the seven servos hang? Switch their 12 V on. Searching asks everybody on the line for his name; nothing moves. "
         "Without servos the rig only looks."
     )
@@ -40,14 +45,14 @@ class PortPage(WizardPage):
     def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
         super().__init__(desk, picture)
         self.ports = QComboBox()
-        self.ports.setAccessibleName("Servo port")
-        self.search_button = button("&Search", self._search)
+        self.ports.setAccessibleName(tr("Servo port"))
+        self.search_button = button(tr("&Search"), self._search)
         row = QHBoxLayout()
-        row.addWidget(QLabel("Port"))
+        row.addWidget(QLabel(tr("Port")))
         row.addWidget(self.ports, 1)
         row.addWidget(self.search_button)
         self.column.addLayout(row)
-        self.servos = table(("id", "model"), 0, "Servos found")
+        self.servos = table(("id", "model"), 0, tr("Servos found"))
         self.column.addWidget(self.servos, 1)
         self.result = note("")
         self.column.addWidget(self.result)
@@ -64,14 +69,14 @@ class PortPage(WizardPage):
     def _fill_ports(self) -> None:
         bench = self.desk.bench
         if bench is not None and bench.config.rig.camera == "twin":
-            self.ports.addItem("the twin's own servos", bench.port)
+            self.ports.addItem(tr("the twin's own servos"), bench.port)
             return
         for port in find_ports():
             self.ports.addItem(f"{port.title} ({port.path})", port.path)
         known = bench.port if bench is not None else None
         if known is not None and self.ports.findData(known) < 0:
             self.ports.insertItem(0, known, known)
-        self.ports.addItem("no servos: look only", None)
+        self.ports.addItem(tr("no servos: look only"), None)
         self.ports.setCurrentIndex(max(0, self.ports.findData(known)))
 
     def refresh(self) -> None:
@@ -84,7 +89,7 @@ class PortPage(WizardPage):
         for row, servo in enumerate(servos):
             put(self.servos, row, 0, str(servo.id))
             put(self.servos, row, 1, str(servo.model))
-        tell(self.result, "" if found is None else f"{len(servos)} servos at {found.baud} baud.")
+        tell(self.result, "" if found is None else tr("{count} servos at {baud} baud.", count=len(servos), baud=found.baud))
 
     def _search(self) -> None:
         draft, bench = self.desk.draft, self.desk.bench
@@ -96,17 +101,17 @@ class PortPage(WizardPage):
             bench.port = port
         if port is None:
             draft.found = None
-            self.desk.said.emit("a rig without servos: the pages about servos have nothing to do")
+            self.desk.said.emit(tr("a rig without servos: the pages about servos have nothing to do"))
             self.desk.changed.emit()
             return
-        self.desk.run("searching the servos", draft.search_servos)
+        self.desk.run(tr("searching the servos"), draft.search_servos)
 
 
 class IdentifyPage(WizardPage):
     """Who is who, and which way is forward: by itself, or by hand."""
 
-    name = "Wiggle and direction"
-    hint = (
+    name = mark("Wiggle and direction")
+    hint = mark(
         "Each servo is turned by 0.75 mm both ways, and farther (3 mm at most) where nothing is seen. Hands off the wires. The "
         "robot's head must be in the picture, with room on both sides. STOP (Space) ends it at any moment. By hand: wiggle one, "
         "watch, and say what it is."
@@ -115,16 +120,19 @@ class IdentifyPage(WizardPage):
 
     def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
         super().__init__(desk, picture)
-        self.rows = table(("joint", "id", "direction", "seen"), len(JOINT_NAMES), "Joints and their servos")
+        self.rows = table((tr("joint"), "id", tr("direction"), tr("seen")), len(JOINT_NAMES), tr("Joints and their servos"))
         self.rows.verticalHeader().setDefaultSectionSize(30)
         self._ids: list[QComboBox] = []
         self._signs: list[QComboBox] = []
         self._fill(self.rows)
         self.column.addWidget(self.rows, 1)
-        self.auto_button = button("&Find by itself", self._identify)
-        self.wiggle_button = button("&Wiggle the chosen", self._wiggle, "Turn the servo of the chosen row both ways by 1.5 mm")
-        self.swap_button = button("Swap &up and down", self._swap, "One camera cannot tell them apart")
-        for parts in ((self.auto_button,), (self.wiggle_button, self.swap_button)):
+        self.auto_button = button(tr("&Find by itself"), self._identify)
+        self.wiggle_button = button(
+            tr("&Wiggle the chosen"), self._wiggle, tr("Turn the servo of the chosen row both ways by 1.5 mm")
+        )
+        self.swap_button = button(tr("Swap &up and down"), self._swap, tr("One camera cannot tell them apart"))
+        self.right_button = button(tr("&Yes, it rises"), self._confirm, tr("Up and down are right as they stand in the table"))
+        for parts in ((self.auto_button,), (self.wiggle_button, self.swap_button, self.right_button)):
             row = QHBoxLayout()
             for part in parts:
                 row.addWidget(part)
@@ -140,10 +148,10 @@ class IdentifyPage(WizardPage):
 
     def _fill(self, rows: QTableWidget) -> None:
         for row, name in enumerate(JOINT_NAMES):
-            put(rows, row, 0, _JOINT_TEXT[name])
+            put(rows, row, 0, tr(_JOINT_TEXT[name]))
             ids, signs = QComboBox(), QComboBox()
-            ids.setAccessibleName(f"Servo of {_JOINT_TEXT[name]}")
-            signs.setAccessibleName(f"Direction of {_JOINT_TEXT[name]}")
+            ids.setAccessibleName(tr("Servo of {joint}", joint=tr(_JOINT_TEXT[name])))
+            signs.setAccessibleName(tr("Direction of {joint}", joint=tr(_JOINT_TEXT[name])))
             for text, sign in _DIRECTIONS:
                 signs.addItem(text, sign)
             for control in (ids, signs):
@@ -164,9 +172,11 @@ class IdentifyPage(WizardPage):
         free = found is not None and not self.desk.is_busy
         for control in (self.auto_button, self.wiggle_button, self.swap_button, *self._ids, *self._signs):
             control.setEnabled(free)
-        self.swap_button.setEnabled(free and self.is_done)
+        assumed = draft is not None and any(one.assumed for one in draft.assignments)
+        self.right_button.setVisible(assumed)
+        self.right_button.setEnabled(free)
         if draft is None or found is None:
-            tell(self.result, "Search the servos first.")
+            tell(self.result, tr("Search the servos first."))
             return
         if self._known_ids != found.ids:
             self._known_ids = found.ids
@@ -181,26 +191,28 @@ class IdentifyPage(WizardPage):
                 self._signs[row].setCurrentIndex(self._signs[row].findData(joint.sign))
         if draft.assignments != self._shown:
             self._show(draft.assignments)
-        assumed = any(one.assumed for one in draft.assignments)
-        text = "Up and down look alike to one camera, their ids decided: swap them if it is the other way round." if assumed else ""
-        tell(self.result, text or ("" if self.is_done else "Not told apart yet; what stands in the table is the configuration's."))
+        text = _UP_OR_DOWN if assumed else ""
+        tell(
+            self.result,
+            text or ("" if self.is_done else tr("Not told apart yet; what stands in the table is the configuration's.")),
+        )
 
     def _show(self, assignments: Sequence[Assignment]) -> None:
         self._shown = tuple(assignments)
         for row, one in enumerate(assignments):
             self._ids[row].setCurrentIndex(self._ids[row].findData(one.id))
             self._signs[row].setCurrentIndex(self._signs[row].findData(one.sign))
-            put(self.rows, row, 3, one.seen + (" (assumed)" if one.assumed else ""))
+            put(self.rows, row, 3, tr_text(one.seen) + (tr(" (assumed)") if one.assumed else ""))
 
     def _identify(self) -> None:
         if self.desk.draft is not None:
-            self.desk.run("telling the servos apart", self.desk.draft.identify)
+            self.desk.run(tr("telling the servos apart"), self.desk.draft.identify)
 
     def _wiggle(self) -> None:
         draft, row = self.desk.draft, self.rows.currentRow()
         if draft is not None and row >= 0:
             servo_id = int(self._ids[row].currentData())
-            self.desk.run(f"wiggling servo {servo_id}", lambda: draft.wiggle(servo_id))
+            self.desk.run(tr("wiggling servo {servo_id}", servo_id=servo_id), lambda: draft.wiggle(servo_id))
 
     def _swap(self) -> None:
         up, down = JOINT_NAMES.index("up"), JOINT_NAMES.index("down")
@@ -208,9 +220,14 @@ class IdentifyPage(WizardPage):
             first, second = boxes[up].currentIndex(), boxes[down].currentIndex()
             boxes[up].setCurrentIndex(second)
             boxes[down].setCurrentIndex(first)
-        self._by_hand("swapped by hand", ("up", "down"))
+        self._by_hand(mark("swapped by hand"), ("up", "down"))
 
-    def _by_hand(self, seen: str = "set by hand", changed: Sequence[str] | None = None) -> None:
+    def _confirm(self) -> None:
+        if self.desk.draft is not None:
+            self.desk.draft.confirm()
+            self.desk.changed.emit()
+
+    def _by_hand(self, seen: str = mark("set by hand"), changed: Sequence[str] | None = None) -> None:
         """Take over what stands in the table."""
         draft = self.desk.draft
         if draft is None:

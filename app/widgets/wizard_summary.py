@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QFrame, QPlainTextEdit
 
+from app.language import mark, tr, tr_text
 from app.rig_command import calibration_lines, describe
 from app.widgets.wizard_page import WizardPage
 from app.widgets.wizard_picture import WizardPicture
@@ -16,8 +17,8 @@ from core.rig_file import RigFile, RigFileError
 class SummaryPage(WizardPage):
     """Shows the rig as it will be saved; ``rig_name`` tells its name."""
 
-    name = "Save"
-    hint = "This is what will be saved. A step that was left out can be done later: menu Rig, Calibrate."
+    name = mark("Save")
+    hint = mark("This is what will be saved. A step that was left out can be done later: menu Rig, Calibrate.")
 
     def __init__(self, desk: WizardDesk, picture: WizardPicture, rig_name: Callable[[], str]) -> None:
         super().__init__(desk, picture)
@@ -25,7 +26,7 @@ class SummaryPage(WizardPage):
         self.text = QPlainTextEdit()
         self.text.setReadOnly(True)
         self.text.setFrameShape(QFrame.Shape.NoFrame)
-        self.text.setAccessibleName("The rig as it will be saved")
+        self.text.setAccessibleName(tr("The rig as it will be saved"))
         self.text.setTabChangesFocus(True)
         self.column.addWidget(self.text, 1)
 
@@ -47,7 +48,13 @@ class SummaryPage(WizardPage):
         draft = self.desk.draft
         if rig is None or draft is None:
             return
-        lines = [f"{rig.name}: {describe(rig)}", "", *calibration_lines(rig), "", *dict.fromkeys(draft.notes)]
+        lines = [
+            f"{rig.name}: {describe(rig)}",
+            "",
+            *calibration_lines(rig),
+            "",
+            *dict.fromkeys(tr_text(line) for line in draft.notes),
+        ]
         if rig.robot != "none":
-            lines.append("Zero is lost whenever the servos are switched off: zero them again then, with slack wires.")
+            lines.append(tr("Zero is lost whenever the servos are switched off: zero them again then, with slack wires."))
         self.text.setPlainText("\n".join(lines))

@@ -17,7 +17,7 @@ from core.control.drive_view import DriveNews, DriveView
 from core.control.faults import Fault
 from core.control.gate_checks import Source
 from core.control.hand import Jog
-from core.control.modes import Act
+from core.control.modes import Act, Mode
 from core.types import (
     Advice,
     Centerline,
@@ -220,6 +220,10 @@ class FakePilot:
         self.faults: list[Fault] = []
         self.view = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, deadman=False)
         self.alerts: list[Alert] = []
+
+    @property
+    def can_move(self) -> bool:
+        return self.view.mode is not Mode.ADVISORY or self.view.servos_on or bool(self.view.busy)
 
     def jog(self, source: object, jog: Jog) -> None:
         self.jogs.append(jog)

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from html.parser import HTMLParser
 from math import atan, degrees
 from pathlib import Path
@@ -139,6 +140,18 @@ def test_the_report_is_one_page_that_needs_nothing_else(paper_csv: Path, tmp_pat
     assert set(page.references) <= set(page.ids)
     for words in ("0.796", "0.801", "0.86", "Evaluation of paper.csv", "n = 44", "95 % interval"):
         assert words in text
+
+
+def test_the_report_says_that_whole_sessions_are_drawn(paper_csv: Path, tmp_path: Path) -> None:
+    evaluate(csv=paper_csv, out=tmp_path / "alone")
+    assert "Images are taken as independent" in (tmp_path / "alone" / "report.html").read_text(encoding="utf-8")
+    rows = [replace(row, group=f"session {place % 11}") for place, row in enumerate(read_measurements(paper_csv))]
+    write_measurements(tmp_path / "grouped.csv", rows)
+    evaluate(csv=tmp_path / "grouped.csv", out=tmp_path / "out")
+    assert "Whole groups (sessions or phantoms; 11 of them) are drawn" in (tmp_path / "out" / "report.html").read_text(
+        encoding="utf-8"
+    )
+    assert read_measurements(tmp_path / "out" / "measurements.csv") == rows
 
 
 def test_figures_carry_units_and_are_valid_svg(paper_csv: Path, tmp_path: Path) -> None:

@@ -12,12 +12,12 @@ from app.heartbeat import Heartbeat
 
 
 def test_a_busy_slot_is_measured(qtbot: QtBot) -> None:
-    beat = Heartbeat()
+    beat, began_s = Heartbeat(), time.monotonic()
     beat.start()
     qtbot.wait(60)
     time.sleep(0.15)  # what a slow slot does
     qtbot.wait(40)
-    assert 120 <= beat.max_block_ms < 1000
+    assert 120 <= beat.max_block_ms <= 1000 * (time.monotonic() - began_s), "in milliseconds"
     beat.stop()
 
 

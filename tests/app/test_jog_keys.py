@@ -7,13 +7,16 @@ from collections.abc import Iterator
 import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QLineEdit, QMenu, QSpinBox, QWidget
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QSpinBox, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.jog_keys import KEYS, JogKeys, Motion
+from app.widgets.setting_field import NumberEdit
 from core.control.hand import AT_REST, Jog
 
 Key = Qt.Key
+NONE = Qt.KeyboardModifier.NoModifier
 
 
 class Bench:
@@ -28,11 +31,17 @@ class Bench:
         row.addWidget(self.spin)
         self.window.show()
         self.window.setFocus()
-        self.jog = JogKeys(self.window)
+        self.can_move = True
+        self.jog = JogKeys(self.window, lambda: self.can_move)
         self.jogs: list[Jog] = []
         self.jog.changed.connect(self.jogs.append)
         self.stops: list[bool] = []
         self.jog.stop_pressed.connect(lambda: self.stops.append(True))
+
+    def type(self, into: QWidget, key: Qt.Key = Key.Key_Space, modifier: Qt.KeyboardModifier = NONE) -> None:
+        """As it comes from a keyboard."""
+        into.setFocus()
+        QTest.keyClick(into, key, modifier)
 
     def key(self, kind: QEvent.Type, key: Qt.Key, *, repeat: bool = False, to: QWidget | None = None) -> QKeyEvent:
         event = QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier, "", repeat)
@@ -146,6 +155,51 @@ def test_space_stops_once_and_lets_go_even_in_a_text_field(bench: Bench) -> None
     assert bench.jogs[-1] == AT_REST
     assert bench.stops == [True]
     assert bench.text.text() == ""
+
+
+def test_where_nothing_can_move_a_space_is_typed(bench: Bench) -> None:
+    page = QPlainTextEdit()
+    bench.window.layout().addWidget(page)
+    bench.can_move = False
+    bench.type(bench.text)
+    bench.type(bench.text, modifier=Qt.KeyboardModifier.ShiftModifier)
+    bench.type(page)
+    assert (bench.text.text(), page.toPlainText(), bench.stops) == ("  ", " ", [])
+    bench.can_move = True
+    bench.type(bench.text)
+    bench.type(page)
+    assert (bench.text.text(), page.toPlainText(), bench.stops) == ("  ", " ", [True, True])
+
+
+@pytest.mark.parametrize(
+    ("key", "modifier"),
+    [
+        (Key.Key_Pause, NONE),
+        (Key.Key_Pause, Qt.KeyboardModifier.ShiftModifier),
+        (Key.Key_Space, Qt.KeyboardModifier.ControlModifier),
+        (Key.Key_Space, Qt.KeyboardModifier.AltModifier),
+    ],
+)
+@pytest.mark.parametrize("can_move", [True, False])
+def test_a_key_is_stop_in_any_focus_and_at_any_moment(
+    bench: Bench, key: Qt.Key, modifier: Qt.KeyboardModifier, can_move: bool
+) -> None:
+    bench.can_move = can_move
+    for number, place in enumerate((bench.text, bench.spin, bench.window), 1):
+        bench.type(place, key, modifier)
+        assert len(bench.stops) == number
+    assert bench.text.text() == ""
+
+
+def test_what_takes_no_space_leaves_it_to_stop(bench: Bench) -> None:
+    bench.can_move = False
+    locked, numbers, button = QLineEdit(), NumberEdit(is_whole=False), QPushButton()
+    locked.setReadOnly(True)
+    for number, widget in enumerate((locked, numbers, button, bench.spin, bench.window), 1):
+        if widget.parent() is None and widget is not bench.window:
+            bench.window.layout().addWidget(widget)
+        bench.type(widget)
+        assert len(bench.stops) == number, widget
 
 
 def test_typing_does_not_move_the_robot(bench: Bench) -> None:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QEvent, QRect, Qt
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtCore import QEvent, QRect, Qt, QTimer
+from PySide6.QtWidgets import QAbstractItemView, QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from app import theme
 from app.engine_thread import Phase
+from app.event_model import EventKind
 from app.operator_window import OperatorWindow
 from app.widgets.overlays import Layer
 from core.config import Config
@@ -182,22 +184,72 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     assert opened[-1] == "random:1"
 
 
-@pytest.mark.real_time
 def test_window_stays_alive_while_a_phantom_is_opened(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    """It is opened only when the window has turned often enough: a window that waits for it would wait in vain."""
+    turned_often, alive = threading.Event(), []
+
     def open_slowly(_config: Config) -> FakeEngine:
-        time.sleep(0.4)
+        alive.append(turned_often.wait(20.0))
         return FakeEngine(bench)
 
     window = make_window(open_slowly)
+    turns: list[Phase] = []
+    timer = QTimer()
+    timer.timeout.connect(lambda: turns.append(window._phase))
+    timer.timeout.connect(lambda: turned_often.set() if len(turns) >= 20 else None)
+    timer.start(1)
     window.start()
-    turns = 0
-    while window.shown_tick is None:
-        before = time.monotonic()
-        QApplication.processEvents()
-        assert time.monotonic() - before < 0.3
-        turns += 1
-        time.sleep(0.005)
-    assert turns > 20
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert alive == [True]
+    assert set(turns[1:20]) == {Phase.STARTING}
+
+
+@pytest.mark.parametrize("page", ["events", "commands"])
+def test_a_list_is_reached_by_tab_scrolled_by_keys_and_left_by_escape(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, page: str
+) -> None:
+    """While it has the focus the arrows are its own; letters and STOP are the robot's as everywhere."""
+    panels = running.panels
+    panels.pages.setCurrentWidget({"events": panels.events, "commands": panels.commands}[page])
+    view = panels.pages.currentWidget().findChild(QAbstractItemView)
+    assert view is not None
+    for number in range(200):
+        panels.events.add(EventKind.OPERATOR, f"event {number}")
+    view.verticalScrollBar().setRange(0, max(500, view.verticalScrollBar().maximum()))
+    for _ in range(80):
+        qtbot.keyClick(running.focusWidget(), Key.Key_Tab)
+        if running.focusWidget() is view:
+            break
+    assert running.focusWidget() is view
+    engine.jogs.clear()
+    bar = view.verticalScrollBar()
+    qtbot.keyClick(view, Key.Key_Down)
+    assert bar.value() > 0
+    before = bar.value()
+    qtbot.keyClick(view, Key.Key_PageDown)
+    assert bar.value() > before
+    qtbot.keyClick(view, Key.Key_Home)
+    qtbot.keyClick(view, Key.Key_Up)
+    assert bar.value() == bar.minimum()
+    assert engine.jogs == []
+    qtbot.keyPress(view, Key.Key_W)
+    assert engine.jogs[-1] == Jog(advance=1.0)
+    qtbot.keyRelease(view, Key.Key_W)
+    qtbot.keyClick(view, Key.Key_Space)
+    assert engine.pilot.acts == [Act.STOP]
+    qtbot.keyClick(view, Key.Key_Escape)
+    assert running.focusWidget() is not view
+    qtbot.keyPress(running, Key.Key_Up)
+    assert engine.jogs[-1] == Jog(advance=1.0)
+    qtbot.keyRelease(running, Key.Key_Up)
+
+
+def test_a_click_into_a_list_leaves_the_arrows_to_the_robot(running: OperatorWindow, qtbot: QtBot) -> None:
+    panels = running.panels
+    panels.pages.setCurrentWidget(panels.events)
+    view = panels.events.findChild(QAbstractItemView)
+    qtbot.mouseClick(view.viewport(), Qt.MouseButton.LeftButton)
+    assert running.focusWidget() is not view
 
 
 def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def test_recording_the_twin_writes_a_session_of_its_rig(recorded: tuple[Path, di
         assert row is not None
         assert row.drive is not None
     assert result["dropped"] == 0
-    assert 1.4 <= float(str(result["seconds"])) < 10.0
+    assert float(str(result["seconds"])) >= 1.4
 
 
 def test_info_is_one_object_and_a_table(recorded: tuple[Path, dict[str, object]]) -> None:

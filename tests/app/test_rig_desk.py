@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from app.operator_devices import OperatorDevices
@@ -17,7 +18,8 @@ from core.config import Config, load_config
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.modes import Mode
-from core.rig_file import make_rig, rig_path, write_rig
+from core.rig_file import make_rig, read_rig, rig_path, with_rig, write_rig
+from core.session.manifest import read_manifest
 from hardware.calibration_bench import CalibrationBench
 from hardware.gamepad import GamepadState
 from hardware.rig_search import FoundCamera
@@ -42,22 +44,24 @@ def opened() -> list[Config]:
 
 
 @pytest.fixture
-def window(make_window: Callable[..., OperatorWindow], bench: FakeBench, opened: list[Config], qtbot: QtBot) -> OperatorWindow:
+def window(
+    make_window: Callable[..., OperatorWindow], bench: FakeBench, opened: list[Config], qtbot: QtBot, tmp_path: Path
+) -> OperatorWindow:
     def open_engine(config: Config) -> FakeEngine:
         opened.append(config)
         return FakeEngine(bench)
 
-    window = make_window(open_engine, load_config(overrides={"record": {"ring_s": 0}}))
+    window = make_window(open_engine, load_config(overrides={"record": {"ring_s": 0, "folder": str(tmp_path / "sessions")}}))
     window.start()
     until(qtbot, lambda: window.shown_tick is not None)
     return window
 
 
-def _desk(window: OperatorWindow, switched: list[str] | None = None) -> RigDesk:
+def _desk(window: OperatorWindow) -> RigDesk:
     def bench(config: Config, see: object) -> CalibrationBench:
         return CalibrationBench(config, StillCamera(), None, lambda frame: make_scene(), lambda: None)
 
-    return RigDesk(window, (switched if switched is not None else []).append, bench, lambda _config: lambda frame: make_scene())
+    return RigDesk(window, bench, lambda _config: lambda frame: make_scene())
 
 
 def test_rigs_are_listed_and_broken_ones_cannot_be_chosen(window: OperatorWindow) -> None:
@@ -84,20 +88,87 @@ def test_a_chosen_rig_is_opened_in_this_window_and_shows_millimetres(
     assert [action.isChecked() for action in desk._rigs] == [True]
 
 
-def test_a_rig_of_another_kind_gets_a_window_of_its_own(window: OperatorWindow, opened: list[Config]) -> None:
+def test_a_rig_of_another_kind_is_opened_in_this_window(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
+    """Banner, title, phantoms and what is recorded follow, in both directions; it is the camera that was chosen."""
     live = load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}})
     write_rig(make_rig(live, "real bench", None))
-    switched: list[str] = []
-    desk = _desk(window, switched)
+    desk, panels, picker = _desk(window), window.panels, window.panels.picker
+    assert picker is not None
+    assert (panels.banner.word, picker.isVisible()) == ("SIM", True)
     desk.choose("real bench")
+    assert (panels.banner.word, picker.isVisible()) == ("LIVE", False), "before anything of the new rig is seen"
+    assert "no servos" in panels.banner.toolTip()
+    assert window.windowTitle().endswith("LIVE")
+    assert panels.notice.text.startswith("Starting: real bench")
+    until(qtbot, lambda: len(opened) == 2 and window.shown_tick is not None)
+    qtbot.keyClick(window, Qt.Key.Key_R)  # another phantom
+    assert window.config.rig.name == "real bench"
+    window.recorder.toggle()
+    until(qtbot, lambda: window.recorder.status.recording)
+    window.recorder.toggle()
+    until(qtbot, lambda: window.recorder.status.saved is not None)
+    saved = window.recorder.status.saved
+    assert saved is not None
+    assert (read_manifest(saved).kind, read_manifest(saved).rig) == ("LIVE", "real bench")
     desk.choose_camera(FoundCamera("realsense", "L515", serial="f1"))
-    assert switched == ["real bench", "realsense"]
-    assert len(opened) == 1
+    until(qtbot, lambda: len(opened) == 3)
+    assert opened[2].camera.serial == "f1"
+    desk.choose_camera(FoundCamera("twin", "Bench twin"))
+    assert (panels.banner.word, picker.isVisible()) == ("SIM", True)
+    until(qtbot, lambda: len(opened) == 4)
+
+
+def test_the_banner_tells_when_a_rig_with_servos_takes_the_place_of_one_that_looks(window: OperatorWindow) -> None:
+    looks = load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}})
+    drives = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}, "servos": {"port": "/dev/ttyUSB0"}})
+    window.use_config(looks)
+    assert "no servos" in window.panels.banner.toolTip()
+    window.use_config(drives)
+    assert "move real servos" in window.panels.banner.toolTip()
 
 
 def test_another_camera_of_the_same_kind_needs_no_restart(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
     _desk(window).choose_camera(FoundCamera("twin", "Bench twin"))
     until(qtbot, lambda: len(opened) == 2)
+
+
+def test_a_click_says_where_the_robot_is_inserted(
+    make_window: Callable[..., OperatorWindow], bench: FakeBench, qtbot: QtBot, tmp_path: Path
+) -> None:
+    config = load_config(overrides={"record": {"ring_s": 0, "folder": str(tmp_path / "sessions")}})
+    path = write_rig(make_rig(config, "bench 1", KNOWN))
+    engine = FakeEngine(bench)
+    window = make_window(lambda _config: engine, with_rig(config, read_rig(path), path))
+    window.start()
+    until(qtbot, lambda: window.shown_tick is not None)
+    desk = _desk(window)
+    desk.ask_port()
+    assert "Click where the robot is inserted" in window.panels.toast.text()
+    window.choose_target(639.0, 120.0)
+    assert engine.targets[-1:] != [(639.0, 120.0)], "no destination this time"
+    known = read_rig(path).calibration
+    assert known is not None and known.port is not None
+    assert (known.port.x_share, known.port.y_share) == (1.0, pytest.approx(120 / 479))
+    assert known.scale == KNOWN.scale
+    assert engine.perceptions[-1].path.port_x_share == 1.0, "at once, without opening the rig anew"
+    window.choose_target(100.0, 100.0)
+    assert engine.targets[-1] == (100.0, 100.0)
+    desk.ask_port()
+    qtbot.keyClick(window, Qt.Key.Key_Escape)
+    window.choose_target(200.0, 100.0)
+    assert engine.targets[-1] == (200.0, 100.0), "Escape has left it as it was"
+    window.preview(config.perception)
+    assert engine.perceptions[-1].path.port_x_share == 1.0, "settings that are tried out leave the rig its port"
+    desk.forget_port()
+    assert engine.perceptions[-1].path.port_x_share is None
+
+
+def test_a_rig_without_a_file_has_nowhere_to_keep_a_port(window: OperatorWindow) -> None:
+    _desk(window).ask_port()
+    assert "save one first" in window.panels.toast.text()
+    window.choose_target(100.0, 100.0)
+    assert window._thread._engine is not None
+    assert window._thread._engine.targets[-1] == (100.0, 100.0)
 
 
 @pytest.mark.parametrize(

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
 
 import pytest
 
 from app import rig_engine
 from app.rig_engine import EngineMaker, RigEngine
+from core.calibration_config import CalibrationConfig, ScaleConfig
 from core.config import Config, PerceptionConfig
 from core.control.engine import Perceive
 from core.control.faults import Cause, Fault
 from core.control.health import ModelReport
 from core.control.modes import Act, Mode
+from core.control.policies import Policy, make_policy
 from core.devices import DeviceError
+from core.policy_config import PolicyName
+from core.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.types import Frame, Point, Reason, Refusal, Scene
 from hardware.rig import Rig, RigKind
 from tests.core.pilot_bench import Robot
@@ -80,6 +86,26 @@ def test_starting_again_clears_no_stop(open_engine: Open, robots: list[Robot]) -
     assert again.pilot is not None
     assert again.pilot.view.mode is Mode.ADVISORY
     again.close()
+
+
+def test_the_policy_and_the_watch_over_stalls_use_the_rigs_own_scale(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """0.2 mm a pixel at 1280 px are 2.5 working pixels a millimetre."""
+    scale = ScaleConfig(mm_per_px=0.2, size_px=(1280, 720), method="board", uncertainty_share=0.001)
+    known = CalibrationConfig(made_utc=datetime(2025, 3, 4, tzinfo=UTC), scale=scale)
+    path = write_rig(make_rig(Config(), "bench 1", known), tmp_path / "bench 1.toml")
+    told: list[float] = []
+
+    def make(name: PolicyName, config: Config) -> Policy:
+        told.append(config.policy.pursuit.pixels_per_mm)
+        return make_policy(name, config)
+
+    monkeypatch.setattr(rig_engine, "make_policy", make)
+    monkeypatch.setattr(rig_engine, "open_rig", lambda config: Rig("twin", RigKind.SIM, _Camera([]), Robot()))
+    engine = _Maker()(with_rig(Config(), read_rig(path), path))
+    assert engine.pilot is not None
+    told.append(engine.pilot._config.policy.pursuit.pixels_per_mm)
+    engine.close()
+    assert told == [pytest.approx(2.5)] * 2
 
 
 def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
+from app.rig_command import calibration_lines
 from app.rig_wizard import RigWizard
 from app.wizard_desk import WizardDesk
 from core.calibration.identify import Assignment
@@ -18,6 +19,7 @@ from core.calibration_config import CalibrationConfig, ScaleConfig
 from core.config import Config, load_config
 from core.devices import DeviceError
 from core.rig_file import find_rig, list_rigs
+from core.servo_config import JOINT_NAMES
 from core.types import Frame
 from hardware.calibration_bench import CalibrationBench
 from hardware.servos.search import FoundServo, FoundServos
@@ -241,6 +243,32 @@ def test_servos_are_told_apart_by_hand(opened: RigWizard, qtbot: QtBot) -> None:
     assert draft.assignments[0].id == 1
 
 
+def test_the_person_is_asked_which_of_two_is_up(opened: RigWizard, qtbot: QtBot) -> None:
+    """One camera cannot tell; without an answer the rig file says that it is assumed."""
+    _to(opened, opened.identify_page)
+    _with_servos(opened)
+    page, draft = opened.identify_page, opened.desk.draft
+    assert draft is not None
+    assert not page.right_button.isVisible()
+    named = [Assignment(name, number, 1, "seen", assumed=name in {"up", "down"}) for number, name in enumerate(JOINT_NAMES, 1)]
+    draft.set_assignments(named)
+    opened.desk.changed.emit()
+    assert "does the head rise" in page.result.text()
+    rig = draft.rig_file("bench 1")
+    assert rig.calibration is not None
+    assert rig.calibration.assumed == ("up", "down")
+    assert any(line.startswith("assumed: up and down by the order of their ids") for line in calibration_lines(rig))
+    qtbot.mouseClick(page.right_button, Qt.MouseButton.LeftButton)
+    assert not page.right_button.isVisible()
+    assert [one.seen for one in draft.assignments[2:4]] == ["seen by eye"] * 2
+    assert draft.calibration().assumed is None
+    draft.set_assignments(named)
+    opened.desk.changed.emit()
+    qtbot.mouseClick(page.swap_button, Qt.MouseButton.LeftButton)
+    assert [(one.name, one.id) for one in draft.assignments[2:4]] == [("up", 4), ("down", 3)]
+    assert draft.calibration().assumed is None, "who swaps has looked"
+
+
 def test_stop_is_heard_on_every_page(opened: RigWizard, qtbot: QtBot) -> None:
     bench = opened.desk.bench
     assert bench is not None
@@ -252,6 +280,21 @@ def test_stop_is_heard_on_every_page(opened: RigWizard, qtbot: QtBot) -> None:
         bench.stop.release()
         press()
         assert bench.stop.is_pressed
+
+
+def test_a_rig_may_have_a_space_in_its_name_and_space_is_stop_there_while_a_job_runs(opened: RigWizard, qtbot: QtBot) -> None:
+    bench, name = opened.desk.bench, opened.camera_page.name_edit
+    assert bench is not None
+    opened.back()
+    name.clear()
+    qtbot.keyClicks(name, "left bench")
+    assert name.text() == "left bench"
+    assert not bench.stop.is_pressed
+    opened.desk.run("moving a servo", lambda: bench.stop.sleep(20.0))
+    qtbot.keyClick(name, Qt.Key.Key_Space)
+    assert bench.stop.is_pressed
+    assert name.text() == "left bench"
+    _idle(opened, qtbot)
 
 
 def test_stop_reaches_a_job_that_runs(opened: RigWizard, qtbot: QtBot) -> None:

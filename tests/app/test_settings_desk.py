@@ -200,6 +200,21 @@ def test_space_stops_the_robot_from_the_dialog_too(at: Bench) -> None:
     assert at.desk.dialog.search.text() == ""
 
 
+def test_a_space_is_typed_while_the_servos_are_off(at: Bench) -> None:
+    at.engine.pilot.view = replace(at.engine.pilot.view, servos_on=False)
+    at.desk.open()
+    assert at.desk.dialog is not None
+    QTest.keyClicks(at.desk.dialog.search, "allowed px")
+    assert at.desk.dialog.search.text() == "allowed px"
+    assert Act.STOP not in at.engine.pilot.acts
+    for mode in (Mode.ARMED, Mode.AUTONOMOUS, Mode.HOLD, Mode.STOPPED):
+        at.engine.pilot.acts.clear()
+        at.engine.pilot.view = replace(at.engine.pilot.view, mode=mode)
+        QTest.keyClick(at.desk.dialog.search, Qt.Key.Key_Space)
+        assert at.engine.pilot.acts == [Act.STOP], mode
+    assert at.desk.dialog.search.text() == "allowed px"
+
+
 def test_a_session_has_one_set_of_thresholds(at: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
     at.edit(D_ALLOW, "9")
     recorder = at.window.recorder
@@ -219,7 +234,7 @@ def test_a_session_has_one_set_of_thresholds(at: Bench, qtbot: QtBot, monkeypatc
 
 def test_what_is_recorded_names_the_thresholds_in_force(at: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[float] = []
-    monkeypatch.setattr(at.window.recorder, "open_rig", lambda config: told.append(config.perception.pose.d_allow_px))
+    monkeypatch.setattr(at.window.recorder, "open_rig", lambda config, _kind: told.append(config.perception.pose.d_allow_px))
     at.edit(D_ALLOW, "9")
     assert at.desk.dialog is not None
     at.desk.dialog.reject()

@@ -10,8 +10,9 @@ from pytestqt.qtbot import QtBot
 
 from app.settings_dialog import SettingsDialog
 from app.settings_model import SettingsDraft
+from app.widgets.browse_button import WANTED
 from app.widgets.setting_field import NumberEdit, SettingField
-from core.config import Config, load_config
+from core.config import RESOURCES, Config, load_config
 from core.config_schema import schema, settings_by_key
 from core.profiles import Profiles
 
@@ -252,3 +253,36 @@ def test_enter_in_a_field_saves_nothing(dialog: SettingsDialog) -> None:
     QTest.keyClick(shown.editor, Key.Key_Return)
     assert asked == []
     assert dialog.isVisible()
+
+
+def test_a_folder_is_chosen_on_the_disk(dialog: SettingsDialog, tmp_path: Path) -> None:
+    seen = drafts(dialog)
+    chooser = field(dialog, "record.folder").browse_button
+    assert chooser is not None
+    chooser.click()
+    assert chooser.dialog is not None
+    assert not chooser.dialog.isModal(), "STOP must stay in reach"
+    chooser.dialog.setDirectory(str(tmp_path))
+    chooser.dialog.fileSelected.emit(str(tmp_path))
+    chooser.dialog.reject()
+    assert seen[-1].record.folder == str(tmp_path)
+    editor = dialog.page.fields["record.folder"].editor
+    assert isinstance(editor, QLineEdit)
+    assert editor.text() == str(tmp_path)
+
+
+def test_everything_that_is_a_path_can_be_browsed_for(dialog: SettingsDialog) -> None:
+    assert set(WANTED) <= set(settings_by_key())
+    for key in WANTED:
+        assert field(dialog, key).browse_button is not None
+    source = field(dialog, "rig.source").browse_button
+    assert source is not None
+    assert [action.text() for action in source.menu().actions()] == ["&File...", "F&older..."]
+
+
+def test_a_shipped_model_goes_by_its_name(dialog: SettingsDialog) -> None:
+    seen = drafts(dialog)
+    chooser = field(dialog, "perception.segmentation.model").browse_button
+    assert chooser is not None
+    chooser._on_selected(str(RESOURCES / "models" / "other"))
+    assert seen[-1].perception.segmentation.model == "other"
