@@ -118,6 +118,9 @@ def train(
     data: Annotated[list[Path] | None, typer.Option(help="labelled folder as synth writes it; may be repeated")] = None,
     synthetic: Annotated[int, typer.Option(min=0, help="also make this many frames with the twin")] = 0,
     init: Annotated[str | None, typer.Option(help="start from this model instead of from nothing")] = None,
+    remember: Annotated[
+        int, typer.Option(min=0, help="for few frames of a new look: as often show so many of the twin, that nothing is forgotten")
+    ] = 0,
     shallow: Annotated[bool, typer.Option("--shallow", help="a new network of two convolutions on every level")] = False,
     deepen: Annotated[bool, typer.Option("--deepen", help="give the --init network the default's depth before training")] = False,
     second_look: Annotated[
@@ -144,8 +147,11 @@ def train(
 ) -> None:
     """Train or fine-tune the network; Ctrl-C keeps what was learnt."""
     from app.learning_commands import TrainOutputs, run_train
+    from core.errors import UserError
     from core.learning.training import TrainingPlan
 
+    if remember and (synthetic or not data or init is None):
+        raise UserError("--remember N is for --data DIR and --init MODEL, without --synthetic")
     plan = TrainingPlan(
         steps=steps,
         batch=batch,
@@ -154,6 +160,7 @@ def train(
         crop=(crop, crop),
         look_share=look_share,
         focus_share=focus,
+        keeps_statistics=remember > 0,
         stop_after=stop_after,
         seed=seed,
         threads=threads,
@@ -162,7 +169,7 @@ def train(
     run_train(
         TrainOutputs(out, held_out),
         data or [],
-        synthetic,
+        synthetic or remember,
         init,
         base,
         plan,

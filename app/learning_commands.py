@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -24,10 +24,6 @@ from rich.progress import (
 from app.progress_lines import ProgressLines, Teller, asked_teller
 
 _console = Console(stderr=True)
-_TOLD_EVERY = 2
-"""Steps between two lines for another program: a step takes half a second and more."""
-_LOOKS = 10
-"""How often held-out frames are looked at during a training."""
 
 
 def progress_bar() -> Progress:
@@ -105,21 +101,21 @@ def run_train(
 
     With `deepen`, the network of `init` first gets the convolutions that today's default shape has more than it; with `shallow`, a
     new network has two convolutions on every level. With `second_look`, it is the network of the second look of `init` that learns,
-    and `out` is `init` with it.
+    and `out` is `init` with it. Where the plan keeps the normalisation, `data` is shown as often as the frames made now.
     """
     import torch
 
     from app.lessons import FrameLesson, Lesson, SecondLookLesson
+    from app.teaching import Classroom, second_plan, teach_second_look
     from core.learning.dataset import DatasetError, find_samples
-    from core.learning.model_file import check_can_write
-    from core.learning.training import Progress as Report
-    from core.learning.training import train
-    from core.perception.unet import DualUNet
+    from core.learning.model_file import check_can_write, model_folder
 
     if second_look and outputs.held_out is not None:
         raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
     if not data and not synthetic:
         raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
+    if init is not None:
+        model_folder(init)  # what is not there is said before half a minute of frames is made
     check_can_write(outputs.out)
     out = outputs.out.resolve()
     try:
@@ -127,11 +123,14 @@ def run_train(
     except OSError as error:
         raise DatasetError(f"{out.parent}: cannot be written ({error.strerror}); choose another --out") from None
     folders = list(data)
+    samples = find_samples(folders)
     if synthetic:
         folder = out.with_name(out.name + "_frames")
         run_synth(folder, synthetic, 1_000_000 + plan.seed * 100_000, (640, 480), None, None, 1)
         folders.append(folder)
-    samples = find_samples(folders)
+        if plan.keeps_statistics:  # few frames of a new look, shown as often as all that is to be remembered
+            samples *= max(1, round(synthetic / len(samples)))
+        samples += find_samples([folder])
     torch.manual_seed(plan.seed)
     lesson: Lesson
     if second_look:
@@ -139,45 +138,21 @@ def run_train(
     else:
         lesson = FrameLesson(samples, init, base, deepen=deepen, shallow=shallow)
     plan = replace(plan, crop=lesson.sides(plan.crop))
-    notes = {"plan": plan.to_json(), "init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
-    log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {notes}\n")
+    then = None if second_look else second_plan(plan, init)
+    notes = {"init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
     teller, watch = asked_teller(), HeldOutWatch(outputs.held_out, out, asked_teller(), log.write)
     with log, Interrupt() as interrupt, progress_bar() as bar:
-        crops = lesson.crops(plan, bar, interrupt)
-        if crops is None:
+        room = Classroom(out, notes, log.write, teller, bar, interrupt, watch, steps_total=plan.steps + (then.steps if then else 0))
+        done = room.teach(lesson, plan)
+        if done is None:
             _console.print(f"interrupted before the first step; nothing was written to {out}", soft_wrap=True)
             return
-        watch.look(lesson.network, 0)
-        task = bar.add_task("steps", total=plan.steps)
-
-        def report(now: Report) -> None:
-            dice = f"dice vessel {now.vessel_dice:.3f} robot {now.robot_dice:.3f}"
-            log.write(f"{time.strftime('%H:%M:%S')} step {now.step} loss {now.loss:.4f} {dice} {now.images_per_s:.1f} images/s\n")
-            if teller is None:
-                bar.update(task, completed=now.step, description=f"loss {now.loss:.3f} {dice}")
-            else:
-                teller.tell(asdict(now) | {"left_s": round((plan.steps - now.step) * plan.batch / max(now.images_per_s, 1e-9), 1)})
-
-        def checkpoint(average: DualUNet, step: int) -> None:
-            watch.look(average, step)
-            lesson.save(average, out, notes | {"steps_done": step}, watch.figures, whole=False)
-
-        network, done = train(
-            lesson.network,
-            crops,
-            plan,
-            on_progress=report,
-            on_checkpoint=checkpoint,
-            # a window that has gone can no longer ask for the end
-            should_stop=lambda: interrupt.asked or (teller is not None and not teller.is_heard),
-            report_every=50 if teller is None else _TOLD_EVERY,
-            checkpoint_every=1000 if outputs.held_out is None else max(_TOLD_EVERY, plan.steps // _LOOKS),
-        )
-        watch.look(network, done)
-    lesson.save(network, out, notes | {"steps_done": done}, watch.figures, whole=True)
+        if then is not None and done == plan.steps:
+            teach_second_look(room, samples, then)
+    steps, done = room.steps_total, room.steps_before
     if teller is not None:
-        teller.tell({"model": str(out), "steps_done": done, "steps": plan.steps})
-    ending = "" if done == plan.steps else f" (interrupted after {done} of {plan.steps} steps; go on with --init {out})"
+        teller.tell({"model": str(out), "steps_done": done, "steps": steps})
+    ending = "" if done == steps else f" (interrupted after {done} of {steps} steps; go on with --init {out})"
     _console.print(f"model written to {out}{ending}", soft_wrap=True)
 
 
@@ -193,6 +168,11 @@ class HeldOutWatch:
         self._teller, self._log = teller, log
         self.figures: dict[str, Any] = {}
         """For the model's manifest: what is known now, and what was before."""
+
+    @property
+    def is_on(self) -> bool:
+        """Whether there are such frames."""
+        return bool(self._samples)
 
     def look(self, network: Any, step: int) -> None:
         """Measure, write pictures, tell."""

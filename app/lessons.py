@@ -56,10 +56,9 @@ class FrameLesson:
         if init is None:
             self.network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
             return
-        folder = model_folder(init)
-        self.network = load_network(folder)[0]
-        if (folder / SECOND_LOOK / INFO).is_file():
-            self._second_look = folder / SECOND_LOOK
+        self.network = load_network(model_folder(init))[0]
+        if has_second_look(init):
+            self._second_look = model_folder(init) / SECOND_LOOK
         if deepen:
             images = [sample.load(WORKING_SIZE_PX)[0] for sample in _some(samples)]
             self.network = deepened(self.network, default_shape().encoder_convolutions, images)
@@ -92,7 +91,7 @@ class SecondLookLesson:
             raise UserError("--second-look needs --init MODEL, whose first look it looks again after")
         self._samples, self._init = samples, init
         self._base = model_folder(init)
-        has_one = (self._base / SECOND_LOOK / INFO).is_file()
+        has_one = has_second_look(init)
         self.network = load_network(self._base / SECOND_LOOK)[0] if has_one else with_first_look(load_network(self._base)[0])
         self._shown: NearCrops | None = None
 
@@ -118,6 +117,11 @@ class SecondLookLesson:
             shown = (self._shown[index][0] for index in range(0, len(self._shown), step))
             examples = [np.ascontiguousarray(planes.numpy().transpose(1, 2, 0)) for planes in shown]
         save_with_second_look(self._base, network, out, training=training, figures=figures, examples=examples)
+
+
+def has_second_look(model: str) -> bool:
+    """Whether a model has a network for a second look; raises ModelError when there is no such model."""
+    return (model_folder(model) / SECOND_LOOK / INFO).is_file()
 
 
 def default_shape(*, deep: bool = True) -> UNetShape:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 STEPS = 400
 _BATCH, _RATE, _CROP, _LOOK_SHARE = 8, 2e-3, 256, 0.7
 """For a network that can see already: a fifth of the rate with which it was taught, so that it does not forget."""
+REMEMBER = 80
+"""Frames of the twin that are made first, in half a minute, and shown as often as the new ones (docs/method.md)."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
 _END_WITHIN_MS = 3000
 
@@ -80,11 +82,12 @@ class TrainingState:
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What is asked for: the new model's name, the one to start from, and how long."""
+    """What is asked for: the new model's name, the one to start from, how long, and with how many frames of the twin beside."""
 
     name: str
     init: str = "default"
     steps: int = STEPS
+    remember: int = REMEMBER
 
 
 def name_problem(name: str) -> str:
@@ -176,6 +179,7 @@ class TrainingJob(QObject):
     def _on_prepared(self, _key: object, frames: OwnFrames) -> None:
         wish, out = self._wish, own_models() / self._wish.name
         plan = ["--steps", wish.steps, "--batch", _BATCH, "--rate", _RATE, "--crop", _CROP, "--look-share", _LOOK_SHARE]
+        plan += ["--remember", wish.remember]
         sets = ["--data", frames.train, "--held-out", frames.held_out, "--init", wish.init, "--out", out]
         child = ChildProcess(command_of("train", *map(str, (*sets, *plan)), "--progress-json"), self)
         child.told.connect(self._on_told)
@@ -194,7 +198,8 @@ class TrainingJob(QObject):
         try:
             if "loss" in record:
                 point = (int(record["step"]), *(float(record[name]) for name in ("loss", "vessel_dice", "robot_dice")))
-                state = replace(state, curve=(*state.curve, point), left_s=record.get("left_s"))
+                steps = int(record.get("steps", state.steps))  # more than asked for where a second look learns, too
+                state = replace(state, curve=(*state.curve, point), steps=steps, left_s=record.get("left_s"))
             elif "held_out_step" in record:
                 dices = float(record["vessel_dice"]), float(record["robot_dice"])
                 look = HeldOutLook(int(record["held_out_step"]), *dices, tuple(record.get("pictures", ())))

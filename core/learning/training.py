@@ -24,7 +24,8 @@ _SMALL_AREA_PX = 50.0
 class TrainingPlan:
     """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours, and
     ``look_share`` of them are changed in exposure, colour, sharpness and noise. ``stop_after`` ends before the learning rate has
-    come down: for a run that another one goes on from. ``focus_share`` of the samples are drawn by difficulty."""
+    come down: for a run that another one goes on from. ``focus_share`` of the samples are drawn by difficulty. With
+    ``keeps_statistics`` the normalisation stays as it was learnt: that of a few frames alike would ruin it for all others."""
 
     steps: int = 6000
     batch: int = 12
@@ -37,6 +38,7 @@ class TrainingPlan:
     robot_weight: float = 1.5
     look_share: float = 1.0
     focus_share: float = 0.0
+    keeps_statistics: bool = False
     stop_after: int | None = None
     seed: int = 0
     workers: int = 1
@@ -107,6 +109,10 @@ def train(
         torch.set_num_threads(plan.threads)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     network = network.to(device, memory_format=torch.channels_last).train()  # type: ignore[call-overload]
+    if plan.keeps_statistics:
+        for module in network.modules():
+            if isinstance(module, torch.nn.BatchNorm2d):
+                module.eval()
     average = copy.deepcopy(network).eval()
     optimizers = make_optimizers(network, plan.learning_rate, plan.weight_decay)
     shares = [[group["lr"] / plan.learning_rate for group in optimizer.param_groups] for optimizer in optimizers]

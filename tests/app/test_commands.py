@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from core.learning.model_file import read_model_info
@@ -66,6 +67,21 @@ def test_the_second_look_is_trained_used_and_carried_along(model: Path, frames: 
     assert len((tmp_path / "out.jsonl").read_text().splitlines()) == 6
     done = run("train", "--second-look", "--out", tmp_path / "none", *few)
     assert (done.returncode, "needs --init MODEL" in done.stderr) == (2, True)
+
+
+def test_a_few_frames_of_a_new_look_are_learnt_beside_what_is_to_be_remembered(model: Path, frames: Path, tmp_path: Path) -> None:
+    from safetensors.numpy import load_file
+
+    few = ("--data", frames, "--steps", 2, "--batch", 2, "--crop", 64, "--threads", 1)
+    done = run("train", "--init", model, "--out", tmp_path / "tuned", "--remember", 14, *few)
+    assert done.returncode == 0, done.stderr
+    assert read_model_info(tmp_path / "tuned").training["frames"] == 2 * 6 + 14
+    before, after = load_file(model / "weights.safetensors"), load_file(tmp_path / "tuned" / "weights.safetensors")
+    learnt = {name for name in before if not np.array_equal(before[name], after[name])}
+    assert "encoder.0.0.weight" in learnt
+    assert not [name for name in learnt if "running_" in name], "the normalisation is not of these few frames"
+    done = run("train", "--out", tmp_path / "none", "--remember", 14, *few)
+    assert (done.returncode, "--remember N is for" in done.stderr) == (2, True)
 
 
 def test_an_interrupted_training_keeps_what_was_learnt(frames: Path, tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def test_it_trains_in_a_process_shows_how_it_goes_and_installs_the_model(small_m
     job = job_on(annotate_masks(tmp_path / "images", 10), tmp_path)
     installed: list[str] = []
     job.installed.connect(installed.append)
-    job.start(Wish("own_1", small_model, 12))
+    job.start(Wish("own_1", small_model, 12, remember=2))
     ended(job, qtbot)
     state = job.state
     assert state.phase is Phase.DONE, state.line
@@ -82,7 +82,7 @@ def test_it_trains_in_a_process_shows_how_it_goes_and_installs_the_model(small_m
 @pytest.mark.slow
 def test_a_training_that_is_stopped_keeps_what_it_learnt(small_model: str, qtbot: QtBot, tmp_path: Path) -> None:
     job = job_on(annotate_masks(tmp_path / "images", 8), tmp_path)
-    job.start(Wish("own_1", small_model, 5000))
+    job.start(Wish("own_1", small_model, 5000, remember=2))
     qtbot.waitUntil(lambda: job.state.step >= 2 or not job.state.is_busy, timeout=LONG_MS)
     job.stop()
     assert job.state.phase is Phase.STOPPING
@@ -96,7 +96,7 @@ def test_a_training_that_is_stopped_keeps_what_it_learnt(small_model: str, qtbot
 @pytest.mark.slow
 def test_a_training_whose_window_has_gone_ends_and_keeps_what_it_learnt(small_model: str, qtbot: QtBot, tmp_path: Path) -> None:
     job = job_on(annotate_masks(tmp_path / "images", 8), tmp_path)
-    job.start(Wish("own_1", small_model, 5000))
+    job.start(Wish("own_1", small_model, 5000, remember=2))
     qtbot.waitUntil(lambda: job.state.step >= 2 or not job.state.is_busy, timeout=LONG_MS)
     child = job._child
     assert child is not None

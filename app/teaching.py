@@ -1,0 +1,100 @@
+"""One lesson after another into one model folder, with progress that people and programs can follow."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.progress import Progress
+
+from app.lessons import FrameLesson, Lesson, SecondLookLesson, has_second_look
+from app.progress_lines import Teller
+from core.learning.dataset import Sample
+from core.learning.training import Progress as Report
+from core.learning.training import TrainingPlan, train
+from core.perception.unet import DualUNet
+
+if TYPE_CHECKING:
+    from app.learning_commands import HeldOutWatch, Interrupt
+
+_TOLD_EVERY = 2
+"""Steps between two lines for another program: a step takes half a second and more."""
+_LOOKS = 10
+"""How often held-out frames are looked at during a training."""
+_SECOND_SHARE, _SECOND_BATCH = 0.3, 24
+"""After few frames of a new look the second look learns on, too: for so much of its steps (docs/method.md)."""
+
+
+@dataclass(slots=True)
+class Classroom:
+    """What all lessons of one ``train`` share. ``log`` takes lines; ``steps_before`` and ``steps_total`` are of all lessons."""
+
+    out: Path
+    notes: dict[str, Any]
+    log: Callable[[str], object]
+    teller: Teller | None
+    bar: Progress
+    interrupt: Interrupt
+    watch: HeldOutWatch
+    steps_before: int = 0
+    steps_total: int = 0
+
+    def teach(self, lesson: Lesson, plan: TrainingPlan) -> int | None:
+        """Teach and save; the steps done, None when it was interrupted before the first."""
+        held_out = self.watch if isinstance(lesson, FrameLesson) else None
+        self.steps_total = max(self.steps_total, self.steps_before + plan.steps)
+        self.log(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {self.notes | {'plan': plan.to_json()}}\n")
+        crops = lesson.crops(plan, self.bar, self.interrupt)
+        if crops is None:
+            return None
+        if held_out is not None:
+            held_out.look(lesson.network, 0)
+        task = self.bar.add_task("steps", total=plan.steps)
+
+        def report(now: Report) -> None:
+            dice = f"dice vessel {now.vessel_dice:.3f} robot {now.robot_dice:.3f}"
+            self.log(f"{time.strftime('%H:%M:%S')} step {now.step} loss {now.loss:.4f} {dice} {now.images_per_s:.1f} images/s\n")
+            if self.teller is None:
+                self.bar.update(task, completed=now.step, description=f"loss {now.loss:.3f} {dice}")
+                return
+            left_s = round((plan.steps - now.step) * plan.batch / max(now.images_per_s, 1e-9), 1)
+            steps = {"step": self.steps_before + now.step, "steps": self.steps_total}
+            self.teller.tell(asdict(now) | steps | {"left_s": left_s})
+
+        def save(network: DualUNet, step: int, *, whole: bool) -> None:
+            if held_out is not None:
+                held_out.look(network, step)
+            figures = self.watch.figures if held_out is not None else {}
+            lesson.save(network, self.out, self.notes | {"plan": plan.to_json(), "steps_done": step}, figures, whole=whole)
+
+        network, done = train(
+            lesson.network,
+            crops,
+            plan,
+            on_progress=report,
+            on_checkpoint=lambda average, step: save(average, step, whole=False),
+            # a window that has gone can no longer ask for the end
+            should_stop=lambda: self.interrupt.asked or (self.teller is not None and not self.teller.is_heard),
+            report_every=50 if self.teller is None else _TOLD_EVERY,
+            checkpoint_every=1000 if not self.watch.is_on else max(_TOLD_EVERY, plan.steps // _LOOKS),
+        )
+        save(network, done, whole=True)
+        self.steps_before += done
+        return done
+
+
+def second_plan(plan: TrainingPlan, init: str | None) -> TrainingPlan | None:
+    """What the second look of `init` learns after the first one has; None where it is not to, or there is none."""
+    if init is None or not plan.keeps_statistics or not has_second_look(init):
+        return None
+    steps = max(1, round(plan.steps * _SECOND_SHARE))
+    return replace(plan, steps=steps, warmup_steps=min(100, max(1, steps // 10)), batch=min(_SECOND_BATCH, 3 * plan.batch))
+
+
+def teach_second_look(room: Classroom, samples: list[Sample], plan: TrainingPlan) -> int | None:
+    """After a lesson of whole frames: the second look of the model that came of it."""
+    lesson = SecondLookLesson(samples, str(room.out))
+    return room.teach(lesson, replace(plan, crop=lesson.sides(plan.crop)))
