@@ -14,7 +14,7 @@ from core.perception.evidence import Calibration, collect
 from core.perception.glance import Background, Glances, look
 from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
-from core.perception.second_look import PlaneSegmenter, SecondLook
+from core.perception.second_look import SecondLook
 from core.perception.segmentation import Mirrored, Segmenter, open_second_look, open_segmenter, to_working
 from core.perception.tracking import Memory, check_jump, recall
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
@@ -240,12 +240,11 @@ def open_sights(config: PerceptionConfig) -> tuple[Sight, Sight]:
     """The configured model as it looks at a picture, and as it looks at picture and mirror image; raises ModelError."""
     segmenter, near = open_segmenter(config.segmentation), open_second_look(config.segmentation)
     info = segmenter.info
-    plain = Sight(_closely(segmenter, near), info.calibration)
-    return plain, Sight(_closely(Mirrored(segmenter), near), info.calibration_mirrored or info.calibration)
-
-
-def _closely(first: Segmenter, near: PlaneSegmenter | None) -> Segmenter:
-    return first if near is None else SecondLook(first, near)
+    plain: Segmenter = segmenter
+    twice: Segmenter = Mirrored(segmenter)
+    if near is not None:
+        plain, twice = SecondLook(plain, near, mirrored=False), SecondLook(twice, near)
+    return Sight(plain, info.calibration), Sight(twice, info.calibration_mirrored or info.calibration)
 
 
 class NoPerception:

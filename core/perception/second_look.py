@@ -18,7 +18,7 @@ from core.perception.masks import clean_mask
 from core.perception.segmentation import Probability, Segmenter
 from core.perception.skeleton import MAX_KNOTS, end_pixels
 from core.perception.thinning import thin_parts
-from core.types import Image, Mask, Point, Window
+from core.types import Image, Point, Window
 
 WINDOW_PX = 160
 """Four times the piece of the robot that its vector is fitted to."""
@@ -58,25 +58,21 @@ def places_to_look(robot: Probability) -> list[Point]:
     Where it took nothing for one, the likeliest place, if there is any.
     """
     mask = clean_mask(robot >= np.float32(0.5), _MIN_AREA_PX, 0)
-    if not mask.any():
+    left, top, across, down = cv2.boundingRect(mask.view(np.uint8))
+    if not across:
         likely = cv2.GaussianBlur(robot, (0, 0), 3.0)
         row, column = np.unravel_index(int(np.argmax(likely)), likely.shape)
         return [(float(column), float(row))] if likely[row, column] >= _FAINT else []
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
-    ends = end_pixels(_skeleton(mask))
-    if len(ends) > MAX_KNOTS or count < 2:
+    box = np.ascontiguousarray(mask[top : top + down, left : left + across])
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(box.view(np.uint8), connectivity=8)
+    ends = end_pixels(thin_parts(box))
+    if len(ends) > MAX_KNOTS:
         return []
     ends.sort(key=lambda end: (-int(stats[labels[end[1], end[0]], cv2.CC_STAT_AREA]), end))
     height, width = mask.shape
+    places = [(float(x + left), float(y + top)) for x, y in ends]
     # Where the robot enters the picture there is no more to see of it.
-    return [(float(x), float(y)) for x, y in ends if 8 <= x < width - 8 and 8 <= y < height - 8]
-
-
-def _skeleton(mask: Mask) -> Mask:
-    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
-    skeleton = np.zeros(mask.shape, np.bool_)
-    skeleton[y : y + height, x : x + width] = thin_parts(np.ascontiguousarray(mask[y : y + height, x : x + width]))
-    return skeleton
+    return [(x, y) for x, y in places if 8 <= x < width - 8 and 8 <= y < height - 8]
 
 
 def window_at(place: Point, size: tuple[int, int]) -> Window:
@@ -106,7 +102,6 @@ class SecondLook:
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         seen = self._first(image)
-        planes = planes_of(image, *seen)
         vessel, robot = (probability.copy() for probability in seen)
         looked: list[Point] = []
         for _ in range(_ROUNDS):
@@ -115,17 +110,19 @@ class SecondLook:
                 if len(looked) < _MAX_LOOKS and all(math.dist(place, other) > _SEEN_PX for other in looked):
                     looked.append(place)
             for place in looked[before:]:
-                self._look(planes, place, vessel, robot)
+                self._look(image, seen, place, vessel, robot)
             if len(looked) == before:
                 break
         return vessel, robot
 
-    def _look(self, planes: Planes, place: Point, vessel: Probability, robot: Probability) -> None:
-        """Replace both probabilities in the window around `place`."""
+    def _look(
+        self, image: Image, seen: tuple[Probability, Probability], place: Point, vessel: Probability, robot: Probability
+    ) -> None:
+        """Replace both probabilities in the window around `place`; the network is shown those of the first look."""
         height, width = robot.shape
         x, y, across, down = window_at(place, (width, height))
         part = np.s_[y : y + down, x : x + across]
-        cut = np.ascontiguousarray(planes[part])
+        cut = planes_of(image[part], seen[0][part], seen[1][part])
         found = self._near(cut)
         if self._mirrored:
             other = self._near(np.ascontiguousarray(cut[:, ::-1]))
