@@ -231,9 +231,8 @@ def open_pipeline(config: PerceptionConfig) -> Pipeline:
     """Load the configured model and build the pipeline around it; raises ModelError."""
     plain, twice = open_sights(config)
     stream = twice if config.segmentation.mirrored == "always" else plain
-    # A window costs a fifth of the whole, so that there is time to look at it twice.
-    careful = plain if config.segmentation.mirrored == "never" else twice
-    return Pipeline(stream.segment, config, stream.calibration, careful, glance=careful)
+    single = plain if config.segmentation.mirrored == "never" else twice
+    return Pipeline(stream.segment, config, stream.calibration, single, glance=stream)
 
 
 def open_sights(config: PerceptionConfig) -> tuple[Sight, Sight]:
