@@ -61,7 +61,7 @@ def _session(studio: Studio) -> Path:
         stage.record(studio.folder / "sessions")
         stage.set_target(_TARGET)
         stage.jog = Jog(bend=0.2, advance=0.4)
-        stage.run(30)
+        stage.run(24)
         stage.jog = AT_REST
         stage.run(8)
         stage.hand_over(_TARGET)
