@@ -102,12 +102,13 @@ class SecondLookLesson:
         plain = open_segmenter(SegmentationConfig(model=self._init))
         # Streams look once at the whole, single pictures twice: the second look has to get on with both.
         ways = (plain, Mirrored(plain))
-        looks: list[FirstLook] = []
+        looks: dict[Path, FirstLook] = {}  # a sample that is shown more often is looked at once
         for index, sample in enumerate(bar.track(self._samples, description="first look")):
             if interrupt.asked:
                 return None
-            looks.append(FirstLook.at(sample, ways[index % 2]))
-        self._shown = NearCrops(self._samples, looks, plan)
+            if sample.image not in looks:
+                looks[sample.image] = FirstLook.at(sample, ways[index % 2])
+        self._shown = NearCrops(self._samples, [looks[sample.image] for sample in self._samples], plan)
         return self._shown
 
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:

@@ -17,8 +17,9 @@ from torch.utils.data import Dataset
 from core.learning.augment import random_clutter, random_crop, random_look
 from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.training import TrainingPlan
-from core.perception.second_look import WINDOW_PX, places_to_look, window_at
+from core.perception.second_look import WINDOW_PX, places_to_look
 from core.perception.segmentation import Segmenter
+from core.perception.windows import window_around
 from core.types import Image, Mask, Point
 
 _KEPT_SHARE = 0.5
@@ -143,7 +144,7 @@ class NearCrops(Dataset[Crop]):
         first = self._first_looks[place]
         seen_vessel, seen_robot = first.probabilities()
         center = _place(seen_robot, robot, first.places, rng)
-        x, y, width, height = window_at(center, (image.shape[1], image.shape[0]))
+        x, y, width, height = window_around(center, (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
         cut = _filled(np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]]))
         # Quarter turns and mirror images cost no sharpness; the first look has seen all other angles and sizes.

@@ -197,7 +197,8 @@ def _put(scratch: Path, folder: Path) -> None:
 def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs: Any) -> None:
     """Write `folder`: the model in `base` with `network` for its second look. The rest of the arguments are ``save_model``'s.
 
-    What was measured of `base`, figures and calibrations, is not true of the new model and left out.
+    What was measured of `base`, figures and calibrations, is not true of the new model and left out; but Dice on held-out frames is
+    its network's alone, and stays.
     """
     check_can_write(folder)
     folder = folder.resolve()
@@ -207,7 +208,9 @@ def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs:
             if (base / name).is_file():
                 shutil.copyfile(base / name, scratch / name)
         save_model(network, scratch / SECOND_LOOK, **kwargs)
-        _update(scratch, {"name": folder.name, "calibration": None, "calibration_mirrored": None, "figures": {}})
+        figures = read_model_info(scratch, verify=()).figures
+        held_out = figures if figures.get("held_out") else {}
+        _update(scratch, {"name": folder.name, "calibration": None, "calibration_mirrored": None, "figures": held_out})
         scratch.chmod(0o755)
         _put(scratch, folder)
     finally:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from core.config import TrackingConfig
 from core.perception.segmentation import Segmenter
+from core.perception.windows import MARGIN_PX, window_around
 from core.types import Image, Mask, Point, Scene, VesselGraph, Window
 
 CELL_PX = 8
@@ -24,8 +25,6 @@ CHANGED_LEVELS = 8.0
 """Grey levels of 255. Noise of 20 levels moves a cell's mean by less than 3."""
 CHANGED_SHARE = 0.03
 """Of the cells outside the window. The robot's body, which slides along itself, is less."""
-MARGIN_PX = 16
-"""At the window's inner edges the network lacks context: so much of what it says there is left out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,14 +105,6 @@ def has_changed(before: NDArray[np.float32], now: NDArray[np.float32], window: W
         return True
     difference -= np.median(difference, axis=0)
     return float(np.mean(np.abs(difference).max(axis=1) > CHANGED_LEVELS)) > CHANGED_SHARE
-
-
-def window_around(head: Point, size: tuple[int, int], side: int) -> Window:
-    """The window (x, y, width, height) of at most `side` px with the head in its middle, or as near to it as the picture allows."""
-    width, height = min(side, size[0]), min(side, size[1])
-    x = min(max(round(head[0]) - width // 2, 0), size[0] - width)
-    y = min(max(round(head[1]) - height // 2, 0), size[1] - height)
-    return x, y, width, height
 
 
 def look(segment: Segmenter, image: Image, window: Window, robot_probability: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -18,12 +18,11 @@ from core.perception.masks import clean_mask
 from core.perception.segmentation import Probability, Segmenter
 from core.perception.skeleton import MAX_KNOTS, end_pixels
 from core.perception.thinning import thin_parts
-from core.types import Image, Point, Window
+from core.perception.windows import MARGIN_PX, window_around
+from core.types import Image, Point
 
 WINDOW_PX = 160
 """Four times the piece of the robot that its vector is fitted to."""
-MARGIN_PX = 16
-"""At the window's inner edges the network lacks context: the first look fades in again."""
 _SEEN_PX = 40.0
 """An end as near as this to the middle of a window has been looked at."""
 _MAX_LOOKS = 5
@@ -75,14 +74,6 @@ def places_to_look(robot: Probability) -> list[Point]:
     return [(x, y) for x, y in places if 8 <= x < width - 8 and 8 <= y < height - 8]
 
 
-def window_at(place: Point, size: tuple[int, int]) -> Window:
-    """The window (x, y, width, height) with `place` in its middle, or as near to it as a picture of this (width, height) allows."""
-    width, height = min(WINDOW_PX, size[0]), min(WINDOW_PX, size[1])
-    x = min(max(round(place[0]) - width // 2, 0), size[0] - width)
-    y = min(max(round(place[1]) - height // 2, 0), size[1] - height)
-    return x, y, width, height
-
-
 class SecondLook:
     """A segmenter that looks again, closely, at the ends of what its first look takes for the robot.
 
@@ -120,7 +111,7 @@ class SecondLook:
     ) -> None:
         """Replace both probabilities in the window around `place`; the network is shown those of the first look."""
         height, width = robot.shape
-        x, y, across, down = window_at(place, (width, height))
+        x, y, across, down = window_around(place, (width, height), WINDOW_PX)
         part = np.s_[y : y + down, x : x + across]
         cut = planes_of(image[part], seen[0][part], seen[1][part])
         found = self._near(cut)

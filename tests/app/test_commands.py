@@ -53,33 +53,44 @@ def test_fine_tuning_starts_from_a_model(model: Path, frames: Path, tmp_path: Pa
     assert read_model_info(tmp_path / "tuned").shape == read_model_info(model).shape
 
 
-def test_the_second_look_is_trained_used_and_carried_along(model: Path, frames: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def near(model: Path, frames: Path) -> Path:
+    """The model with a second look."""
+    out = frames.parent / "near"
     few = ("--data", frames, "--steps", 1, "--batch", 1, "--threads", 1)
-    done = run("train", "--second-look", "--init", model, "--out", tmp_path / "near", *few)
+    done = run("train", "--second-look", "--init", model, "--out", out, *few)
     assert done.returncode == 0, done.stderr
-    assert read_model_info(tmp_path / "near" / "second_look").training["steps_done"] == 1
-    done = run("train", "--init", tmp_path / "near", "--out", tmp_path / "tuned", "--crop", 64, *few)
+    return out
+
+
+def test_the_second_look_is_trained_used_and_carried_along(near: Path, frames: Path, tmp_path: Path) -> None:
+    few = ("--data", frames, "--steps", 1, "--batch", 1, "--threads", 1)
+    assert read_model_info(near / "second_look").training["steps_done"] == 1
+    done = run("train", "--init", near, "--out", tmp_path / "tuned", "--crop", 64, *few)
     assert done.returncode == 0, done.stderr
-    weights = [tmp_path / name / "second_look" / "weights.safetensors" for name in ("near", "tuned")]
+    weights = [folder / "second_look" / "weights.safetensors" for folder in (near, tmp_path / "tuned")]
     assert weights[0].read_bytes() == weights[1].read_bytes()
-    done = run("perceive", frames / "images", "--model", tmp_path / "near", "--jsonl", tmp_path / "out.jsonl")
+    done = run("perceive", frames / "images", "--model", near, "--jsonl", tmp_path / "out.jsonl")
     assert done.returncode == 0, done.stderr
     assert len((tmp_path / "out.jsonl").read_text().splitlines()) == 6
     done = run("train", "--second-look", "--out", tmp_path / "none", *few)
     assert (done.returncode, "needs --init MODEL" in done.stderr) == (2, True)
 
 
-def test_a_few_frames_of_a_new_look_are_learnt_beside_what_is_to_be_remembered(model: Path, frames: Path, tmp_path: Path) -> None:
+def test_a_few_frames_of_a_new_look_are_learnt_beside_what_is_to_be_remembered(near: Path, frames: Path, tmp_path: Path) -> None:
     from safetensors.numpy import load_file
 
     few = ("--data", frames, "--steps", 2, "--batch", 2, "--crop", 64, "--threads", 1)
-    done = run("train", "--init", model, "--out", tmp_path / "tuned", "--remember", 14, *few)
+    done = run("train", "--init", near, "--out", tmp_path / "tuned", "--remember", 14, "--held-out", frames, *few)
     assert done.returncode == 0, done.stderr
-    assert read_model_info(tmp_path / "tuned").training["frames"] == 2 * 6 + 14
-    before, after = load_file(model / "weights.safetensors"), load_file(tmp_path / "tuned" / "weights.safetensors")
-    learnt = {name for name in before if not np.array_equal(before[name], after[name])}
-    assert "encoder.0.0.weight" in learnt
-    assert not [name for name in learnt if "running_" in name], "the normalisation is not of these few frames"
+    info = read_model_info(tmp_path / "tuned")
+    assert info.training["frames"] == 2 * 6 + 14
+    assert info.figures["held_out"] is True
+    for part in (".", "second_look"):  # one after the other
+        before, after = (load_file(folder / part / "weights.safetensors") for folder in (near, tmp_path / "tuned"))
+        learnt = {name for name in before if not np.array_equal(before[name], after[name])}
+        assert "encoder.0.0.weight" in learnt
+        assert not [name for name in learnt if "running_" in name], "the normalisation is not of these few frames"
     done = run("train", "--out", tmp_path / "none", "--remember", 14, *few)
     assert (done.returncode, "--remember N is for" in done.stderr) == (2, True)
 

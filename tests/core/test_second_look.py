@@ -14,9 +14,10 @@ from core.learning.dataset import Sample, write_mask, write_png
 from core.learning.growing import with_first_look
 from core.learning.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, save_model, save_with_second_look
 from core.learning.training import TrainingPlan
-from core.perception.second_look import MARGIN_PX, WINDOW_PX, Planes, SecondLook, places_to_look, planes_of, window_at
+from core.perception.second_look import WINDOW_PX, Planes, SecondLook, places_to_look, planes_of
 from core.perception.segmentation import OpenVinoSegmenter, open_second_look
 from core.perception.unet import DualUNet, UNetShape
+from core.perception.windows import MARGIN_PX, window_around
 
 SIZE = (480, 640)
 TINY = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
@@ -89,8 +90,8 @@ def test_noise_is_not_looked_at_end_by_end() -> None:
     ("place", "expected"), [((320, 240), (240, 160, 160, 160)), ((3, 470), (0, 320, 160, 160)), ((639, 0), (480, 0, 160, 160))]
 )
 def test_windows_stay_in_the_picture(place: tuple[float, float], expected: tuple[int, ...]) -> None:
-    assert window_at(place, (640, 480)) == expected
-    assert window_at(place, (100, 120)) == (0, 0, 100, 120)
+    assert window_around(place, (640, 480), WINDOW_PX) == expected
+    assert window_around(place, (100, 120), WINDOW_PX) == (0, 0, 100, 120)
 
 
 def test_a_tip_that_was_missed_is_found_and_followed() -> None:
@@ -122,7 +123,7 @@ def test_the_network_is_shown_the_picture_and_the_first_look() -> None:
 
 def test_the_second_look_fades_out_at_its_edges_but_not_at_the_pictures() -> None:
     vessel, _ = SecondLook(First(bar(0, 100, row=20)), Near(), mirrored=False)(picture_of(bar(0, 100, row=20)))
-    x, y, width, height = window_at((95, 20), (640, 480))
+    x, y, width, height = window_around((95, 20), (640, 480), WINDOW_PX)
     assert y == 0
     assert vessel[0, x + width // 2] == pytest.approx(0.75)
     column = vessel[:, x + width // 2]
@@ -225,6 +226,15 @@ def test_a_model_is_kept_with_its_second_look(model: Path) -> None:
     second = read_model_info(model / SECOND_LOOK)
     assert second.training == {"steps_done": 3}
     assert second.shape["inputs"] == 5
+
+
+def test_what_was_held_out_is_still_known_after_the_second_look(model: Path, tmp_path: Path) -> None:
+    """Dice on held-out frames is the first network's own, and that one stays; the set's figures were of another model."""
+    network, held_out = DualUNet(TINY).eval(), {"held_out": True, "robot_dice": 0.7}
+    save_model(network, tmp_path / "tuned", training={}, figures=held_out)
+    save_with_second_look(tmp_path / "tuned", with_first_look(network), tmp_path / "tuned", training={}, figures={})
+    assert read_model_info(tmp_path / "tuned").figures == held_out
+    assert open_second_look(SegmentationConfig(model=str(tmp_path / "tuned"), precision="fp32")) is not None
 
 
 @pytest.mark.parametrize("device", ["openvino", "torch"])
