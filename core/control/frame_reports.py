@@ -10,7 +10,7 @@ from core.control.frame_watch import FrameReport, RouteState
 from core.control.landmarks import Landmarks
 from core.control.pursuit import look_ahead
 from core.policy_config import PursuitConfig
-from core.types import Advice, Frame, Image, Reason, Scene
+from core.types import Advice, Frame, Image, Point, Reason, Scene
 
 _SAMPLE = 16
 _NOTHING_SEEN = frozenset({Reason.BLACK, Reason.WHITE, Reason.UNREADABLE})
@@ -24,6 +24,7 @@ class FrameReports:
         self._before: Frame | None = None
         self._shape: tuple[int, ...] | None = None
         self._landmarks = Landmarks()
+        self._direction = _Direction(config.behind_s)
 
     def report(self, frame: Frame, scene: Scene, advice: Advice | None, *, has_target: bool) -> FrameReport:
         """The report of a frame, what was understood of it and what was advised."""
@@ -56,7 +57,27 @@ class FrameReports:
         if not has_target or scene.route is None:
             return RouteState.NONE
         way = look_ahead(scene, self._config.look_ahead_px, self._config)
-        return RouteState.BEHIND if way is not None and way.behind else RouteState.READY
+        behind = way is not None and way.behind
+        return RouteState.BEHIND if self._direction.is_behind(behind, scene.route.target, scene.captured_s) else RouteState.READY
+
+
+class _Direction:
+    """Whether the destination lies behind the robot, without flicker: at a bifurcation one frame alone may see the way turn back.
+
+    The first word on a destination counts at once; another one when it has been said for as long as a policy needs to back off.
+    """
+
+    def __init__(self, dwell_s: float) -> None:
+        self._dwell_s = dwell_s
+        self._target: Point | None = None
+        self._behind = False
+        self._agreed_s = -math.inf
+
+    def is_behind(self, seen: bool, target: Point, captured_s: float) -> bool:
+        backwards = captured_s < self._agreed_s  # the camera's clock began anew
+        if target != self._target or seen == self._behind or backwards or captured_s - self._agreed_s >= self._dwell_s:
+            self._target, self._behind, self._agreed_s = target, seen, captured_s
+        return self._behind
 
 
 def is_picture(image: Image) -> bool:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from core.config import AdviceConfig, Config
+from core.control.frame_reports import FrameReports
+from core.control.frame_watch import RouteState
 from core.control.policies import POLICY_NAMES, RandomOperator, make_policy
 from core.control.pursuit import Pursuit, look_ahead, speed_word
 from core.control.stall import BackOff, ContactLimit, Stall
@@ -16,7 +18,7 @@ from core.perception.pose import measure
 from core.perception.route import plan_route
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.policy_config import PursuitConfig
-from core.types import GraphEdge, Point, Points, Reason, Refusal, RobotPath, RobotStatus, Scene, Speed, VesselGraph
+from core.types import Frame, GraphEdge, Point, Points, Reason, Refusal, RobotPath, RobotStatus, Scene, Speed, VesselGraph
 
 CONFIG, WORDS = PursuitConfig(smoothing_s=0.0), AdviceConfig()
 
@@ -277,3 +279,38 @@ def test_push_never_steers_and_the_random_operator_is_seeded() -> None:
 def test_contact_limits_that_contradict_each_other_are_refused() -> None:
     with pytest.raises(ValueError, match="contact_slow_n must be below"):
         PursuitConfig(contact_slow_n=0.3, contact_back_off_n=0.2)
+
+
+def _routes_reported(headings: list[tuple[float, float]], target: Point = (380, 100)) -> list[RouteState]:
+    """What is reported of frames at given times whose robot points along given directions."""
+    reports = FrameReports(PursuitConfig(behind_s=0.3))
+    image = np.zeros((480, 640, 3), np.uint8)
+    found = []
+    for index, (time_s, heading_deg) in enumerate(headings):
+        scene = _scene(STRAIGHT, (100, 100), target, heading_deg, time_s)
+        found.append(reports.report(Frame(index, time_s, image), scene, None, has_target=True).route)
+    return found
+
+
+def test_a_destination_is_behind_or_ahead_at_the_first_look() -> None:
+    assert _routes_reported([(0.0, 180)]) == [RouteState.BEHIND]
+    assert _routes_reported([(0.0, 0)]) == [RouteState.READY]
+
+
+@pytest.mark.parametrize("first", [0, 180])
+def test_a_flicker_of_the_way_changes_nothing_and_a_lasting_change_does(first: int) -> None:
+    turned = 180 - first
+    headings = [(0.0, first), (0.1, turned), (0.2, turned), (0.25, first), (0.35, turned), (0.45, turned), (0.56, turned)]
+    routes = _routes_reported(headings)
+    before, after = (RouteState.READY, RouteState.BEHIND) if first == 0 else (RouteState.BEHIND, RouteState.READY)
+    assert routes == [before] * 6 + [after]
+
+
+def test_another_destination_is_looked_at_anew() -> None:
+    reports = FrameReports(PursuitConfig(behind_s=0.3))
+    image = np.zeros((480, 640, 3), np.uint8)
+    routes = [
+        reports.report(Frame(k, 0.03 * k, image), _scene(STRAIGHT, (200, 100), target, 0, 0.03 * k), None, has_target=True).route
+        for k, target in enumerate([(380.0, 100.0), (20.0, 100.0), (380.0, 100.0)])
+    ]
+    assert routes == [RouteState.READY, RouteState.BEHIND, RouteState.READY]
