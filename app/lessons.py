@@ -18,7 +18,7 @@ from core.learning.growing import deepened, with_first_look
 from core.learning.model_file import INFO, SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX
-from core.perception.segmentation import Mirrored, open_segmenter
+from core.perception.segmentation import Mirrored, open_second_look, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 from core.study.difficulty import difficulty
 
@@ -91,8 +91,8 @@ class SecondLookLesson:
             raise UserError("--second-look needs --init MODEL, whose first look it looks again after")
         self._samples, self._init = samples, init
         self._base = model_folder(init)
-        has_one = has_second_look(init)
-        self.network = load_network(self._base / SECOND_LOOK)[0] if has_one else with_first_look(load_network(self._base)[0])
+        self._has_one = has_second_look(init)
+        self.network = load_network(self._base / SECOND_LOOK)[0] if self._has_one else with_first_look(load_network(self._base)[0])
         self._shown: NearCrops | None = None
 
     def sides(self, crop: tuple[int, int]) -> tuple[int, int]:
@@ -102,12 +102,14 @@ class SecondLookLesson:
         plain = open_segmenter(SegmentationConfig(model=self._init))
         # Streams look once at the whole, single pictures twice: the second look has to get on with both.
         ways = (plain, Mirrored(plain))
+        # What the second look still gets wrong is worth more of its time than what only the first one did.
+        near = open_second_look(SegmentationConfig(model=self._init)) if self._has_one and plan.focus_share > 0 else None
         looks: dict[Path, FirstLook] = {}  # a sample that is shown more often is looked at once
         for index, sample in enumerate(bar.track(self._samples, description="first look")):
             if interrupt.asked:
                 return None
             if sample.image not in looks:
-                looks[sample.image] = FirstLook.at(sample, ways[index % 2])
+                looks[sample.image] = FirstLook.at(sample, ways[index % 2], near)
         self._shown = NearCrops(self._samples, [looks[sample.image] for sample in self._samples], plan)
         return self._shown
 

@@ -17,7 +17,7 @@ from torch.utils.data import Dataset
 from core.learning.augment import random_clutter, random_crop, random_look
 from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.training import TrainingPlan
-from core.perception.second_look import WINDOW_PX, places_to_look
+from core.perception.second_look import WINDOW_PX, PlaneSegmenter, look_again, places_to_look
 from core.perception.segmentation import Segmenter
 from core.perception.windows import window_around
 from core.types import Image, Mask, Point
@@ -27,6 +27,10 @@ _KEPT_SHARE = 0.5
 _MISSED_SHARE = 0.35
 """Of the second look's windows: as many show a pixel that the first look got wrong. The others show what it would look at."""
 _JITTER_PX = 10.0
+_EDGE_PX = 4
+"""What is wrong farther than this from the robot's outline is no blur of it: a piece was missed or invented."""
+_WRONG_PLACES = 32
+_WRONG_JITTER_PX = 30.0
 
 Crop = tuple[Tensor, Tensor]
 """uint8 (planes, h, w) and its labels uint8 (2, h, w): vessel, robot."""
@@ -106,18 +110,24 @@ class FrameCrops(Dataset[Crop]):
 
 @dataclass(frozen=True, slots=True)
 class FirstLook:
-    """What a model saw in a frame: both probabilities as PNG, 0..255, and the places that a second look would go to."""
+    """What a model saw in a frame: both probabilities as PNG, 0..255, and the places that a second look would go to.
+
+    ``wrong`` are places on pieces of robot that it missed or invented in the end, after its second look where it has one.
+    """
 
     vessel_png: bytes
     robot_png: bytes
     places: tuple[Point, ...]
+    wrong: tuple[Point, ...] = ()
 
     @classmethod
-    def at(cls, sample: Sample, segment: Segmenter) -> FirstLook:
-        """Look at a frame; raises DatasetError."""
-        vessel, robot = segment(sample.load(WORKING_SIZE_PX)[0])
+    def at(cls, sample: Sample, segment: Segmenter, near: PlaneSegmenter | None = None) -> FirstLook:
+        """Look at a frame, with a second look by `near`; raises DatasetError."""
+        image, _, truth = sample.load(WORKING_SIZE_PX)
+        vessel, robot = segment(image)
         packed = [cv2.imencode(".png", np.rint(seen * 255).astype(np.uint8))[1].tobytes() for seen in (vessel, robot)]
-        return cls(packed[0], packed[1], tuple(places_to_look(robot)))
+        found = look_again(image, (vessel, robot), near, mirrored=False)[1] if near is not None else robot
+        return cls(packed[0], packed[1], tuple(places_to_look(robot)), tuple(_wrong_places(found >= np.float32(0.5), truth)))
 
     def probabilities(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Vessel and robot (h, w), 0..255."""
@@ -127,10 +137,14 @@ class FirstLook:
 
 
 class NearCrops(Dataset[Crop]):
-    """For the second look: windows as it is shown them, with what the first look (one per sample) says there."""
+    """For the second look: windows as it is shown them, with what the first look (one per sample) says there.
+
+    ``plan.focus_share`` of them show a piece of robot that was missed or invented, of any frame with one.
+    """
 
     def __init__(self, samples: list[Sample], first_looks: list[FirstLook], plan: TrainingPlan) -> None:
         self._plan, self._first_looks = plan, first_looks
+        self._failed = [place for place, look in enumerate(first_looks) if look.wrong]
         self._frames = _Frames(samples)
         self._order = _Order(plan.seed, len(samples))
 
@@ -139,11 +153,12 @@ class NearCrops(Dataset[Crop]):
 
     def __getitem__(self, index: int) -> Crop:
         rng = np.random.default_rng((self._plan.seed, index))
-        place = self._order[index]
+        focused = self._plan.focus_share > 0 and bool(self._failed) and rng.random() < self._plan.focus_share
+        place = self._failed[int(rng.integers(len(self._failed)))] if focused else self._order[index]
         image, vessel, robot = self._frames[place]
         first = self._first_looks[place]
         seen_vessel, seen_robot = first.probabilities()
-        center = _place(seen_robot, robot, first.places, rng)
+        center = _beside(first.wrong, _WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, first.places, rng)
         x, y, width, height = window_around(center, (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
         cut = _filled(np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]]))
@@ -158,15 +173,29 @@ class NearCrops(Dataset[Crop]):
 
 def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...], rng: Generator) -> Point:
     """Where the first look went wrong, or where the second one would look, a bit beside it."""
-    height, width = robot.shape
     if rng.random() < _MISSED_SHARE:
         rows, columns = np.nonzero((seen_robot > 127) != robot)
         if len(rows):
             pick = int(rng.integers(len(rows)))
             return float(columns[pick]), float(rows[pick])
+    return _beside(places, _JITTER_PX, robot, rng)
+
+
+def _beside(places: tuple[Point, ...], jitter_px: float, robot: Mask, rng: Generator) -> Point:
+    """Near one of the places, or anywhere in the picture where there is none."""
+    height, width = robot.shape
     x, y = places[int(rng.integers(len(places)))] if places else (rng.uniform(0, width), rng.uniform(0, height))
-    across, down = rng.normal(0, _JITTER_PX, 2)
+    across, down = rng.normal(0, jitter_px, 2)
     return min(max(x + across, 0.0), width - 1.0), min(max(y + down, 0.0), height - 1.0)
+
+
+def _wrong_places(found: Mask, true: Mask) -> list[Point]:
+    """Places on what was missed or invented beyond the blur of an edge, evenly over it."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1))
+    near_found, near_true = (cv2.dilate(mask.view(np.uint8), disc) > 0 for mask in (found, true))
+    rows, columns = np.nonzero((true & ~near_found) | (found & ~near_true))
+    step = max(1, len(rows) // _WRONG_PLACES)
+    return list(zip(columns[::step].astype(float).tolist(), rows[::step].astype(float).tolist(), strict=True))
 
 
 def _filled(cut: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -92,37 +92,49 @@ class SecondLook:
         return f"{self._first.engine}, second look"
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        seen = self._first(image)
-        vessel, robot = (probability.copy() for probability in seen)
-        looked: list[Point] = []
-        for _ in range(_ROUNDS):
-            before = len(looked)
-            for place in places_to_look(robot):
-                if len(looked) < _MAX_LOOKS and all(math.dist(place, other) > _SEEN_PX for other in looked):
-                    looked.append(place)
-            for place in looked[before:]:
-                self._look(image, seen, place, vessel, robot)
-            if len(looked) == before:
-                break
-        return vessel, robot
+        return look_again(image, self._first(image), self._near, mirrored=self._mirrored)
 
-    def _look(
-        self, image: Image, seen: tuple[Probability, Probability], place: Point, vessel: Probability, robot: Probability
-    ) -> None:
-        """Replace both probabilities in the window around `place`; the network is shown those of the first look."""
-        height, width = robot.shape
-        x, y, across, down = window_around(place, (width, height), WINDOW_PX)
-        part = np.s_[y : y + down, x : x + across]
-        cut = planes_of(image[part], seen[0][part], seen[1][part])
-        found = self._near(cut)
-        if self._mirrored:
-            other = self._near(np.ascontiguousarray(cut[:, ::-1]))
-            found = (0.5 * (found[0] + other[0][:, ::-1]), 0.5 * (found[1] + other[1][:, ::-1]))
-        columns = _fade(across, x > 0, x + across < width)
-        rows = _fade(down, y > 0, y + down < height)
-        weight = rows[:, None] * columns[None, :]
-        for whole, near in ((vessel, found[0]), (robot, found[1])):
-            whole[part] += weight * (near - whole[part])
+
+def look_again(
+    image: Image, seen: tuple[Probability, Probability], near: PlaneSegmenter, *, mirrored: bool
+) -> tuple[Probability, Probability]:
+    """Probabilities of vessel and robot after a second look at the ends of what the first one has `seen` in the picture."""
+    vessel, robot = (probability.copy() for probability in seen)
+    looked: list[Point] = []
+    for _ in range(_ROUNDS):
+        before = len(looked)
+        for place in places_to_look(robot):
+            if len(looked) < _MAX_LOOKS and all(math.dist(place, other) > _SEEN_PX for other in looked):
+                looked.append(place)
+        for place in looked[before:]:
+            _look_at(place, image, seen, near, mirrored, (vessel, robot))
+        if len(looked) == before:
+            break
+    return vessel, robot
+
+
+def _look_at(
+    place: Point,
+    image: Image,
+    seen: tuple[Probability, Probability],
+    near: PlaneSegmenter,
+    mirrored: bool,
+    probabilities: tuple[Probability, Probability],
+) -> None:
+    """Replace both probabilities in the window around `place`; the network is shown those of the first look."""
+    height, width = image.shape[:2]
+    x, y, across, down = window_around(place, (width, height), WINDOW_PX)
+    part = np.s_[y : y + down, x : x + across]
+    cut = planes_of(image[part], seen[0][part], seen[1][part])
+    found = near(cut)
+    if mirrored:
+        other = near(np.ascontiguousarray(cut[:, ::-1]))
+        found = (0.5 * (found[0] + other[0][:, ::-1]), 0.5 * (found[1] + other[1][:, ::-1]))
+    columns = _fade(across, x > 0, x + across < width)
+    rows = _fade(down, y > 0, y + down < height)
+    weight = rows[:, None] * columns[None, :]
+    for whole, near_it in zip(probabilities, found, strict=True):
+        whole[part] += weight * (near_it - whole[part])
 
 
 def _fade(length: int, at_start: bool, at_end: bool) -> NDArray[np.float32]:

@@ -206,6 +206,42 @@ def test_what_the_first_look_got_wrong_is_shown(tmp_path: Path) -> None:
     assert shown > 40
 
 
+def test_wrong_are_pieces_missed_or_invented_and_not_the_blur_of_an_edge(tmp_path: Path) -> None:
+    sample = _samples(tmp_path, 1)[0]  # the robot ends at 250
+    assert FirstLook.at(sample, First(bar(0, 252))).wrong == ()
+    missed = FirstLook.at(sample, First(bar(0, 150))).wrong
+    assert missed
+    assert all(150 < x < 250 and abs(y - 240) <= 4 for x, y in missed)
+    invented = FirstLook.at(sample, First(np.maximum(bar(0, 250), bar(400, 460, row=100)))).wrong
+    assert invented
+    assert all(400 <= x < 460 and abs(y - 100) <= 4 for x, y in invented)
+
+
+def test_what_the_second_look_mends_is_not_wrong(tmp_path: Path) -> None:
+    def near(planes: Planes, /) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(planes.shape[:2], np.float32), (planes[:, :, 0] < 100).astype(np.float32)
+
+    sample = _samples(tmp_path, 1)[0]
+    first = First(bar(0, 210))
+    assert FirstLook.at(sample, first).wrong
+    assert FirstLook.at(sample, first, near).wrong == ()
+    assert FirstLook.at(sample, first, near).places == FirstLook.at(sample, first).places
+
+
+def test_focused_windows_show_what_was_wrong(tmp_path: Path) -> None:
+    """Two frames, one of them understood: with focus, the piece that was missed in the other is in nearly every window."""
+    samples = _samples(tmp_path)
+    looks = [FirstLook.at(samples[0], First(bar(0, 250))), FirstLook.at(samples[1], First(bar(0, 200)))]
+    assert looks[0].wrong == () and looks[1].wrong
+
+    def missed_shown(focus: float) -> int:
+        crops = NearCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0, focus_share=focus))
+        shown = (tuple(part.numpy() for part in crops[index]) for index in range(100))
+        return sum(bool(((target[1] > 0) & (planes[4] < 128)).any()) for planes, target in shown)
+
+    assert missed_shown(0.9) > 80 > missed_shown(0.0)
+
+
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("models") / "near"
