@@ -1,9 +1,9 @@
 """Eight-bit copy of a trained network: what runs on processors, in a third of the time of fp32 (docs/method.md).
 
-Weights get one step size per output channel, activations one per tensor, both chosen from what a few training frames make of them
-(B. Jacob et al., "Quantization and training of neural networks for efficient integer-arithmetic-only inference", CVPR 2018). The
-copy is an ordinary torch module whose fake quantisation exports as ONNX QuantizeLinear / DequantizeLinear pairs, which OpenVINO
-computes in int8.
+Weights (in seven of the eight bits) get one step size per output channel, activations one per tensor, both chosen from what a few
+training frames make of them (B. Jacob et al., "Quantization and training of neural networks for efficient
+integer-arithmetic-only inference", CVPR 2018). The copy is an ordinary torch module whose fake quantisation exports as ONNX
+QuantizeLinear / DequantizeLinear pairs, which OpenVINO computes in int8.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from core.perception.unet import DualUNet
 
+WEIGHT_STEPS = 63
+"""Steps to each side of zero: seven bits, not eight. Processors without VNNI add pairs of products in 16 bits, which overflow
+silently where two full steps meet two full activations (2 * 255 * 127 > 32767); with seven bits they cannot (2 * 255 * 64)."""
 _KEPT_SHARE = 0.9999
 """Share of the activations that the range covers; the few beyond it are clipped so that all others get finer steps."""
 
@@ -47,7 +50,7 @@ class _Conv(nn.Module):
         super().__init__()
         channel = 1 if isinstance(conv, nn.ConvTranspose2d) else 0
         weight = conv.weight.detach()
-        scale = weight.abs().amax(dim=[d for d in range(4) if d != channel]).clamp_min(1e-8) / 127
+        scale = weight.abs().amax(dim=[d for d in range(4) if d != channel]).clamp_min(1e-8) / WEIGHT_STEPS
         zero = torch.zeros_like(scale, dtype=torch.int32)
         self.conv, self.rectify, self.channel = conv, rectify, channel
         self.register_buffer("scale", scale)

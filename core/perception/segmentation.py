@@ -94,6 +94,10 @@ class OpenVinoSegmenter:
         self._requests: dict[tuple[int, int], openvino.InferRequest] = {}
 
     @property
+    def is_eight_bit(self) -> bool:
+        return self._int8
+
+    @property
     def engine(self) -> str:
         return f"OpenVINO CPU {'int8' if self._int8 else 'fp32'}"
 

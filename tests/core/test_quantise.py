@@ -8,7 +8,7 @@ import torch
 
 from core.config import SegmentationConfig
 from core.learning.model_file import ONNX_INT8, ModelError, read_model_info, save_model
-from core.learning.quantise import EightBitUNet
+from core.learning.quantise import EightBitUNet, _Conv
 from core.perception.segmentation import OpenVinoSegmenter, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 from core.types import Image
@@ -50,6 +50,17 @@ def test_the_copy_answers_like_the_original() -> None:
     spread = float(original.max() - original.min())
     assert float((original - eight_bit).abs().mean()) < 0.05 * spread
     assert not torch.equal(original, eight_bit), "nothing was quantised"
+
+
+def test_two_products_never_overflow_the_sixteen_bits_of_an_old_processor() -> None:
+    """Without VNNI, u8 x s8 products are added in pairs with 16 bits, and what is beyond is cut off without a word."""
+    parts = [module for module in EightBitUNet(_network()).modules() if isinstance(module, _Conv)]
+    assert len(parts) > 20
+    for part in parts:
+        shape = [-1 if axis == part.channel else 1 for axis in range(4)]
+        steps = torch.round(part.conv.weight.detach() / part.scale.reshape(shape)).abs()
+        assert 60 <= float(steps.max()) <= 64
+        assert 2 * 255 * float(steps.max()) < 2**15
 
 
 def test_openvino_computes_in_eight_bits_where_the_model_has_them(folder: Path) -> None:

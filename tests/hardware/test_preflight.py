@@ -177,6 +177,20 @@ def test_a_whole_model_passes_and_a_flipped_bit_is_found(copied: Path) -> None:
     _bad(model.check_model(str(copied / "gone")), "no model", "restore|set perception")
 
 
+def test_an_eight_bit_network_that_a_processor_gets_wrong_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model, "_EIGHT_BIT_OFF", 1e-9)  # no eight-bit network is as exact as that
+    _bad(
+        model.check_self_test(_segmentation("default")),
+        "on this processor the eight-bit network is off by 0.00",
+        "precision to fp32",
+    )
+
+
+def test_an_exact_network_has_nothing_to_be_compared_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model, "_EIGHT_BIT_OFF", 1e-9)
+    _good(model.check_self_test(PerceptionConfig(segmentation=SegmentationConfig(precision="fp32"))), "OpenVINO CPU fp32")
+
+
 def test_the_shipped_model_passes_its_self_test() -> None:
     _good(model.check_self_test(_segmentation("default")), "state . .true .., theta off by")
 
