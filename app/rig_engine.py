@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import gc
 from contextlib import ExitStack
 
+from app.memory import give_back
 from core.config import Config, PerceptionConfig, SegmentationConfig
 from core.control.drive_view import LeftOver
 from core.control.engine import Engine, Perceive
@@ -75,7 +75,7 @@ class EngineMaker:
             perceive = network.perceive_single
         if self._pilot is not None:  # a rig that could not be opened, or that nobody drives, acknowledges nothing either
             self._left_over, self._pilot = self._pilot.left_over, None
-            gc.collect()  # a rig is a knot of callbacks about pictures and physics: 30 MB each would wait for the collector's turn
+            give_back()
         with ExitStack() as undo:
             rig = open_rig(config)
             undo.callback(rig.close)

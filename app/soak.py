@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import shutil
 import tempfile
 import time
@@ -12,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from app.memory import give_back
 from app.rig_engine import EngineMaker
 from app.soak_faults import RandomFaults
 from app.soak_operator import RandomOperator
@@ -133,7 +133,7 @@ class Soak:
         self._left_over = rig.close()
         self.tally.frames += rig.frames
         del rig
-        gc.collect()  # as when the window opens the next rig
+        give_back()  # as when the window opens the next rig
 
     def _turn_over(self) -> None:
         """End the session that is being written, begin the next, and look at what is complete."""

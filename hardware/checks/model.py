@@ -94,7 +94,7 @@ def _eight_bit_off(config: SegmentationConfig, image: Image) -> float:
     used = open_segmenter(config)
     if not isinstance(used, OpenVinoSegmenter) or not used.is_eight_bit:
         return 0.0
-    bright = cv2.convertScaleAbs(image, alpha=2.0)
+    bright = np.asarray(cv2.convertScaleAbs(image, alpha=2.0), np.uint8)
     exact = OpenVinoSegmenter(model_folder(config.model), config.threads, "fp32")
     return max(float(np.abs(one - other).mean()) for one, other in zip(used(bright), exact(bright), strict=True))
 
