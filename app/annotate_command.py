@@ -121,9 +121,9 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
             else tr("rater {rater}", rater=rater)
         )
         window = AnnotatorWindow(desk, who)
-        bar = window.bar
+        bar = window.panels.bar
         switches = {name: Switch(partial(bar.is_on, key), lambda _on, which=key: bar.toggle(which)) for name, key in _KEPT}
-        LayoutKeeper(window, "annotator", Parts({"main": window.columns}, {}, switches))
+        LayoutKeeper(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
         application.aboutToQuit.connect(window.shut_down)
         timer = _quit_on_signal(application)
         window.show()

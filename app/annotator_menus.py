@@ -19,21 +19,16 @@ _BRUSH_STEP = 1.25
 
 def add_annotator_menus(window: AnnotatorWindow) -> None:
     """Fill the window's menu bar; keys that step repeat while they are held."""
-    canvas, bar, light = window.canvas, window.bar, window.light
-    add_menu(
-        window,
-        tr("&File"),
+    panels = window.panels
+    canvas, bar, light = panels.canvas, panels.bar, panels.light
+    window.add_file_menu(
         [
             MenuEntry(tr("Where is it &saved?"), window.tell_saved, ("Ctrl+S",)),
             None,
             MenuEntry(tr("&Train on my annotations..."), window.train),
-            None,
-            MenuEntry(tr("&Quit"), window.close, ("Ctrl+Q",)),
-        ],
+        ]
     )
-    view = add_menu(
-        window,
-        tr("&View"),
+    view = window.add_view_menu(
         [
             MenuEntry(tr("Zoom &in"), partial(canvas.zoom, _ZOOM_STEP), ("+", "=")),
             MenuEntry(tr("Zoom &out"), partial(canvas.zoom, 1 / _ZOOM_STEP), ("-",)),
@@ -49,9 +44,7 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("&Loupe"), partial(bar.toggle, "L"), ("L",)),
             MenuEntry(tr("&Masks"), partial(bar.toggle, "K"), ("K",)),
             MenuEntry(tr("&Algorithm"), window.toggle_proposal, ("H",)),
-            None,
-            MenuEntry(tr("&Full screen"), window.toggle_full_screen, ("F11",), checked=False),
-        ],
+        ]
     )
     states = [MenuEntry(tr("State {state}", state=s.value), partial(window.set_state, s), (s.value,)) for s in PoseState]
     edits = add_menu(
@@ -92,9 +85,9 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("Next &without an answer"), window.go_open, ("U",)),
             MenuEntry(tr("&First"), partial(window.open, 0), ("Home",)),
             MenuEntry(tr("&Last"), partial(window.open, len(window.desk.items) - 1), ("End",)),
-            MenuEntry(tr("Lis&t"), window.queue.take_focus, ("F6",)),
+            MenuEntry(tr("Lis&t"), panels.queue.take_focus, ("F6",)),
         ],
     )
     for action in (*go[:2], *view[:2], *view[4:8]):
         action.setAutoRepeat(True)
-    add_help_menu(window, window.help.toggle)
+    add_help_menu(window, panels.help.toggle)

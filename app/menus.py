@@ -16,6 +16,8 @@ from app.language import tr
 KEY_HINT = "key_hint"
 """Property of an action: the key that does the same and is handled elsewhere."""
 
+_STAYS_LAST = "stays_last"
+
 
 @dataclass(frozen=True, slots=True)
 class MenuEntry:
@@ -31,20 +33,24 @@ class MenuEntry:
 def add_menu(window: QMainWindow, title: str, entries: Sequence[MenuEntry | None]) -> list[QAction]:
     """Add a menu to the window's bar, or entries to the menu of that title; None is a separator.
 
-    Help stays the last menu. An entry without a mnemonic (&) gets the first letter that is free in its menu. Returns the actions
-    without the separators.
+    Help stays the last menu, Quit and About the last entries of theirs. An entry without a mnemonic (&) gets the first letter that
+    is free in its menu. Returns the actions without the separators.
     """
     menu = _menu_of(window, title)
+    end = _end_of(menu)
     if menu.actions():
-        menu.addSeparator()
+        _separate(menu, end)
     taken = {mnemonic(text) for text in (*(a.text() for a in menu.actions()), *(e.text for e in entries if e is not None))}
     actions = []
     for entry in entries:
         if entry is None:
-            menu.addSeparator()
+            _separate(menu, end)
             continue
         action = _action(window, entry, taken)
-        menu.addAction(action)
+        if end is None:
+            menu.addAction(action)
+        else:
+            menu.insertAction(end, action)
         window.addAction(action)  # keeps the shortcut alive while the menu bar is hidden
         actions.append(action)
     return actions
@@ -75,6 +81,22 @@ def _menu_of(window: QMainWindow, title: str) -> QMenu:
     else:
         bar.addMenu(menu)
     return menu
+
+
+def _end_of(menu: QMenu) -> QAction | None:
+    """The separator above an entry that stays the last one: what is added comes before it."""
+    actions = menu.actions()
+    if len(actions) < 2 or not actions[-2].isSeparator():
+        return None
+    last = actions[-1]
+    return actions[-2] if QKeySequence("Ctrl+Q") in last.shortcuts() or last.property(_STAYS_LAST) else None
+
+
+def _separate(menu: QMenu, end: QAction | None) -> None:
+    if end is None:
+        menu.addSeparator()
+    else:
+        menu.insertSeparator(end)
 
 
 def _action(window: QMainWindow, entry: MenuEntry, taken: set[str]) -> QAction:
@@ -112,7 +134,8 @@ def _is_key(letter: str) -> bool:
 def add_help_menu(window: QMainWindow, show_keys: Callable[[], object], more: Sequence[MenuEntry | None] = ()) -> None:
     """The last menu, the same in all windows; `more` stands between the keys and what the program is."""
     about = MenuEntry(tr("&About LumenPilot"), partial(show_about, window))
-    add_menu(window, tr("&Help"), [MenuEntry(tr("&Keys"), show_keys, ("F1",)), *more, None, about])
+    *_, last = add_menu(window, tr("&Help"), [MenuEntry(tr("&Keys"), show_keys, ("F1",)), *more, None, about])
+    last.setProperty(_STAYS_LAST, True)
 
 
 def action_of(window: QMainWindow, key: str) -> QAction:

@@ -4,30 +4,26 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
-import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from PySide6.QtCore import QEvent, Qt, QTimer, QUrl, Signal, Slot
-from PySide6.QtGui import QAction, QCloseEvent, QDesktopServices, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QAbstractButton, QAbstractItemView, QAbstractSpinBox, QComboBox, QLabel, QLineEdit, QMainWindow
+from PySide6.QtCore import QUrl, Signal, Slot
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QAbstractItemView, QAbstractSpinBox, QComboBox, QLineEdit
 
-from app import theme
 from app.drive_desk import DriveDesk
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
-from app.heartbeat import Heartbeat
-from app.language import tr, tr_text
-from app.menus import MenuEntry, add_help_menu, add_menu, turn_page
+from app.language import tr
 from app.next_step import Step
+from app.operator_menus import add_operator_menus
 from app.operator_panels import OperatorPanels
 from app.recorder import Recorder
 from app.snapshot import Origin, SnapshotWriter, pictures_folder
+from app.tick_pace import TickPace
 from app.tour_stops import operator_stops
 from app.widgets.event_log import EventKind
-from app.widgets.notice import NoticeKind
-from app.widgets.overlays import Layer
 from app.widgets.tour_overlay import TourOverlay
+from app.window_frame import WindowFrame
 from core.config import Config, PerceptionConfig
 from core.control.hand import Jog
 from core.control.pilot import Pilot
@@ -38,16 +34,14 @@ from hardware.rig import RigKind, kind_of
 
 OpenEngineFor = Callable[[Config], EngineLike]
 
-SHOW_EVERY_S = 1.0 / 30.0
 STALE_AFTER_S = 0.5
 PLAYBACK_STALE_AFTER_S = 3.0
-_CHECK_EVERY_MS = 100
 _STOP_WITHIN_MS = 20_000
 
 _log = logging.getLogger(__name__)
 
 
-class OperatorWindow(QMainWindow):
+class OperatorWindow(WindowFrame):
     """Shows the newest tick at 30 Hz at most, and hands the operator's wishes to the engine; it never waits for anything.
 
     Parameters
@@ -76,38 +70,23 @@ class OperatorWindow(QMainWindow):
         self._is_stale = False
         self._target: Point | None = None
         self._place_asked: Callable[[Point], object] | None = None
-        self._shown_s = 0.0
-        self._due_s = 0.0
-        self._is_shut = False
         self._thread = EngineThread(self)
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
-        self._heartbeat = Heartbeat(parent=self)
-        self._show_later = QTimer(self)
-        self._show_later.setSingleShot(True)
-        self._show_later.setTimerType(Qt.TimerType.PreciseTimer)
-        self._check = QTimer(self)
-        self._check.setInterval(_CHECK_EVERY_MS)
+        self._pace = TickPace(self)
         self._panels = OperatorPanels(config, kind, phantoms)
         self._recorder = Recorder(config, kind, self._thread, self)
         self._desk = DriveDesk(self, self._thread, self._panels, self._recorder)
         self.setCentralWidget(self._panels)
         self._tour = TourOverlay(self._panels, kept_clear=(self._panels.mode_bar.stop, self._panels.alerts))
         self._tour.ended.connect(self._panels.live.setFocus)
-        self._make_menus()
+        add_operator_menus(self)
         self._wire()
         self._show_kind()
-        self.setMinimumSize(*theme.MIN_WINDOW)
-        self.resize(theme.start_size(self.screen()))
 
     @property
     def panels(self) -> OperatorPanels:
         """What is on the screen."""
         return self._panels
-
-    @property
-    def max_block_ms(self) -> float:
-        """The longest time that the GUI thread was blocked in the last ten seconds."""
-        return self._heartbeat.max_block_ms
 
     @property
     def shown_tick(self) -> Tick | None:
@@ -156,64 +135,15 @@ class OperatorWindow(QMainWindow):
 
     # ---- composition
 
-    def _make_menus(self) -> None:
-        panels = self._panels
-        file_entries = [
-            MenuEntry(tr("&Snapshot"), self._take_snapshot, ("P", "Ctrl+S")),
-            MenuEntry(tr("&Open pictures folder"), self._open_pictures),
-            None,
-            MenuEntry(tr("&Record, or end the recording"), self._recorder.toggle, ("F9",)),
-            MenuEntry(tr("Save the &last seconds"), self._recorder.save_last, ("F10",)),
-            None,
-            MenuEntry(tr("&Quit"), self.close, ("Ctrl+Q",)),
-        ]
-        toggle = panels.overlay_bar.toggle
-        layers = [MenuEntry(tr(layer.value.label), partial(toggle, layer), (layer.value.key,), checked=True) for layer in Layer]
-        view_entries = [
-            MenuEntry(tr("&All overlays on or off"), self._toggle_all_layers, ("0",)),
-            None,
-            MenuEntry(tr("&Whole picture"), panels.live.fit, ("F",)),
-            None,
-            MenuEntry(tr("&Next page"), partial(turn_page, panels.pages, 1), ("Ctrl+Tab",)),
-            MenuEntry(tr("&Previous page"), partial(turn_page, panels.pages, -1), ("Ctrl+Shift+Tab",)),
-            None,
-            MenuEntry(tr("&Full screen"), self._toggle_full_screen, ("F11",), checked=False),
-        ]
-        robot_entries = [
-            MenuEntry(tr("S&TOP"), self._desk.stop, hint="Space"),
-            None,
-            *(MenuEntry(tr(step.value.name), partial(self.take, step), _keys_of(step)) for step in Step),
-            None,
-            MenuEntry(tr("&Clear target"), self._clear_target, hint="Esc"),
-            None,
-            *(panels.picker.menu_entries() if panels.picker is not None else ()),
-            MenuEntry(tr("Start the &rig again"), self._restart, ("F5",)),
-        ]
-        add_menu(self, tr("&File"), file_entries)
-        view_actions = add_menu(self, tr("&View"), [*layers, *view_entries])
-        add_menu(self, tr("&Robot"), robot_entries)
-        add_help_menu(self, panels.help.toggle, [MenuEntry(tr("&Tour"), self.show_tour)])
-        self._layer_actions = dict(zip(Layer, view_actions[: len(Layer)], strict=True))
-        self._full_screen = view_actions[-1]
-        escape = QAction(self)
-        escape.setShortcut(QKeySequence(Qt.Key.Key_Escape))
-        escape.triggered.connect(self._on_escape)
-        self.addAction(escape)
-        hint = QLabel(tr("F1  keys"))
-        hint.setObjectName("card_note")
-        hint.setContentsMargins(0, 0, 14, 0)
-        self.menuBar().setCornerWidget(hint)
-
     def _wire(self) -> None:
         panels = self._panels
-        self._thread.tick_ready.connect(self._on_tick_ready)
+        self._thread.tick_ready.connect(self._pace.tick_came)
         self._thread.status_changed.connect(self._on_status)
-        self._show_later.timeout.connect(self._show_newest)
-        self._check.timeout.connect(self._check_age)
+        self._pace.due.connect(self._show_newest)
+        self._pace.checked.connect(self._check_age)
         panels.live.clicked.connect(self.choose_target)
-        panels.live.cleared.connect(self._clear_target)
-        panels.overlay_bar.toggled.connect(self._on_layer)
-        panels.notice.restart.connect(self._restart)
+        panels.live.cleared.connect(self.clear_target)
+        panels.notice.restart.connect(self.restart)
         desk = self._desk
         desk.jog.held_changed.connect(panels.jog.show_held)
         panels.jog.pressed.connect(desk.press)
@@ -256,7 +186,7 @@ class OperatorWindow(QMainWindow):
         self._thread.end_engine()  # before the banner changes: nothing of the old rig is shown or recorded under it
         self._config = config
         self._show_kind()
-        self._restart()
+        self.restart()
 
     def _show_kind(self) -> None:
         self._stale_after_s = PLAYBACK_STALE_AFTER_S if self._kind is RigKind.PLAYBACK else STALE_AFTER_S
@@ -309,9 +239,9 @@ class OperatorWindow(QMainWindow):
 
     def start(self) -> None:
         """Open the rig; the window shows progress until the first picture comes."""
+        super().start()
         self._panels.live.setFocus()
-        self._heartbeat.start()
-        self._check.start()
+        self._pace.start()
         self._desk.start()
         self._start_rig()
 
@@ -319,13 +249,14 @@ class OperatorWindow(QMainWindow):
         self._config = self.amend_config(self._config)
         self._panels.set_config(self._config)
         self._desk.reset()
-        self._clear_target()
+        self.clear_target()
         self._recorder.open_rig(self._as_calibrated(self._config), self._kind)
         self._show_phase(Phase.STARTING)
         self._thread.start_engine(partial(self._open_engine, self._config))
 
     @Slot()
-    def _restart(self) -> None:
+    def restart(self) -> None:
+        """Open the rig anew."""
         if not self._is_shut:
             self._start_rig()
 
@@ -363,48 +294,18 @@ class OperatorWindow(QMainWindow):
         self._tell_phase(phase, message)
 
     def _tell_phase(self, phase: Phase, message: str) -> None:
-        panels = self._panels
-        rig, picker = self._config.rig, panels.picker
+        rig, picker = self._config.rig, self._panels.picker
         what = picker.title if picker is not None and self._kind is RigKind.SIM else rig.source or rig.name
-        if phase is Phase.STARTING:
-            self._blank(tr("Starting"), what)
-            panels.notice.show_notice(
-                NoticeKind.PROGRESS, tr("Starting: {what}", what=what), tr("Opening camera and robot, loading the network")
-            )
-        elif phase is Phase.RUNNING:
-            self._blank(tr("Waiting for the first picture"), "")
-            panels.notice.show_notice(NoticeKind.PROGRESS, tr("Waiting for the first picture"), what)
-        elif phase is Phase.ENDED:
-            self._blank(tr("Recording is over"), tr("F5 plays it again"))
-            panels.notice.show_notice(NoticeKind.WARNING, tr("Recording is over"), message, restartable=True)
-        elif phase is Phase.FAULT:
-            self._blank(tr("Fault"), message)
-            panels.notice.show_notice(NoticeKind.FAULT, tr("The rig stopped"), message, restartable=True)
-
-    def _blank(self, title: str, why: str) -> None:
-        self._panels.blank(title, why)
-        self._panels.jog.set_enabled(False, title)
+        self._panels.show_phase(phase, what, message)
 
     # ---- ticks
-
-    @Slot()
-    def _on_tick_ready(self) -> None:
-        """Show the newest tick now, or when a thirtieth of a second has passed since the last one was due."""
-        wait_s = self._due_s - time.monotonic()
-        if wait_s <= 0.0:
-            self._show_newest()
-        elif not self._show_later.isActive():
-            self._show_later.start(int(wait_s * 1000) + 1)
 
     @Slot()
     def _show_newest(self) -> None:
         tick = self._thread.ticks.take()
         if tick is None or self._phase is not Phase.RUNNING or self._is_shut:
             return
-        now = time.monotonic()
-        # on average, not at least, a thirtieth apart: a tick that comes early by a hair must not be shown a whole period later
-        self._due_s = max(self._due_s, now - SHOW_EVERY_S) + SHOW_EVERY_S
-        self._shown_s = now
+        self._pace.tick_shown()
         self._is_stale = False
         if self._tick is None:
             self._panels.jog.set_enabled(tick.status is not None, "" if tick.status is not None else tr("This rig has no robot"))
@@ -412,17 +313,12 @@ class OperatorWindow(QMainWindow):
         self._panels.notice.clear()
         self._panels.show_tick(tick, self._heartbeat.max_block_ms)
 
-    @Slot()
-    def _check_age(self) -> None:
+    @Slot(float)
+    def _check_age(self, age_s: float) -> None:
         """A picture that does not change is not live: after half a second nothing of it is shown as true."""
-        age_s = time.monotonic() - self._shown_s
         if self._phase is Phase.RUNNING and self._tick is not None and age_s > self._stale_after_s:
             self._is_stale = True
-            problem = self._thread.problem
-            self._panels.blank(tr("No new picture"), tr_text(problem) or tr("Check the camera; F5 starts the rig again"))
-            notice = tr("No new picture for {seconds:.0f} s", seconds=age_s)
-            detail = tr_text(problem) or tr("The camera or the program is behind")
-            self._panels.notice.show_notice(NoticeKind.WARNING, notice, detail, restartable=problem is not None)
+            self._panels.show_stale(age_s, self._thread.problem)
 
     # ---- the operator
 
@@ -444,7 +340,8 @@ class OperatorWindow(QMainWindow):
         self._place_asked = then
 
     @Slot()
-    def _clear_target(self) -> None:
+    def clear_target(self) -> None:
+        """No destination; and a click into the picture is for one again."""
         self._place_asked = None
         if self._target is not None:
             self._target = None
@@ -452,16 +349,8 @@ class OperatorWindow(QMainWindow):
             self._thread.set_target(None)
             self._panels.live.show_target(None)
 
-    @Slot(object, bool)
-    def _on_layer(self, layer: Layer, on: bool) -> None:
-        self._panels.live.set_layer(layer, on)
-        self._layer_actions[layer].setChecked(on)
-
-    def _toggle_all_layers(self) -> None:
-        bar = self._panels.overlay_bar
-        bar.set_all(not any(bar.is_on(layer) for layer in Layer))
-
-    def _take_snapshot(self) -> None:
+    def take_snapshot(self) -> None:
+        """The picture that is shown, plain, with overlays, and its values."""
         if self._tick is None or self._is_stale:
             has_old = self._is_stale or self._phase in (Phase.ENDED, Phase.FAULT)
             why = tr("the picture is not live") if has_old else tr("there is no picture yet")
@@ -475,7 +364,8 @@ class OperatorWindow(QMainWindow):
     def _on_snapshot_failed(self, message: str) -> None:
         self._panels.toast.show_message(message, is_fault=True)
 
-    def _open_pictures(self) -> None:
+    def open_pictures(self) -> None:
+        """Where snapshots go."""
         folder = self._snapshots.folder
         if not folder.is_dir() or not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
             self._panels.toast.show_message(tr("Snapshots go to {folder}", folder=folder))
@@ -493,69 +383,31 @@ class OperatorWindow(QMainWindow):
         elif self._tour.is_running:
             self._tour.end()
         elif self.isFullScreen():
-            self._toggle_full_screen()
+            self.toggle_full_screen()
         else:
-            self._clear_target()
-
-    def _toggle_full_screen(self) -> None:
-        self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
-
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.WindowStateChange:  # the desktop can end full screen too
-            self.menuBar().setVisible(not self.isFullScreen())
-            self._full_screen.setChecked(self.isFullScreen())
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Enter presses the button that has the focus: Space, which does it elsewhere, stops the robot here."""
-        button = self.focusWidget()
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and isinstance(button, QAbstractButton):
-            if not event.isAutoRepeat():
-                button.click()
-            return
-        super().keyPressEvent(event)
+            self.clear_target()
 
     # ---- the end
 
-    def closeEvent(self, event: QCloseEvent) -> None:
-        self.shut_down()
-        event.accept()
-
-    @Slot()
-    def shut_down(self) -> None:
-        """Stop the robot, end the thread, finish writing. The window is gone at once; a rig that is being opened is waited for."""
-        if self._is_shut:
-            return
-        self._is_shut = True
+    def _let_go(self) -> None:
+        """Stop the robot."""
         self._desk.halt()
         self._desk.detach()
-        for timer in (self._check, self._show_later):
-            timer.stop()
-        self._heartbeat.stop()
+        self._pace.stop()
         self._panels.notice.clear()
-        # A repaint that is still queued would find a window without a surface.
-        self.setUpdatesEnabled(False)
-        self.hide()
+
+    def _finish(self) -> Sequence[str]:
+        """End the thread, finish writing; a rig that is being opened is waited for."""
         self._thread.stop()
         has_ended = self._thread.wait(_STOP_WITHIN_MS)
-        has_saved = self._snapshots.finish()
+        stuck = [] if self._snapshots.finish() else ["the disk did not take a snapshot in time; leaving without it"]
         if not self._recorder.close():
             _log.error("the disk did not take the recording in time; what was written is safe, and is found at the next start")
-        if not has_saved:
-            _log.error("the disk did not take a snapshot in time; leaving without it")
         if not has_ended:
-            _log.error("the rig's driver did not return within %g s; leaving without it", _STOP_WITHIN_MS / 1000)
-        if not (has_ended and has_saved):
-            # Qt would abort on a thread that still runs, or wait for it for ever; nobody drives any more
-            os._exit(1)
+            stuck.append(f"the rig's driver did not return within {_STOP_WITHIN_MS / 1000:g} s; leaving without it")
+        return stuck
 
 
 def _lent(why: str) -> EngineLike:
     """Instead of an engine: the one before it is closed by the time that this is called."""
     raise DeviceError(why)
-
-
-def _keys_of(step: Step) -> tuple[str, ...]:
-    """The step's key, which must also be heard while Shift is held as the deadman."""
-    key = step.value.key
-    return (key,) if "+" in key or step is Step.ARM else (key, f"Shift+{key}")

@@ -5,12 +5,10 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtGui import QAction
-
 from app.language import tr
-from app.menus import MenuEntry, add_help_menu, add_menu, turn_page
+from app.menus import MenuEntry, add_help_menu, add_menu
+from app.scene_view_menu import add_scene_view_menu
 from app.session_marks import JumpKind
-from app.widgets.overlays import Layer
 
 if TYPE_CHECKING:
     from app.player_window import PlayerWindow
@@ -18,38 +16,24 @@ if TYPE_CHECKING:
 _ZOOM = 1.5
 
 
-def add_player_menus(window: PlayerWindow) -> dict[Layer, QAction]:
-    """Fill the window's menu bar; returns the actions of the overlays. Keys that step repeat while they are held."""
+def add_player_menus(window: PlayerWindow) -> None:
+    """Fill the window's menu bar. Keys that step repeat while they are held."""
     panels = window.panels
-    add_menu(
-        window,
-        tr("&File"),
+    window.add_file_menu(
         [
             MenuEntry(tr("&Snapshot"), window.take_snapshot, ("S", "Ctrl+S")),
             None,
             MenuEntry(tr("Selection as &video"), window.export_clip, ("E",)),
             MenuEntry(tr("&Note"), window.begin_note, ("M",)),
-            None,
-            MenuEntry(tr("&Quit"), window.close, ("Ctrl+Q",)),
-        ],
+        ]
     )
-    layers = [MenuEntry(tr(la.value.label), partial(panels.overlay_bar.toggle, la), (la.value.key,), checked=True) for la in Layer]
-    view = add_menu(
+    view = add_scene_view_menu(
         window,
-        tr("&View"),
+        panels,
         [
-            *layers,
-            MenuEntry(tr("&All overlays on or off"), window.toggle_all_layers, ("0",)),
-            None,
-            MenuEntry(tr("&Whole picture"), panels.fit, ("F",)),
             MenuEntry(tr("Zoom the timeline &in"), partial(panels.timeline.zoom, _ZOOM), ("+", "=")),
             MenuEntry(tr("Zoom the timeline &out"), partial(panels.timeline.zoom, 1 / _ZOOM), ("-",)),
             MenuEntry(tr("The whole &session"), panels.timeline.fit, ("Ctrl+0",)),
-            None,
-            MenuEntry(tr("&Next page"), partial(turn_page, panels.pages, 1), ("Ctrl+Tab",)),
-            MenuEntry(tr("&Previous page"), partial(turn_page, panels.pages, -1), ("Ctrl+Shift+Tab",)),
-            None,
-            MenuEntry(tr("&Full screen"), window.toggle_full_screen, ("F11",), checked=False),
         ],
     )
     play = add_menu(
@@ -96,4 +80,3 @@ def add_player_menus(window: PlayerWindow) -> dict[Layer, QAction]:
     for action in (*play[1:7], *go[:2], *view[-6:-4]):
         action.setAutoRepeat(True)
     add_help_menu(window, panels.help.toggle)
-    return dict(zip(Layer, view[: len(Layer)], strict=True))

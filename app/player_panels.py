@@ -6,112 +6,89 @@ from collections.abc import Sequence
 from html import escape
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QPlainTextEdit, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPlainTextEdit, QVBoxLayout, QWidget
 
 from app import palette, theme
 from app.language import tr, tr_text
-from app.pace import Pace
 from app.palette import ON_PICTURE
+from app.panel_layout import card_note, column, holder
 from app.provenance import Provenance
 from app.recorded_values import value_lines
 from app.replayed import compared_line
-from app.widgets.advice_line import AdviceLine
+from app.scene_panels import ScenePanels
 from app.widgets.card import Card
-from app.widgets.clearance_bar import ClearanceBar
-from app.widgets.columns import Columns
-from app.widgets.distance_bars import DistanceBars
 from app.widgets.head_loupe import HeadLoupe
 from app.widgets.live_view import LiveView
-from app.widgets.mode_badge import ModeBadge
+from app.widgets.note_field import NoteField
 from app.widgets.notice import Notice, NoticeKind
-from app.widgets.overlay_bar import OverlayBar
-from app.widgets.overlays import Layer
 from app.widgets.player_bar import PlayerBar
 from app.widgets.player_help import player_help
 from app.widgets.provenance_table import ProvenanceTable
 from app.widgets.recorded_plate import RecordedPlate
 from app.widgets.session_events import SessionEvents
 from app.widgets.sim_banner import SimBanner
-from app.widgets.state_badge import StateBadge
-from app.widgets.theta_gauge import ThetaGauge
 from app.widgets.timeline import TimelineView
 from app.widgets.toast import Toast
-from app.wording import REASON_TEXT
-from core.calibration.scale import mm_per_working_px
 from core.config import Config
 from core.rig_file import scaled
 from core.session.manifest import Manifest
 from core.session.recorded import RecordedRow
-from core.types import Point, PoseState, Scene, Tick
+from core.types import Point, Scene, Tick
 from hardware.rig import RigKind
 
 _TEXT_EVERY_S = 0.1
-_LEFT_SHARE = 0.62
-_RIGHT_WIDTH = (470, 660)
-_BANNER_WIDTH = 330
+_BANNER_WIDTH, _GAP = 330, 8
 
 
-class PlayerPanels(QWidget):
+class PlayerPanels(ScenePanels):
     """Makes the widgets, lays them out, and shows one recorded row on all of them."""
 
     def __init__(self, config: Config, manifest: Manifest | None, name: str, *, with_other: bool = False) -> None:
-        super().__init__()
         known = manifest.known if manifest is not None else None
-        limits, pixels_per_mm = config.perception.pose, scaled(config, known).policy.pursuit.pixels_per_mm
+        pixels_per_mm = scaled(config, known).policy.pursuit.pixels_per_mm
+        super().__init__(config.perception.pose, pixels_per_mm, _TEXT_EVERY_S)
         self._scale = known.scale if known is not None else None
         self.banner = SimBanner(RigKind.PLAYBACK)
         self.banner.setFixedWidth(_BANNER_WIDTH)
         self.plate = RecordedPlate(manifest, name)
-        self.mode = ModeBadge()
-        self.live = LiveView(pixels_per_mm)
         self.live.setAccessibleName(tr("Recorded picture"))
         self.live.setAccessibleDescription(tr("Played back, not live"))
         self.live.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.other = LiveView(pixels_per_mm) if with_other else None
         self.compared = QLabel("", self)
         self.compared.setVisible(with_other)
-        self.overlay_bar = OverlayBar()
-        self.advice = AdviceLine()
-        self.badge = StateBadge(limits)
-        self.gauge = ThetaGauge(limits.theta_allow_deg)
-        self.bars = DistanceBars(limits.d_allow_px)
-        self.clearance = ClearanceBar(pixels_per_mm)
         self.commands = ProvenanceTable()
         self.events = SessionEvents()
         self.values = QPlainTextEdit()
         self.problems = QPlainTextEdit()
         self.timeline = TimelineView()
         self.bar = PlayerBar()
-        self.note = QLineEdit()
-        self._limits = limits
+        self.note = NoteField(tr("Note at this time; Enter keeps it, Esc does not"), "SKY")
+        self.note.hide()
         self._provenance = Provenance()
-        self._text_pace = Pace(_TEXT_EVERY_S)
-        self._state: PoseState | None = None
-        stage = QWidget()
         self._style()
-        self._lay_out(stage)
+        left = column(
+            (self._pictures(), 5), (self.overlay_bar, 0), (self.note, 0), (_framed(self.timeline), 1), (self.bar, 0), spacing=_GAP
+        )
+        self.help = player_help(self._lay_out(self._header(), holder(left), self._right_side()))
         self.notice = Notice(self.live)
         self.toast = Toast(self.live)
-        self.help = player_help(stage)
+
+    @property
+    def views(self) -> tuple[LiveView, ...]:
+        return (self.live,) if self.other is None else (self.live, self.other)
 
     def show_row(self, row: RecordedRow, tick: Tick, target: Point | None, *, renew_text: bool) -> None:
         """Everything as it was recorded; `target` in source pixels."""
-        scene, pose = tick.scene, tick.scene.pose
-        state = pose.state if pose is not None else None
-        renew_text = renew_text or self._text_pace.due() or state is not self._state
-        self._state = state
+        scene = tick.scene
+        renew_text = self._renews_text(scene, asked=renew_text)
         self.notice.clear()
         self.live.show_frame(tick.frame, scene, tick.advice)
         self.live.show_target(target)
         self.badge.show_scene(scene, renew_text=renew_text)
-        self.gauge.show_pose(pose, renew_text=renew_text)
-        self.bars.set_scale(mm_per_working_px(self._scale, scene))
-        self.bars.show_pose(pose, renew_text=renew_text)
+        self._show_dials(scene, tick.status, renew_text=renew_text)
         why_none = row.drive.blanked if row.drive is not None and row.drive.blanked else tr("none was recorded")
-        if scene.refusal is not None:
-            why_none = tr(REASON_TEXT[scene.refusal.reason].title).lower()
-        self.advice.show_advice(tick.advice, state, why_none, renew_text=renew_text)
-        self.clearance.show_scene(scene, tick.status)
+        self._show_advice(tick, why_none, renew_text=renew_text)
         self._show_drive(row)
         if renew_text:
             self._show_values(row)
@@ -135,11 +112,7 @@ class PlayerPanels(QWidget):
         if self.other is not None:
             self.other.clear()
             self.compared.setText("")
-        self.badge.show_nothing(title, why)
-        self.gauge.show_pose(None)
-        self.bars.show_pose(None)
-        self.advice.show_advice(None, None, title[0].lower() + title[1:])
-        self.clearance.show_scene(None, None)
+        self._blank_dials(title, why)
 
     def _show_drive(self, row: RecordedRow) -> None:
         view = row.drive
@@ -164,13 +137,12 @@ class PlayerPanels(QWidget):
 
     def _style(self) -> None:
         # a frame in the banner's colour and its word in the corner: also a part of the screen must not look live
-        for view in (self.live, self.other):
-            if view is not None:
-                view.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
-                theme.set_sheet(view, f"LiveView {{ border: 2px solid @PLAYBACK; background: {ON_PICTURE.INK}; }}")
-                room = view.layout()
-                assert room is not None
-                room.setContentsMargins(2, 2, 2, 2)
+        for view in self.views:
+            view.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+            theme.set_sheet(view, f"LiveView {{ border: 2px solid @PLAYBACK; background: {ON_PICTURE.INK}; }}")
+            room = view.layout()
+            assert room is not None
+            room.setContentsMargins(2, 2, 2, 2)
         corner, loupe = _CornerMark(tr("PLAYBACK"), self.live), self.live.findChild(HeadLoupe)
         if isinstance(loupe, HeadLoupe):
             corner.stackUnder(loupe)
@@ -179,42 +151,16 @@ class PlayerPanels(QWidget):
             page.setTabChangesFocus(True)
             page.setAccessibleName(name)
             theme.set_sheet(page, "QPlainTextEdit { background: @PANEL; color: @TEXT_DIM; border: none; font-size: 13px; }")
-        self.note.setPlaceholderText(tr("Note at this time; Enter keeps it, Esc does not"))
-        self.note.setAccessibleName(tr("Note"))
-        self.note.setMaxLength(2000)
-        theme.set_sheet(
-            self.note,
-            "QLineEdit { background: @PANEL; color: @TEXT; border: 1px solid @SKY; border-radius: 6px; padding: 5px 10px; }",
-        )
-        self.note.hide()
 
-    def _lay_out(self, stage: QWidget) -> None:
+    def _header(self) -> QHBoxLayout:
         header = QHBoxLayout()
         header.setSpacing(14)
         header.addWidget(self.banner)
         header.addWidget(self.plate, 1)
-        self._mode_note = QLabel(tr("mode then"))
-        self._mode_note.setObjectName("card_note")
+        self._mode_note = card_note(tr("mode then"))
         header.addWidget(self._mode_note)
         header.addWidget(self.mode)
-        side = QWidget()
-        left = QVBoxLayout(side)
-        left.setContentsMargins(0, 0, 0, 0)
-        left.setSpacing(8)
-        left.addWidget(self._pictures(), 5)
-        left.addWidget(self.overlay_bar)
-        left.addWidget(self.note)
-        left.addWidget(_framed(self.timeline), 1)
-        left.addWidget(self.bar)
-        self.columns = Columns(side, self._right_side(), _LEFT_SHARE)
-        room = QHBoxLayout(stage)
-        room.setContentsMargins(0, 0, 0, 0)
-        room.addWidget(self.columns)
-        rows = QVBoxLayout(self)
-        rows.setContentsMargins(theme.GAP, 4, theme.GAP, theme.GAP)
-        rows.setSpacing(theme.GAP)
-        rows.addLayout(header)
-        rows.addWidget(stage, 1)
+        return header
 
     def _pictures(self) -> QWidget:
         """The recorded picture, and beside it what a replay saw in it."""
@@ -222,22 +168,17 @@ class PlayerPanels(QWidget):
             return self.live
         self.other.setAccessibleName(tr("The same picture perceived again"))
         self.other.setAccessibleDescription(tr("Played back, not live"))
-        for view in (self.live, self.other):
+        both = QHBoxLayout()
+        both.setSpacing(6)
+        for view in self.views:
             view.setMinimumSize(300, 225)
+            both.addWidget(view, 1)
         _CornerMark(tr("PERCEIVED AGAIN"), self.other)
         theme.set_sheet(self.compared, "color: @TEXT; font-size: 14px;")
         self.compared.setAccessibleName(tr("Recorded against perceived again"))
-        holder = QWidget()
-        column = QVBoxLayout(holder)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
-        row = QHBoxLayout()
-        row.setSpacing(6)
-        row.addWidget(self.live, 1)
-        row.addWidget(self.other, 1)
-        column.addLayout(row, 1)
-        column.addWidget(self.compared)
-        return holder
+        pictures = column((self.compared, 0), spacing=4)
+        pictures.insertLayout(0, both, 1)
+        return holder(pictures)
 
     def show_other(self, tick: Tick, other: Scene | None) -> None:
         """What a replay saw in the same picture."""
@@ -249,30 +190,7 @@ class PlayerPanels(QWidget):
         again = f'<span style="color:{palette.SKY}">\N{HORIZONTAL BAR} {tr("perceived again:")}</span>'
         self.compared.setText(f"{again} {escape(line)}")
 
-    def set_layer(self, layer: Layer, on: bool) -> None:
-        for view in (self.live, self.other):
-            if view is not None:
-                view.set_layer(layer, on)
-
-    def fit(self) -> None:
-        """The whole picture."""
-        for view in (self.live, self.other):
-            if view is not None:
-                view.fit()
-
-    def _right_side(self) -> QWidget:
-        limits = self._limits
-        dials = QWidget()
-        row = QHBoxLayout(dials)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(theme.GAP)
-        row.addWidget(Card(tr("Angle to the vessel"), self.gauge, tr("allowed {limit:g}°", limit=limits.theta_allow_deg)), 1)
-        row.addWidget(Card(tr("Distances"), self.bars, tr("allowed {limit:g} px", limit=limits.d_allow_px)), 1)
-        self.pages = QTabWidget()
-        self.pages.setDocumentMode(True)
-        self.pages.setAccessibleName(tr("Pages"))
-        self.pages.tabBar().setAccessibleName(tr("Pages"))
-        self.pages.tabBar().setDrawBase(False)
+    def _right_side(self) -> QVBoxLayout:
         for page, name in (
             (self.events, tr("Events")),
             (self.commands, tr("Commands")),
@@ -280,15 +198,8 @@ class PlayerPanels(QWidget):
             (self.problems, tr("Problems")),
         ):
             self.pages.addTab(page, name)
-        side = QWidget()
-        column = QVBoxLayout(side)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(theme.GAP)
-        for widget, stretch in ((Card("", self.badge), 0), (self.advice, 0), (dials, 3), (self.clearance, 0), (self.pages, 3)):
-            column.addWidget(widget, stretch)
-        side.setMinimumWidth(_RIGHT_WIDTH[0])
-        side.setMaximumWidth(_RIGHT_WIDTH[1])
-        return side
+        dials = self._dials()
+        return column((Card("", self.badge), 0), (self.advice, 0), (dials, 3), (self.clearance, 0), (self.pages, 3))
 
 
 class _CornerMark(QLabel):

@@ -2,43 +2,35 @@
 
 from __future__ import annotations
 
-import logging
-import os
 import time
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Slot
-from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QAbstractButton, QLabel, QMainWindow
+from PySide6.QtCore import Qt, QTimer, Slot
+from PySide6.QtGui import QKeyEvent
 
-from app import theme
 from app.decode_thread import Decoded, DecodeThread
-from app.heartbeat import Heartbeat
+from app.known_session import KnownSession
 from app.language import tr
-from app.menus import action_of
 from app.play_clock import PlayClock
 from app.player_keeper import PlayerKeeper
 from app.player_menus import add_player_menus
 from app.player_panels import PlayerPanels
 from app.replayed import Replayed
-from app.session_marks import Course, JumpKind, course_of, neighbour, places_of, target_at
+from app.session_marks import Course, JumpKind, neighbour, places_of, target_at
 from app.snapshot import pictures_folder
 from app.widgets.notice import NoticeKind
 from app.widgets.overlays import Layer
+from app.window_frame import WindowFrame
 from core.config import Config
 from core.session.events import Event, EventKind
 from core.session.reader import SessionReader
 
 _TURN_MS = 15
-_LOOK_MS = 200
-_GROWN = 1.2
 _STOP_WITHIN_MS = 10_000
 
-_log = logging.getLogger(__name__)
 
-
-class PlayerWindow(QMainWindow):
+class PlayerWindow(WindowFrame):
     """Plays an open session. All reading, decoding and writing is done by other threads; the newest wish wins.
 
     Parameters
@@ -51,9 +43,6 @@ class PlayerWindow(QMainWindow):
     def __init__(self, reader: SessionReader, config: Config, against: Path | None = None) -> None:
         super().__init__()
         self._reader = reader
-        manifest = reader.manifest
-        self._events: tuple[Event, ...] = ()
-        self._course = course_of(reader.timeline())
         self._clock = PlayClock()
         self._jump_kind = JumpKind.STATE
         self._selection: tuple[float, float] | None = None
@@ -61,35 +50,19 @@ class PlayerWindow(QMainWindow):
         self._asked = -1
         self._asked_s = 0.0
         self._shown: Decoded | None = None
-        self._is_shut = False
-        self._problem_count = -1
-        self._is_empty = False
         self.seek_ms = 0.0
         self._decode = DecodeThread(reader, self)
         self._keeper = PlayerKeeper(reader, pictures_folder(config.window.pictures_folder), self)
-        self._heartbeat = Heartbeat(parent=self)
+        self._known = KnownSession(reader, self)
         self._turn = QTimer(self)
         self._turn.setInterval(_TURN_MS)
         self._turn.setTimerType(Qt.TimerType.PreciseTimer)
-        self._look = QTimer(self)
-        self._look.setInterval(_LOOK_MS)
         self._against = against
-        self._replayed: Replayed | None = None
-        self.panels = PlayerPanels(config, manifest, reader.folder.name, with_other=against is not None)
+        self.panels = PlayerPanels(config, reader.manifest, reader.folder.name, with_other=against is not None)
         self.setCentralWidget(self.panels)
-        self._layer_actions = add_player_menus(self)
-        escape = QAction(self)
-        escape.setShortcut(QKeySequence(Qt.Key.Key_Escape))
-        escape.triggered.connect(self._on_escape)
-        self.addAction(escape)
-        hint = QLabel(tr("F1  keys"))
-        hint.setObjectName("card_note")
-        hint.setContentsMargins(0, 0, 14, 0)
-        self.menuBar().setCornerWidget(hint)
+        add_player_menus(self)
         self._wire()
         self.setWindowTitle(tr("LumenPilot \N{EM DASH} PLAYBACK of {name}", name=reader.folder.name))
-        self.setMinimumSize(*theme.MIN_WINDOW)
-        self.resize(theme.start_size(self.screen()))
 
     # ---- what can be asked
 
@@ -127,12 +100,11 @@ class PlayerWindow(QMainWindow):
 
     @property
     def events(self) -> tuple[Event, ...]:
-        return self._events
+        return self._known.events
 
     @property
-    def max_block_ms(self) -> float:
-        """The longest time that the GUI thread was blocked in the last ten seconds."""
-        return self._heartbeat.max_block_ms
+    def _course(self) -> Course:
+        return self._known.course
 
     # ---- composition
 
@@ -141,13 +113,17 @@ class PlayerWindow(QMainWindow):
         self._decode.decoded.connect(self._on_decoded)
         self._decode.failed.connect(lambda line: panels.show_nothing(tr("Playing ended"), line, NoticeKind.FAULT))
         self._keeper.said.connect(self.say)
-        self._keeper.events_read.connect(self._on_events)
-        self._keeper.noted.connect(self._on_noted)
+        self._keeper.events_read.connect(self._known.take_events)
+        self._keeper.noted.connect(self._known.take_note)
         self._keeper.replayed_read.connect(self._on_replayed)
         self._keeper.progressed.connect(bar.show_progress)
+        known = self._known
+        known.said.connect(self.say)
+        known.changed.connect(self._show_course)
+        known.emptied.connect(lambda why: panels.show_nothing(tr("Nothing to play"), why, NoticeKind.WARNING))
+        known.looked.connect(self._on_looked)
+        known.problems_found.connect(panels.show_problems)
         self._turn.timeout.connect(self._on_turn)
-        self._look.timeout.connect(self._look_again)
-        panels.overlay_bar.toggled.connect(self._on_layer)
         panels.timeline.sought.connect(self.seek)
         panels.timeline.selected.connect(lambda first, last: self.select((first, last)))
         panels.events.chosen.connect(self._go_to_event)
@@ -169,89 +145,37 @@ class PlayerWindow(QMainWindow):
 
     def start(self) -> None:
         """Show the first row as soon as it is known."""
+        super().start()
         self.panels.live.setFocus()
-        self._heartbeat.start()
         self.panels.show_nothing(tr("Opening"), self._reader.folder.name)
         self._keeper.read_events()
         if self._against is not None:
             self._keeper.read_replayed(self._against)
-        self._look.start()
-        self._look_again()
+        self._known.start()
 
     # ---- what is known of the session
 
     @Slot()
-    def _look_again(self) -> None:
-        """Rows become known while an hour-long session is being read; problems as they are met."""
-        is_all = self._reader.wait(0.0)
-        known, shown = len(self._reader), len(self._course)
-        # every look costs more the longer the session is: a few of them are enough while it is read
-        if known != shown and (is_all or known > _GROWN * shown):
-            self._course = self._compared(course_of(self._reader.timeline()))
-            self._show_course()
-        if is_all and not len(self._course) and not self._is_empty:
-            self._is_empty = True
-            loose = (
-                tr("there are pictures, but no rows: repair it with: session recover") if self._reader.videos else tr("it is empty")
-            )
-            self.panels.show_nothing(tr("Nothing to play"), loose, NoticeKind.WARNING)
-        elif self._asked < 0 and len(self._course):
+    def _on_looked(self) -> None:
+        if self._asked < 0 and len(self._course):
             self._ask(0)
-        self._show_problems()
 
+    @Slot()
     def _show_course(self) -> None:
-        self.panels.timeline.show_course(self._course, self._events)
+        self.panels.timeline.show_course(self._course, self.events)
         self.panels.bar.show_length(round(self._course.duration_s * 1000), len(self._course))
-        self.panels.events.show_events(self._events, self._course.first_s)
+        self.panels.events.show_events(self.events, self._course.first_s)
         if self._shown is not None and self._shown.row is not None:
             self.panels.events.show_time(self._shown.row.captured_s)
         self._show_position()
 
-    def _show_problems(self) -> None:
-        problems = list(self._reader.problems)
-        missing = self._reader.missing_rows
-        if missing:
-            problems.append(tr("{count} rows are missing between those that are there", count=missing))
-        manifest = self._reader.manifest
-        if manifest is not None and manifest.counts.dropped:
-            problems.append(tr("{count} frames could not be recorded: the recorder was behind", count=manifest.counts.dropped))
-        if manifest is not None and not manifest.closed:
-            problems.append(tr("the session did not end properly; session recover makes a repaired copy"))
-        if len(problems) != self._problem_count:
-            self._problem_count = len(problems)
-            self.panels.show_problems(problems)
-
-    @Slot(object, bool)
-    def _on_events(self, events: tuple[Event, ...], is_written: bool) -> None:
-        self._events = events
-        if is_written:
-            self.say(tr("This session is still being recorded: what came later is not shown"))
-        self._show_course()
-
-    @Slot(object)
-    def _on_noted(self, event: Event) -> None:
-        self._events = tuple(sorted((*self._events, event), key=lambda one: one.time_s))
-        self.say(tr("Note kept"))
-        self._show_course()
-
     @Slot(object)
     def _on_replayed(self, replayed: Replayed) -> None:
-        self._replayed = replayed
-        if replayed.skipped:
-            self.say(tr("{count} results of the replay cannot be read", count=replayed.skipped), is_fault=True)
-        self._course = self._compared(self._course)
+        self._known.compare_with(replayed)
         self.set_jump_kind(JumpKind.REPLAY)
         self._show_course()
         self._decode.replayed = replayed.scene
         self._decode.ask_again()
-
-    def _compared(self, course: Course) -> Course:
-        """With what a replay saw, as far as it is known."""
-        replayed = self._replayed
-        if replayed is None:
-            return course
-        differs = replayed.changed(course.rows, course.theta_deg, course.states)
-        return replace(course, other_theta_deg=replayed.theta_deg(course.rows), differs=differs)
 
     # ---- playing
 
@@ -316,7 +240,7 @@ class PlayerWindow(QMainWindow):
     def jump(self, step: int) -> None:
         """To the next (1) or previous (-1) of the chosen kind, paused."""
         self.pause()
-        found = neighbour(places_of(self._jump_kind, self._course, self._events), max(0, self._asked), step)
+        found = neighbour(places_of(self._jump_kind, self._course, self.events), max(0, self._asked), step)
         if found is None:
             kind = tr(self._jump_kind.value).lower()
             self.say(tr("No {kind} after this frame", kind=kind) if step > 0 else tr("No {kind} before this frame", kind=kind))
@@ -371,7 +295,7 @@ class PlayerWindow(QMainWindow):
 
     def _show(self, found: Decoded) -> None:
         if found.row is not None and found.tick is not None:
-            target = target_at(self._events, found.tick.scene, found.row.captured_s)
+            target = target_at(self.events, found.tick.scene, found.row.captured_s)
             self.panels.show_row(found.row, found.tick, target, renew_text=not self._clock.is_playing)
             self.panels.show_other(found.tick, found.other)
         else:
@@ -434,8 +358,7 @@ class PlayerWindow(QMainWindow):
         self.panels.live.setFocus()
 
     def _keep_note(self) -> None:
-        # what no file can hold (half of a surrogate pair, pasted) becomes a question mark
-        text = self.panels.note.text().encode("utf-8", errors="replace").decode("utf-8").strip()
+        text = self.panels.note.kept_text
         self._end_note()
         if text and len(self._course):
             event = Event(self._course.first_s + self._clock.position_s, EventKind.NOTE, text)
@@ -447,15 +370,6 @@ class PlayerWindow(QMainWindow):
     def say(self, message: str, is_fault: bool = False) -> None:
         """A line for the person at the screen."""
         self.panels.toast.show_message(message, is_fault=is_fault)
-
-    @Slot(object, bool)
-    def _on_layer(self, layer: Layer, on: bool) -> None:
-        self.panels.set_layer(layer, on)
-        self._layer_actions[layer].setChecked(on)
-
-    def toggle_all_layers(self) -> None:
-        bar = self.panels.overlay_bar
-        bar.set_all(not any(bar.is_on(layer) for layer in Layer))
 
     def go_to_time(self) -> None:
         """Type a time in ms."""
@@ -480,49 +394,26 @@ class PlayerWindow(QMainWindow):
             self._keeper.cancel_clip()
         elif self._selection is not None:
             self.select(None)
-        elif self.isFullScreen():
-            self.toggle_full_screen()
-
-    def toggle_full_screen(self) -> None:
-        """Full screen, without the menu bar, and back."""
-        self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
-
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.WindowStateChange:
-            self.menuBar().setVisible(not self.isFullScreen())
-            action_of(self, "F11").setChecked(self.isFullScreen())
+        else:
+            super()._on_escape()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Enter presses the button that has the focus: Space, which does it elsewhere, plays here."""
-        button = self.focusWidget()
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            if isinstance(button, QAbstractButton) and not event.isAutoRepeat():
-                button.click()
-            elif button is self.panels.bar.position:
-                self.panels.live.setFocus()
+        """Enter takes the time that was typed."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self.focusWidget() is self.panels.bar.position:
+            self.panels.live.setFocus()
             return
         super().keyPressEvent(event)
 
-    def closeEvent(self, event: QCloseEvent) -> None:
-        self.shut_down()
-        event.accept()
-
-    @Slot()
-    def shut_down(self) -> None:
-        """End the threads; notes and snapshots are finished, a clip is given up."""
-        if self._is_shut:
-            return
-        self._is_shut = True
-        for timer in (self._turn, self._look):
-            timer.stop()
-        self._heartbeat.stop()
+    def _let_go(self) -> None:
+        self._turn.stop()
+        self._known.stop()
         self.panels.notice.clear()
-        self.setUpdatesEnabled(False)
-        self.hide()
+
+    def _finish(self) -> Sequence[str]:
+        """End the threads; notes and snapshots are finished, a clip is given up."""
         self._decode.stop()
         has_saved = self._keeper.shut_down()
         if not (self._decode.wait(_STOP_WITHIN_MS) and has_saved):
-            _log.error("the disk did not answer in time; leaving without it")
-            os._exit(1)  # Qt would abort on a thread that still runs
+            return ["the disk did not answer in time; leaving without it"]
         self._reader.close()
+        return ()

@@ -50,7 +50,7 @@ def worker_dies(kit: Kit) -> Seen:
         problems += [] if window.pilot is None else ["there is still somebody who drives"]
         made[-1].broken = False
         folder = window._recorder.status.folder
-        window._restart()
+        window.restart()
         again = until(lambda: window._phase is Phase.RUNNING and window.desk.view is not None)
         problems += [] if again else ["it could not be started again"]
         view = window.desk.view

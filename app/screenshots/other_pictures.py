@@ -90,7 +90,7 @@ def annotator(studio: Studio) -> None:
         for place in (2, 1, 0):
             window.open(place)
             _annotate(studio, window)
-        window.toast.hide()
+        window.panels.toast.hide()
         studio.wait(0.3)
         studio.take(window, "annotator")
     finally:

@@ -62,7 +62,7 @@ class Rater:
 
     @property
     def canvas(self):
-        return self.window.canvas
+        return self.window.panels.canvas
 
     def at(self, point: Point) -> QPoint:
         return QPoint(*(round(value) for value in self.canvas.view.to_screen(point)))
@@ -138,7 +138,7 @@ def test_an_image_in_at_most_twelve_events_with_the_angle_of_the_method(rater: R
 
 
 def test_the_readout_is_live_and_says_what_is_missing(rater: Rater) -> None:
-    readout = rater.window.readout
+    readout = rater.window.panels.readout
     assert readout.angle_text == "–"
     assert readout.advice_text == "Draw the robot, from its tail to its head"
     rater.click(*ROBOT)
@@ -171,7 +171,7 @@ def test_everything_by_keyboard(rater: Rater) -> None:
     rater.press(Key.Key_Insert)
     rater.press(*[Key.Key_Left] * 6, modifier=shift)
     rater.press(Key.Key_Insert, Key.Key_Return)
-    assert rater.window.readout.angle_text == "0.0°"
+    assert rater.window.panels.readout.angle_text == "0.0°"
     rater.press(Key.Key_1, Key.Key_Tab)
     rater.press(Key.Key_Up)
     rater.press(Key.Key_Right, modifier=ctrl)
@@ -196,7 +196,7 @@ def test_undo_and_redo_reach_over_a_restart(make: MakeRater) -> None:
     again.press(*[Key.Key_Z] * 3, modifier=ctrl)
     assert drawn(again) == Annotation()
     again.press(Key.Key_Z, modifier=ctrl)
-    assert again.window.toast.text() == "Nothing to undo"
+    assert again.window.panels.toast.text() == "Nothing to undo"
 
 
 def test_points_are_dragged_put_in_and_taken_out(rater: Rater) -> None:
@@ -219,25 +219,25 @@ def test_a_double_click_ends_the_line(rater: Rater) -> None:
 
 
 def test_progress_and_status(rater: Rater) -> None:
-    queue = rater.window.queue
+    queue = rater.window.panels.queue
     assert queue.progress_text == "0 of 3 done, 3 left"
     rater.press(Key.Key_X, Key.Key_N)
     assert queue.progress_text == "1 of 3 done, 2 left"
     rater.press(Key.Key_N, Key.Key_U)
     assert rater.desk.index == 1, "the next without an answer, around the end"
     rater.press(Key.Key_X, Key.Key_End, Key.Key_X, Key.Key_N)
-    assert rater.window.toast.text() == "The last image. All are done"
+    assert rater.window.panels.toast.text() == "The last image. All are done"
     assert [one.content.cannot_tell for one in rater.kept()] == [True] * 3
 
 
 def test_a_blind_study_hides_the_algorithm_and_the_names(make: MakeRater) -> None:
     rater = make((View.AS_IS, View.MIRRORED), blind=True)
     rater.press(Key.Key_H)
-    assert "hidden" in rater.window.toast.text()
+    assert "hidden" in rater.window.panels.toast.text()
     rater.press(Key.Key_G)
     assert rater.desk.proposal is None
     assert rater.canvas.proposal is None
-    assert ".png" not in rater.window.header._title.text()
+    assert ".png" not in rater.window.panels.header._title.text()
     assert len(rater.desk.items) == 6
 
 
@@ -267,7 +267,7 @@ def test_the_algorithms_answer_is_shown_and_taken_over_on_demand(rater: Rater) -
     assert rater.canvas.proposal is None
     rater.press(Key.Key_H)
     assert rater.canvas.proposal is not None
-    assert "G takes it over" in rater.window.toast.text()
+    assert "G takes it over" in rater.window.panels.toast.text()
     assert drawn(rater) == Annotation(), "seen is not taken"
     rater.press(Key.Key_G)
     assert (drawn(rater).robot, drawn(rater).vessel, drawn(rater).state, drawn(rater).masks) == (ROBOT, VESSEL, None, ())
@@ -303,9 +303,9 @@ def test_a_hole_in_a_mask_stays_open_on_the_screen(rater: Rater) -> None:
 
 def test_letters_go_into_a_note_and_not_into_the_state(rater: Rater) -> None:
     rater.press(Key.Key_F2)
-    assert rater.window.note.hasFocus()
+    assert rater.window.panels.note.hasFocus()
     for letter in (Key.Key_B, Key.Key_A, Key.Key_D):
-        QTest.keyClick(rater.window.note, letter)
+        QTest.keyClick(rater.window.panels.note, letter)
     rater.press(Key.Key_Return)
     assert rater.canvas.hasFocus()
     assert (drawn(rater).note, drawn(rater).state) == ("bad", None)
@@ -328,10 +328,10 @@ def test_an_edit_that_cannot_be_written_is_shouted_and_written_later(rater: Rate
     whole = store.save
     monkeypatch.setattr(store, "save", lambda *_: (_ for _ in ()).throw(AnnotationError("the disk is full")))
     rater.click(*ROBOT)
-    rater.qtbot.waitUntil(lambda: "NOT SAVED: 3 edits" in rater.window.header.saved_text)
+    rater.qtbot.waitUntil(lambda: "NOT SAVED: 3 edits" in rater.window.panels.header.saved_text)
     monkeypatch.setattr(store, "save", whole)
     rater.press(Key.Key_X)
-    rater.qtbot.waitUntil(lambda: rater.window.header.saved_text.endswith("saved"))
+    rater.qtbot.waitUntil(lambda: rater.window.panels.header.saved_text.endswith("saved"))
     (one,) = rater.kept()
     assert one.content.cannot_tell
     with AnnotationStore(rater.store_path, read_only=True) as kept:
@@ -341,7 +341,7 @@ def test_an_edit_that_cannot_be_written_is_shouted_and_written_later(rater: Rate
 def test_an_image_that_vanished_is_named_and_the_others_go_on(rater: Rater) -> None:
     rater.desk.items[2].image.path.unlink()
     rater.window.open(2)
-    rater.qtbot.waitUntil(lambda: "2.png: cannot be read" in rater.window.toast.text())
+    rater.qtbot.waitUntil(lambda: "2.png: cannot be read" in rater.window.panels.toast.text())
     assert not rater.desk.is_open
     rater.click(*ROBOT)
     rater.window.open(0)
@@ -352,7 +352,7 @@ def test_an_image_that_vanished_is_named_and_the_others_go_on(rater: Rater) -> N
 def test_contrast_changes_the_picture_only(rater: Rater) -> None:
     middle = rater.at((320.0, 400.0))
     before = rater.canvas.grab().toImage().pixelColor(middle).red()
-    rater.window.light.step(0, 3)
+    rater.window.panels.light.step(0, 3)
     assert rater.canvas.grab().toImage().pixelColor(middle).red() == before + 30
     QTest.keyClick(rater.canvas, Key.Key_Slash)
     assert rater.canvas.grab().toImage().pixelColor(middle).red() == before

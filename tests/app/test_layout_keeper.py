@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel, QMainWindow, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from app.layout_keeper import LayoutKeeper, Parts, Switch, layout_settings, overlay_switches
-from app.menus import plain
+from app.menus import action_of, plain
 from app.operator_window import OperatorWindow
 from app.widgets.columns import Columns
 from app.widgets.overlay_bar import OverlayBar
@@ -157,7 +157,7 @@ def test_overlays_of_the_operator_window_are_kept(make_window: MakeWindow) -> No
     window.close()
     again = arranged()
     assert not again.panels.overlay_bar.is_on(Layer.LOUPE)
-    assert not again._layer_actions[Layer.LOUPE].isChecked()
+    assert not action_of(again, Layer.LOUPE.value.key).isChecked()
     assert again.panels.pages.tabText(again.panels.pages.currentIndex()) == name
 
 

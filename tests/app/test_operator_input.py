@@ -15,6 +15,7 @@ from pytestqt.qtbot import QtBot
 from app import theme
 from app.engine_thread import Phase
 from app.event_model import EventKind
+from app.menus import action_of
 from app.operator_window import OperatorWindow
 from app.widgets.overlays import Layer
 from core.config import Config
@@ -59,10 +60,10 @@ def test_digits_switch_overlays(running: OperatorWindow, qtbot: QtBot) -> None:
     for layer in Layer:
         qtbot.keyClick(running, layer.value.key)
         assert not running.panels.overlay_bar.is_on(layer)
-        assert not running._layer_actions[layer].isChecked()
+        assert not action_of(running, layer.value.key).isChecked()
     qtbot.keyClick(running, Key.Key_0)
     assert all(running.panels.overlay_bar.is_on(layer) for layer in Layer)
-    assert all(action.isChecked() for action in running._layer_actions.values())
+    assert all(action_of(running, layer.value.key).isChecked() for layer in Layer)
 
 
 def test_digits_typed_into_the_seed_switch_nothing(running: OperatorWindow, qtbot: QtBot) -> None:
@@ -309,7 +310,7 @@ def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench
         show_tick(tick, max_block_ms)
 
     window.panels.show_tick = spy  # type: ignore[method-assign]
-    window._due_s = time.monotonic() + 60.0  # no picture's time comes before the end
+    window._pace._due_s = time.monotonic() + 60.0  # no picture's time comes before the end
     window.start()
     until(qtbot, lambda: window._phase is Phase.ENDED)
     assert shown == [3]
@@ -346,10 +347,10 @@ def test_help_and_full_screen_and_what_escape_leaves_first(running: OperatorWind
     assert running.menuBar().isVisible()
     running.showFullScreen()
     assert not running.menuBar().isVisible()
-    assert running._full_screen.isChecked()
+    assert action_of(running, "F11").isChecked()
     running.showNormal()  # as the desktop does it
     assert running.menuBar().isVisible()
-    assert not running._full_screen.isChecked()
+    assert not action_of(running, "F11").isChecked()
     assert engine.targets[-1] is not None, "the target is cleared last"
     qtbot.keyClick(running, Key.Key_Escape)
     assert engine.targets[-1] is None

@@ -157,7 +157,7 @@ def test_what_was_saved_without_a_restart_waits_for_the_next_one(at: Bench, qtbo
 
 def test_other_limits_reach_a_rig_that_is_started_while_they_are_tried_out(at: Bench, qtbot: QtBot) -> None:
     at.edit(D_ALLOW, "9")
-    at.window._restart()
+    at.window.restart()
     until(qtbot, lambda: len(at.engines) == 2 and bool(at.engine.perceptions))
     assert at.tried() == [9.0]
 

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
     QComboBox,
+    QLabel,
     QLineEdit,
     QMainWindow,
     QMenu,
@@ -116,6 +117,13 @@ def test_what_all_windows_have_has_the_same_name_key_and_place(window: QMainWind
     assert found["Help"][-1][0] == "About LumenPilot"
 
 
+def test_the_menu_bar_says_where_the_keys_are(window: QMainWindow) -> None:
+    hint = window.menuBar().cornerWidget()
+    assert isinstance(hint, QLabel)
+    assert hint.isVisible()
+    assert hint.text() == "F1  keys"
+
+
 def test_every_entry_has_a_mnemonic_of_its_own(window: QMainWindow) -> None:
     bar = [mnemonic(action.text()) for action in window.menuBar().actions()]
     assert len(set(bar)) == len(bar)
@@ -141,14 +149,37 @@ def test_full_screen_is_marked_while_it_lasts(window: QMainWindow, qtbot: QtBot)
     qtbot.waitUntil(lambda: not action.isChecked())
 
 
+def test_escape_leaves_full_screen(window: QMainWindow, qtbot: QtBot) -> None:
+    place = window.panels.canvas if window.objectName() == "annotator" else window.panels.live
+    place.setFocus()
+    qtbot.keyClick(place, Key.Key_F11)
+    assert window.isFullScreen()
+    assert not window.menuBar().isVisible()
+    qtbot.keyClick(place, Key.Key_Escape)
+    assert not window.isFullScreen()
+    assert window.menuBar().isVisible()
+
+
+def test_closing_is_done_once(window: QMainWindow) -> None:
+    window.start()
+    assert window.close()
+    assert not window.isVisible()
+    assert not window._heartbeat._timer.isActive()
+    window.shut_down()  # as the application does it when it ends
+    assert window.close()
+
+
 def test_entries_that_are_added_later_stand_before_help_and_in_the_menu_of_their_title(window: QMainWindow) -> None:
     add_menu(window, "&Rig", [MenuEntry("Make a rig", lambda: None, ("Ctrl+Alt+M",))])
     add_menu(window, "&File", [MenuEntry("Settings", lambda: None)])
     names = list(_menus(window))
     assert names[-2:] == ["Rig", "Help"]
     assert names.count("File") == 1
-    assert plain(_menus(window)["File"].actions()[-1].text()) == "Settings"
-    page = _page(window)
+    names = [plain(action.text()) for action in _menus(window)["File"].actions()]
+    assert names[-4:] == ["", "Settings", "", "Quit"]
+    add_menu(window, "&Help", [MenuEntry("Language", lambda: None)])
+    assert [plain(action.text()) for action in _menus(window)["Help"].actions()][-4:] == ["", "Language", "", "About LumenPilot"]
+    page = window.panels.help
     page.toggle()
     assert ("Ctrl+Alt+M", "Make a rig") in dict(page.tables)["Rig"]
 
@@ -169,13 +200,9 @@ def test_the_icon_is_there() -> None:
 # ---- the page of keys
 
 
-def _page(window: QMainWindow):
-    return window.help if hasattr(window, "help") else window.panels.help
-
-
 def test_the_page_names_every_key_of_the_menus_and_nothing_else_of_them(window: QMainWindow, qtbot: QtBot) -> None:
     qtbot.keyClick(window, Key.Key_F1)
-    page = _page(window)
+    page = window.panels.help
     assert page.isVisible()
     rows = {row for title, table in page.tables for row in table if title in _menus(window)}
     wanted = {
@@ -190,7 +217,7 @@ def test_the_page_names_every_key_of_the_menus_and_nothing_else_of_them(window: 
 def test_the_page_fits_the_smallest_window(window: QMainWindow, qtbot: QtBot) -> None:
     window.resize(window.minimumSize())
     qtbot.keyClick(window, Key.Key_F1)
-    page = _page(window)
+    page = window.panels.help
     image = page.grab().toImage()
     panel = image.pixelColor(page.width() // 2, page.height() // 2)
     assert image.pixelColor(page.width() // 2, 4) != panel, "there is room above it"
@@ -217,7 +244,7 @@ def test_the_picture_to_annotate_hears_the_keys_that_the_page_tells(qtbot: QtBot
     window.show()
     window.start()
     qtbot.waitUntil(lambda: window.desk.is_open)
-    canvas = window.canvas
+    canvas = window.panels.canvas
     for point in ((100.0, 100.0), (200.0, 120.0)):  # so that Tab has a point to go to
         qtbot.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=QPoint(*(round(value) for value in canvas.view.to_screen(point))))
     for name, text in CANVAS_KEYS:

@@ -1,0 +1,103 @@
+"""Commands that make a model: synth, train, calibrate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.cli_options import ConfigOption, ProgressOption, tell_asked_progress
+from core.errors import UserError
+
+
+def synth(
+    out: Annotated[Path, typer.Option(help="folder of the set; an interrupted one is continued")],
+    count: Annotated[int, typer.Option(min=1, help="frames")],
+    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; sixteen frames use one seed")] = 0,
+    width: Annotated[int, typer.Option(min=160, max=4096)] = 640,
+    height: Annotated[int, typer.Option(min=120, max=4096)] = 480,
+    family: Annotated[list[str] | None, typer.Option(help="only these families of looks")] = None,
+    phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,
+    workers: Annotated[int, typer.Option(min=1, max=64)] = 1,
+) -> None:
+    """Randomised labelled frames from the bench twin: images, masks, truth."""
+    from app.learning_commands import run_synth
+
+    run_synth(out, count, seed, (width, height), tuple(family) if family else None, phantom, workers)
+
+
+def train(
+    out: Annotated[Path, typer.Option(help="folder of the new model")],
+    data: Annotated[list[Path] | None, typer.Option(help="labelled folder as synth writes it; may be repeated")] = None,
+    synthetic: Annotated[int, typer.Option(min=0, help="also make this many frames with the twin")] = 0,
+    init: Annotated[str | None, typer.Option(help="start from this model instead of from nothing")] = None,
+    remember: Annotated[
+        int, typer.Option(min=0, help="for few frames of a new look: as often show so many of the twin, that nothing is forgotten")
+    ] = 0,
+    shallow: Annotated[bool, typer.Option("--shallow", help="a new network of two convolutions on every level")] = False,
+    deepen: Annotated[bool, typer.Option("--deepen", help="give the --init network the default's depth before training")] = False,
+    second_look: Annotated[
+        bool, typer.Option("--second-look", help="train the network of the --init model's second look, near the robot's ends")
+    ] = False,
+    steps: Annotated[int, typer.Option(min=1)] = 6000,
+    stop_after: Annotated[int | None, typer.Option(min=1, help="end after so many of the steps, to go on with --init")] = None,
+    batch: Annotated[int, typer.Option(min=1, max=512)] = 12,
+    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 1e-2,
+    crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 256,
+    look_share: Annotated[float, typer.Option(min=0, max=1, help="share of the crops whose look is changed at random")] = 1.0,
+    focus: Annotated[
+        float, typer.Option(min=0, max=0.9, help="share of the crops from frames that the --init model finds hard")
+    ] = 0.0,
+    base: Annotated[
+        int | None, typer.Option(min=4, max=128, help="plain U-Net of this base width instead of the folded one")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    threads: Annotated[int, typer.Option(min=0, max=256, help="CPU threads; 0 = all")] = 0,
+    held_out: Annotated[
+        Path | None, typer.Option(help="labelled folder that is not trained on: its Dice before and after goes into the model")
+    ] = None,
+    progress_json: ProgressOption = False,
+) -> None:
+    """Train or fine-tune the network; Ctrl-C keeps what was learnt."""
+    from app.learning_commands import TrainOutputs, run_train
+    from core.learning.training import TrainingPlan
+
+    if remember and (synthetic or not data or init is None):
+        raise UserError("--remember N is for --data DIR and --init MODEL, without --synthetic")
+    plan = TrainingPlan(
+        steps=steps,
+        batch=batch,
+        learning_rate=rate,
+        warmup_steps=min(100, max(1, steps // 10)),
+        crop=(crop, crop),
+        look_share=look_share,
+        focus_share=focus,
+        keeps_statistics=remember > 0,
+        stop_after=stop_after,
+        seed=seed,
+        threads=threads,
+    )
+    tell_asked_progress(progress_json)
+    run_train(
+        TrainOutputs(out, held_out),
+        data or [],
+        synthetic or remember,
+        init,
+        base,
+        plan,
+        deepen=deepen,
+        shallow=shallow,
+        second_look=second_look,
+    )
+
+
+def calibrate(
+    folder: Annotated[Path, typer.Argument(help="labelled folder as synth writes it, which training has never seen")],
+    model: Annotated[str, typer.Option(help="model in resources/models, or a folder; its model.json is rewritten")] = "default",
+    config: ConfigOption = None,
+) -> None:
+    """Teach a model what its confidence means: the share of right answers among those that it is so sure of."""
+    from app.calibrate_command import run_calibrate
+
+    run_calibrate(folder, model=model, config_path=config)

@@ -1,0 +1,29 @@
+"""What commands of several families take, said once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file; keys that differ from the defaults are enough")]
+PresetOption = Annotated[str | None, typer.Option("--preset", help="'paper' takes the paper literally")]
+ModelOption = Annotated[str | None, typer.Option(help="model name or folder")]
+RigOption = Annotated[
+    str | None,
+    typer.Option("--rig", help="twin (needs no hardware), realsense, webcam, or a name of rig list; default: the configured one"),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
+ProgressOption = Annotated[
+    bool, typer.Option("--progress-json", help="progress as JSON objects on standard output, one a line, for other programs")
+]
+SessionArgument = Annotated[Path, typer.Argument(metavar="SESSION", help="folder of a recorded session")]
+
+
+def tell_asked_progress(asked: bool) -> None:
+    """For ``ProgressOption``."""
+    if asked:
+        from app.progress_lines import tell_progress
+
+        tell_progress()

@@ -1,0 +1,128 @@
+"""What the operator window and the player have in common: the widgets that show a scene, and their places."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app import theme
+from app.language import tr
+from app.pace import Pace
+from app.panel_layout import card_note, page_tabs, row, set_window_margins, side
+from app.widgets.advice_line import AdviceLine
+from app.widgets.card import Card
+from app.widgets.clearance_bar import ClearanceBar
+from app.widgets.columns import Columns
+from app.widgets.distance_bars import DistanceBars
+from app.widgets.live_view import LiveView
+from app.widgets.mode_badge import ModeBadge
+from app.widgets.overlay_bar import OverlayBar
+from app.widgets.overlays import Layer
+from app.widgets.state_badge import StateBadge
+from app.widgets.theta_gauge import ThetaGauge
+from app.wording import REASON_TEXT
+from core.calibration.scale import mm_per_working_px
+from core.calibration_config import ScaleConfig
+from core.config import PoseConfig
+from core.types import PoseState, RobotStatus, Scene, Tick
+
+_LEFT_SHARE = 0.62
+_RIGHT_WIDTH = (470, 660)
+
+
+class ScenePanels(QWidget):
+    """Makes the widgets of a scene; whose it is, and what else there is, says the class below it, which also lays them out.
+
+    Parameters
+    ----------
+    limits : of the pose states, on all dials.
+    pixels_per_mm : of the picture.
+    text_every_s : texts are renewed no more often, unless the state is another one.
+    """
+
+    def __init__(self, limits: PoseConfig, pixels_per_mm: float, text_every_s: float) -> None:
+        super().__init__()
+        self.mode = ModeBadge()
+        self.live = LiveView(pixels_per_mm)
+        self.overlay_bar = OverlayBar()
+        self.overlay_bar.toggled.connect(self.set_layer)
+        self.advice = AdviceLine()
+        self.badge = StateBadge(limits)
+        self.gauge = ThetaGauge(limits.theta_allow_deg)
+        self.bars = DistanceBars(limits.d_allow_px)
+        self.clearance = ClearanceBar(pixels_per_mm)
+        self.pages = page_tabs()
+        self._allowed = (card_note(""), card_note(""))
+        self._tell_allowed(limits)
+        self._scale: ScaleConfig | None = None
+        self._text_pace = Pace(text_every_s)
+        self._state: PoseState | None = None
+
+    @property
+    def views(self) -> tuple[LiveView, ...]:
+        """The pictures that the overlays are drawn in."""
+        return (self.live,)
+
+    def set_layer(self, layer: Layer, on: bool) -> None:
+        """An overlay on or off."""
+        for view in self.views:
+            view.set_layer(layer, on)
+
+    def fit(self) -> None:
+        """The whole picture."""
+        for view in self.views:
+            view.fit()
+
+    # ---- a scene
+
+    def _renews_text(self, scene: Scene, *, asked: bool = False) -> bool:
+        """A new state renews all texts together: the numbers beside it must be the ones that made it."""
+        state = scene.pose.state if scene.pose is not None else None
+        is_due = asked or self._text_pace.due() or state is not self._state
+        self._state = state
+        return is_due
+
+    def _show_dials(self, scene: Scene, status: RobotStatus | None, *, renew_text: bool) -> None:
+        self.gauge.show_pose(scene.pose, renew_text=renew_text)
+        self.bars.set_scale(mm_per_working_px(self._scale, scene))
+        self.bars.show_pose(scene.pose, renew_text=renew_text)
+        self.clearance.show_scene(scene, status)
+
+    def _show_advice(self, tick: Tick, why_none: str, *, renew_text: bool) -> None:
+        """`why_none` is said where the scene itself has no reason for being without."""
+        if tick.scene.refusal is not None:
+            why_none = tr(REASON_TEXT[tick.scene.refusal.reason].title).lower()
+        self.advice.show_advice(tick.advice, self._state, why_none, renew_text=renew_text)
+
+    def _blank_dials(self, title: str, why: str) -> None:
+        """Nothing is known now, and why."""
+        self.badge.show_nothing(title, why)
+        self.gauge.show_pose(None)
+        self.bars.show_pose(None)
+        self.advice.show_advice(None, None, title[0].lower() + title[1:])
+        self.clearance.show_scene(None, None)
+
+    def _tell_allowed(self, limits: PoseConfig) -> None:
+        angle, distances = self._allowed
+        angle.setText(tr("allowed {limit:g}°", limit=limits.theta_allow_deg))
+        distances.setText(tr("allowed {limit:g} px", limit=limits.d_allow_px))
+
+    # ---- places
+
+    def _dials(self) -> QWidget:
+        """Angle and distances, side by side."""
+        angle, distances = self._allowed
+        return row(Card(tr("Angle to the vessel"), self.gauge, angle), Card(tr("Distances"), self.bars, distances))
+
+    def _lay_out(self, header: QHBoxLayout, left: QWidget, right: QVBoxLayout) -> QWidget:
+        """A header and two columns below it, ``columns``; returns their place: what covers that leaves the header in sight."""
+        stage = QWidget()
+        self.columns = Columns(left, side(right, *_RIGHT_WIDTH), _LEFT_SHARE)
+        room = QHBoxLayout(stage)
+        room.setContentsMargins(0, 0, 0, 0)
+        room.addWidget(self.columns)
+        rows = QVBoxLayout(self)
+        set_window_margins(rows)
+        rows.setSpacing(theme.GAP)
+        rows.addLayout(header)
+        rows.addWidget(stage, 1)
+        return stage

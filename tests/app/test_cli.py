@@ -1,0 +1,51 @@
+"""The command line's table of contents: what there is, in which order it is listed, and that to ask costs nothing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from app.cli import app
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMANDS = (
+    "gui", "perceive", "synth", "train", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay", "play",
+    "ablation", "screenshots", "faults", "soak", "doctor", "session", "rig",
+)  # fmt: skip
+INNER = {"session": ("info", "recover", "export"), "rig": ("list", "show", "calibrate", "board")}
+SLOW = ("PySide6", "numpy", "torch", "openvino", "cv2", "scipy", "mujoco", "pydantic", "rich")
+
+
+def help_of(*path: str) -> str:
+    result = CliRunner().invoke(app, [*path, "--help"], prog_name="main.py")
+    assert result.exit_code == 0
+    return result.output
+
+
+def listed(text: str) -> tuple[str, ...]:
+    """Names of a help page's list of commands."""
+    _, _, commands = text.partition("Commands:\n")
+    return tuple(line.split()[0] for line in commands.splitlines() if line.strip())
+
+
+def test_commands_are_listed_in_their_order_and_groups_after_them() -> None:
+    assert listed(help_of()) == COMMANDS
+    for group, names in INNER.items():
+        assert listed(help_of(group)) == names
+
+
+@pytest.mark.parametrize("path", [*((name,) for name in COMMANDS), *((g, name) for g, names in INNER.items() for name in names)])
+def test_every_command_says_what_it_does(path: tuple[str, ...]) -> None:
+    usage, _, rest = help_of(*path).partition("\n\n")
+    assert usage.startswith(f"Usage: main.py {' '.join(path)} ")
+    assert rest.partition("\n\n")[0].strip().endswith(".")
+
+
+def test_a_help_page_waits_for_nothing_slow() -> None:
+    code = f"import sys, app.cli; print([name for name in {SLOW} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.stdout.strip() == "[]", done.stderr
