@@ -254,7 +254,7 @@ TEMPLATES = (
     "{port} is free",
     "{port} is in use by another program",
     "{port} is no serial port",
-    "{name}: {files} are whole (SHA-256)",
+    "{name}: all {count} files are whole (SHA-256)",
     "{a} answer, model {b}, firmware {rest}",
     "no permission for {node}",
     # calibration

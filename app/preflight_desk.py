@@ -73,7 +73,7 @@ class Preflight:
             return tr("Not checked yet")
         warned = len(self.findings) - good
         return tr("Ready: {good} of {count} checks good", good=good, count=len(self.findings)) + (
-            tr(", {warned} to know of", warned=warned) if warned else ""
+            tr(", {warned} to note", warned=warned) if warned else ""
         )
 
 

@@ -201,7 +201,7 @@ def loss_words(lost: dict[str, Any]) -> str:
     if not lost["rows"] and not lost["pictures"]:
         return tr("nothing of it is lost")
     return tr(
-        "{seconds:.1f} s are lost ({rows} rows, {pictures} pictures)",
+        "{seconds:.1f} s are lost (rows: {rows}, pictures: {pictures})",
         seconds=lost["seconds"],
         rows=lost["rows"],
         pictures=lost["pictures"],

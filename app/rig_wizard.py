@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtCore import QPointF, QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QCloseEvent, QColor, QIcon, QKeyEvent, QPainter, QPen, QPixmap, QPolygonF
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QListWidgetItem, QStackedWidget, QVBoxLayout, QWidget
 
-from app import theme
+from app import palette, theme
 from app.language import tr, tr_text
 from app.stop_key import StopKeys
 from app.widgets.card import Card
+from app.widgets.enter_key import takes_enter
 from app.widgets.stop_button import StopButton
 from app.widgets.wizard_camera import CameraPage
 from app.widgets.wizard_motion import SteeringPage, ZeroPage
-from app.widgets.wizard_page import WizardPage, button, note
+from app.widgets.wizard_page import WizardPage, button, mark_main, note
 from app.widgets.wizard_picture import WizardPicture
 from app.widgets.wizard_scale import ScalePage
 from app.widgets.wizard_servos import IdentifyPage, PortPage
@@ -22,8 +23,11 @@ from app.wizard_desk import WizardDesk
 from core.rig_file import RigFileError
 
 _SIZE = QSize(1240, 660)
-_STEPS_PX, _CONTROLS_PX = 176, 420
-_STEP_LINE_PX = 30
+_FRAME = QSize(16, 56)
+"""Room that the desktop needs for title bar and borders."""
+_STEPS_PX, _CONTROLS_PX = 190, 450
+_STEP_LINE_PX, _SIGN_PX = 30, 16
+_TICK = QPolygonF([QPointF(2.5, 8.5), QPointF(6.5, 12.5), QPointF(13.5, 4.0)])
 _LOOK_EVERY_MS = 50
 
 
@@ -47,7 +51,8 @@ class RigWizard(QDialog):
         desk.setParent(self)
         self.setWindowTitle(tr("Calibrate {name}", name=rig_name) if rig_name else tr("New rig"))
         self.setModal(True)
-        self.resize(_SIZE)
+        theme.set_sheet(self, theme.FORM_SHEET)
+        self.resize(_SIZE.boundedTo(self.screen().availableGeometry().size() - _FRAME))
         self.picture = WizardPicture()
         self.picture.show_text(tr("No camera yet"))
         self.camera_page = CameraPage(desk, self.picture, rig_name)
@@ -119,6 +124,13 @@ class RigWizard(QDialog):
         self.desk.close()
         super().done(result)
 
+    def follow_theme(self) -> None:
+        self._refresh()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not takes_enter(self, event):
+            super().keyPressEvent(event)
+
     def closeEvent(self, event: QCloseEvent) -> None:
         self.reject()
         event.accept()
@@ -130,6 +142,7 @@ class RigWizard(QDialog):
         self.steps.setAccessibleName(tr("Steps"))
         self.steps.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.steps.setSelectionMode(QListWidget.SelectionMode.NoSelection)
+        self.steps.setIconSize(QSize(_SIGN_PX, _SIGN_PX))
         for page in self.pages:
             item = QListWidgetItem(tr(page.name))
             item.setSizeHint(QSize(_STEPS_PX - 8, _STEP_LINE_PX))
@@ -156,6 +169,7 @@ class RigWizard(QDialog):
 
     def _go(self, index: int) -> None:
         self.page.leave()
+        self._say("")  # what was said belonged to the page before
         self.stack.setCurrentIndex(index)
         self.page.enter()
         self._refresh()
@@ -170,8 +184,9 @@ class RigWizard(QDialog):
         page.refresh()
         for row, other in enumerate(self.pages):
             item = self.steps.item(row)
-            mark = "\N{CHECK MARK}" if other.is_done else "\N{BULLET}" if other is page else "  "
-            item.setText(f" {mark}  {tr(other.name)}")
+            item.setIcon(self._sign(other.is_done, is_here=other is page))
+            words = [tr(other.name), *([tr("done")] if other.is_done else []), *([tr("this page")] if other is page else [])]
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, ", ".join(words))
             font = item.font()
             font.setBold(other is page)
             item.setFont(font)
@@ -181,12 +196,34 @@ class RigWizard(QDialog):
         )
         self.next_button.setEnabled(page.may_leave and not busy and (not is_last or self.desk.draft is not None))
         self.back_button.setEnabled(self.stack.currentIndex() > 0 and not busy)
+        mark_main(self.next_button, is_last or page.is_done)
+        if page.main is not None:
+            mark_main(page.main, not page.is_done)
         if busy:
             busy = tr_text(self.desk.busy)
             self._say(f"{busy[0].upper()}{busy[1:]} ...")
         elif self.message.endswith(" ..."):
             self._say("")
         self._look(anew=True)
+
+    def _sign(self, is_done: bool, *, is_here: bool) -> QIcon:
+        """A tick, or a point for the page in front."""
+        ratio = self.devicePixelRatioF()
+        pixmap = QPixmap(QSize(_SIGN_PX, _SIGN_PX) * ratio)
+        pixmap.setDevicePixelRatio(ratio)
+        pixmap.fill(Qt.GlobalColor.transparent)
+        painter = QPainter(pixmap)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if is_done:
+            pen = QPen(QColor(palette.ALLOWED), 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
+            painter.setPen(pen)
+            painter.drawPolyline(_TICK)
+        elif is_here:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(palette.SKY))
+            painter.drawEllipse(QPointF(_SIGN_PX / 2, _SIGN_PX / 2), 4.0, 4.0)
+        painter.end()
+        return QIcon(pixmap)
 
     @Slot(str)
     def _say(self, text: str, is_fault: bool = False) -> None:

@@ -27,6 +27,11 @@ NAMES = {
     "player": "other_pictures.player",
     "annotator": "other_pictures.annotator",
     "study_figures": "other_pictures.study_figures",
+    "settings": "dialog_pictures.settings",
+    "preflight": "dialog_pictures.preflight",
+    "training": "dialog_pictures.training",
+    "rig_wizard": "dialog_pictures.rig_wizard",
+    "servo_table": "dialog_pictures.servo_table",
 }
 """Name of the file, without its ending, and what makes it."""
 
@@ -63,9 +68,13 @@ def _open_studio(out: Path, folder: Path, config_path: Path | None) -> Studio:
 
 
 def _picture_of(name: str) -> Callable[[Studio], None]:
-    from app.screenshots import operator_pictures, other_pictures
+    from app.screenshots import dialog_pictures, operator_pictures, other_pictures
 
-    modules = {"operator_pictures": operator_pictures, "other_pictures": other_pictures}
+    modules = {
+        "operator_pictures": operator_pictures,
+        "other_pictures": other_pictures,
+        "dialog_pictures": dialog_pictures,
+    }
     module, _, function = NAMES[name].partition(".")
     make: Callable[[Studio], None] = getattr(modules[module], function)
     return make

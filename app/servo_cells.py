@@ -231,6 +231,10 @@ def bus_line(status: BusStatus | None, silence_s: float | None = None) -> Cell:
     ]
     whole = f"  {chr(0xB7)}  ".join(parts)
     tip = f"{whole}\n" + tr("cycle: half of the periods of the last ten seconds were shorter than the first, 99 % than p99")
-    if broken := [f"{r.name} {error_words(r.error)}" for r in status.servos if isinstance(r, ServoState) and r.error]:
+    if broken := [
+        f"{tr_text(r.name).replace('_', ' ')} {error_words(r.error)}"
+        for r in status.servos
+        if isinstance(r, ServoState) and r.error
+    ]:
         return Cell(f"!! {'; '.join(broken)}", Tone.BAD, tip)  # for which a narrow table has no room
     return Cell(whole, Tone.WARN if slow else Tone.PLAIN, tip)

@@ -9,7 +9,6 @@ from pathlib import Path
 from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
-    QAbstractButton,
     QDialog,
     QHBoxLayout,
     QLabel,
@@ -25,6 +24,7 @@ from PySide6.QtWidgets import (
 from app import theme
 from app.language import tr
 from app.settings_model import SettingsDraft, search
+from app.widgets.enter_key import takes_enter
 from app.widgets.profile_row import ProfileRow
 from app.widgets.setting_page import SettingPage
 from core.config_schema import Effect, Section, schema, settings_by_key
@@ -34,7 +34,7 @@ _SIZE = (900, 660)
 _LEAST = (700, 420)
 _SEARCH_AFTER_MS = 150
 _ROW_PX = 26
-_TREE_PX = 186
+_TREE_PX = 204
 _MOST_SHARE, _MARGIN_PX = 0.57, 40
 _KEY_ROLE = Qt.ItemDataRole.UserRole
 
@@ -205,7 +205,7 @@ class SettingsDialog(QDialog):
             return f"\N{WARNING SIGN}  {self._locked}"
         problem = self.draft.first_problem
         if problem is not None:
-            return f'\N{WARNING SIGN}  <a href="{problem[0]}">{problem[0]}</a>: {problem[1]}'
+            return f'\N{WARNING SIGN}  <a href="{problem[0]}">{_shown_name(problem[0])}</a>: {problem[1].replace(" °", "°")}'
         if not self.draft.is_dirty:
             return tr("Saved in {path}", path=self._path)
         count = len(self.draft.unsaved_keys())
@@ -288,11 +288,7 @@ class SettingsDialog(QDialog):
     # ---- keys
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Enter presses the button that has the focus: Space, which does it elsewhere, stops the robot."""
-        focus = self.focusWidget()
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            if isinstance(focus, QAbstractButton) and not event.isAutoRepeat():
-                focus.click()
+        if takes_enter(self, event):
             return
         if event.key() == Qt.Key.Key_Escape and self.profile_row.is_asking:
             self.profile_row.question.cancel()
@@ -347,6 +343,7 @@ class SettingsDialog(QDialog):
         self.tree.setColumnCount(2)
         self.tree.setHeaderHidden(True)
         self.tree.header().setStretchLastSection(False)
+        self.tree.header().setMinimumSectionSize(0)
         self.tree.header().setSectionResizeMode(0, self.tree.header().ResizeMode.Stretch)
         self.tree.header().setSectionResizeMode(1, self.tree.header().ResizeMode.ResizeToContents)
         self.tree.setAccessibleName(tr("Sections"))
@@ -380,3 +377,10 @@ class SettingsDialog(QDialog):
         column.addWidget(self.notice)
         column.addWidget(self.splitter, 1)
         column.addLayout(bottom)
+
+
+def _shown_name(key: str) -> str:
+    """What a setting or a section is called on the page."""
+    setting = settings_by_key().get(key)
+    section = next((one for one in schema().walk() if one.key == (key.rpartition(".")[0] if setting is not None else key)), None)
+    return ", ".join(tr(one.title) for one in (section, setting) if one is not None and one.title)

@@ -194,9 +194,17 @@ QMenu::separator { height: 1px; background: @LINE; margin: 4px 8px; }
 QStatusBar { background: @WINDOW; color: @TEXT_DIM; font-size: 13px; }
 QStatusBar::item { border: none; }
 QToolTip { background: @RAISED; color: @TEXT; border: 1px solid @LINE; padding: 6px; }
-QComboBox, QSpinBox { background: @RAISED; color: @TEXT; border: 1px solid @LINE; border-radius: 5px; padding: 3px 8px;
-    min-height: 22px; selection-background-color: @SKY; selection-color: @INK; }
-QComboBox:focus, QSpinBox:focus, QPushButton:focus { border: 1px solid @SKY; }
+QComboBox, QSpinBox, QDoubleSpinBox { background: @RAISED; color: @TEXT; border: 1px solid @LINE; border-radius: 5px;
+    padding: 3px 8px; min-height: 22px; selection-background-color: @SKY; selection-color: @INK; }
+QComboBox:focus, QSpinBox:focus, QDoubleSpinBox:focus, QPushButton:focus { border: 1px solid @SKY; }
+QSpinBox::up-button, QSpinBox::down-button, QDoubleSpinBox::up-button, QDoubleSpinBox::down-button { subcontrol-origin: border;
+    width: 20px; border: none; background: transparent; }
+QSpinBox::up-button, QDoubleSpinBox::up-button { subcontrol-position: top right; }
+QSpinBox::down-button, QDoubleSpinBox::down-button { subcontrol-position: bottom right; }
+QSpinBox::up-arrow, QDoubleSpinBox::up-arrow { width: 0; height: 0; border-left: 4px solid @RAISED;
+    border-right: 4px solid @RAISED; border-bottom: 5px solid @TEXT_DIM; }
+QSpinBox::down-arrow, QDoubleSpinBox::down-arrow { width: 0; height: 0; border-left: 4px solid @RAISED;
+    border-right: 4px solid @RAISED; border-top: 5px solid @TEXT_DIM; }
 QComboBox::drop-down { border: none; width: 24px; }
 QComboBox::down-arrow { width: 0; height: 0; border-left: 4px solid @RAISED; border-right: 4px solid @RAISED;
     border-top: 5px solid @TEXT_DIM; margin-right: 10px; }
@@ -212,18 +220,33 @@ QTabBar::tab:selected { background: @RAISED; color: @TEXT; border-color: @TEXT_F
 QTabBar::tab:hover { color: @TEXT; }
 QPushButton:hover { border-color: @TEXT_FAINT; }
 QPushButton:pressed { background: @LINE; }
-QPushButton:disabled, QSpinBox:disabled { color: @TEXT_FAINT; background: @WINDOW; }
+QPushButton:disabled, QComboBox:disabled, QSpinBox:disabled, QDoubleSpinBox:disabled { color: @TEXT_FAINT; background: @WINDOW; }
+QSpinBox::up-arrow:disabled, QDoubleSpinBox::up-arrow:disabled { border-left-color: @WINDOW; border-right-color: @WINDOW;
+    border-bottom-color: @LINE; }
+QSpinBox::down-arrow:disabled, QDoubleSpinBox::down-arrow:disabled { border-left-color: @WINDOW; border-right-color: @WINDOW;
+    border-top-color: @LINE; }
+QComboBox::down-arrow:disabled { border-left-color: @WINDOW; border-right-color: @WINDOW; border-top-color: @LINE; }
 QPushButton#main_button:enabled { background: @SKY; color: @INK; font-weight: 600; }
+QPushButton#main_button:focus { border: 2px solid @TEXT; }
+QScrollBar:vertical { background: transparent; width: 10px; margin: 0; }
+QScrollBar:horizontal { background: transparent; height: 10px; margin: 0; }
+QScrollBar::handle:vertical { background: @LINE; border-radius: 4px; min-height: 28px; margin: 0 1px; }
+QScrollBar::handle:horizontal { background: @LINE; border-radius: 4px; min-width: 28px; margin: 1px 0; }
+QScrollBar::handle:hover { background: @TEXT_FAINT; }
+QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
+QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
+QScrollArea#checks { background: transparent; border: 1px solid transparent; border-radius: 6px; }
+QScrollArea#checks:focus { border: 1px solid @SKY; }
 QSplitter::handle { background: transparent; }
 QSplitter::handle:hover { background: @LINE; border-radius: 3px; }
 QDialog#settings QLineEdit { background: @PANEL; color: @TEXT; border: 1px solid @LINE; border-radius: 5px; padding: 4px 8px;
     min-height: 20px; selection-background-color: @SKY; selection-color: @INK; }
-QDialog#settings QLineEdit:focus, QDialog#settings QCheckBox:focus { border: 1px solid @SKY; }
-QDialog#settings QLineEdit[wrong="true"] { border: 1px solid @FAULT; }
+QDialog#settings QLineEdit:focus { border: 1px solid @SKY; }
 QDialog#settings QLineEdit:disabled { color: @TEXT_FAINT; }
-QDialog#settings QCheckBox { color: @TEXT; border: 1px solid transparent; border-radius: 4px; padding: 3px; }
+QDialog#settings QLineEdit[wrong="true"] { border: 1px solid @FAULT; }
 QDialog#settings QTreeWidget { background: @PANEL; color: @TEXT; border: 1px solid @LINE; border-radius: 8px; padding: 4px;
     outline: none; }
+QDialog#settings QTreeWidget:focus { border: 1px solid @SKY; }
 QDialog#settings QTreeWidget::item { padding: 4px 2px; }
 QDialog#settings QTreeWidget::item:selected { background: @SKY; color: @INK; }
 QDialog#settings QScrollArea, QWidget#setting_page { background: @WINDOW; }
@@ -235,12 +258,27 @@ QLabel#setting_meaning { color: @TEXT_DIM; font-size: 13px; }
 QLabel#setting_note { color: @TEXT_FAINT; font-size: 12px; }
 QLabel#setting_error { color: @FAULT; font-size: 13px; font-weight: 600; }
 QLabel#section_title { color: @TEXT; font-size: 18px; font-weight: 700; padding-top: 8px; }
-QDialog#settings QScrollBar:vertical { background: transparent; width: 10px; margin: 0; }
-QDialog#settings QScrollBar::handle:vertical { background: @LINE; border-radius: 4px; min-height: 28px; margin: 0 1px; }
-QDialog#settings QScrollBar::handle:vertical:hover { background: @TEXT_FAINT; }
-QDialog#settings QScrollBar::add-line:vertical, QDialog#settings QScrollBar::sub-line:vertical { height: 0; }
-QDialog#settings QScrollBar::add-page:vertical, QDialog#settings QScrollBar::sub-page:vertical { background: transparent; }
 QFrame#setting QSlider::groove:horizontal { height: 4px; background: @LINE; border-radius: 2px; }
 QFrame#setting QSlider::sub-page:horizontal { background: @SKY; border-radius: 2px; }
 QFrame#setting QSlider::handle:horizontal { background: @TEXT_DIM; width: 12px; margin: -4px 0; border-radius: 6px; }
 """
+
+FORM_SHEET = """
+QPushButton:checked { background: @SKY; color: @INK; }
+QLineEdit { background: @PANEL; color: @TEXT; border: 1px solid @LINE; border-radius: 5px; padding: 4px 8px;
+    min-height: 20px; selection-background-color: @SKY; selection-color: @INK; }
+QLineEdit:focus { border: 1px solid @SKY; }
+QLineEdit:disabled { color: @TEXT_FAINT; background: @WINDOW; }
+QAbstractSpinBox QLineEdit { background: transparent; border: none; padding: 0; min-height: 0; }
+QListWidget, QTableWidget, QPlainTextEdit { background: @PANEL; color: @TEXT; border: 1px solid @LINE;
+    border-radius: 5px; gridline-color: @LINE; selection-background-color: @SKY; selection-color: @INK; outline: none; }
+QListWidget:focus, QTableWidget:focus, QPlainTextEdit:focus { border: 1px solid @SKY; }
+QListWidget::item { padding: 4px 6px; }
+QListWidget::item:selected { background: @SKY; color: @INK; }
+QTableWidget::item { padding: 0 6px; }
+QTableWidget::item:selected { background: @SKY; color: @INK; }
+QTableWidget QHeaderView::section { background: @RAISED; color: @TEXT_DIM; border: none; border-bottom: 1px solid @LINE;
+    padding: 4px 6px; font-size: 12px; font-weight: 600; }
+"""
+"""For a dialog with fields, lists and tables: by ``set_sheet`` on the dialog itself. In the application's sheet, rules that name a
+dialog do not hold for a field that was measured before it came into the dialog: Qt keeps what it has found."""

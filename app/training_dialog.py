@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QFontMetrics, QKeyEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -22,6 +23,7 @@ from app.language import tr, tr_text
 from app.training_job import STEPS, Collect, Phase, TrainingJob, TrainingState, Wish, name_problem
 from app.widgets.before_after import BeforeAfter
 from app.widgets.card import Card
+from app.widgets.enter_key import takes_enter
 from app.widgets.training_curves import TrainingCurves
 
 _SIZE = QSize(940, 640)
@@ -42,14 +44,19 @@ class TrainingDialog(QDialog):
         self.setWindowTitle(tr("Train on my annotations"))
         self.setModal(False)
         self.resize(_SIZE)
+        theme.set_sheet(self, theme.FORM_SHEET)
         self.name, self.init, self.steps = QLineEdit(), QComboBox(), QSpinBox()
         self.start, self.stop = QPushButton(tr("&Train")), QPushButton(tr("&Stop, keep what was learnt"))
         self.hide_button = QPushButton(tr("&Close"))
         self.curves, self.pictures = TrainingCurves(), BeforeAfter()
         self._bar, self._line = QProgressBar(), QLabel()
         self._fill_form()
-        heading = QLabel(tr("Masks from {source}", source=source))
+        heading = QLabel()
         heading.setObjectName("card_title")
+        from_where, room = tr("Masks from {source}", source=source), _SIZE.width() - 48
+        heading.setText(QFontMetrics(theme.semi_bold(12)).elidedText(from_where, Qt.TextElideMode.ElideMiddle, room))
+        heading.setToolTip(source)
+        heading.setAccessibleName(from_where)
         column = QVBoxLayout(self)
         column.setContentsMargins(16, 12, 16, 12)
         column.setSpacing(theme.GAP)
@@ -90,6 +97,10 @@ class TrainingDialog(QDialog):
         self.steps.setValue(STEPS)
         self.steps.setSuffix(tr(" steps"))
         self.steps.setAccessibleName(tr("Steps of training"))
+        self.name.setToolTip(tr("Letters, digits, - and _; the Model menu lists it under this name"))
+        self.init.setToolTip(tr("What this model can do is kept as far as possible, and the new look is learnt on top"))
+        self.steps.setToolTip(tr("More steps learn more and take longer: on two processor cores a step takes about a second"))
+        self.start.setObjectName("main_button")
         self._line.setWordWrap(True)
         self._line.setMinimumHeight(38)
         self._bar.setTextVisible(False)
@@ -119,6 +130,10 @@ class TrainingDialog(QDialog):
         row.addWidget(self.hide_button)
         return row
 
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not takes_enter(self, event):
+            super().keyPressEvent(event)
+
     def _on_start(self) -> None:
         self.job.start(Wish(self.name.text().strip(), str(self.init.currentData() or "default"), self.steps.value()))
 
@@ -126,6 +141,7 @@ class TrainingDialog(QDialog):
         for field in (self.name, self.init, self.steps, self.start):
             field.setEnabled(not state.is_busy)
         self.stop.setEnabled(state.phase is Phase.RUNNING)
+        self.hide_button.setText(tr("&Hide, go on training") if state.is_busy else tr("&Close"))
         self._bar.setRange(0, state.steps if state.step or not state.is_busy else 0)
         self._bar.setValue(state.steps if state.phase is Phase.DONE else state.step)
         self._line.setText(_words(state))

@@ -180,7 +180,7 @@ class AdviceConfig(_Section):
 
 
 class TwinConfig(_Section):
-    """The bench twin (hardware/twin)."""
+    """The bench twin: a simulated robot, phantom and camera."""
 
     phantom: str = Field("s_curve", min_length=1, description="a named phantom, or random:<seed>")
     appearance_seed: int = Field(0, ge=0, le=2**31 - 1, description="of light, board and camera noise; 0 = the clear bench")
@@ -192,7 +192,7 @@ class TwinConfig(_Section):
     wiring: str | None = Field(
         None,
         pattern=r"^-?\d{1,3}(,-?\d{1,3}){6}$",
-        description="ids of its servos in the order of the joints, minus: it turns the other way; None: as servos.joints says",
+        description="ids of its servos in the order of the joints, minus: it turns the other way; empty: as servos.joints says",
     )
     roll_deg: float = Field(
         0.0, ge=-180.0, le=180.0, description="turn of the robot about its axis; 0: right and left act in the picture"
@@ -207,10 +207,10 @@ class RigConfig(_Section):
     camera: Literal["twin", "realsense", "webcam", "video_file", "image_folder"] = Field(
         "twin", description="where pictures come from"
     )
-    robot: Literal["twin", "servos", "none"] = Field("twin", description="servos: real ones, on servos.port")
+    robot: Literal["twin", "servos", "none"] = Field("twin", description="what moves; servos = real ones, see section Servos")
     source: str | None = Field(None, description="path of the video, folder, or RealSense recording (.bag)")
     file: str | None = Field(
-        None, min_length=1, description="rig file (main.py rig list) whose calibration is used; None: not calibrated"
+        None, min_length=1, description="rig file, made by the rig wizard, whose calibration is used; empty: not calibrated"
     )
     watch_folder: bool = Field(False, description="image_folder: wait for new pictures, instead of playing those that are there")
 
@@ -222,7 +222,7 @@ class WindowConfig(_Section):
     language: Literal["auto", "en", "zh"] = Field(
         "auto", description="of all windows; auto = as the system says, en = English, zh = Chinese (simplified)"
     )
-    pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; None: LumenPilot in Pictures")
+    pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; empty: LumenPilot in Pictures")
 
 
 class Config(_Section):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import types
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -63,7 +64,13 @@ _TITLES = {  # of sections, and of settings whose name says little without its u
     "record.ring_s": "Ring length",
     "record.ring_mb": "Ring size",
     "servos.bus_hz": "Bus rate",
+    "perception.pose.d_allow_px": "Allowed distance",
+    "perception.pose.theta_allow_deg": "Allowed angle",
+    "perception.pose.hysteresis_px": "Hysteresis, distance",
+    "perception.pose.hysteresis_deg": "Hysteresis, angle",
 }
+_SOURCE = re.compile(r" \(METHOD section \d\)")
+"""Where in the method a section is told: for readers of the code."""
 
 
 class Kind(StrEnum):
@@ -217,10 +224,10 @@ def _section(model: type[BaseModel], key: str, title: str | None = None) -> Sect
             sections.append(_section(kind, path))
         elif path == JOINTS:
             (item, *_) = get_args(kind)
-            sections.extend(_section(item, f"{path}.{k}", f"Joint {name}") for k, name in enumerate(JOINT_NAMES))
+            sections.extend(_section(item, f"{path}.{k}", f"Joint {name.replace('_', ' ')}") for k, name in enumerate(JOINT_NAMES))
         elif _is_simple(info) and (name != "name" or not key.startswith("servos.joints")):  # a joint's name is its place
             settings.append(_setting(path, info))
-    text = " ".join((model.__doc__ or "").split()) if model.__doc__ != BaseModel.__doc__ else ""
+    text = _SOURCE.sub("", " ".join((model.__doc__ or "").split())) if model.__doc__ != BaseModel.__doc__ else ""
     shown = title or _TITLES.get(key) or _title(key.rpartition(".")[2])
     return Section(key, shown, text, tuple(settings), tuple(sections))
 

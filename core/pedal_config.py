@@ -10,7 +10,7 @@ class PedalConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    port: str | None = Field(None, min_length=1, description="stable path in /dev/serial/by-id; None: no pedal")
+    port: str | None = Field(None, min_length=1, description="stable path in /dev/serial/by-id; empty: no pedal")
     baud: int = Field(115_200, ge=9600, le=1_000_000, description="speed of the line")
     silence_s: float = Field(0.06, ge=0.03, le=0.06, description="no report for so long: the deadman counts as released")
     press_reports: int = Field(

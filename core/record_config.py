@@ -17,7 +17,7 @@ class RecordConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    folder: str | None = Field(None, min_length=1, description="where sessions go; None: LumenPilot in Videos")
+    folder: str | None = Field(None, min_length=1, description="where sessions go; empty: LumenPilot in Videos")
     codec: Literal["lossy", "lossless"] = Field("lossy", description="lossless keeps every pixel, at a hundred times the size")
     quality_crf: int = Field(21, ge=0, le=40, description="of the lossy video; smaller is better and larger")
     max_mbit_s: float = Field(2.4, ge=0.2, le=100.0, description="upper end of the lossy video at 640x480; grows with the picture")

@@ -71,7 +71,7 @@ class ServosConfig(_Section):
     """The bus and its seven joints."""
 
     driver: Literal["dynamixel", "direct"] = Field("dynamixel", description="direct: the twin without servos, a lighter load")
-    port: str | None = Field(None, min_length=1, description="serial device; None: the twin's own pseudo-terminal")
+    port: str | None = Field(None, min_length=1, description="serial device; empty: the twin's own pseudo-terminal")
     baud: int = Field(1_000_000, ge=9600, le=4_500_000, description="speed of the bus")
     model: int = Field(1020, ge=0, le=65535, description="model number that every servo must report (1020: XM430-W350)")
     pretension_mm: float = Field(0.3, ge=0.0, le=5.0, description="pull of every tendon at zero bend")

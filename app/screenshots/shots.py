@@ -48,9 +48,9 @@ class Studio:
             self.application.processEvents()
             time.sleep(_LOOK_S)
 
-    def until(self, ready: Callable[[], bool], what: str) -> None:
-        """Let the windows work until something is so. Raises UserError after a minute."""
-        until_s = time.monotonic() + _PATIENCE_S
+    def until(self, ready: Callable[[], bool], what: str, patience_s: float = _PATIENCE_S) -> None:
+        """Let the windows work until something is so. Raises UserError after `patience_s`."""
+        until_s = time.monotonic() + patience_s
         while not ready():
             if time.monotonic() > until_s:
                 raise UserError(f"waited in vain for {what}; is the machine very busy? Try again")

@@ -8,7 +8,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
-from app import palette
+from app import palette, theme
 from app.language import tr
 
 
@@ -21,6 +21,7 @@ class _Picture(QLabel):
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self.setMinimumSize(200, 130)
+        theme.set_sheet(self, "color: @TEXT_FAINT;")
         self._pixmap = QPixmap()
 
     def show_file(self, path: Path | None) -> None:
@@ -35,7 +36,7 @@ class _Picture(QLabel):
 
     def _fit(self) -> None:
         if self._pixmap.isNull():
-            self.setText(tr("not yet"))
+            self.setText(tr("shown when the training has begun"))
             return
         smooth = Qt.TransformationMode.SmoothTransformation
         self.setPixmap(self._pixmap.scaled(self.size(), Qt.AspectRatioMode.KeepAspectRatio, smooth))
@@ -93,7 +94,8 @@ class BeforeAfter(QWidget):
             picture.show_file(Path(paths[self._place]) if self._place < len(paths) else None)
         colours = palette.ON_PICTURE
         vessel, robot = (
-            f'<span style="color:{c}">{n}</span>' for c, n in ((colours.VESSEL, tr("vessel")), (colours.ROBOT, tr("robot")))
+            f'<span style="color:{c}">\N{BLACK SQUARE}</span>&nbsp;{n}'
+            for c, n in ((colours.VESSEL, tr("vessel")), (colours.ROBOT, tr("robot")))
         )
         found = tr("colour: found ({vessel}, {robot})", vessel=vessel, robot=robot)
         which = (

@@ -16,9 +16,11 @@ from app.language import tr
 
 _WIDEST_PX = 900
 _MARGIN_PX = 12
-_BUTTON = "padding: 0 10px; min-height: 24px; font-size: 13px;"
 _INK = palette.ON_PICTURE
-_MAIN = f"background: {_INK.SKY}; color: {_INK.INK}; font-weight: 600; border: 1px solid {_INK.SKY};"
+_SHAPE = "padding: 0 10px; min-height: 24px; font-size: 13px;"
+_PLAIN = f"{_SHAPE} background: {_INK.RAISED}; color: {_INK.TEXT}; border: 1px solid {_INK.TEXT_FAINT};"
+_MAIN = f"{_SHAPE} background: {_INK.SKY}; color: {_INK.INK}; font-weight: 600; border: 1px solid {_INK.SKY};"
+_FOCUS = f"QPushButton:focus {{ border: 2px solid {_INK.TEXT}; }} QPushButton:hover {{ border-color: {_INK.TEXT}; }}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,7 @@ class Offer:
     Attributes
     ----------
     text, detail : what is the matter, and a second line.
-    answers : the first one is the one that is meant; pressing any of them closes the offer first.
+    answers : the first one is the one that is meant, unless work goes on; pressing any of them closes the offer first.
     share : None: no work goes on; 0..1: how much is done; negative: work goes on, nobody knows how long.
     is_fault : something went wrong.
     dismissed : when the cross is pressed; without one the offer only goes.
@@ -158,14 +160,14 @@ class OfferStrip(QFrame):
             button.deleteLater()
         self._buttons = []
         for place, answer in enumerate(offer.answers):
-            self._add_button(answer.name, answer.meaning or answer.name, place == 0)
+            self._add_button(answer.name, answer.meaning or answer.name, place == 0 and offer.share is None)
         cross = self._add_button("\N{MULTIPLICATION SIGN}", tr("Close this"), False)
         cross.setAccessibleName(tr("Close this offer"))
         cross.setFixedWidth(30)
 
     def _add_button(self, name: str, meaning: str, is_main: bool) -> QPushButton:
         button = QPushButton(name)
-        button.setStyleSheet(_BUTTON + (_MAIN if is_main else ""))
+        button.setStyleSheet(f"QPushButton {{ {_MAIN if is_main else _PLAIN} }} {_FOCUS}")
         button.setToolTip(meaning)
         button.setAccessibleDescription(meaning)
         button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from app import palette, theme
 from app.language import mark, tr, tr_text
 from app.preflight_desk import Finding, Preflight, PreflightDesk
+from app.widgets.enter_key import takes_enter
 from app.widgets.signs import Sign, paint_sign
 from hardware.driving_checks import Level
 
@@ -17,7 +18,7 @@ _RENEW_MS = 1000
 _TICK = QPolygonF([QPointF(4.0, 12.0), QPointF(9.0, 17.0), QPointF(18.0, 6.0)])
 _LOOK: dict[Level, tuple[Sign | None, str, str]] = {
     Level.GOOD: (None, "ALLOWED", mark("good")),
-    Level.WARNING: (Sign.WARNING, "ORANGE", mark("to know")),
+    Level.WARNING: (Sign.WARNING, "ORANGE", mark("notice")),
     Level.BAD: (Sign.BARRED, "FAULT", mark("NOT READY")),
 }
 
@@ -66,12 +67,15 @@ class PreflightList(QDialog):
         self._note.setObjectName("card_note")
         self._list = QWidget()
         self._rows = QGridLayout(self._list)
+        self._rows.setContentsMargins(8, 6, 8, 6)
         self._rows.setColumnStretch(2, 1)
         self._rows.setHorizontalSpacing(14)
         self._rows.setVerticalSpacing(8)
         scroll = QScrollArea()
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setObjectName("checks")
+        scroll.setAccessibleName(tr("Checks before driving"))
         scroll.setWidget(self._list)
         self.again = QPushButton(tr("Check &again"))
         self.arm = QPushButton(tr("A&rm  (F6)"))
@@ -79,6 +83,7 @@ class PreflightList(QDialog):
         self.again.clicked.connect(desk.begin)
         self.arm.clicked.connect(self._on_arm)
         self.leave.clicked.connect(self.close)
+        self.arm.setObjectName("main_button")
         for button in (self.again, self.arm, self.leave):
             button.setAutoDefault(False)
         buttons = QHBoxLayout()
@@ -124,10 +129,16 @@ class PreflightList(QDialog):
         self._headline.setText(now.headline)
         self._note.setText(_note(now))
         self.again.setEnabled(not now.is_running)
+        self.again.setText(tr("Check &again") if now.age_s is not None else tr("Check &now"))
         self.arm.setEnabled(self._desk.has_robot and now.is_fresh and not now.against and not now.is_running)
+        self.arm.setToolTip("" if self.arm.isEnabled() else _why_not(now, self._desk.has_robot))
         if now.findings != self._shown:
             self._shown = now.findings
             self._fill()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not takes_enter(self, event):
+            super().keyPressEvent(event)
 
     def _on_arm(self) -> None:
         self.close()
@@ -156,10 +167,16 @@ class PreflightList(QDialog):
 
 
 def _note(now: Preflight) -> str:
-    if now.is_running:
-        return tr("Nothing moves by this. Some seconds.")
-    if now.age_s is None:
-        return ""
+    if now.is_running or now.age_s is None:
+        return tr("The checks take some seconds. Nothing moves by them.")
     minutes = int(now.age_s // 60)
     ago = tr("just now") if minutes < 1 else tr("{minutes} min ago", minutes=minutes)
     return tr("Checked {ago}", ago=ago) + ("" if now.is_fresh else tr(": too long ago"))
+
+
+def _why_not(now: Preflight, has_robot: bool) -> str:
+    if not has_robot:
+        return tr("There is nothing to arm: no servos are open")
+    if now.against:
+        return tr("First mend what is NOT READY, and check again")
+    return tr("First the checks must be done")

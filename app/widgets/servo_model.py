@@ -23,9 +23,10 @@ _HEADER, _ROW = 19, (15, 34)
 _STYLE = """
 QTableView { background: @PANEL; border: none; }
 QHeaderView::section { background: @PANEL; color: @TEXT_FAINT; border: none;
-    border-bottom: 1px solid @LINE; font-size: 10px; padding: 0 3px; }
+    border-bottom: 1px solid @LINE; font-size: 11px; padding: 0 3px; }
 """
-_PAD = 3.0
+_PAD, _GAP = 3.0, 6.0
+"""The words of the last column stand clear of those before, which end at its edge."""
 _NUMBER_PX = 48.0
 
 _Index = QModelIndex | QPersistentModelIndex
@@ -72,7 +73,7 @@ class ServoModel(QAbstractTableModel):
         if orientation == Qt.Orientation.Horizontal:
             heading, meaning = (tr(text) for text in _COLUMNS[section].value)
             if role == Qt.ItemDataRole.DisplayRole:
-                return heading
+                return f"  {heading}" if _COLUMNS[section] is Column.ERROR else heading
             if role == Qt.ItemDataRole.ToolTipRole:
                 return meaning
             if role == Qt.ItemDataRole.TextAlignmentRole:
@@ -133,7 +134,7 @@ class ServoDelegate(QStyledItemDelegate):
             painter.fillRect(box.adjusted(1, 0, -1, 0), theme.colour(palette.of(TONE_ROLE[cell.tone]), 0.16))
         size = 14 if box.height() >= 26 else 13 if box.height() >= 21 else 12
         text_font = theme.semi_bold(size) if column is Column.JOINT or cell.tone >= Tone.WARN else theme.font(size)
-        inside = box.adjusted(_PAD, 0, -_PAD, 0)
+        inside = box.adjusted(_PAD + (_GAP if column is Column.ERROR else 0), 0, -_PAD, 0)
         if cell.track is not None:
             _paint_track(painter, inside.adjusted(2, 0, -_NUMBER_PX, 0), cell.track, cell.tone)
         painter.setFont(theme.fitted(text_font, cell.text, int(inside.width()), 9))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QWheelEvent
+from PySide6.QtCore import QPoint, QRectF, QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import QCheckBox, QFrame, QGridLayout, QHBoxLayout, QLabel, QLineEdit, QPushButton, QSlider, QWidget
 
+from app import palette, theme
 from app.language import mark, tr, tr_text
 from app.settings_model import as_text
 from app.stop_key import NUMBERS_ONLY
@@ -19,8 +20,10 @@ from core.config_schema import Effect, Kind, Setting
 _SLIDER_STEPS = 1000
 _CURVED_FROM = 10.0
 """A range this much longer than the default is stretched at its lower end, or the slider could not be set finely there."""
-_UNSET = {Kind.NUMBER: mark("automatic"), Kind.WHOLE: mark("automatic"), Kind.TEXT: mark("not set")}
+_UNSET = mark("not set")
+"""An empty field; its description says what that means."""
 _NAME_PX, _FIELD_PX, _UNIT_PX = 132, 100, 46
+_SLIDE_PX = (36, 18)
 
 
 class SettingField(QFrame):
@@ -55,7 +58,7 @@ class SettingField(QFrame):
         if isinstance(self._default, bool):
             return tr("on") if self._default else tr("off")
         text = as_text(self._default)
-        return f"{text} {tr_text(self.setting.unit)}".strip() if text else tr(_UNSET.get(self.setting.kind, "not set"))
+        return _with_unit(text, tr_text(self.setting.unit)) if text else tr(_UNSET)
 
     @property
     def error_text(self) -> str:
@@ -85,6 +88,7 @@ class SettingField(QFrame):
         if self.slider is not None and value is not None and not self.slider.isSliderDown():
             with QSignalBlocker(self.slider):
                 self.slider.setValue(self._place_of(float(value)))
+        error = error.replace(" °", "°")
         self._error.setText(f"\N{WARNING SIGN}  {error}" if error else "")
         self._error.setVisible(bool(error))
         self.reset_button.setEnabled(is_changed)
@@ -117,7 +121,7 @@ class SettingField(QFrame):
             combo.currentIndexChanged.connect(lambda _place: self.edited.emit(setting.key, combo.currentData()))
         else:
             editor = QLineEdit() if setting.kind is Kind.TEXT else NumberEdit(is_whole=setting.kind is Kind.WHOLE)
-            editor.setPlaceholderText(_UNSET[setting.kind] if setting.is_optional else "")
+            editor.setPlaceholderText(tr(_UNSET) if setting.is_optional else "")
             editor.textEdited.connect(lambda text: self.edited.emit(setting.key, text))
         editor.setAccessibleName(f"{tr(setting.title)}, {tr_text(setting.unit)}" if setting.unit else tr(setting.title))
         editor.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -248,7 +252,35 @@ class NumberEdit(QLineEdit):
 
 
 class _Switch(QCheckBox):
-    """Enter turns it too: Space, which does it elsewhere, stops the robot."""
+    """A slide with its word. Enter turns it too: Space, which does it elsewhere, stops the robot."""
+
+    def sizeHint(self) -> QSize:
+        return QSize(_SLIDE_PX[0] + 12 + max(self.fontMetrics().horizontalAdvance(tr(word)) for word in ("on", "off")) + 8, 30)
+
+    def hitButton(self, at: QPoint) -> bool:
+        return self.rect().contains(at)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        is_on, can = self.isChecked(), self.isEnabled()
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if self.hasFocus():
+            painter.setPen(QPen(QColor(palette.SKY), 1))
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
+        width, height = _SLIDE_PX
+        slide = QRectF(4, (self.height() - height) / 2, width, height)
+        painter.setPen(QPen(QColor(palette.TEXT_FAINT if can else palette.LINE), 1.2))
+        painter.setBrush(QColor(palette.SKY if is_on and can else palette.LINE if is_on else palette.WINDOW))
+        painter.drawRoundedRect(slide, height / 2, height / 2)
+        knob = QRectF(slide.right() - height if is_on else slide.left(), slide.top(), height, height).adjusted(4, 4, -4, -4)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(palette.TEXT_FAINT if not can else palette.INK if is_on else palette.TEXT_DIM))
+        painter.drawEllipse(knob)
+        painter.setPen(QColor(palette.TEXT if can else palette.TEXT_FAINT))
+        painter.setFont(theme.font())
+        room = QRectF(slide.right() + 8, 0, self.width(), self.height())
+        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, self.text())
+        painter.end()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not event.isAutoRepeat():
@@ -262,9 +294,14 @@ class _Slider(QSlider):
         event.ignore()  # it belongs to the page
 
 
+def _with_unit(text: str, unit: str) -> str:
+    """The sign of degrees stands at its number."""
+    return f"{text}{unit}" if unit == "°" else f"{text} {unit}".strip()
+
+
 def _together(text: str, unit: str) -> str:
     """No unit stands alone in a line."""
-    return text.replace(f" {unit}", f"\N{NO-BREAK SPACE}{unit}") if unit else text
+    return text.replace(f" {unit}", "°" if unit == "°" else f"\N{NO-BREAK SPACE}{unit}") if unit else text
 
 
 def _capital(text: str) -> str:

@@ -104,12 +104,24 @@ class SettingPage(QScrollArea):
                 self._add(label)
         del self._waiting[:_AT_ONCE]
         self.renew()
+        self._make_room()
         if self._waiting:
             self._soon.start()
+
+    def _make_room(self) -> None:
+        """All that is there gets its height now: left to Qt it would be painted squeezed together once, and then pulled apart."""
+        page, column = self.widget(), self._column
+        assert column is not None
+        for part in page.findChildren(QWidget):
+            part.ensurePolished()
+        column.activate()
+        width = self.viewport().width()
+        page.resize(width, max(self.viewport().height(), column.totalHeightForWidth(width)))
 
     def _add(self, part: QWidget) -> None:
         assert self._column is not None
         self._column.insertWidget(self._column.count() - 1, part)
+        part.show()  # Qt does it later, and until then the column has no room for it
 
     def _add_head(self, section: Section) -> None:
         title, meaning, error = QLabel(tr(section.title)), QLabel(tr(section.description).replace("``", "")), QLabel()

@@ -19,12 +19,18 @@ class TrainingCurves(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.setAccessibleName(tr("Loss and Dice of the training, by step"))
-        self.setMinimumHeight(150)
+        self.setMinimumHeight(170)
+        self.setToolTip(
+            tr(
+                "Left: the loss, which training makes small. Right: Dice, the agreement of what is found with what was drawn by "
+                "hand, 1 at best. What counts are the held-out pictures: when they get no better any more, it has learnt enough."
+            )
+        )
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(theme.GAP)
         self._loss_plot, self._dice_plot = self._plot(tr("loss")), self._plot("Dice")
-        self._dice_plot.setYRange(0.0, 1.0, padding=0.02)
+        self._dice_plot.setYRange(0.0, 1.0, padding=0.05)
         for plot in (self._loss_plot, self._dice_plot):
             row.addWidget(plot, 1)
         self._loss = self._loss_plot.plot(pen=_pen(palette.TEXT, 1.8))
@@ -32,10 +38,10 @@ class TrainingCurves(QWidget):
         legend = self._dice_plot.addLegend(offset=(-6, -6), labelTextColor=palette.TEXT_DIM, verSpacing=-4)
         legend.setLabelTextSize("11px")
         for name, colour, symbol in (("vessel", palette.VESSEL, "o"), ("robot", palette.ROBOT, "s")):
-            self._lines[name] = self._dice_plot.plot(pen=_pen(colour, 1.0))
+            self._lines[name] = self._dice_plot.plot([], [], pen=_pen(colour, 1.0), name=tr("{name}, learning", name=tr_text(name)))
             dots = {"symbol": symbol, "symbolBrush": QColor(colour), "symbolPen": None, "symbolSize": 8}
             pen = _pen(colour, 2.0, Qt.PenStyle.DashLine)
-            self._dots[name] = self._dice_plot.plot(pen=pen, name=tr("{name}, held out", name=tr_text(name)), **dots)
+            self._dots[name] = self._dice_plot.plot([], [], pen=pen, name=tr("{name}, held out", name=tr_text(name)), **dots)
 
     def _plot(self, unit: str) -> pg.PlotWidget:
         plot = pg.PlotWidget(background=palette.PANEL)
@@ -49,6 +55,8 @@ class TrainingCurves(QWidget):
             axis.setTextPen(QPen(QColor(palette.TEXT_DIM)))
             axis.setStyle(tickFont=theme.font(theme.Size.LABEL))
             axis.setLabel(label, color=palette.TEXT_DIM)
+            axis.enableAutoSIPrefix(False)  # a loss has no milli
+        plot.getPlotItem().layout.setContentsMargins(1, 8, 1, 1)  # the uppermost number is not cut
         return plot
 
     def show_state(self, state: TrainingState) -> None:

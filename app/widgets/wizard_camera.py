@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLineEdit, QListWidget, QListWidgetItem, QSpinBox
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QLineEdit, QListWidget, QListWidgetItem, QSpinBox
 
+from app import theme
 from app.language import mark, tr, tr_text
 from app.widgets.wizard_page import WizardPage, button, note, tell
 from app.widgets.wizard_picture import WizardPicture
@@ -32,22 +33,30 @@ class CameraPage(WizardPage):
         self.cameras.setAccessibleName(tr("Cameras"))
         self.cameras.setMinimumHeight(96)
         self.cameras.itemActivated.connect(lambda _item: self._open())
+        self.cameras.currentItemChanged.connect(lambda _item, _before: self._offer_size())
         self.sizes = (
             _spin(desk.config.camera.width_px, 160, 4096, " px", tr("Width")),
             _spin(desk.config.camera.height_px, 120, 4096, " px", tr("Height")),
         )
-        self.rate = _spin(desk.config.camera.frames_per_second, 5, 240, " /s", tr("Pictures per second"))
+        self.rate = _spin(desk.config.camera.frames_per_second, 5, 240, " fps", tr("Pictures per second"))
         size = QHBoxLayout()
-        for field in (*self.sizes, self.rate):
-            size.addWidget(field)
-        form = QFormLayout()
-        form.addRow(tr("&Name"), self.name_edit)
-        form.addRow(tr("Real camera"), size)
+        for part in (self.sizes[0], QLabel("\N{MULTIPLICATION SIGN}"), self.sizes[1], self.rate):
+            size.addWidget(part, 0 if isinstance(part, QLabel) else 1)
+        form = QGridLayout()
+        form.setColumnStretch(1, 1)
+        form.setHorizontalSpacing(theme.GAP)
+        labels = QLabel(tr("&Name")), QLabel(tr("&Picture")), QLabel(tr("C&amera"))
+        for line, (label, buddy) in enumerate(zip(labels, (self.name_edit, self.sizes[0], self.cameras), strict=True)):
+            label.setBuddy(buddy)
+            form.addWidget(label, line, 0, Qt.AlignmentFlag.AlignTop if buddy is self.cameras else Qt.AlignmentFlag.AlignVCenter)
+        form.addWidget(self.name_edit, 0, 1)
+        form.addLayout(size, 1, 1)
+        form.addWidget(self.cameras, 2, 1)
         self.column.addLayout(form)
-        self.cameras.setMaximumHeight(190)
-        self.column.addWidget(self.cameras)
+        self.cameras.setMaximumHeight(150)
         row = QHBoxLayout()
-        self.open_button = button(tr("&Open"), self._open)
+        self.open_button = button(tr("&Open the camera"), self._open)
+        self.main = self.open_button
         self.search_button = button(tr("&Search again"), self.search, tr("Look for cameras and ports once more"))
         row.addWidget(self.open_button, 1)
         row.addWidget(self.search_button)
@@ -83,7 +92,10 @@ class CameraPage(WizardPage):
     def refresh(self) -> None:
         for control in (self.open_button, self.search_button, self.cameras):
             control.setEnabled(not self.desk.is_busy)
+        self._offer_size()
         lines = [self._name_problem(), *self.found.problems]
+        if self.desk.bench is None and not self.desk.is_busy:
+            lines.append(tr("Next goes on when the camera is open."))
         if self.desk.bench is not None and self.rig_name and rig_path(self.rig_name).exists():
             lines.append(tr("There is a rig {name}: saving replaces it, and keeps the older one beside it.", name=self.rig_name))
         tell(self.problem, "\n".join(line for line in lines if line))
@@ -98,6 +110,14 @@ class CameraPage(WizardPage):
             self.cameras.addItem(item)
         chosen = next((k for k, camera in enumerate(found.cameras) if _is_of(camera, self.desk.config)), 0)
         self.cameras.setCurrentRow(chosen)
+
+    def _offer_size(self) -> None:
+        """The twin's camera has its size in the settings."""
+        item = self.cameras.currentItem()
+        camera = item.data(Qt.ItemDataRole.UserRole) if item is not None else None
+        is_real = camera is not None and camera.kind != "twin" and not self.desk.is_busy
+        for field in (*self.sizes, self.rate):
+            field.setEnabled(is_real)
 
     def _open(self) -> None:
         item = self.cameras.currentItem()

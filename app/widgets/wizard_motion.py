@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHBoxLayout, QLabel
 
+from app.cells import NONE
 from app.language import mark, tr, tr_text
-from app.widgets.wizard_page import WizardPage, button, note, put, table, tell
+from app.widgets.wizard_page import WizardPage, button, fit, note, put, table, tell
 from app.widgets.wizard_picture import Arrow, Shape, WizardPicture
 from app.wizard_desk import WizardDesk
 from core.servo_config import TENDONS
@@ -24,19 +25,20 @@ class ZeroPage(WizardPage):
 
     name = mark("Zero and pretension")
     hint = mark(
-        "Each wire is let go by 1.25 mm and then pulled in steps of 0.25 mm until the head follows, 4 mm and 300 mA at most; "
-        "there it is left, taut and without tension: zero. Wires that the camera cannot judge are set by eye."
+        "Each wire is loosened by 1.25 mm and then pulled in steps of 0.25 mm until the head follows, 4 mm and 300 mA at most; "
+        "there it is left, taut and without tension: zero. A wire that the camera cannot judge is set by eye: choose it, and "
+        "tighten or loosen it."
     )
     needs_servos = True
 
     def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
         super().__init__(desk, picture)
-        self.find_button = button(tr("&Find by itself"), self._find)
+        self.find_button = button(tr("&Find automatically"), self._find)
         self.tendon = QComboBox()
         self.tendon.addItems([tr("tendon {name}", name=tr_text(name)) for name in TENDONS])
         self.tendon.setAccessibleName(tr("Tendon to set by eye"))
         self.tighten = button(tr("&Tighten {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(_NUDGE_MM))
-        self.loosen = button(tr("&Let go {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(-_NUDGE_MM))
+        self.loosen = button(tr("&Loosen {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(-_NUDGE_MM))
         self.pretension = QDoubleSpinBox()
         self.pretension.setRange(0.0, 2.0)
         self.pretension.setSingleStep(0.05)
@@ -45,11 +47,13 @@ class ZeroPage(WizardPage):
         self.pretension.setAccessibleName(tr("Pretension"))
         self.pretension.setToolTip(tr("Pull of every wire while the robot is straight, so that none hangs"))
         self.pretension.valueChanged.connect(self._set_pretension)
-        self.rows = table((tr("tendon"), tr("was slack by")), len(TENDONS), tr("Slack of the tendons"))
+        self.rows = table((tr("Tendon"), tr("Was slack by")), len(TENDONS), tr("Slack of the tendons"))
         for row, name in enumerate(TENDONS):
             put(self.rows, row, 0, tr_text(name))
+        fit(self.rows)
+        self.main = self.find_button
         self.column.addWidget(self.find_button)
-        self.column.addWidget(self.rows, 1)
+        self.column.addWidget(self.rows)
         for parts in ((self.tendon, self.tighten, self.loosen), (QLabel(tr("Pretension")), self.pretension)):
             row_of = QHBoxLayout()
             for part in parts:
@@ -58,6 +62,7 @@ class ZeroPage(WizardPage):
             self.column.addLayout(row_of)
         self.result = note("")
         self.column.addWidget(self.result)
+        self.column.addStretch(1)
 
     @property
     def is_done(self) -> bool:
@@ -70,7 +75,7 @@ class ZeroPage(WizardPage):
             control.setEnabled(ready)
         zeros = draft.zeros if draft is not None else None
         for row in range(len(TENDONS)):
-            put(self.rows, row, 1, "" if zeros is None else f"{zeros.slack_mm[row]:+.2f} mm")
+            put(self.rows, row, 1, NONE if zeros is None else f"{zeros.slack_mm[row]:+.2f} mm")
         if draft is None or draft.found is None:
             tell(self.result, tr("Search the servos first."))
         elif not draft.assignments:
@@ -106,13 +111,19 @@ class SteeringPage(WizardPage):
     def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
         super().__init__(desk, picture)
         self.learn_button = button(tr("&Learn"), self._learn)
-        self.rows = table((tr("tendon"), tr("direction"), tr("way per mm")), len(TENDONS), tr("Steering directions"))
+        self.rows = table(
+            (tr("Tendon"), tr("Direction of the head"), tr("Way per mm of wire")), len(TENDONS), tr("Steering directions")
+        )
         for row, name in enumerate(TENDONS):
-            put(self.rows, row, 0, tr_text(name))
+            for column, text in enumerate((tr_text(name), NONE, NONE)):
+                put(self.rows, row, column, text)
         self.result = note("")
+        fit(self.rows)
+        self.main = self.learn_button
         self.column.addWidget(self.learn_button)
-        self.column.addWidget(self.rows, 1)
+        self.column.addWidget(self.rows)
         self.column.addWidget(self.result)
+        self.column.addStretch(1)
 
     @property
     def is_done(self) -> bool:

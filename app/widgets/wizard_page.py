@@ -22,8 +22,9 @@ from app.widgets.wizard_picture import Shape, WizardPicture
 from app.wizard_desk import WizardDesk
 from core.types import Image
 
-_TEXT_PX = 380
+_TEXT_PX = 400
 """A page's text is a little wider."""
+_HEAD_PX = 28
 
 
 class WizardPage(QWidget):
@@ -38,6 +39,8 @@ class WizardPage(QWidget):
         self.desk, self.picture = desk, picture
         self.still: Image | None = None
         """Shown instead of the living picture; None: that."""
+        self.main: QPushButton | None = None
+        """What the page is for; it stands out until that is done."""
         self.column = QVBoxLayout(self)
         self.column.setContentsMargins(0, 0, 0, 0)
         self.column.setSpacing(theme.GAP)
@@ -97,6 +100,15 @@ def button(text: str, slot: Callable[[], object], tip: str = "") -> QPushButton:
     return made
 
 
+def mark_main(which: QPushButton, is_main: bool) -> None:
+    """Whether a button is what comes next."""
+    name = "main_button" if is_main else ""
+    if which.objectName() != name:
+        which.setObjectName(name)
+        which.style().unpolish(which)
+        which.style().polish(which)
+
+
 def table(headings: Sequence[str], rows: int, name: str) -> QTableWidget:
     """An empty table of texts; the last column takes what room is left."""
     made = QTableWidget(rows, len(headings))
@@ -107,9 +119,19 @@ def table(headings: Sequence[str], rows: int, name: str) -> QTableWidget:
     made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
     made.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
     made.setTabKeyNavigation(False)
+    made.horizontalHeader().setFixedHeight(_HEAD_PX)
+    made.horizontalHeader().setHighlightSections(False)
+    made.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
     made.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
     made.horizontalHeader().setStretchLastSection(True)
     return made
+
+
+def fit(where: QTableWidget) -> None:
+    """As high as its rows, so that what follows stands beneath them."""
+    rows = where.rowCount() * where.verticalHeader().defaultSectionSize()
+    where.setFixedHeight(_HEAD_PX + rows + 2 * max(1, where.frameWidth()))
+    where.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
 
 def put(where: QTableWidget, row: int, column: int, text: str) -> None:

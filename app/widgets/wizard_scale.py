@@ -9,13 +9,16 @@ from PySide6.QtWidgets import QDoubleSpinBox, QFileDialog, QHBoxLayout, QLabel
 
 from app.board_print import print_board
 from app.language import mark, tr, tr_text
-from app.widgets.wizard_page import WizardPage, button, note, tell
+from app.widgets.wizard_page import WizardPage, button, mark_main, note, tell
 from app.widgets.wizard_picture import Cross, Line, Shape, WizardPicture
 from app.wizard_desk import WizardDesk
 from core.calibration.board import BoardSpec
 from core.calibration.lens import BoardView
 from core.errors import UserError
 from core.types import Image, Point
+
+_ENOUGH = 3
+"""Pictures of the board, in its middle and towards the corners."""
 
 
 class ScalePage(WizardPage):
@@ -37,6 +40,7 @@ class ScalePage(WizardPage):
         self.print_button = button(tr("&Print..."), self._print, tr("Save the board as PDF or PNG"))
         self.clicks_button = button(tr("Two clic&ks"), self._begin_clicks)
         self.clicks_button.setCheckable(True)
+        self.main = self.take_button
         self.count = QLabel()
         self.result = note("")
         self._view: BoardView | None = None
@@ -70,6 +74,9 @@ class ScalePage(WizardPage):
             control.setEnabled(draft is not None and not self.desk.is_busy)
         self.solve_button.setEnabled(self.solve_button.isEnabled() and views > 0)
         self.square.setEnabled(self.square.isEnabled() and views == 0)
+        self.main = self.solve_button if views >= _ENOUGH else self.take_button
+        for one in (self.take_button, self.solve_button):
+            mark_main(one, one is self.main and not self.is_done)
         self.count.setText(
             tr("1 picture of the board taken") if views == 1 else tr("{count} pictures of the board taken", count=views)
         )
@@ -134,7 +141,7 @@ class ScalePage(WizardPage):
     def _solve(self) -> None:
         draft = self.desk.draft
         if draft is not None:
-            self.desk.run("calculating", draft.solve_boards, lambda _given: self.leave())
+            self.desk.run(tr("calculating"), draft.solve_boards, lambda _given: self.leave())
 
     def _forget(self) -> None:
         if self.desk.draft is not None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QTableWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QHeaderView, QLabel, QTableWidget
 
 from app.language import mark, tr, tr_text
-from app.widgets.wizard_page import WizardPage, button, note, put, table, tell
+from app.widgets.wizard_page import WizardPage, button, fit, note, put, table, tell
 from app.widgets.wizard_picture import WizardPicture
 from app.wizard_desk import WizardDesk
 from core.calibration.identify import Assignment
@@ -30,6 +30,12 @@ _UP_OR_DOWN = mark(
     "One camera cannot tell up from down. Choose tendon up, wiggle it and look from the side: does the head rise when the wire is "
     "pulled? Without an answer the order of their ids counts, and the rig file says that it is assumed."
 )
+_MODEL_NAMES = {
+    1000: "XH430-W350", 1010: "XH430-W210", 1020: "XM430-W350", 1030: "XM430-W210", 1040: "XH430-V350", 1050: "XH430-V210",
+    1060: "XL430-W250", 1070: "XC430-W150", 1080: "XC430-W240", 1120: "XM540-W270", 1130: "XM540-W150",
+}  # fmt: skip
+"""As printed on the servo (Robotis e-Manual), by the number that it tells."""
+_ID_PX, _DIRECTION_PX = 66, 80
 _DIRECTIONS = (("+", 1), ("\N{MINUS SIGN}", -1))
 
 
@@ -38,8 +44,8 @@ class PortPage(WizardPage):
 
     name = mark("Port and servos")
     hint = mark(
-        "Where do the seven servos hang? Switch their 12 V on. Searching asks everybody on the line for his name; nothing moves. "
-        "Without servos the rig only looks."
+        "Which port are the seven servos connected to? Switch their 12 V supply on. Searching asks every servo on the line for its "
+        "number and model; nothing moves. Without servos the rig only looks."
     )
 
     def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
@@ -52,7 +58,8 @@ class PortPage(WizardPage):
         row.addWidget(self.ports, 1)
         row.addWidget(self.search_button)
         self.column.addLayout(row)
-        self.servos = table(("id", "model"), 0, tr("Servos found"))
+        self.servos = table((tr("ID"), tr("Model")), 0, tr("Servos found"))
+        self.main = self.search_button
         self.column.addWidget(self.servos, 1)
         self.result = note("")
         self.column.addWidget(self.result)
@@ -88,7 +95,8 @@ class PortPage(WizardPage):
         self.servos.setRowCount(len(servos))
         for row, servo in enumerate(servos):
             put(self.servos, row, 0, str(servo.id))
-            put(self.servos, row, 1, str(servo.model))
+            name = _MODEL_NAMES.get(servo.model)
+            put(self.servos, row, 1, f"{name}  ({servo.model})" if name is not None else str(servo.model))
         tell(self.result, "" if found is None else tr("{count} servos at {baud} baud.", count=len(servos), baud=found.baud))
 
     def _search(self) -> None:
@@ -120,13 +128,18 @@ class IdentifyPage(WizardPage):
 
     def __init__(self, desk: WizardDesk, picture: WizardPicture) -> None:
         super().__init__(desk, picture)
-        self.rows = table((tr("joint"), "id", tr("direction"), tr("seen")), len(JOINT_NAMES), tr("Joints and their servos"))
+        self.rows = table((tr("Joint"), tr("ID"), tr("Direction"), tr("Seen")), len(JOINT_NAMES), tr("Joints and their servos"))
         self.rows.verticalHeader().setDefaultSectionSize(30)
         self._ids: list[QComboBox] = []
         self._signs: list[QComboBox] = []
         self._fill(self.rows)
-        self.column.addWidget(self.rows, 1)
-        self.auto_button = button(tr("&Find by itself"), self._identify)
+        for place, width in ((1, _ID_PX), (2, _DIRECTION_PX)):
+            self.rows.horizontalHeader().setSectionResizeMode(place, QHeaderView.ResizeMode.Fixed)
+            self.rows.setColumnWidth(place, width)
+        fit(self.rows)
+        self.column.addWidget(self.rows)
+        self.auto_button = button(tr("&Find automatically"), self._identify)
+        self.main = self.auto_button
         self.wiggle_button = button(
             tr("&Wiggle the chosen"), self._wiggle, tr("Turn the servo of the chosen row both ways by 1.5 mm")
         )
@@ -139,6 +152,7 @@ class IdentifyPage(WizardPage):
             self.column.addLayout(row)
         self.result = note("")
         self.column.addWidget(self.result)
+        self.column.addStretch(1)
         self._shown: tuple[Assignment, ...] | None = None
         self._known_ids: tuple[int, ...] = ()
 
@@ -152,6 +166,10 @@ class IdentifyPage(WizardPage):
             ids, signs = QComboBox(), QComboBox()
             ids.setAccessibleName(tr("Servo of {joint}", joint=tr(_JOINT_TEXT[name])))
             signs.setAccessibleName(tr("Direction of {joint}", joint=tr(_JOINT_TEXT[name])))
+            signs.setToolTip(
+                tr("Which way the servo turns to pull the wire, or to go forward: + as it counts, \N{MINUS SIGN} against it")
+            )
+            ids.setToolTip(tr("Number of the servo on the bus"))
             for text, sign in _DIRECTIONS:
                 signs.addItem(text, sign)
             for control in (ids, signs):

@@ -247,16 +247,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/annotator_menus.py"/>
-        <source>&amp;File</source>
-        <translation>文件(&amp;F)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator_menus.py"/>
-        <source>&amp;View</source>
-        <translation>视图(&amp;V)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator_menus.py"/>
         <source>&amp;Edit</source>
         <translation>编辑(&amp;E)</translation>
     </message>
@@ -284,11 +274,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/annotator_menus.py"/>
         <source>&amp;Train on my annotations...</source>
         <translation>用我的标注训练(&amp;T)...</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator_menus.py"/>
-        <source>&amp;Quit</source>
-        <translation>退出(&amp;Q)</translation>
     </message>
     <message>
         <location filename="../../app/annotator_menus.py"/>
@@ -349,11 +334,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/annotator_menus.py"/>
         <source>&amp;Algorithm</source>
         <translation>算法(&amp;A)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator_menus.py"/>
-        <source>&amp;Full screen</source>
-        <translation>全屏(&amp;F)</translation>
     </message>
     <message>
         <location filename="../../app/annotator_menus.py"/>
@@ -431,24 +411,24 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>列表(&amp;T)</translation>
     </message>
     <message>
-        <location filename="../../app/annotator_window.py"/>
+        <location filename="../../app/annotator_panels.py"/>
         <source>Note on this image  (F2)</source>
         <translation>本图像的备注  (F2)</translation>
     </message>
     <message>
-        <location filename="../../app/annotator_window.py"/>
-        <source>Note</source>
-        <translation>备注</translation>
+        <location filename="../../app/annotator_panels.py"/>
+        <source>Angle to the vessel</source>
+        <translation>与血管的夹角</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator_panels.py"/>
+        <source>Images</source>
+        <translation>图像</translation>
     </message>
     <message>
         <location filename="../../app/annotator_window.py"/>
         <source>LumenPilot — annotate</source>
         <translation>LumenPilot — 标注</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator_window.py"/>
-        <source>F1  keys</source>
-        <translation>F1  按键</translation>
     </message>
     <message>
         <location filename="../../app/annotator_window.py"/>
@@ -494,16 +474,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/annotator_window.py"/>
         <source>image {place}</source>
         <translation>图像 {place}</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator_window.py"/>
-        <source>Angle to the vessel</source>
-        <translation>与血管的夹角</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator_window.py"/>
-        <source>Images</source>
-        <translation>图像</translation>
     </message>
     <message>
         <location filename="../../app/annotator_window.py"/>
@@ -1712,8 +1682,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>{name}: {files} are whole (SHA-256)</source>
-        <translation>{name}：{files} 完整（SHA-256）</translation>
+        <source>{name}: all {count} files are whole (SHA-256)</source>
+        <translation>{name}：全部 {count} 个文件完整（SHA-256）</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -2181,6 +2151,46 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>头端回直</translation>
     </message>
     <message>
+        <location filename="../../app/known_session.py"/>
+        <source>Note kept</source>
+        <translation>备注已保存</translation>
+    </message>
+    <message>
+        <location filename="../../app/known_session.py"/>
+        <source>there are pictures, but no rows: repair it with: session recover</source>
+        <translation>有图像但没有数据行：用 session recover 修复</translation>
+    </message>
+    <message>
+        <location filename="../../app/known_session.py"/>
+        <source>This session is still being recorded: what came later is not shown</source>
+        <translation>此会话仍在录制：之后的内容不显示</translation>
+    </message>
+    <message>
+        <location filename="../../app/known_session.py"/>
+        <source>{count} results of the replay cannot be read</source>
+        <translation>重新感知的 {count} 个结果无法读取</translation>
+    </message>
+    <message>
+        <location filename="../../app/known_session.py"/>
+        <source>{count} rows are missing between those that are there</source>
+        <translation>其间缺少 {count} 行</translation>
+    </message>
+    <message>
+        <location filename="../../app/known_session.py"/>
+        <source>{count} frames could not be recorded: the recorder was behind</source>
+        <translation>{count} 帧未能录制：录制器跟不上</translation>
+    </message>
+    <message>
+        <location filename="../../app/known_session.py"/>
+        <source>the session did not end properly; session recover makes a repaired copy</source>
+        <translation>会话没有正常结束；session recover 可生成修复的副本</translation>
+    </message>
+    <message>
+        <location filename="../../app/known_session.py"/>
+        <source>it is empty</source>
+        <translation>内容为空</translation>
+    </message>
+    <message>
         <location filename="../../app/language_menu.py"/>
         <source>The language changes at the next start of the program</source>
         <translation>语言将在下次启动程序后更改</translation>
@@ -2199,6 +2209,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/language_menu.py"/>
         <source>&amp;Language (中文)</source>
         <translation>语言(&amp;L) (Language)</translation>
+    </message>
+    <message>
+        <location filename="../../app/layout_keeper.py"/>
+        <source>&amp;View</source>
+        <translation>视图(&amp;V)</translation>
     </message>
     <message>
         <location filename="../../app/layout_keeper.py"/>
@@ -2446,24 +2461,64 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>手柄断开：{name}</translation>
     </message>
     <message>
-        <location filename="../../app/operator_panels.py"/>
-        <source>allowed {limit:g}°</source>
-        <translation>允许 {limit:g}°</translation>
+        <location filename="../../app/operator_menus.py"/>
+        <source>&amp;Robot</source>
+        <translation>机器人(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_menus.py"/>
+        <source>&amp;Snapshot</source>
+        <translation>截图(&amp;S)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_menus.py"/>
+        <source>&amp;Open pictures folder</source>
+        <translation>打开图片文件夹(&amp;O)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_menus.py"/>
+        <source>&amp;Record, or end the recording</source>
+        <translation>开始或结束录制(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_menus.py"/>
+        <source>Save the &amp;last seconds</source>
+        <translation>保存最近几秒(&amp;L)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_menus.py"/>
+        <source>S&amp;TOP</source>
+        <translation>停止(&amp;T)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_menus.py"/>
+        <source>&amp;Clear destination</source>
+        <translation>清除目标(&amp;C)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_menus.py"/>
+        <source>Start the &amp;rig again</source>
+        <translation>重新启动装置(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_menus.py"/>
+        <source>&amp;Tour</source>
+        <translation>导览(&amp;T)</translation>
     </message>
     <message>
         <location filename="../../app/operator_panels.py"/>
-        <source>allowed {limit:g} px</source>
-        <translation>允许 {limit:g} px</translation>
+        <source>No new picture for {seconds:.0f} s</source>
+        <translation>已 {seconds:.0f} 秒没有新图像</translation>
     </message>
     <message>
         <location filename="../../app/operator_panels.py"/>
-        <source>the pose is not steady yet</source>
-        <translation>位姿尚不稳定</translation>
+        <source>No new picture</source>
+        <translation>没有新图像</translation>
     </message>
     <message>
         <location filename="../../app/operator_panels.py"/>
-        <source>Distances</source>
-        <translation>距离</translation>
+        <source>The camera or the program is behind</source>
+        <translation>相机或程序跟不上</translation>
     </message>
     <message>
         <location filename="../../app/operator_panels.py"/>
@@ -2472,8 +2527,28 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/operator_panels.py"/>
-        <source>Pages</source>
-        <translation>页面</translation>
+        <source>the pose is not steady yet</source>
+        <translation>位姿尚不稳定</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_panels.py"/>
+        <source>Starting</source>
+        <translation>正在启动</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_panels.py"/>
+        <source>Starting: {what}</source>
+        <translation>正在启动：{what}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_panels.py"/>
+        <source>Opening camera and robot, loading the network</source>
+        <translation>正在打开相机和机器人，加载网络</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_panels.py"/>
+        <source>Check the camera; F5 starts the rig again</source>
+        <translation>检查相机；按 F5 重新启动装置</translation>
     </message>
     <message>
         <location filename="../../app/operator_panels.py"/>
@@ -2516,89 +2591,29 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>日志</translation>
     </message>
     <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>&amp;Robot</source>
-        <translation>机器人(&amp;R)</translation>
+        <location filename="../../app/operator_panels.py"/>
+        <source>Waiting for the first picture</source>
+        <translation>等待第一幅图像</translation>
     </message>
     <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>No new picture for {seconds:.0f} s</source>
-        <translation>已 {seconds:.0f} 秒没有新图像</translation>
+        <location filename="../../app/operator_panels.py"/>
+        <source>Recording is over</source>
+        <translation>回放结束</translation>
     </message>
     <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>&amp;Snapshot</source>
-        <translation>截图(&amp;S)</translation>
+        <location filename="../../app/operator_panels.py"/>
+        <source>F5 plays it again</source>
+        <translation>按 F5 重新播放</translation>
     </message>
     <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>&amp;Open pictures folder</source>
-        <translation>打开图片文件夹(&amp;O)</translation>
+        <location filename="../../app/operator_panels.py"/>
+        <source>Fault</source>
+        <translation>故障</translation>
     </message>
     <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>&amp;Record, or end the recording</source>
-        <translation>开始或结束录制(&amp;R)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Save the &amp;last seconds</source>
-        <translation>保存最近几秒(&amp;L)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>&amp;All overlays on or off</source>
-        <translation>显示或隐藏所有叠加层(&amp;A)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>&amp;Next page</source>
-        <translation>下一页(&amp;N)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>&amp;Previous page</source>
-        <translation>上一页(&amp;P)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>S&amp;TOP</source>
-        <translation>停止(&amp;T)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>&amp;Clear target</source>
-        <translation>清除目标(&amp;C)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Start the &amp;rig again</source>
-        <translation>重新启动装置(&amp;R)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Starting</source>
-        <translation>正在启动</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Starting: {what}</source>
-        <translation>正在启动：{what}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Opening camera and robot, loading the network</source>
-        <translation>正在打开相机和机器人，加载网络</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>No new picture</source>
-        <translation>没有新图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>The camera or the program is behind</source>
-        <translation>相机或程序跟不上</translation>
+        <location filename="../../app/operator_panels.py"/>
+        <source>The rig stopped</source>
+        <translation>装置已停止</translation>
     </message>
     <message>
         <location filename="../../app/operator_window.py"/>
@@ -2621,39 +2636,9 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>截图保存到 {folder}</translation>
     </message>
     <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>&amp;Tour</source>
-        <translation>导览(&amp;T)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Waiting for the first picture</source>
-        <translation>等待第一幅图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Check the camera; F5 starts the rig again</source>
-        <translation>检查相机；按 F5 重新启动装置</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Recording is over</source>
-        <translation>回放结束</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>F5 plays it again</source>
-        <translation>按 F5 重新播放</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Fault</source>
-        <translation>故障</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>The rig stopped</source>
-        <translation>装置已停止</translation>
+        <location filename="../../app/panel_layout.py"/>
+        <source>Pages</source>
+        <translation>页面</translation>
     </message>
     <message>
         <location filename="../../app/player_keeper.py"/>
@@ -2792,6 +2777,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/player_panels.py"/>
+        <source>Note at this time; Enter keeps it, Esc does not</source>
+        <translation>此刻的备注；Enter 保存，Esc 取消</translation>
+    </message>
+    <message>
+        <location filename="../../app/player_panels.py"/>
         <source>none was recorded</source>
         <translation>未录制</translation>
     </message>
@@ -2814,11 +2804,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/player_panels.py"/>
         <source>Go on with the arrow keys</source>
         <translation>用方向键继续</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_panels.py"/>
-        <source>Note at this time; Enter keeps it, Esc does not</source>
-        <translation>此刻的备注；Enter 保存，Esc 取消</translation>
     </message>
     <message>
         <location filename="../../app/player_panels.py"/>
@@ -2902,53 +2887,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/player_window.py"/>
-        <source>Note kept</source>
-        <translation>备注已保存</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_window.py"/>
         <source>N and P: {kind}</source>
         <translation>N 和 P：{kind}</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_window.py"/>
-        <source>there are pictures, but no rows: repair it with: session recover</source>
-        <translation>有图像但没有数据行：用 session recover 修复</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_window.py"/>
-        <source>it is empty</source>
-        <translation>内容为空</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_window.py"/>
-        <source>Nothing to play</source>
-        <translation>没有可播放的内容</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_window.py"/>
-        <source>{count} rows are missing between those that are there</source>
-        <translation>其间缺少 {count} 行</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_window.py"/>
-        <source>{count} frames could not be recorded: the recorder was behind</source>
-        <translation>{count} 帧未能录制：录制器跟不上</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_window.py"/>
-        <source>the session did not end properly; session recover makes a repaired copy</source>
-        <translation>会话没有正常结束；session recover 可生成修复的副本</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_window.py"/>
-        <source>This session is still being recorded: what came later is not shown</source>
-        <translation>此会话仍在录制：之后的内容不显示</translation>
-    </message>
-    <message>
-        <location filename="../../app/player_window.py"/>
-        <source>{count} results of the replay cannot be read</source>
-        <translation>重新感知的 {count} 个结果无法读取</translation>
     </message>
     <message>
         <location filename="../../app/player_window.py"/>
@@ -2969,6 +2909,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/player_window.py"/>
         <source>Playing ended</source>
         <translation>播放已结束</translation>
+    </message>
+    <message>
+        <location filename="../../app/player_window.py"/>
+        <source>Nothing to play</source>
+        <translation>没有可播放的内容</translation>
     </message>
     <message>
         <location filename="../../app/player_window.py"/>
@@ -3027,8 +2972,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/preflight_desk.py"/>
-        <source>, {warned} to know of</source>
-        <translation>，{warned} 项需留意</translation>
+        <source>, {warned} to note</source>
+        <translation>，{warned} 项须注意</translation>
     </message>
     <message>
         <location filename="../../app/preflight_desk.py"/>
@@ -3217,8 +3162,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/recovery_desk.py"/>
-        <source>{seconds:.1f} s are lost ({rows} rows, {pictures} pictures)</source>
-        <translation>丢失 {seconds:.1f} 秒（{rows} 行，{pictures} 张图像）</translation>
+        <source>{seconds:.1f} s are lost (rows: {rows}, pictures: {pictures})</source>
+        <translation>丢失 {seconds:.1f} s（{rows} 行，{pictures} 张图像）</translation>
     </message>
     <message>
         <location filename="../../app/recovery_desk.py"/>
@@ -3566,6 +3511,46 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>跳过(&amp;S)</translation>
     </message>
     <message>
+        <location filename="../../app/rig_wizard.py"/>
+        <source>done</source>
+        <translation>已完成</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard.py"/>
+        <source>this page</source>
+        <translation>本页</translation>
+    </message>
+    <message>
+        <location filename="../../app/scene_panels.py"/>
+        <source>allowed {limit:g}°</source>
+        <translation>允许 {limit:g}°</translation>
+    </message>
+    <message>
+        <location filename="../../app/scene_panels.py"/>
+        <source>allowed {limit:g} px</source>
+        <translation>允许 {limit:g} px</translation>
+    </message>
+    <message>
+        <location filename="../../app/scene_panels.py"/>
+        <source>Distances</source>
+        <translation>距离</translation>
+    </message>
+    <message>
+        <location filename="../../app/scene_view_menu.py"/>
+        <source>&amp;All overlays on or off</source>
+        <translation>显示或隐藏所有叠加层(&amp;A)</translation>
+    </message>
+    <message>
+        <location filename="../../app/scene_view_menu.py"/>
+        <source>&amp;Next page</source>
+        <translation>下一页(&amp;N)</translation>
+    </message>
+    <message>
+        <location filename="../../app/scene_view_menu.py"/>
+        <source>&amp;Previous page</source>
+        <translation>上一页(&amp;P)</translation>
+    </message>
+    <message>
         <location filename="../../app/servo_cells.py"/>
         <source>envelope {low_mm:g} to {high_mm:g} mm, slow within {margin:g} mm of its ends</source>
         <translation>行程范围 {low_mm:g} 至 {high_mm:g} mm，距末端 {margin:g} mm 内减速</translation>
@@ -3837,6 +3822,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/session_marks.py"/>
+        <source>Note</source>
+        <translation>备注</translation>
+    </message>
+    <message>
+        <location filename="../../app/session_marks.py"/>
         <source>Mode</source>
         <translation>模式</translation>
     </message>
@@ -3879,6 +3869,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/session_marks.py"/>
         <source>fault</source>
         <translation>故障</translation>
+    </message>
+    <message>
+        <location filename="../../app/settings_desk.py"/>
+        <source>&amp;File</source>
+        <translation>文件(&amp;F)</translation>
     </message>
     <message>
         <location filename="../../app/settings_desk.py"/>
@@ -4655,6 +4650,21 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/training_dialog.py"/>
+        <source>Letters, digits, - and _; the Model menu lists it under this name</source>
+        <translation>字母、数字、- 和 _；“模型”菜单以此名列出</translation>
+    </message>
+    <message>
+        <location filename="../../app/training_dialog.py"/>
+        <source>What this model can do is kept as far as possible, and the new look is learnt on top</source>
+        <translation>尽量保留该模型已有的能力，并在此基础上学习新的外观</translation>
+    </message>
+    <message>
+        <location filename="../../app/training_dialog.py"/>
+        <source>More steps learn more and take longer: on two processor cores a step takes about a second</source>
+        <translation>步数越多学得越多，也越久：两个处理器核心上每步约一秒</translation>
+    </message>
+    <message>
+        <location filename="../../app/training_dialog.py"/>
         <source>&amp;Train</source>
         <translation>训练(&amp;T)</translation>
     </message>
@@ -4677,6 +4687,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/training_dialog.py"/>
         <source>for</source>
         <translation>训练</translation>
+    </message>
+    <message>
+        <location filename="../../app/training_dialog.py"/>
+        <source>&amp;Hide, go on training</source>
+        <translation>隐藏并继续训练(&amp;H)</translation>
     </message>
     <message>
         <location filename="../../app/training_job.py"/>
@@ -5040,8 +5055,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/before_after.py"/>
-        <source>not yet</source>
-        <translation>还没有</translation>
+        <source>shown when the training has begun</source>
+        <translation>训练开始后显示</translation>
     </message>
     <message>
         <location filename="../../app/widgets/before_after.py"/>
@@ -5890,13 +5905,18 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/preflight_list.py"/>
+        <source>First the checks must be done</source>
+        <translation>须先完成检查</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/preflight_list.py"/>
         <source>good</source>
         <translation>正常</translation>
     </message>
     <message>
         <location filename="../../app/widgets/preflight_list.py"/>
-        <source>to know</source>
-        <translation>留意</translation>
+        <source>notice</source>
+        <translation>注意</translation>
     </message>
     <message>
         <location filename="../../app/widgets/preflight_list.py"/>
@@ -5905,8 +5925,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/preflight_list.py"/>
-        <source>Nothing moves by this. Some seconds.</source>
-        <translation>不会引起运动。需几秒。</translation>
+        <source>The checks take some seconds. Nothing moves by them.</source>
+        <translation>检查需要几秒，不会有任何运动。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/preflight_list.py"/>
@@ -5925,7 +5945,22 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/preflight_list.py"/>
+        <source>There is nothing to arm: no servos are open</source>
+        <translation>没有可待命的：舵机未打开</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/preflight_list.py"/>
+        <source>First mend what is NOT READY, and check again</source>
+        <translation>请先解决“未就绪”的项目，再次检查</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/preflight_list.py"/>
         <source>Before driving</source>
+        <translation>驾驶前检查</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/preflight_list.py"/>
+        <source>Checks before driving</source>
         <translation>驾驶前检查</translation>
     </message>
     <message>
@@ -5942,6 +5977,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/preflight_list.py"/>
         <source>: too long ago</source>
         <translation>：时间过久</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/preflight_list.py"/>
+        <source>Check &amp;now</source>
+        <translation>立即检查(&amp;N)</translation>
     </message>
     <message>
         <location filename="../../app/widgets/profile_row.py"/>
@@ -6190,11 +6230,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/setting_field.py"/>
-        <source>automatic</source>
-        <translation>自动</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/setting_field.py"/>
         <source>not set</source>
         <translation>未设置</translation>
     </message>
@@ -6439,6 +6474,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/training_curves.py"/>
+        <source>Left: the loss, which training makes small. Right: Dice, the agreement of what is found with what was drawn by hand, 1 at best. What counts are the held-out pictures: when they get no better any more, it has learnt enough.</source>
+        <translation>左：损失，训练使其变小。右：Dice，即检出与手绘的一致程度，最好为 1。以留出图像为准：不再变好时，就学够了。</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/training_curves.py"/>
         <source>loss</source>
         <translation>损失</translation>
     </message>
@@ -6446,6 +6486,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/training_curves.py"/>
         <source>step</source>
         <translation>步</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/training_curves.py"/>
+        <source>{name}, learning</source>
+        <translation>{name}，学习</translation>
     </message>
     <message>
         <location filename="../../app/widgets/training_curves.py"/>
@@ -6489,18 +6534,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_camera.py"/>
-        <source>&amp;Name</source>
-        <translation>名称(&amp;N)</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/wizard_camera.py"/>
-        <source>Real camera</source>
-        <translation>真实相机</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/wizard_camera.py"/>
-        <source>&amp;Open</source>
-        <translation>打开(&amp;O)</translation>
+        <source>&amp;Open the camera</source>
+        <translation>打开相机(&amp;O)</translation>
     </message>
     <message>
         <location filename="../../app/widgets/wizard_camera.py"/>
@@ -6539,6 +6574,21 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_camera.py"/>
+        <source>&amp;Name</source>
+        <translation>名称(&amp;N)</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_camera.py"/>
+        <source>&amp;Picture</source>
+        <translation>图像(&amp;P)</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_camera.py"/>
+        <source>Next goes on when the camera is open.</source>
+        <translation>打开相机后才能进入下一项。</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_camera.py"/>
         <source>There is a rig {name}: saving replaces it, and keeps the older one beside it.</source>
         <translation>已有装置 {name}：保存会替换它，旧的保留在旁边。</translation>
     </message>
@@ -6549,8 +6599,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
-        <source>Each wire is let go by 1.25 mm and then pulled in steps of 0.25 mm until the head follows, 4 mm and 300 mA at most; there it is left, taut and without tension: zero. Wires that the camera cannot judge are set by eye.</source>
-        <translation>每根驱动丝先放松 1.25 mm，再以 0.25 mm 为步拉紧，直到头端跟随，最多 4 mm 和 300 mA；停在绷直而无张力处：即零位。相机无法判断的驱动丝由目测设定。</translation>
+        <source>Each wire is loosened by 1.25 mm and then pulled in steps of 0.25 mm until the head follows, 4 mm and 300 mA at most; there it is left, taut and without tension: zero. A wire that the camera cannot judge is set by eye: choose it, and tighten or loosen it.</source>
+        <translation>每根驱动丝先放松 1.25 mm，再以 0.25 mm 的步长拉紧，直到头端跟随，最多 4 mm 和 300 mA；停在绷直而无张力处：零位。相机无法判断的驱动丝用目测设定：选中它，拉紧或放松。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
@@ -6564,7 +6614,7 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
-        <source>&amp;Find by itself</source>
+        <source>&amp;Find automatically</source>
         <translation>自动寻找(&amp;F)</translation>
     </message>
     <message>
@@ -6579,7 +6629,7 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
-        <source>&amp;Let go {step:g} mm</source>
+        <source>&amp;Loosen {step:g} mm</source>
         <translation>放松 {step:g} mm(&amp;L)</translation>
     </message>
     <message>
@@ -6619,12 +6669,12 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
-        <source>tendon</source>
+        <source>Tendon</source>
         <translation>驱动丝</translation>
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
-        <source>was slack by</source>
+        <source>Was slack by</source>
         <translation>原松弛量</translation>
     </message>
     <message>
@@ -6644,13 +6694,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
-        <source>direction</source>
-        <translation>方向</translation>
+        <source>Direction of the head</source>
+        <translation>头端方向</translation>
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
-        <source>way per mm</source>
-        <translation>每 mm 位移</translation>
+        <source>Way per mm of wire</source>
+        <translation>每 mm 驱动丝的位移</translation>
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
@@ -6774,6 +6824,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_scale.py"/>
+        <source>calculating</source>
+        <translation>正在计算</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_scale.py"/>
         <source>{path}: print it on {paper} at 100 %, and measure its line of 100 mm</source>
         <translation>{path}：按 100 % 打印在 {paper} 上，并测量其 100 mm 线</translation>
     </message>
@@ -6839,8 +6894,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_servos.py"/>
-        <source>Where do the seven servos hang? Switch their 12 V on. Searching asks everybody on the line for his name; nothing moves. Without servos the rig only looks.</source>
-        <translation>七个舵机接在哪里？请接通其 12 V 电源。搜索会询问线上每个舵机的名字；不会引起运动。没有舵机的装置只观察。</translation>
+        <source>Which port are the seven servos connected to? Switch their 12 V supply on. Searching asks every servo on the line for its number and model; nothing moves. Without servos the rig only looks.</source>
+        <translation>七个舵机接在哪个端口？请接通它们的 12 V 电源。搜索会询问线上每个舵机的编号和型号，不会有任何运动。没有舵机时，装置只观察。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/wizard_servos.py"/>
@@ -6929,6 +6984,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_servos.py"/>
+        <source>ID</source>
+        <translation>ID</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_servos.py"/>
+        <source>Model</source>
+        <translation>模型</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_servos.py"/>
         <source>the twin's own servos</source>
         <translation>数字孪生自带的舵机</translation>
     </message>
@@ -6944,12 +7009,12 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/wizard_servos.py"/>
-        <source>joint</source>
-        <translation>关节</translation>
+        <source>Direction</source>
+        <translation>方向</translation>
     </message>
     <message>
         <location filename="../../app/widgets/wizard_servos.py"/>
-        <source>seen</source>
+        <source>Seen</source>
         <translation>所见</translation>
     </message>
     <message>
@@ -6961,6 +7026,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/wizard_servos.py"/>
         <source>Direction of {joint}</source>
         <translation>{joint}的方向</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_servos.py"/>
+        <source>Which way the servo turns to pull the wire, or to go forward: + as it counts, − against it</source>
+        <translation>拉紧驱动丝或前进时舵机的转向：+ 为其计数方向，− 为相反方向</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_servos.py"/>
+        <source>Number of the servo on the bus</source>
+        <translation>舵机在总线上的编号</translation>
     </message>
     <message>
         <location filename="../../app/widgets/wizard_servos.py"/>
@@ -6996,6 +7071,21 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/wizard_summary.py"/>
         <source>Zero is lost whenever the servos are switched off: zero them again then, with slack wires.</source>
         <translation>舵机断电后零位总会丢失：届时请在驱动丝松弛时重新归零。</translation>
+    </message>
+    <message>
+        <location filename="../../app/window_frame.py"/>
+        <source>F1  keys</source>
+        <translation>F1  按键</translation>
+    </message>
+    <message>
+        <location filename="../../app/window_frame.py"/>
+        <source>&amp;Full screen</source>
+        <translation>全屏(&amp;F)</translation>
+    </message>
+    <message>
+        <location filename="../../app/window_frame.py"/>
+        <source>&amp;Quit</source>
+        <translation>退出(&amp;Q)</translation>
     </message>
     <message>
         <location filename="../../app/wizard_desk.py"/>
@@ -8524,8 +8614,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>servos: real ones, on servos.port</source>
-        <translation>servos：真实舵机，接在 servos.port</translation>
+        <source>what moves; servos = real ones, see section Servos</source>
+        <translation>由什么来运动；servos = 真实舵机，见“舵机”一节</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8544,8 +8634,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>rig file (main.py rig list) whose calibration is used; None: not calibrated</source>
-        <translation>使用其标定的装置文件（main.py rig list）；未设置：未标定</translation>
+        <source>rig file, made by the rig wizard, whose calibration is used; empty: not calibrated</source>
+        <translation>装置向导生成的装置文件，使用其标定；留空：未标定</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8574,8 +8664,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>RealSense: its serial number; None: the only one there is</source>
-        <translation>RealSense：其序列号；未设置：唯一的那一台</translation>
+        <source>RealSense: its serial number; empty: the only one there is</source>
+        <translation>RealSense：其序列号；留空：唯一的那一台</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8584,8 +8674,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>webcam: its stable path in /dev/v4l/by-id, or its number; None: the first one</source>
-        <translation>网络摄像头：/dev/v4l/by-id 中的固定路径或编号；未设置：第一台</translation>
+        <source>webcam: its stable path in /dev/v4l/by-id, or its number; empty: the first one</source>
+        <translation>网络摄像头：/dev/v4l/by-id 中的固定路径或编号；留空：第一台</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8619,8 +8709,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>None: automatic, but never at the cost of frames</source>
-        <translation>未设置：自动，但绝不以丢帧为代价</translation>
+        <source>empty: automatic, but never at the cost of frames</source>
+        <translation>留空：自动，但绝不以丢帧为代价</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8629,8 +8719,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>in the camera's own steps; None: as it is</source>
-        <translation>以相机自己的步长计；未设置：保持原样</translation>
+        <source>in the camera's own steps; empty: as it is</source>
+        <translation>以相机自己的步长计；留空：保持原样</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8639,8 +8729,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>colour temperature; None: automatic</source>
-        <translation>色温；未设置：自动</translation>
+        <source>colour temperature; empty: automatic</source>
+        <translation>色温；留空：自动</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8669,8 +8759,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>The bench twin (hardware/twin).</source>
-        <translation>数字孪生台架（hardware/twin）。</translation>
+        <source>The bench twin: a simulated robot, phantom and camera.</source>
+        <translation>数字孪生台架：仿真的机器人、体模和相机。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8734,8 +8824,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>ids of its servos in the order of the joints, minus: it turns the other way; None: as servos.joints says</source>
-        <translation>按关节顺序列出舵机 id，负号表示反向；未设置：同 servos.joints</translation>
+        <source>ids of its servos in the order of the joints, minus: it turns the other way; empty: as servos.joints says</source>
+        <translation>按关节顺序列出舵机 id，负号表示反向；留空：同 servos.joints</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8784,13 +8874,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>The network and its thresholds (METHOD section 1).</source>
-        <translation>网络及其阈值（方法第 1 节）。</translation>
-    </message>
-    <message>
-        <location filename="../../app/core_texts.py"/>
-        <source>Model</source>
-        <translation>模型</translation>
+        <source>The network and its thresholds.</source>
+        <translation>网络及其阈值。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8869,8 +8954,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>Mask cleaning and thinning (METHOD section 2).</source>
-        <translation>掩膜清理与细化（方法第 2 节）。</translation>
+        <source>Mask cleaning and thinning.</source>
+        <translation>掩膜清理与细化。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8949,8 +9034,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>Gap repair of the robot's skeleton (METHOD section 3).</source>
-        <translation>机器人骨架的断点修复（方法第 3 节）。</translation>
+        <source>Gap repair of the robot's skeleton.</source>
+        <translation>机器人骨架的断点修复。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8989,8 +9074,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>Choice of the robot's path among candidates (METHOD section 4).</source>
-        <translation>在候选中选择机器人路径（方法第 4 节）。</translation>
+        <source>Choice of the robot's path among candidates.</source>
+        <translation>在候选中选择机器人路径。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9144,8 +9229,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>Line fits (METHOD section 5).</source>
-        <translation>直线拟合（方法第 5 节）。</translation>
+        <source>Line fits.</source>
+        <translation>直线拟合。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9189,13 +9274,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>Pose state thresholds (METHOD section 6); hysteresis acts in a stream only.</source>
-        <translation>位姿状态阈值（方法第 6 节）；滞回只在连续图像中起作用。</translation>
+        <source>Pose state thresholds; hysteresis acts in a stream only.</source>
+        <translation>位姿状态阈值；滞回只在连续图像中起作用。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>d allow</source>
-        <translation>允许的 d</translation>
+        <source>Allowed distance</source>
+        <translation>允许的距离</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9204,8 +9289,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>θ allow</source>
-        <translation>允许的 θ</translation>
+        <source>Allowed angle</source>
+        <translation>允许的夹角</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9214,13 +9299,18 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>Hysteresis</source>
-        <translation>滞回</translation>
+        <source>Hysteresis, distance</source>
+        <translation>滞回，距离</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
         <source>so much farther before a state is left again</source>
         <translation>再远这么多才离开某个状态</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Hysteresis, angle</source>
+        <translation>滞回，角度</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9804,8 +9894,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>serial device; None: the twin's own pseudo-terminal</source>
-        <translation>串口设备；未设置：孪生自带的伪终端</translation>
+        <source>serial device; empty: the twin's own pseudo-terminal</source>
+        <translation>串口设备；留空：孪生自带的伪终端</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9919,11 +10009,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>ID</source>
-        <translation>ID</translation>
-    </message>
-    <message>
-        <location filename="../../app/core_texts.py"/>
         <source>on the bus</source>
         <translation>在总线上</translation>
     </message>
@@ -10024,12 +10109,12 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>Joint delivery_1</source>
+        <source>Joint delivery 1</source>
         <translation>关节：鞘管 1</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>Joint delivery_2</source>
+        <source>Joint delivery 2</source>
         <translation>关节：鞘管 2</translation>
     </message>
     <message>
@@ -10394,8 +10479,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>stable path in /dev/serial/by-id; None: no pedal</source>
-        <translation>/dev/serial/by-id 中的固定路径；未设置：没有脚踏板</translation>
+        <source>stable path in /dev/serial/by-id; empty: no pedal</source>
+        <translation>/dev/serial/by-id 中的固定路径；留空：没有脚踏板</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -10454,8 +10539,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>path in /dev/input; None: the first gamepad that is plugged in</source>
-        <translation>/dev/input 中的路径；未设置：第一个插入的手柄</translation>
+        <source>path in /dev/input; empty: the first gamepad that is plugged in</source>
+        <translation>/dev/input 中的路径；留空：第一个插入的手柄</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -10514,8 +10599,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>where snapshots go; None: LumenPilot in Pictures</source>
-        <translation>截图保存的位置；未设置：“图片”中的 LumenPilot</translation>
+        <source>where snapshots go; empty: LumenPilot in Pictures</source>
+        <translation>截图保存的位置；留空：“图片”中的 LumenPilot</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -10529,8 +10614,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>where sessions go; None: LumenPilot in Videos</source>
-        <translation>会话保存的位置；未设置：“视频”中的 LumenPilot</translation>
+        <source>where sessions go; empty: LumenPilot in Videos</source>
+        <translation>会话保存的位置；留空：“视频”中的 LumenPilot</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

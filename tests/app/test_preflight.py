@@ -60,7 +60,7 @@ def test_arming_waits_for_the_checks_and_then_is_granted_for_some_minutes(qtbot:
     assert desk.preflight.is_running
     assert "some seconds" in bench.asked[0]
     done(desk, qtbot)
-    assert desk.preflight.headline == "Ready: 3 of 4 checks good, 1 to know of"
+    assert desk.preflight.headline == "Ready: 3 of 4 checks good, 1 to note"
     assert desk.may_take(Step.ARM)
     bench.now_s += KEPT_S - 1.0
     assert desk.may_take(Step.ARM)

@@ -65,7 +65,7 @@ def test_a_cut_session_is_offered_with_its_loss_and_recovered_into_a_copy(
     desk.look()
     qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
     # 12 frames 0.1 s apart, one row gone: its picture is there, but nobody knows what it showed
-    assert "0.1 s are lost (1 rows, 0 pictures)" in strip.text
+    assert "0.1 s are lost (rows: 1, pictures: 0)" in strip.text
     assert session.name in strip.text
     strip.answers["Recover"].click()
     qtbot.waitUntil(lambda: bool(copies), timeout=LONG_MS)
@@ -163,5 +163,5 @@ def test_a_damaged_list_of_declined_ones_declines_nothing(text: str, tmp_path: P
 
 
 def test_a_loss_in_words() -> None:
-    assert loss_words({"seconds": 0.2, "rows": 1, "pictures": 6}) == "0.2 s are lost (1 rows, 6 pictures)"
+    assert loss_words({"seconds": 0.2, "rows": 1, "pictures": 6}) == "0.2 s are lost (rows: 1, pictures: 6)"
     assert loss_words({"seconds": 0.0, "rows": 0, "pictures": 0}) == "nothing of it is lost"

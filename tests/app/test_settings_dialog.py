@@ -68,9 +68,9 @@ def test_every_section_has_its_page_with_every_setting(dialog: SettingsDialog) -
 def test_a_field_shows_unit_default_range_and_meaning(dialog: SettingsDialog) -> None:
     shown = field(dialog, D_ALLOW)
     texts = " ".join(label.text() for label in shown.findChildren(type(shown._error))).replace("\N{NO-BREAK SPACE}", " ")
-    for words in ("d allow", "px", "Default 6 px", "above 0 and at most 200 px", "Distance of head and tail"):
+    for words in ("Allowed distance", "px", "Default 6 px", "above 0 and at most 200 px", "Distance of head and tail"):
         assert words in texts
-    assert shown.editor.accessibleName() == "d allow, px"
+    assert shown.editor.accessibleName() == "Allowed distance, px"
     assert shown.toolTip() == D_ALLOW
 
 

@@ -72,7 +72,7 @@ def test_sections_are_a_tree_with_the_joints_by_name() -> None:
     titles = {section.key: section.title for section in schema().walk()}
     assert titles["perception.pose"] == "Pose state"
     assert titles["servos.joints.0"] == "Joint right"
-    assert titles["servos.joints.6"] == "Joint delivery_2"
+    assert titles["servos.joints.6"] == "Joint delivery 2"
 
 
 def test_values_at_dotted_paths() -> None:
