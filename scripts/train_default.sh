@@ -25,7 +25,7 @@ $python main.py train "${sets[@]}" --init "$out/stage4" "${larger[@]}" --rate 4.
 $python main.py train "${sets[@]}" --second-look --init "$out/stage5" --batch 24 --rate 5e-3 --steps 6000 --seed 21 --out "$out/near1"
 # And on frames that neither look has seen, half of the time on what both still miss or invent there.
 $python main.py train --data "$out/frames3" --look-share 0.35 --second-look --init "$out/near1" --focus 0.5 --batch 24 --rate 4e-3 \
-    --steps 2800 --seed 22 --out "$out/default"
+    --steps 2800 --stop-after 2000 --seed 22 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 480 --seed 950000 --workers 2
 $python main.py calibrate "$out/calibration" --model "$out/default"
