@@ -64,24 +64,28 @@ class Classroom:
             steps = {"step": self.steps_before + now.step, "steps": self.steps_total}
             self.teller.tell(asdict(now) | steps | {"left_s": left_s})
 
-        def save(network: DualUNet, step: int, *, whole: bool) -> None:
-            if held_out is not None:
-                held_out.look(network, step)
+        def keep(network: DualUNet, step: int, *, whole: bool) -> None:
             figures = self.watch.figures if held_out is not None else {}
             lesson.save(network, self.out, self.notes | {"plan": plan.to_json(), "steps_done": step}, figures, whole=whole)
+
+        def look_and_keep(network: DualUNet, step: int) -> None:
+            if held_out is not None:
+                held_out.look(network, step)
+            keep(network, step, whole=False)
 
         network, done = train(
             lesson.network,
             crops,
             plan,
             on_progress=report,
-            on_checkpoint=lambda average, step: save(average, step, whole=False),
+            on_checkpoint=look_and_keep,
             # a window that has gone can no longer ask for the end
             should_stop=lambda: self.interrupt.asked or (self.teller is not None and not self.teller.is_heard),
             report_every=50 if self.teller is None else _TOLD_EVERY,
             checkpoint_every=1000 if not self.watch.is_on else max(_TOLD_EVERY, plan.steps // _LOOKS),
         )
-        save(network, done, whole=True)
+        look_and_keep(network, done)  # at once: hours of learning must not hang on the eight-bit copy, which takes a while
+        keep(network, done, whole=True)
         self.steps_before += done
         return done
 

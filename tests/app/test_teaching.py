@@ -1,0 +1,58 @@
+"""A lesson is kept as soon as it is learnt."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from rich.progress import Progress
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from app.learning_commands import HeldOutWatch, Interrupt
+from app.teaching import Classroom
+from core.learning.training import TrainingPlan
+from core.perception.unet import DualUNet, UNetShape
+
+_STEPS = 3
+
+
+class _Crops(Dataset[tuple[Tensor, Tensor]]):
+    def __len__(self) -> int:
+        return _STEPS
+
+    def __getitem__(self, index: int) -> tuple[Tensor, Tensor]:
+        if index >= _STEPS:
+            raise IndexError
+        return torch.zeros(3, 64, 64, dtype=torch.uint8), torch.zeros(2, 64, 64, dtype=torch.uint8)
+
+
+class _Lesson:
+    """Remembers what was to be kept; the last, whole copy breaks down."""
+
+    def __init__(self) -> None:
+        self.network = DualUNet(UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2))
+        self.kept: list[int] = []
+
+    def sides(self, crop: tuple[int, int]) -> tuple[int, int]:
+        return crop
+
+    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> _Crops:
+        return _Crops()
+
+    def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
+        if whole:
+            raise MemoryError("no room for the eight-bit copy")
+        self.kept.append(training["steps_done"])
+
+
+def test_what_was_learnt_is_kept_before_the_eight_bit_copy_is_made(tmp_path: Path) -> None:
+    lesson = _Lesson()
+    watch = HeldOutWatch(None, tmp_path / "out", None, lambda _: None)
+    with Progress(disable=True) as bar:
+        room = Classroom(tmp_path / "out", {}, lambda _: None, None, bar, Interrupt(), watch)
+        with pytest.raises(MemoryError):
+            room.teach(lesson, TrainingPlan(steps=_STEPS, batch=1, crop=(64, 64), workers=0, warmup_steps=1))
+    assert lesson.kept == [_STEPS]
