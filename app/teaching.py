@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 _TOLD_EVERY = 2
 """Steps between two lines for another program: a step takes half a second and more."""
+_MAY_BE_LOST = 20
+"""Steps that may be lost when the last, whole copy of the network cannot be made."""
 _LOOKS = 10
 """How often held-out frames are looked at during a training."""
 _SECOND_SHARE, _SECOND_BATCH = 0.3, 24
@@ -84,7 +86,10 @@ class Classroom:
             report_every=50 if self.teller is None else _TOLD_EVERY,
             checkpoint_every=1000 if not self.watch.is_on else max(_TOLD_EVERY, plan.steps // _LOOKS),
         )
-        look_and_keep(network, done)  # at once: hours of learning must not hang on the eight-bit copy, which takes a while
+        if done > _MAY_BE_LOST:  # at once: hours of learning must not hang on the eight-bit copy, which takes a while
+            keep(network, done, whole=False)
+        if held_out is not None:
+            held_out.look(network, done)
         keep(network, done, whole=True)
         self.steps_before += done
         return done

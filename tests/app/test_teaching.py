@@ -16,7 +16,7 @@ from app.teaching import Classroom
 from core.learning.training import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
 
-_STEPS = 3
+_STEPS = 21
 
 
 class _Crops(Dataset[tuple[Tensor, Tensor]]):
