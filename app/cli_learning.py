@@ -47,7 +47,7 @@ def train(
     crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 256,
     look_share: Annotated[float, typer.Option(min=0, max=1, help="share of the crops whose look is changed at random")] = 1.0,
     focus: Annotated[
-        float, typer.Option(min=0, max=0.9, help="share of the crops from frames that the --init model finds hard")
+        float, typer.Option(min=0, max=0.9, help="share of the crops that show what the --init model finds hard")
     ] = 0.0,
     base: Annotated[
         int | None, typer.Option(min=4, max=128, help="plain U-Net of this base width instead of the folded one")

@@ -70,10 +70,10 @@ class Classroom:
             figures = self.watch.figures if held_out is not None else {}
             lesson.save(network, self.out, self.notes | {"plan": plan.to_json(), "steps_done": step}, figures, whole=whole)
 
-        def look_and_keep(network: DualUNet, step: int) -> None:
+        def look_and_keep(network: DualUNet, step: int, *, whole: bool = False) -> None:
             if held_out is not None:
                 held_out.look(network, step)
-            keep(network, step, whole=False)
+            keep(network, step, whole=whole)
 
         network, done = train(
             lesson.network,
@@ -88,9 +88,7 @@ class Classroom:
         )
         if done > _MAY_BE_LOST:  # at once: hours of learning must not hang on the eight-bit copy, which takes a while
             keep(network, done, whole=False)
-        if held_out is not None:
-            held_out.look(network, done)
-        keep(network, done, whole=True)
+        look_and_keep(network, done, whole=True)
         self.steps_before += done
         return done
 

@@ -14,6 +14,7 @@ from app import theme
 from app.heartbeat import Heartbeat
 from app.language import tr
 from app.menus import MenuEntry, action_of, add_menu
+from app.widgets.enter_key import takes_enter
 
 _FULL_SCREEN_KEY = "F11"
 _HINT_MARGIN_PX, _HINT_DOWN_PX = 14, 5
@@ -67,10 +68,7 @@ class WindowFrame(QMainWindow):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Enter presses the button that has the focus: Space, which does it elsewhere, has another use here."""
-        button = self.focusWidget()
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and isinstance(button, QAbstractButton):
-            if not event.isAutoRepeat():
-                button.click()
+        if isinstance(self.focusWidget(), QAbstractButton) and takes_enter(self, event):
             return
         super().keyPressEvent(event)
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible
@@ -40,27 +38,15 @@ from app.wizard_desk import WizardDesk
 from core.config import Config, load_config
 from core.control.drive_view import DriveView
 from core.profiles import Profiles
-from core.types import Frame
 from hardware.calibration_bench import CalibrationBench
 from hardware.rig_search import Found, FoundCamera
 from hardware.servos.search import FoundServo, FoundServos
 from tests.app.fakes import make_scene, until
 from tests.app.test_preflight import BAD, GOOD, done, says
+from tests.app.test_rig_wizard import StillCamera
 
 Key = Qt.Key
 IDLE = DriveView(0.0)
-
-
-class StillCamera:
-    name, is_live = "still camera", False
-
-    def open(self) -> None: ...
-
-    def read(self, timeout_s: float) -> Frame | None:
-        time.sleep(0.01)
-        return Frame(0, time.monotonic(), np.full((480, 640, 3), 90, np.uint8))
-
-    def close(self) -> None: ...
 
 
 @pytest.fixture
