@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+
 from PySide6.QtCore import QObject, QTimer
 
 from app.deadman_key import REPEAT_MS
@@ -10,12 +11,16 @@ from app.next_step import Step
 from app.operator_window import OperatorWindow
 from core.control.hand import AT_REST, Jog
 from core.control.modes import DRIVING_MODES, Mode
+from core.control.pursuit import look_ahead
+from core.perception.route import plan_route
+from core.policy_config import PursuitConfig
 from core.types import Point, Scene
 
 _MOVE_S = 1.5
 _MOVES = (Jog(bend=0.4, advance=0.8), Jog(bend=-0.6, advance=0.6), Jog(bend=0.2, advance=-1.0), AT_REST)
 _ASK_EVERY_S = 0.5
 _LEAST_WAY_PX = 60.0
+_LOOK_AHEAD = PursuitConfig()
 
 
 class ScriptedOperator(QObject):
@@ -69,11 +74,14 @@ class ScriptedOperator(QObject):
 
 
 def _far_ahead(scene: Scene) -> Point | None:
-    """The end of the vessel that is farthest from the head, in source pixels; None when the way there is short."""
+    """The end of the vessel with the longest way that begins ahead of the head, in source pixels; None when no way is long."""
     if scene.path is None or scene.vessel_graph is None:
         return None
-    away_px = np.linalg.norm(scene.vessel_graph.nodes - np.array(scene.path.head), axis=1)
-    away_px[np.linalg.norm(scene.vessel_graph.nodes - np.array(scene.path.tail), axis=1) < away_px] = 0.0
-    place = int(np.argmax(away_px))
-    x, y = scene.vessel_graph.nodes[place]
-    return scene.to_source((float(x), float(y))) if away_px[place] > _LEAST_WAY_PX else None
+    best_px, best = _LEAST_WAY_PX, None
+    for x, y in scene.vessel_graph.nodes.tolist():
+        route = plan_route(scene.vessel_graph, scene.path.head, (x, y))
+        if route is not None and route.length_px > best_px:
+            way = look_ahead(replace(scene, route=route), _LOOK_AHEAD.look_ahead_px, _LOOK_AHEAD)
+            if way is not None and not way.behind:
+                best_px, best = route.length_px, scene.to_source((x, y))
+    return best

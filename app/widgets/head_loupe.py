@@ -11,7 +11,8 @@ from PySide6.QtWidgets import QWidget
 from app import theme
 from app.language import tr
 from app.palette import ON_PICTURE
-from app.widgets.overlays import OverlayItem
+from app.widgets.marks_label import MarksLabel
+from app.widgets.overlays import Marks
 from core.types import Image, Point, Scene
 
 _SPAN_PX = 110.0
@@ -27,7 +28,7 @@ class HeadLoupe(QWidget):
     It stays in its corner as long as the head is elsewhere, and moves to the opposite side when the head comes near.
     """
 
-    def __init__(self, parent: QWidget, marks: OverlayItem) -> None:
+    def __init__(self, parent: QWidget, marks: Marks) -> None:
         super().__init__(parent)
         self._parent = parent
         self._marks = marks
@@ -35,6 +36,7 @@ class HeadLoupe(QWidget):
         self._pixels: Image | None = None
         self._to_widget = QTransform()
         self._corner = 0
+        self._drawn = MarksLabel(self)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setAccessibleName(tr("Magnified head"))
         self.hide()
@@ -51,6 +53,8 @@ class HeadLoupe(QWidget):
         left, top = middle[0] + 0.5 - span / 2, middle[1] + 0.5 - self.height() / zoom / 2
         self._cut(image, left, top, span, self.height() / zoom)
         self._to_widget = QTransform(zoom, 0.0, 0.0, zoom, -left * zoom, -top * zoom)
+        self._drawn.setGeometry(self.rect())
+        self._drawn.record(self._marks, self._to_widget, _LABEL_PX, self._glass(3.0))
         self.show()
         self.update()
 
@@ -86,20 +90,22 @@ class HeadLoupe(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        glass = QPainterPath()
-        glass.addRoundedRect(frame, theme.RADIUS, theme.RADIUS)
+        glass = self._glass(1.0)
         painter.fillPath(glass, QColor(ON_PICTURE.INK))
         painter.save()
         painter.setClipPath(glass)
         painter.setWorldTransform(self._to_widget)
         painter.drawImage(self._image.offset(), self._image)
-        self._marks.draw(painter, _LABEL_PX)
         painter.restore()
         painter.setPen(QPen(QColor(ON_PICTURE.TEXT), 2))
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.drawRoundedRect(frame, theme.RADIUS, theme.RADIUS)
+        painter.drawPath(glass)
         painter.end()
+
+    def _glass(self, inset: float) -> QPainterPath:
+        glass = QPainterPath()
+        glass.addRoundedRect(QRectF(self.rect()).adjusted(inset, inset, -inset, -inset), theme.RADIUS, theme.RADIUS)
+        return glass
 
 
 def _middle(scene: Scene) -> Point | None:

@@ -16,7 +16,8 @@ from app.pace import Pace
 from app.palette import ON_PICTURE
 from app.scene_shapes import scene_shapes
 from app.widgets.head_loupe import HeadLoupe
-from app.widgets.overlays import Layer, Overlay, OverlayItem
+from app.widgets.marks_label import MarksLabel
+from app.widgets.overlays import Layer, Marks, Overlay
 from app.wording import target_note
 from core.control.ghost import predict
 from core.policy_config import PursuitConfig
@@ -25,6 +26,7 @@ from core.types import Advice, Frame, Image, Point, Points, Scene
 _VESSEL, _ROBOT, _VESSEL_SKELETON, _ROBOT_SKELETON = 1, 2, 4, 8
 _ZOOM_MAX = 12.0
 _GHOST_S = 2.0
+_LABEL_PX = 13
 _LOUPE_EVERY_S = 0.09
 _PIXELS_PER_MM = PursuitConfig().pixels_per_mm
 
@@ -59,8 +61,7 @@ class LiveView(QWidget):
         self._view.setCentralItem(self._box)
         self._picture = _SmoothImage()
         self._labels = _SmoothImage(_label_colours())
-        self._marks = OverlayItem()
-        for item in (self._picture, self._labels, self._marks):
+        for item in (self._picture, self._labels):
             item.setVisible(False)
             self._box.addItem(item, ignoreBounds=True)
         self._box.left_clicked.connect(self._on_left_click)
@@ -68,6 +69,9 @@ class LiveView(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self._view)
+        self._marks = Marks()
+        self._drawn = MarksLabel(self)
+        self._box.sigTransformChanged.connect(self._draw_marks)
         self._loupe = HeadLoupe(self, self._marks)
         self._loupe_pace = Pace(_LOUPE_EVERY_S)
 
@@ -107,11 +111,12 @@ class LiveView(QWidget):
         self._size = None
         self._image = None
         self._picture.setVisible(False)
-        self._marks.setVisible(False)
+        self._drawn.hide()
 
     def show_target(self, target: Point | None) -> None:
         self._target = target
         self._show_marks()
+        self._show_loupe()
 
     def set_layer(self, layer: Layer, visible: bool) -> None:
         if layer is Layer.MASKS:
@@ -123,6 +128,7 @@ class LiveView(QWidget):
         elif layer is Layer.LOUPE:
             self._loupe_on = visible
         self._marks.set_layer(layer, visible)
+        self._draw_marks()
         self._show_labels()
         self._show_loupe()
 
@@ -136,9 +142,8 @@ class LiveView(QWidget):
         self._picture.setImage(image, autoLevels=False, levels=None)
         if self._size != (width, height):
             self._size = (width, height)
-            self._marks.set_size(width, height)
             self._picture.setVisible(True)
-            self._marks.setVisible(True)
+            self._drawn.show()
             self.fit()
 
     def _show_labels(self) -> None:
@@ -165,7 +170,15 @@ class LiveView(QWidget):
         scene = self._scene
         shapes = scene_shapes(scene, self._ghost) if scene is not None else None
         note = target_note(scene) if scene is not None and self._target is not None else ""
-        self._marks.show_overlay(Overlay(shapes, scene.pose if scene is not None else None, self._target, note))
+        self._marks.set_overlay(Overlay(shapes, scene.pose if scene is not None else None, self._target, note))
+        self._draw_marks()
+
+    def _draw_marks(self) -> None:
+        if self._size is None:
+            return
+        to_view = self._box.childGroup.sceneTransform() * self._view.viewportTransform()
+        self._drawn.setGeometry(self._view.geometry())
+        self._drawn.record(self._marks, to_view, 0 if self._loupe_on else _LABEL_PX)  # the loupe shows the same values larger
 
     def _show_loupe(self) -> None:
         scene, image = self._scene, self._image
@@ -199,7 +212,7 @@ class _SmoothImage(pg.ImageItem):
     def render(self) -> None:
         height, width = self.image.shape[:2]
         if self._table is not None:
-            self._pixels = np.asarray(np.take(self._table, self.image), np.uint32)
+            self._pixels = np.asarray(np.take(self._table, self.image, mode="wrap"), np.uint32)
             pixel_format = QImage.Format.Format_ARGB32_Premultiplied
         else:
             self._pixels = np.asarray(cv2.cvtColor(self.image, cv2.COLOR_RGB2BGRA), np.uint8)

@@ -1,4 +1,4 @@
-"""What is drawn over the live picture: one item that paints the switched-on layers of a scene."""
+"""What is drawn over the live picture: the switched-on layers of a scene, as marks of constant size."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-import pyqtgraph as pg
 from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QPainter
-from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
+from PySide6.QtGui import QPainter, QTransform
 
 from app.language import mark
 from app.palette import ON_PICTURE
@@ -51,7 +49,7 @@ class Layer(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overlay:
-    """All that the item needs to paint. ``target`` is in source pixels; ``target_note`` is written beside it."""
+    """All that is needed to draw. ``target`` is in source pixels; ``target_note`` is written beside it."""
 
     shapes: SceneShapes | None
     pose: Pose | None
@@ -59,45 +57,29 @@ class Overlay:
     target_note: str = ""
 
 
-class OverlayItem(pg.GraphicsObject):
-    """Paints in screen pixels: lines and texts keep their size at any zoom. A dark edge keeps them visible on any picture."""
+class Marks:
+    """Drawn in screen pixels: lines and texts keep their size at any zoom. A dark edge keeps them visible on any picture."""
 
     def __init__(self) -> None:
-        super().__init__()
         self._overlay = Overlay(None, None, None)
-        self._bounds = QRectF(0, 0, 1, 1)
         self._visible = set(Layer)
         self._head_side = self._tail_side = 1.0
 
-    def show_overlay(self, overlay: Overlay) -> None:
+    def set_overlay(self, overlay: Overlay) -> None:
         self._overlay = overlay
         if overlay.pose is not None:
             self._head_side = _steady_side(self._head_side, overlay.pose.c_head_px)
             self._tail_side = _steady_side(self._tail_side, overlay.pose.c_tail_px)
-        self.update()
 
     def set_layer(self, layer: Layer, visible: bool) -> None:
         if visible:
             self._visible.add(layer)
         else:
             self._visible.discard(layer)
-        self.update()
 
-    def set_size(self, width: int, height: int) -> None:
-        """Size of the source picture."""
-        self.prepareGeometryChange()
-        self._bounds = QRectF(0, 0, width, height)
-
-    def boundingRect(self) -> QRectF:
-        return self._bounds
-
-    def paint(self, painter: QPainter, option: QStyleOptionGraphicsItem, widget: QWidget | None = None) -> None:
-        # the loupe shows the same values larger
-        self.draw(painter, 0 if Layer.LOUPE in self._visible else 13)
-
-    def draw(self, painter: QPainter, label_px: int) -> None:
-        """Paint through the painter's transform, which maps source pixels to the screen; labels in that size, 0 for none."""
-        pencil = Pencil(painter, painter.worldTransform(), label_px)
+    def draw(self, painter: QPainter, to_screen: QTransform, room: QRectF, label_px: int) -> None:
+        """Draw with `to_screen` (source pixels to the screen) within `room` on the screen; labels in that size, 0 for none."""
+        pencil = Pencil(painter, to_screen, label_px, room)
         shapes, pose = self._overlay.shapes, self._overlay.pose
         if shapes is not None:
             if Layer.VESSEL in self._visible:

@@ -22,11 +22,11 @@ _TUBE_MIN, _TUBE_DASH = 14.0, 6.0
 class Pencil:
     """Lines have a dark edge that keeps them visible on any picture; labels keep out of each other's way."""
 
-    def __init__(self, painter: QPainter, to_screen: QTransform, label_px: int) -> None:
+    def __init__(self, painter: QPainter, to_screen: QTransform, label_px: int, room: QRectF | None = None) -> None:
         self._painter = painter
         self._to_screen = to_screen
         self._label_px = label_px
-        self._room = QRectF(painter.window())
+        self._room = QRectF(painter.window()) if room is None else room
         self._labels: list[QRectF] = []
         painter.resetTransform()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

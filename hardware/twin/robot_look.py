@@ -43,28 +43,39 @@ def measure_band(points_mm: Points, radius_mm: float, reach_mm: float, view: Vie
     start, step = points[:-1], np.diff(points, axis=0)
     length = np.linalg.norm(step, axis=1)
     start, step, length = start[length > 0], step[length > 0], length[length > 0]
-    before = np.concatenate([[0.0], np.cumsum(length)])
-    middle = start + step / 2
-    piece, pixel = _pairs(middle, length / 2 + reach_mm, view)
-    flat = grid_mm.reshape(-1, 2)
-    offset = flat[pixel] - start[piece].astype(np.float32)
-    along_unit, unit = step[piece].astype(np.float32), (step / length[:, None]).astype(np.float32)
-    squared = (length[piece] ** 2).astype(np.float32)
-    share = np.clip((offset[:, 0] * along_unit[:, 0] + offset[:, 1] * along_unit[:, 1]) / squared, 0, 1)
-    rest = offset - share[:, None] * along_unit
-    distance = np.sqrt(rest[:, 0] ** 2 + rest[:, 1] ** 2)
-    keep = np.flatnonzero(distance < reach_mm)
-    keep = keep[np.argsort(-distance[keep], kind="stable")]
-    # Written far to near, the nearest piece has the last word for each pixel.
-    owner = np.empty(height * width, np.int64)
-    owner[pixel[keep]] = keep
-    chosen = keep[owner[pixel[keep]] == keep]
-    piece, pixel, distance, share = piece[chosen], pixel[chosen], distance[chosen], share[chosen]
-    normal = np.column_stack([-unit[piece, 1], unit[piece, 0]])
-    lateral = np.sum(offset[chosen] * normal, axis=1)
+    visible, corner, side_px = _windows(start + step / 2, length / 2 + reach_mm, view)
+    window = np.arange(side_px)
+    x, y = corner[:, 0, None] + window, corner[:, 1, None] + window
+    inside = ((y >= 0) & (y < height))[:, :, None] & ((x >= 0) & (x < width))[:, None, :]
+    pixel = np.clip(y, 0, height - 1)[:, :, None] * width + np.clip(x, 0, width - 1)[:, None, :]
+    # Windows of one size make dense arrays (pieces, rows, columns): nothing of a piece is copied for each of its pixels.
+    (start_x, start_y), (step_x, step_y) = (part[visible].T.astype(np.float32)[..., None, None] for part in (start, step))
+    offset_x, offset_y = grid_mm[..., 0].reshape(-1)[pixel] - start_x, grid_mm[..., 1].reshape(-1)[pixel] - start_y
+    squared = (length[visible] ** 2).astype(np.float32)[:, None, None]
+    share = np.clip((offset_x * step_x + offset_y * step_y) / squared, 0, 1)
+    distance = np.sqrt((offset_x - share * step_x) ** 2 + (offset_y - share * step_y) ** 2)
+    near = np.flatnonzero((distance < reach_mm) & inside)
+    near = near[_winners(pixel.reshape(-1)[near], distance.reshape(-1)[near], height * width)]
+    pixel, distance, share = pixel.reshape(-1)[near], distance.reshape(-1)[near], share.reshape(-1)[near]
+    piece = visible[near // side_px**2]
+    unit = (step / length[:, None])[piece].astype(np.float32)
+    normal = np.column_stack([-unit[:, 1], unit[:, 0]])
+    lateral = offset_x.reshape(-1)[near] * normal[:, 0] + offset_y.reshape(-1)[near] * normal[:, 1]
     side = np.sign(lateral) * np.minimum(distance / np.float32(radius_mm), 1)
+    before = np.concatenate([[0.0], np.cumsum(length)])
     from_tail = (before[piece] + share * length[piece]).astype(np.float32)
     return Band(pixel, distance, np.float32(before[-1]) - from_tail, from_tail, side.astype(np.float32), normal)
+
+
+def _winners(pixel: NDArray[np.int64], distance: F32, size: int) -> NDArray[np.int64]:
+    """For each pixel that occurs the place of its smallest distance; of equal ones the last."""
+    nearest = np.full(size, np.inf, np.float32)
+    np.minimum.at(nearest, pixel, distance)
+    place = np.flatnonzero(distance == nearest[pixel])
+    owner = np.empty(size, np.int64)
+    owner[pixel[place]] = place
+    last: NDArray[np.int64] = place[owner[pixel[place]] == place]
+    return last
 
 
 def _subdivide(points: Points) -> Points:
@@ -78,20 +89,16 @@ def _subdivide(points: Points) -> Points:
     return np.vstack([points[index] + share[:, None] * np.diff(points, axis=0)[index], points[-1:]])
 
 
-def _pairs(middle_mm: Points, reach_mm: NDArray[np.float64], view: View) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """All pairs of a piece and a pixel in its window, the window being as large as the largest that any piece needs."""
+def _windows(middle_mm: Points, reach_mm: NDArray[np.float64], view: View) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+    """The pieces that are visible, the corners (K, 2) of their windows in pixels, and the side of a window.
+
+    All are as large as the largest that any piece needs.
+    """
     width, height = view.size
-    pixels, scales = view.project(middle_mm), view.scales(middle_mm)
-    half = int(np.ceil(1.06 * float(np.max(reach_mm * scales)) + 1)) if len(middle_mm) else 0
-    corner = np.rint(pixels).astype(np.int64) - half
+    half = int(np.ceil(1.06 * float(np.max(reach_mm * view.scales(middle_mm))) + 1)) if len(middle_mm) else 0
+    corner = np.rint(view.project(middle_mm)).astype(np.int64) - half
     visible = np.flatnonzero(np.all((corner + 2 * half >= 0) & (corner < (width, height)), axis=1))
-    window = np.arange(2 * half + 1)
-    x = corner[visible, 0, None, None] + window[None, None, :]
-    y = corner[visible, 1, None, None] + window[None, :, None]
-    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    pixel = np.broadcast_to(y * width + x, inside.shape)[inside]
-    piece = np.broadcast_to(visible[:, None, None], inside.shape)[inside]
-    return piece, pixel
+    return visible, corner[visible], 2 * half + 1
 
 
 def paint_sheath(canvas: F32, band: Band, coverage: F32, appearance: Appearance) -> None:
