@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 
 from app.memory import give_back
@@ -67,18 +68,19 @@ class EngineMaker:
     def __call__(self, config: Config) -> RigEngine:
         """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame, with why."""
         config = as_calibrated(config)
-        perceive, model = self._perception(leaving_a_core(config.perception))
-        network = perceive if isinstance(perceive, Pipeline) else None
-        # Pictures that have nothing to do with each other have no past.
-        knows_past = config.rig.camera != "image_folder"
-        if network is not None and not knows_past:
-            perceive = network.perceive_single
         if self._pilot is not None:  # a rig that could not be opened, or that nobody drives, acknowledges nothing either
             self._left_over, self._pilot = self._pilot.left_over, None
             give_back()
-        with ExitStack() as undo:
+        with ExitStack() as undo, ThreadPoolExecutor(1, "network") as beside:
+            loading = beside.submit(self._perception, leaving_a_core(config.perception))  # both take seconds
             rig = open_rig(config)
             undo.callback(rig.close)
+            perceive, model = loading.result()
+            network = perceive if isinstance(perceive, Pipeline) else None
+            # Pictures that have nothing to do with each other have no past.
+            knows_past = config.rig.camera != "image_folder"
+            if network is not None and not knows_past:
+                perceive = network.perceive_single
             engine = RigEngine(rig, perceive, config, model, self._left_over)
             undo.pop_all()
         if network is not None:
@@ -93,6 +95,7 @@ class EngineMaker:
         elif self._perceive is None or self._loaded != config:
             try:
                 self._perceive = open_pipeline(config)
+                self._perceive.warm_up()
                 self._loaded = config
             except ModelError as error:
                 # Not remembered: once the model is restored, starting the rig again is enough.

@@ -7,10 +7,12 @@ import logging
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from app.learning_commands import Interrupt, progress_bar
 from app.soak import Soak
+from app.soak_samples import Sample
+from core.errors import UserError
 
 
 def run_soak(hours: float, seed: int, out: Path | None, *, true_masks: bool, as_json: bool) -> int:
@@ -19,7 +21,7 @@ def run_soak(hours: float, seed: int, out: Path | None, *, true_masks: bool, as_
     soak = Soak(seed, true_masks=true_masks)
     seconds = 3600.0 * hours
     try:
-        with Interrupt() as interrupt, progress_bar() as bar:
+        with _SampleFile(out) as file, Interrupt() as interrupt, progress_bar() as bar:
             task = bar.add_task("seconds", total=round(seconds))
 
             def go_on(now: Soak) -> bool:
@@ -27,6 +29,7 @@ def run_soak(hours: float, seed: int, out: Path | None, *, true_masks: bool, as_
                 memory = f"{sample.memory_mb:.0f} MB, {sample.threads} threads, {sample.files} files" if sample else "starting"
                 text = f"s, {seen.goals} goals, {seen.unsafe} unsafe, {now.tally.lost} lost, {memory}"
                 bar.update(task, completed=int(now.elapsed_s), description=text)
+                file.follow(now.tally.samples)
                 return not interrupt.asked
 
             soak.run(seconds, go_on)
@@ -34,10 +37,37 @@ def run_soak(hours: float, seed: int, out: Path | None, *, true_masks: bool, as_
         logging.disable(logging.NOTSET)
     summary = soak.summary()
     if out is not None:
-        lines = [json.dumps(asdict(sample)) for sample in soak.tally.samples] + [json.dumps({"summary": summary})]
-        out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        with out.open("a", encoding="utf-8") as lines:
+            lines.write(json.dumps({"summary": summary}) + "\n")
     sys.stdout.write((json.dumps(summary) if as_json else _text(summary)) + "\n")
     return 0 if summary["ok"] else 1
+
+
+class _SampleFile:
+    """Writes the samples as they come: a soak that breaks down after an hour has to tell what it saw until then."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._file: TextIO | None = None
+        self._written = 0
+        if path is not None:
+            try:
+                self._file = path.open("w", encoding="utf-8", buffering=1)
+            except OSError as error:
+                raise UserError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
+
+    def __enter__(self) -> _SampleFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def follow(self, samples: list[Sample]) -> None:
+        """Write those that are new."""
+        if self._file is not None:
+            for sample in samples[self._written :]:
+                self._file.write(json.dumps(asdict(sample)) + "\n")
+            self._written = len(samples)
 
 
 def _text(summary: dict[str, Any]) -> str:

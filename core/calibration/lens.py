@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from core.calibration_config import LensConfig
 from core.errors import UserError
@@ -111,6 +110,8 @@ def fit_lens(views: Sequence[BoardView], size: tuple[int, int]) -> LensConfig:
             parts.append(_distort(flat, numbers[0], numbers[1], center, half) - view.pixels)
         # Where the board does not reach, nothing but its smallness is known of the second term.
         return np.append(np.concatenate(parts).ravel(), _SMALL_K2_PX * numbers[1])
+
+    from scipy.optimize import least_squares  # half a second that nobody else needs
 
     found = least_squares(misses, start, x_scale="jac", loss="soft_l1", f_scale=_HUBER_PX, max_nfev=300)
     k1, k2 = (float(value) for value in found.x[:2])

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+import numpy as np
+
 from core.config import PathConfig, PerceptionConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton
 from core.perception.centerline import find as find_centerline
@@ -85,6 +87,16 @@ class Pipeline:
     def with_config(self, config: PerceptionConfig) -> Pipeline:
         """The same networks under other thresholds, with no memory; what is set of the networks themselves is not looked at."""
         return Pipeline(self._stream.segment, config, self._stream.calibration, self._single, self._offered)
+
+    def warm_up(self) -> None:
+        """Compile the networks for a stream of 4:3 pictures. Else the first pictures wait for it, up to a second each."""
+        side, window = self._config.working_size_px, self._config.tracking.window_px
+        segment = self._stream.segment
+        segment(np.zeros((round(0.75 * side), side, 3), np.uint8))
+        if self._glance is not None:
+            self._glance.segment(np.zeros((window, window, 3), np.uint8))
+        if isinstance(segment, SecondLook):
+            segment.warm_up()
 
     def reset(self) -> None:
         """Forget the stream's past."""

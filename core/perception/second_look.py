@@ -91,6 +91,10 @@ class SecondLook:
     def engine(self) -> str:
         return f"{self._first.engine}, second look"
 
+    def warm_up(self) -> None:
+        """Let the second network be compiled; a picture without a robot would not ask it."""
+        self._near(np.zeros((WINDOW_PX, WINDOW_PX, 5), np.uint8))
+
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         return look_again(image, self._first(image), self._near, mirrored=self._mirrored)
 

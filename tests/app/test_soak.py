@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import pytest
 
 from app.soak import Soak
+from app.soak_command import _SampleFile, run_soak
 from app.soak_faults import names
 from app.soak_samples import Sample, flatness, take_sample
+from core.errors import UserError
 
 
 def samples(count: int, grow_mb: float = 0.0, threads: int = 0, files: int = 0) -> list[Sample]:
@@ -60,3 +65,19 @@ def test_a_short_soak_sends_nothing_unsafe_and_loses_nothing() -> None:
     assert summary["records"]["lost"] == 0
     assert summary["packets"] > 20
     assert summary["rigs_opened"] >= 1
+
+
+def test_samples_are_on_disk_while_the_soak_runs(tmp_path: Path) -> None:
+    """One that breaks down after an hour has to tell what it saw until then."""
+    out, taken = tmp_path / "soak.jsonl", samples(3)
+    with pytest.raises(RuntimeError), _SampleFile(out) as file:
+        file.follow(taken[:2])
+        file.follow(taken)
+        assert [json.loads(line)["time_s"] for line in out.read_text().splitlines()] == [0.0, 10.0, 20.0]
+        raise RuntimeError
+    assert len(out.read_text().splitlines()) == 3
+
+
+def test_a_file_that_cannot_be_written_is_told_before_the_hours(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="choose another --out"):
+        run_soak(0.01, 0, tmp_path / "no folder" / "soak.jsonl", true_masks=True, as_json=True)

@@ -4,11 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
-from core.config import PerceptionConfig, TrackingConfig
+from core.config import Config, PerceptionConfig, TrackingConfig
 from core.learning.model_file import ModelInfo
 from core.perception.pipeline import NoPerception, Pipeline, Sight, open_pipeline
 from core.perception.segmentation import Mirrored, open_segmenter
 from core.types import Frame, Image, Points, PoseState, Reason, Scene
+from hardware.twin.world import TwinWorld
 from tests.core.drawing import SIZE, curve, depth, probability
 
 CONFIG = PerceptionConfig()
@@ -277,6 +278,22 @@ def test_the_configuration_says_what_is_mirrored(mirrored: str, stream: int, sin
     assert len(seen) == stream
     pipeline.perceive_single(Frame(0, 0.0, image))
     assert len(seen) - stream == single
+
+
+def test_after_the_warm_up_a_stream_meets_no_size_for_the_first_time() -> None:
+    """Every size that is met for the first time costs a compilation, in the middle of a stream."""
+    pipeline = open_pipeline(CONFIG)
+    pipeline.warm_up()
+    networks = [pipeline._stream.segment._first, pipeline._stream.segment._near]  # type: ignore[attr-defined]
+    known = [set(network._requests) for network in networks]
+    assert all(known)
+    world = TwinWorld(Config().twin)
+    world.insert(60.0)
+    image = world.frame().image
+    for index in range(4):
+        scene = pipeline(Frame(index, 0.05 * index, image))
+    assert scene.window is not None, "the last ones were windows around the head"
+    assert [set(network._requests) for network in networks] == known
 
 
 def test_other_thresholds_act_with_the_same_networks_and_no_memory(pipeline: Pipeline, network: DrawnNetwork) -> None:
