@@ -186,6 +186,14 @@ def test_an_eight_bit_network_that_a_processor_gets_wrong_is_told(monkeypatch: p
     )
 
 
+def test_the_second_looks_eight_bits_are_compared_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first look is exact here, the second one is off."""
+    apart = model._apart
+    off = iter((0.0, 1.0))
+    monkeypatch.setattr(model, "_apart", lambda some, others: next(off) + 0.0 * apart(some, others))
+    _bad(model.check_self_test(_segmentation("default")), "eight-bit network is off by 1.000", "precision to fp32")
+
+
 def test_an_exact_network_has_nothing_to_be_compared_with(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(model, "_EIGHT_BIT_OFF", 1e-9)
     _good(model.check_self_test(PerceptionConfig(segmentation=SegmentationConfig(precision="fp32"))), "OpenVINO CPU fp32")
