@@ -99,9 +99,9 @@ _KEPT = (("loupe", "L"), ("masks", "K"))
 
 
 def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
-    from app.window_command import _check_display, _quit_on_signal, make_application
+    from app.application import check_display, make_application, run_until_closed
 
-    _check_display()
+    check_display()
     files = image_files(paths, options.frames)
     with AnnotationStore(store_path) as store:
         images = _listed(files, store)
@@ -124,13 +124,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         bar = window.panels.bar
         switches = {name: Switch(partial(bar.is_on, key), lambda _on, which=key: bar.toggle(which)) for name, key in _KEPT}
         LayoutKeeper(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
-        application.aboutToQuit.connect(window.shut_down)
-        timer = _quit_on_signal(application)
-        window.show()
-        window.start()
-        code = application.exec()
-        timer.stop()
-        return code
+        return run_until_closed(application, window, window.say)
 
 
 def _listed(files: Sequence[Path], store: AnnotationStore) -> list[FoundImage]:

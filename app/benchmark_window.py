@@ -94,7 +94,8 @@ class WindowWatch(QObject):
 
 def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     """Run the window on the twin for some seconds and tell how it went."""
-    from app.window_command import make_application, make_window, window_config
+    from app.application import make_application
+    from app.window_command import make_window, window_config
 
     config, kind = window_config("twin", config_path, None)
     application = make_application()

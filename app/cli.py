@@ -17,6 +17,7 @@ from app.cli_options import ConfigOption, RigOption
 from app.cli_rigs import doctor, rig_commands
 from app.cli_sessions import play, record, replay, session_commands
 from app.cli_study import ablation, annotate, evaluate, perceive
+from app.memory import share_heaps
 from core.errors import UserError
 
 app = typer.Typer(
@@ -33,6 +34,7 @@ SourceOption = Annotated[Path | None, typer.Option("--source", help="video, pict
 
 def main() -> None:
     """Run the command line. Known errors end as one line on standard error and exit code 2; Ctrl-C as exit code 130."""
+    share_heaps()
     try:
         app()
     except UserError as error:

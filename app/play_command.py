@@ -16,9 +16,9 @@ from core.session.reader import SessionReader
 
 def run_play(session: Path, against: Path | None = None) -> int:
     """Show the player until it is closed; returns the exit code. Raises SessionError for what is no session, UserError."""
-    from app.window_command import _check_display, _quit_on_signal, make_application
+    from app.application import check_display, make_application, run_until_closed
 
-    _check_display()
+    check_display()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     if against is not None and not against.is_file():
         raise UserError(f"{against}: no such file; write one with: replay SESSION --jsonl FILE")
@@ -27,7 +27,6 @@ def run_play(session: Path, against: Path | None = None) -> int:
         config = recorded_config(reader.manifest)
         application = make_application(own_config().window)
 
-        from app.language import language_problem
         from app.layout_keeper import LayoutKeeper, Parts, overlay_switches
         from app.player_window import PlayerWindow
         from app.widgets.overlays import Layer
@@ -36,15 +35,7 @@ def run_play(session: Path, against: Path | None = None) -> int:
         panels = window.panels
         switches = overlay_switches(panels.overlay_bar, without=(Layer.LOUPE,) if against is not None else ())
         LayoutKeeper(window, "player", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
-        application.aboutToQuit.connect(window.shut_down)
-        timer = _quit_on_signal(application)
-        window.show()
-        window.start()
-        if language_problem():
-            window.say(language_problem(), is_fault=True)
-        code = application.exec()
-        timer.stop()
-        return code
+        return run_until_closed(application, window, window.say)
     finally:
         reader.close()
 

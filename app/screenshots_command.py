@@ -58,8 +58,8 @@ def run_screenshots(out: Path, only: Sequence[str], config_path: Path | None) ->
 
 
 def _open_studio(out: Path, folder: Path, config_path: Path | None) -> Studio:
+    from app.application import make_application
     from app.screenshots.shots import Studio
-    from app.window_command import make_application
     from core.perception.pipeline import open_pipeline
 
     places = {"record": {"folder": str(folder / "sessions")}, "window": {"pictures_folder": str(folder / "pictures")}}

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.application import check_display, make_application, run_until_closed
 from app.rig_engine import EngineMaker
 from app.sources import VIDEO_ENDINGS
-from core.config import Config, WindowConfig, load_config, merge
+from core.config import Config, load_config, merge
 from core.devices import DeviceError
-from core.errors import UserError
 from core.profiles import settings_of_windows
 from core.rig_file import RESERVED, find_rig, with_rig
 from core.types import Reason
@@ -22,13 +21,10 @@ from hardware.rig import RigKind, kind_of
 from hardware.twin.phantom import PHANTOM_TITLES
 
 if TYPE_CHECKING:
-    from PySide6.QtWidgets import QApplication
+    from PySide6.QtCore import QTimer
 
     from app.operator_window import OperatorWindow
 
-_SWITCH_S = 0.001
-"""How long a thread may keep the interpreter while another waits: at Python's 5 ms the window stood still for 198 to 221 ms, so for
-125 to 158 (alternating runs on a busy machine)."""
 RIGS = RESERVED
 _REALSENSE_ENDING = ".bag"
 
@@ -85,34 +81,11 @@ def make_window(config: Config, kind: RigKind, maker: EngineMaker | None = None)
     return OperatorWindow(config, maker or EngineMaker(), kind, list(PHANTOM_TITLES.items()))
 
 
-def make_application(look: WindowConfig | None = None) -> QApplication:
-    """The one application object, with names, theme and language; both as `look` has them, else dark and English."""
-    from PySide6.QtWidgets import QApplication
-
-    from app import theme
-    from app.about import program_icon
-    from app.language import ENGLISH, use_language
-
-    sys.setswitchinterval(_SWITCH_S)
-    # Qt paints large areas in a thread pool and waits for it; while perception keeps the cores busy, that wait is longer than the
-    # painting (measured on two cores: 105 instead of 70 ms from capture to screen).
-    os.environ.setdefault("QT_NO_GUI_THREADPOOL", "1")
-    application = QApplication.instance() or QApplication([sys.argv[0]])
-    assert isinstance(application, QApplication)
-    application.setApplicationName("LumenPilot")
-    application.setDesktopFileName("lumenpilot")  # the desktop entry that `make install` writes
-    application.setWindowIcon(program_icon())
-    use_language(application, look.language if look is not None else ENGLISH)
-    theme.apply_theme(application, look.theme if look is not None else theme.Theme.DARK)
-    return application
-
-
 def run_window(
     rig: str | None, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False, tour: bool = False
 ) -> int:
     """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
     from app.crash_report import CrashWatch, state_folder
-    from app.language import language_problem
     from app.layout_keeper import LayoutKeeper, Parts, overlay_switches
     from app.operator_devices import OperatorDevices
     from app.rig_desk import RigDesk
@@ -120,7 +93,7 @@ def run_window(
     from app.side_work import SideWork
     from app.tour import tour_at_start
 
-    _check_display()
+    check_display()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     file = settings_of_windows(config_path)
     is_own = config_path is None and not until_first_frame  # what is measured does not depend on who measures
@@ -143,47 +116,23 @@ def run_window(
     application.aboutToQuit.connect(rigs.close)
     application.aboutToQuit.connect(devices.close)
     application.aboutToQuit.connect(side_work.close)
-    application.aboutToQuit.connect(window.shut_down)
-    timers = [_quit_on_signal(application)]
-    window.show()
-    window.start()
-    devices.start()
-    side_work.start()
-    settings.start()
-    if language_problem():
-        window.say(language_problem(), is_fault=True)
-    if until_first_frame:
-        timers.append(_leave_after_first_frame(window))
-    else:
-        tour_at_start(window, asked=tour)
-    code = application.exec()
+    timers: list[QTimer] = []
+
+    def begin() -> None:
+        devices.start()
+        side_work.start()
+        settings.start()
+        if until_first_frame:
+            timers.append(_leave_after_first_frame(window))
+        else:
+            tour_at_start(window, asked=tour)
+
+    code = run_until_closed(application, window, window.say, begin)
     watch.remove()
     return code
 
 
-def _check_display() -> None:
-    """Qt would end the process with a core dump; better one line."""
-    named = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
-    if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in named):
-        raise UserError("no display: start it in a desktop session, or give it a virtual one (xvfb-run -a make run)")
-
-
-def _quit_on_signal(application: QApplication) -> Any:
-    """Ctrl-C and a termination request close the window properly. Python sees signals only between Qt events, hence the timer."""
-    import signal
-
-    from PySide6.QtCore import QTimer
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        # Not at once: a signal may come while a widget is painting, and its window must not go from under it.
-        signal.signal(number, lambda *_: QTimer.singleShot(0, application.closeAllWindows))
-    timer = QTimer(application)
-    timer.timeout.connect(lambda: None)
-    timer.start(200)
-    return timer
-
-
-def _leave_after_first_frame(window: OperatorWindow) -> Any:
+def _leave_after_first_frame(window: OperatorWindow) -> QTimer:
     """For ``benchmark``: say when the first understood frame was on screen, and close."""
     from PySide6.QtCore import QTimer
 

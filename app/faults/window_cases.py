@@ -136,8 +136,8 @@ def quit_while_busy(kit: Kit) -> Seen:
     wanted="a permanent banner SIM, LIVE or PLAYBACK; the session keeps it",
 )
 def labels(kit: Kit) -> Seen:
+    from app.application import make_application
     from app.operator_window import OperatorWindow
-    from app.window_command import make_application
 
     problems = []
     rigs = {

@@ -53,9 +53,9 @@ def window_settings(folder: Path) -> Config:
 def make_test_window(folder: Path) -> tuple[OperatorWindow, list[BreakingPerception]]:
     """The window, shown and started, with the real opener; and the perceptions that it opens, newest last."""
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    from app.application import make_application
     from app.operator_window import OperatorWindow
     from app.rig_engine import EngineMaker
-    from app.window_command import make_application
 
     make_application()
     made: list[BreakingPerception] = []

@@ -18,10 +18,10 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QMessageBox
 
+from app.application import make_application
 from app.crash_report import CrashWatch
 from app.operator_window import OperatorWindow
 from app.side_work import SideWork
-from app.window_command import make_application
 from core.config import Config
 from hardware.rig import RigKind
 from tests.app.fakes import FakeEngine

@@ -15,7 +15,7 @@ import os, signal, sys, time
 from PySide6.QtCore import QTimer
 from app import operator_window
 from app.operator_window import OperatorWindow
-from app.window_command import _quit_on_signal, make_application
+from app.application import make_application, quit_on_signal
 from core.config import Config
 from hardware.rig import RigKind
 from tests.app.fakes import FakeBench, FakeEngine
@@ -38,7 +38,7 @@ window = OperatorWindow(Config(), open_engine, RigKind.SIM, [("tree", "Tree")])
 application.aboutToQuit.connect(window.shut_down)
 window.show()
 window.start()
-_quit_on_signal(application)
+quit_on_signal(application)
 end = {
     "close": window.close,
     "quit": application.quit,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import platform
+import subprocess
 import sys
 import threading
 import weakref
@@ -46,3 +48,32 @@ def test_what_other_threads_have_freed_goes_back_to_the_system() -> None:
     give_back()
     assert kept
     assert used_mb() < before_mb - 20
+
+
+_MANY_THREADS = """
+import ctypes, sys, threading
+from app.memory import share_heaps
+if sys.argv[1] == "shared":
+    share_heaps()
+libc = ctypes.CDLL(None)
+libc.malloc.restype = ctypes.c_void_p
+libc.fopen.restype = ctypes.c_void_p
+together = threading.Barrier(8)
+def allocate():
+    libc.malloc(1000)
+    together.wait()
+threads = [threading.Thread(target=allocate) for _ in range(8)]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+file = ctypes.c_void_p(libc.fopen(sys.argv[2].encode(), b"w"))
+libc.malloc_info(0, file)
+libc.fclose(file)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries have other heaps")
+@pytest.mark.parametrize(("how", "fewest", "most"), [("shared", 1, 2), ("default", 3, 64)])
+def test_threads_share_two_heaps(how: str, fewest: int, most: int, tmp_path: Path) -> None:
+    command = [sys.executable, "-c", _MANY_THREADS, how, str(tmp_path / "heaps.xml")]
+    subprocess.run(command, check=True, timeout=60, cwd=Path(__file__).parents[2])
+    assert fewest <= (tmp_path / "heaps.xml").read_text(encoding="utf-8").count("<heap nr=") <= most
