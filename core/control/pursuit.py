@@ -57,8 +57,10 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig) -> Way
     heading = _heading(scene.path.points, config.heading_px)
     goal = _goal(points, head, look_ahead_px)
     straight_deg = _angle_deg(heading, (goal[0] - head[0], goal[1] - head[1]))
-    behind = left_px is not None and left_px > config.arrive_px and abs(straight_deg) > _BEHIND_DEG
     foot, first = points[0], polyline.cut(points, 0.0, 6.0)[-1]
+    # A head that has to turn into a branch beside it has the way across, not behind: it leads back only if it also begins backwards.
+    back_deg = min(abs(straight_deg), abs(_angle_deg(heading, _step(foot, first))))
+    behind = left_px is not None and left_px > config.arrive_px and back_deg > _BEHIND_DEG
     arc_deg = _angle_deg(_step(foot, first), _step(foot, goal)) if not behind else 0.0
     error_deg = straight_deg - config.follow_arc * max(-45.0, min(45.0, arc_deg))
     radius_px, robot_px = scene.centerline.radius_px, scene.path.radius_px
@@ -198,7 +200,12 @@ def _heading(path: Points, length_px: float) -> Point:
 
 
 def _goal(points: Points, head: Point, distance_px: float) -> Point:
-    """The first point of the way that is `distance_px` from the head; the way goes straight on beyond its end."""
+    """The first point of the way that is `distance_px` from the head; the way goes straight on beyond its end.
+
+    A head far beside the way looks farther ahead, at 45 degrees at most: its foot on the way would lie across, and look as if it
+    were behind a head that is turned a little outwards.
+    """
+    distance_px = max(distance_px, math.sqrt(2.0) * math.hypot(points[0][0] - head[0], points[0][1] - head[1]))
     line = polyline.resample(points, 2.0)
     last, before = line[-1], line[max(0, len(line) - 6)]
     length = float(np.hypot(*(last - before)))

@@ -202,6 +202,29 @@ def test_a_missed_branch_is_backed_out_of_until_it_lies_well_ahead() -> None:
     assert seen[-1][0] < 190.0
 
 
+@pytest.mark.parametrize("heading", [70.0, 95.0])
+def test_a_branch_beside_the_head_is_turned_into_and_not_backed_away_from(heading: float) -> None:
+    """At a T the head enters across the way, and is past its middle before it has turned: the way is not behind it."""
+    way = look_ahead(_scene(STRAIGHT, (100, 112), (380, 100), heading), 10.0, CONFIG)
+    assert way is not None
+    assert not way.behind
+    assert way.error_deg < 0.0, "to the left, where the way goes on"
+
+
+def test_a_head_far_beside_the_way_looks_at_a_place_ahead_and_not_across() -> None:
+    config = CONFIG.model_copy(update={"follow_arc": 0.0, "min_bend_radius_px": 5.0})
+    way = look_ahead(_scene(STRAIGHT, (100, 113), (380, 100), 0.0), 10.0, config)
+    assert way is not None
+    assert way.error_deg == pytest.approx(-45.0, abs=3.0)
+
+
+def test_a_way_that_leads_back_is_behind_wherever_the_head_is_beside_it() -> None:
+    for y in (90.0, 100.0, 112.0):
+        way = look_ahead(_scene(STRAIGHT, (300, y), (20, 100), 0.0), 10.0, CONFIG)
+        assert way is not None
+        assert way.behind
+
+
 def test_no_pose_no_advice() -> None:
     assert Pursuit(CONFIG, WORDS)(Scene(0, 0.0, (640, 480), 1.0, refusal=Refusal(Reason.NO_ROBOT)), _status(0.9)) is None
 
