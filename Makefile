@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := help
-.PHONY: help run test lint translations setup install uninstall clean
+.PHONY: help run test damage lint translations setup install uninstall clean
 
 # Tools are started as modules, so that a checkout that was moved still works (the scripts in .venv/bin name their old place).
 PY := .venv/bin/python
@@ -22,6 +22,13 @@ test: setup  ## ruff, mypy and pytest, no screen needed (ARGS='...' is handed to
 	$(PY) -m mypy || failed=1
 	$(PY) -m pytest $(ARGS) || failed=1
 	[[ -z $$failed ]]
+
+damage: setup  ## 50 kills of a recording, 100 of saves, 2600 damaged files: what the tests do a few times (minutes)
+	@export LUMENPILOT_FUZZ=1000
+	only='damage_at_random or damaged_files_end or damaged_at_random'
+	$(PY) -m pytest --timeout 3600 tests/core -k "$$only"
+	LUMENPILOT_KILLS=50 $(PY) -m pytest --timeout 3600 tests/core/test_session_recovery.py -k is_killed
+	LUMENPILOT_KILLS=100 $(PY) -m pytest --timeout 3600 tests/core/test_annotation_store.py -k kill_9
 
 lint: setup  ## ruff and mypy only
 	@failed=

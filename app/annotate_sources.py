@@ -14,6 +14,7 @@ from app.sources import VIDEO_ENDINGS, expand
 from core.learning.dataset import write_png
 from core.study.annotation_store import DEFAULT_NAME
 from core.study.annotations import AnnotationError
+from core.video_in import open_video
 
 
 def default_store(paths: Sequence[Path]) -> Path:
@@ -45,7 +46,7 @@ def _frames_of(video: Path, count: int) -> list[Path]:
     """Pictures of a video, written once: the same frames are the same files, so that their annotations are found again."""
     folder = video.with_name(f"{video.stem}_frames")
     try:
-        with av.open(str(video)) as container:
+        with open_video(video) as container:
             if not container.streams.video:
                 raise AnnotationError(f"{video}: has no video in it")
             stream = container.streams.video[0]

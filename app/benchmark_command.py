@@ -8,7 +8,7 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, MutableMapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -117,8 +117,7 @@ def _first_frame_s() -> float | None:
     """Seconds from starting ``main.py`` to its first overlaid frame, in a process of its own (offscreen without a display)."""
     main = Path(sys.modules["__main__"].__file__ or "main.py").resolve()
     environment = dict(os.environ)
-    if sys.platform.startswith("linux") and not environment.get("DISPLAY") and not environment.get("WAYLAND_DISPLAY"):
-        environment.setdefault("QT_QPA_PLATFORM", "offscreen")
+    _without_display(environment)
     started = time.monotonic()
     command = [sys.executable, str(main), "gui", "--until-first-frame"]
     try:
@@ -135,11 +134,23 @@ def _first_frame_s() -> float | None:
 
 def run_window_pace(seconds: float, *, config_path: Path | None, as_json: bool) -> None:
     """Run the operator window and measure it (offscreen when there is no display)."""
-    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY") and not os.environ.get("WAYLAND_DISPLAY"):
-        os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    _without_display(os.environ)
     from app.benchmark_window import measure_window
 
     _print(measure_window(seconds, config_path), as_json, "window")
+
+
+def run_player(minutes: float, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
+    """Open a long session in the player window and measure it (offscreen when there is no display)."""
+    _without_display(os.environ)
+    from app.benchmark_player import measure_player
+
+    _print(measure_player(_config(model, preset, config_path), minutes), as_json, "player")
+
+
+def _without_display(environment: MutableMapping[str, str]) -> None:
+    if sys.platform.startswith("linux") and not environment.get("DISPLAY") and not environment.get("WAYLAND_DISPLAY"):
+        environment.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 
 def run_recording(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:

@@ -45,7 +45,7 @@ def measure_recording(config: Config, frames: int) -> dict[str, Any]:
         the blocks, ``dropped`` frames, ``mb_per_minute``.
     """
     pipeline = open_pipeline(leaving_a_core(config.perception))
-    images = _one_way_and_back()
+    images = one_way_and_back()
     settings = config.record.model_copy(update={"ring_s": 0.0, "stop_free_mb": 0.0})
     blocks = -(-frames // _BLOCK)
     without: list[list[float]] = []
@@ -81,7 +81,7 @@ def measure_recording(config: Config, frames: int) -> dict[str, Any]:
     }
 
 
-def _one_way_and_back() -> list[Image]:
+def one_way_and_back() -> list[Image]:
     """A robot that goes in and comes back, as a stream shows it: unrelated pictures would cost more room."""
     from hardware.twin.world import TwinWorld
 

@@ -50,6 +50,9 @@ def benchmark(
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
     window: Annotated[float | None, typer.Option(min=5.0, help="run the window for so many seconds and measure its pace")] = None,
     recording: Annotated[bool, typer.Option("--recording", help="how much a recording slows perception down, in turns")] = False,
+    player: Annotated[
+        float | None, typer.Option(min=0.5, max=600.0, help="open a session of so many minutes in the player and seek in it")
+    ] = None,
     true_masks: Annotated[bool, typer.Option("--true-masks", help="accuracy of the geometry alone, without the network")] = False,
     store: Annotated[bool, typer.Option("--store", help="keep the accuracy in the model's model.json")] = False,
     frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
@@ -58,10 +61,12 @@ def benchmark(
     config: ConfigOption = None,
 ) -> None:
     """Latency per stage, throughput, memory and start-up, against the paper-literal baseline in the same run; or accuracy."""
-    from app.benchmark_command import run_accuracy, run_recording, run_speed, run_window_pace
+    from app.benchmark_command import run_accuracy, run_player, run_recording, run_speed, run_window_pace
 
     if window is not None:
         run_window_pace(window, config_path=config, as_json=json)
+    elif player is not None:
+        run_player(player, model=model, preset=preset, config_path=config, as_json=json)
     elif recording:
         run_recording(frames, model=model, preset=preset, config_path=config, as_json=json)
     elif accuracy is not None:

@@ -58,7 +58,7 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig) -> Way
     goal = _goal(points, head, look_ahead_px)
     straight_deg = _angle_deg(heading, (goal[0] - head[0], goal[1] - head[1]))
     foot, first = points[0], polyline.cut(points, 0.0, 6.0)[-1]
-    # A head that has to turn into a branch beside it has the way across, not behind: it leads back only if it also begins backwards.
+    # A head that has to turn into a branch beside it has the way across, not behind: one that leads back also begins backwards.
     back_deg = min(abs(straight_deg), abs(_angle_deg(heading, _step(foot, first))))
     behind = left_px is not None and left_px > config.arrive_px and back_deg > _BEHIND_DEG
     arc_deg = _angle_deg(_step(foot, first), _step(foot, goal)) if not behind else 0.0

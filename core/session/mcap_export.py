@@ -31,6 +31,7 @@ from core.session.reader import SessionReader
 from core.session.recorded import RecordedRow
 from core.session.remux import has_h264
 from core.types import Command, Points, PoseState, Vector
+from core.video_in import open_video
 
 Message = tuple[int, int, str, dict[str, Any]]
 """Time (ns since 1970), an order among equal times, topic, content."""
@@ -260,7 +261,7 @@ def _video(reader: SessionReader, clock: _Clock) -> Iterator[Message]:
 
 def _annex_b(path: Path, check: PacketCheck) -> Iterator[tuple[int, bytes]]:
     """Time (ms) and trusted H.264 packets with start codes, each key picture with its parameter sets."""
-    with av.open(str(path)) as container:
+    with open_video(path) as container:
         if not has_h264(container):
             return
         stream = container.streams.video[0]

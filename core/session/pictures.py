@@ -17,6 +17,7 @@ import numpy as np
 from core.session.packet_check import Known, PacketCheck
 from core.session.remux import has_h264
 from core.types import Image
+from core.video_in import open_video
 
 _CACHE_BYTES = 48_000_000
 _STEP_MS = 1500
@@ -46,7 +47,7 @@ class _OpenVideo:
         self.at_ms: int | None = None
 
     def _open(self) -> None:
-        self._container = av.open(str(self._path))
+        self._container = open_video(self._path)
         if not has_h264(self._container):
             self._container.close()
             raise ValueError("has no H.264 video in it")
@@ -206,7 +207,7 @@ def packet_times(path: Path) -> list[tuple[int, bool]]:
     """Time in ms and "is a key picture" of all packets that can be read, without decoding; empty when it is no video."""
     found: list[tuple[int, bool]] = []
     try:
-        with av.open(str(path)) as container:
+        with open_video(path) as container:
             if not container.streams.video:
                 return []
             stream = container.streams.video[0]

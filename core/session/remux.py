@@ -13,6 +13,7 @@ import av.error
 
 from core.session.packet_check import PacketCheck
 from core.session.video import VideoError
+from core.video_in import open_video
 
 _MAX_STEP_MS = 5_000
 _NO_END_MS = 2**62
@@ -49,7 +50,7 @@ def remux(source: Path, target: Path, expected: Sequence[Expected]) -> Remuxed:
     """
     done = Remuxed()
     try:
-        container = av.open(str(source))
+        container = open_video(source)
     except (av.error.FFmpegError, OSError) as error:
         done.problems.append(f"{source.name}: cannot be read as a video ({getattr(error, 'strerror', None) or error})")
         return done

@@ -11,6 +11,7 @@ import numpy as np
 
 from core.devices import DamagedStream, DeviceError, EndOfStream
 from core.types import Frame, Image
+from core.video_in import open_video
 from hardware.cameras.pacing import Pacer
 
 
@@ -46,7 +47,7 @@ class VideoFile:
     def open(self) -> None:
         self._first_s, self._pacer = None, Pacer()
         try:
-            container = av.open(str(self._path))
+            container = open_video(self._path)
         except (av.error.FFmpegError, OSError) as error:
             raise DeviceError(f"{self._path}: cannot be read as a video ({error.strerror or error})") from None
         if not container.streams.video:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import random
 import shutil
 import subprocess
@@ -369,7 +370,7 @@ def run_case(whole: Path, folder: Path, seed: int) -> None:
 
 
 def test_damage_at_random_is_survived(whole: Path, tmp_path: Path) -> None:
-    for seed in range(40):
+    for seed in range(int(os.environ.get("LUMENPILOT_FUZZ", "40"))):
         run_case(whole, tmp_path / str(seed), seed)
 
 
@@ -394,7 +395,7 @@ def test_a_recording_that_is_killed_loses_a_row_and_half_a_second_at_most(tmp_pa
     dice = random.Random(4)
     earlier = record(tmp_path, (tick_of(i, 1000.0 + i / FPS) for i in range(5)))
     before = fingerprint(earlier)
-    for _ in range(3):
+    for _ in range(int(os.environ.get("LUMENPILOT_KILLS", "3"))):
         last = record_and_kill(tmp_path, dice.uniform(0.3, 1.2))
         (found,) = find_cut_sessions(tmp_path)
         done = recover(found.folder)
