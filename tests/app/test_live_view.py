@@ -69,6 +69,21 @@ def test_head_is_drawn_where_it_is_in_the_source(view: LiveView, size: tuple[int
     assert not near(image, at.x() + 80, at.y() + 80, palette.HEAD)
 
 
+def test_the_marks_follow_a_zoom_and_a_new_size(view: LiveView) -> None:
+    scene = head_scene((640, 480), 1.0, (400.0, 150.0))
+    view.show_frame(blank_frame(), scene)
+    before = on_screen(view, 400.0, 150.0)
+    view._box.setRange(xRange=(300, 500), yRange=(75, 225), padding=0)
+    at = on_screen(view, 400.0, 150.0)
+    assert (at - before).manhattanLength() > 50
+    assert near(picture(view), at.x(), at.y(), palette.HEAD)
+    assert not near(picture(view), before.x(), before.y(), palette.HEAD)
+    view.fit()
+    view.resize(900, 500)
+    at = on_screen(view, 400.0, 150.0)
+    assert near(picture(view), at.x(), at.y(), palette.HEAD)
+
+
 def test_picture_keeps_its_aspect_and_is_shown_whole(view: LiveView) -> None:
     view.show_frame(blank_frame(640, 360), make_scene())
     image = picture(view)
