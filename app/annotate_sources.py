@@ -12,9 +12,9 @@ import numpy as np
 from app.learning_commands import progress_bar
 from app.sources import VIDEO_ENDINGS, expand
 from core.learning.dataset import write_png
+from core.session.video_in import open_video
 from core.study.annotation_store import DEFAULT_NAME
 from core.study.annotations import AnnotationError
-from core.video_in import open_video
 
 
 def default_store(paths: Sequence[Path]) -> Path:

@@ -30,8 +30,8 @@ from core.session.pictures import video_path
 from core.session.reader import SessionReader
 from core.session.recorded import RecordedRow
 from core.session.remux import has_h264
+from core.session.video_in import open_video
 from core.types import Command, Points, PoseState, Vector
-from core.video_in import open_video
 
 Message = tuple[int, int, str, dict[str, Any]]
 """Time (ns since 1970), an order among equal times, topic, content."""

@@ -16,8 +16,8 @@ import numpy as np
 
 from core.session.packet_check import Known, PacketCheck
 from core.session.remux import has_h264
+from core.session.video_in import open_video
 from core.types import Image
-from core.video_in import open_video
 
 _CACHE_BYTES = 48_000_000
 _STEP_MS = 1500

@@ -13,7 +13,7 @@ import av.error
 
 from core.session.packet_check import PacketCheck
 from core.session.video import VideoError
-from core.video_in import open_video
+from core.session.video_in import open_video
 
 _MAX_STEP_MS = 5_000
 _NO_END_MS = 2**62

@@ -10,8 +10,8 @@ import av.error
 import numpy as np
 
 from core.devices import DamagedStream, DeviceError, EndOfStream
+from core.session.video_in import open_video
 from core.types import Frame, Image
-from core.video_in import open_video
 from hardware.cameras.pacing import Pacer
 
 

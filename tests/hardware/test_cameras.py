@@ -221,7 +221,7 @@ def test_a_file_without_pictures_in_it_is_closed_again(tmp_path: Path, monkeypat
         container.mux(stream.encode())
     opened = []
     really_open = av.open
-    monkeypatch.setattr(av, "open", lambda name: opened.append(really_open(name)) or opened[-1])
+    monkeypatch.setattr(av, "open", lambda *name, **how: opened.append(really_open(*name, **how)) or opened[-1])
     with pytest.raises(DeviceError, match="has no video in it"):
         VideoFile(path).open()
     with pytest.raises(AssertionError, match="not open"):

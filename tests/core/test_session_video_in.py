@@ -8,7 +8,7 @@ import av
 import numpy as np
 import pytest
 
-from core.video_in import open_video
+from core.session.video_in import open_video
 
 
 def test_a_damaged_title_costs_no_picture(tmp_path: Path) -> None:
