@@ -77,6 +77,8 @@ def _make_session(config: Config, minutes: float, parent: str) -> None:
 
 
 def _measure(folder: Path, config: Config) -> dict[str, Any]:
+    from PySide6.QtCore import QEvent
+
     from app.application import make_application
     from app.player_window import PlayerWindow
     from core.session.reader import SessionReader
@@ -108,6 +110,8 @@ def _measure(folder: Path, config: Config) -> dict[str, Any]:
             seeks_ms.append(1000.0 * until(lambda wanted=place: window.place == wanted))  # type: ignore[misc]
         rows, memory_mb = window.rows, psutil.Process().memory_info().rss / 2**20
         window.close()
+        window.deleteLater()
+        application.sendPostedEvents(window, QEvent.Type.DeferredDelete.value)
     return {
         "opens_s": round(opens_s, 2),
         "known_s": round(known_s, 2),
