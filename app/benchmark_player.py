@@ -17,6 +17,7 @@ import psutil
 from app.benchmark_command import quantiles
 from app.benchmark_recording import FRAMES_PER_SECOND, one_way_and_back
 from core.config import Config
+from core.errors import UserError
 
 _CYCLE = 300
 """Frames that are perceived and encoded; the session repeats them, which takes seconds and not the hour."""
@@ -39,7 +40,7 @@ def measure_player(config: Config, minutes: float) -> dict[str, Any]:
         child.start()
         child.join()
         if child.exitcode:
-            raise RuntimeError(f"the session could not be made (exit code {child.exitcode})")
+            raise UserError(f"{parent}: the session could not be made (exit code {child.exitcode}); is the disk full?")
         (folder,) = Path(parent).iterdir()
         size_mb = sum(file.stat().st_size for file in folder.iterdir()) / 1e6
         return _measure(folder, config) | {"minutes": minutes, "size_mb": round(size_mb, 1)}
@@ -90,7 +91,7 @@ def _measure(folder: Path, config: Config) -> dict[str, Any]:
         began_s = time.monotonic()
         while not condition():
             if time.monotonic() - began_s > _WAIT_S:
-                raise TimeoutError("the player does not show what was asked for")
+                raise UserError(f"the player did not show what was asked for within {_WAIT_S:.0f} s")
             application.processEvents()
             time.sleep(0.0005)
         return time.monotonic() - began_s
