@@ -179,7 +179,7 @@ class Bench:
         return self
 
     def on(self) -> Bench:
-        self.seconds(0.2).pilot.switch_on()
+        self.seconds(0.2).done().pilot.switch_on()  # which is refused while something else is under way
         return self.done().seconds(1.2)
 
     def armed(self) -> Bench:
