@@ -68,7 +68,7 @@ FIXED = (
     "a bifurcation ahead",
     "the head must turn first",
     "the head is near the wall",
-    "the robot leans on the wall",
+    "the robot meets the wall",
     "the target is near",
     "the way seems to lie behind the head: looking again",
     "the way to the target branches off behind the head",
@@ -208,6 +208,7 @@ TEMPLATES = (
     "crossed the centerline to the {side}, angle left",
     "the robot presses against the wall with {a} N",
     "backing off: {why}",
+    "missed the branch {a} times: take over, or choose another destination",
     # faults, and what is being done
     "{joint} off by {a} mm (at most {b} mm)",
     "silent for {a} ms",

@@ -11,7 +11,7 @@ from app.next_step import Step
 from app.operator_window import OperatorWindow
 from core.control.hand import AT_REST, Jog
 from core.control.modes import DRIVING_MODES, Mode
-from core.control.pursuit import look_ahead
+from core.control.way import look_ahead
 from core.perception.route import plan_route
 from core.policy_config import PursuitConfig
 from core.types import Point, Scene

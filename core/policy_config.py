@@ -25,10 +25,12 @@ class PursuitConfig(_Section):
     min_bend_radius_px: float = Field(30.0, ge=5.0, le=500.0, description="tightest arc that is steered for")
     smoothing_s: float = Field(0.08, ge=0.0, le=1.0, description="time constant of the steering's low-pass")
     preview_px: float = Field(50.0, ge=5.0, le=400.0, description="bends and bifurcations so far ahead slow the robot down")
+    brake_px: float = Field(25.0, ge=5.0, le=400.0, description="way left at which it begins to slow down for the target")
     gentle_turn_deg: float = Field(25.0, gt=0.0, le=180.0, description="turn within the preview that still allows full speed")
     slow_steer_deg: float = Field(8.0, gt=0.0, le=180.0, description="steering error above which the robot goes slow")
     wall_share: float = Field(0.85, gt=0.1, le=1.5, description="head's distance over the room it has: above, near the wall")
-    contact_slow_n: float = Field(0.10, gt=0.0, le=5.0, description="contact force above which the robot goes slow")
+    contact_slow_n: float = Field(0.06, gt=0.0, le=5.0, description="rise of the contact force that slows the robot down")
+    lean_mm: float = Field(5.0, gt=0.1, le=100.0, description="way over which a contact force becomes the body's own lean")
     contact_back_off_n: float = Field(0.22, gt=0.0, le=5.0, description="contact force above which it backs off")
     contact_limit_n: float = Field(0.40, gt=0.0, le=5.0, description="never leans harder, however often it backed off")
     stuck_s: float = Field(1.5, ge=0.2, le=20.0, description="no progress for so long: back off")
@@ -37,6 +39,8 @@ class PursuitConfig(_Section):
     behind_s: float = Field(0.3, ge=0.0, le=5.0, description="the way must have lain behind the head for so long to back off")
     retry_mm: float = Field(9.0, gt=0.0, le=50.0, description="way back from where a missed branch lies beside the head")
     arrive_px: float = Field(8.0, ge=1.0, le=100.0, description="way left at which the target counts as reached")
+
+    most_misses: int = Field(3, ge=1, le=100, description="after missing a branch so often it gives up and stops")
 
     @model_validator(mode="after")
     def _check_forces(self) -> Self:

@@ -8,7 +8,7 @@ import numpy as np
 
 from core.control.frame_watch import FrameReport, RouteState
 from core.control.landmarks import Landmarks
-from core.control.pursuit import look_ahead
+from core.control.way import look_ahead
 from core.policy_config import PursuitConfig
 from core.types import Advice, Frame, Image, Point, Reason, Scene
 

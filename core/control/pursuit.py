@@ -7,73 +7,17 @@ without one, from the centerline's piece. Contact force is used where the rig re
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-
-import numpy as np
 
 from core.config import AdviceConfig
-from core.control.stall import BackOff, ContactLimit, Stall
-from core.perception import polyline
+from core.control.stall import BackOff, ContactLimit, Lean, Misses, Stall
+from core.control.way import Way, limited, look_ahead
 from core.policy_config import PursuitConfig
-from core.types import Advice, Point, Points, RobotStatus, Scene, Speed, VesselGraph
+from core.types import Advice, RobotStatus, Scene, Speed
 
-_BEHIND_DEG = 100.0
-"""The way lies behind the head when it leaves it at more than this angle."""
-_ON_ROUTE_PX = 2.0
 _UNFOLLOWED_S = 1.0
 """Who does not take the robot back for so long meant something else; if the reason is gone, the advice is, too."""
 _STILL_MM_S = 0.3
 """Servos at rest measure a little motion, too."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Way:
-    """The way ahead of the head, in working px.
-
-    ``points`` (N, 2) from the place beside the head; ``left_px`` to the target (None: no target); ``error_deg`` the turn that is
-    missing, positive to the right; ``behind`` when the way leaves backwards; ``turn_deg`` the sharpest turn within the preview;
-    ``junction_px`` the distance to the next bifurcation on it (None: none in the preview); ``wall`` how much of the room beside the
-    centerline the head has used (1: it touches the wall).
-    """
-
-    points: Points
-    left_px: float | None
-    error_deg: float
-    behind: bool
-    turn_deg: float
-    junction_px: float | None
-    wall: float
-
-
-def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig) -> Way | None:
-    """What lies ahead in a scene; None when it has no pose."""
-    if scene.pose is None or scene.path is None or scene.centerline is None:
-        return None
-    head = scene.path.head
-    points = scene.route.points if scene.route is not None else _ahead_of(scene.centerline.piece, head)
-    left_px = scene.route.length_px if scene.route is not None else None
-    if len(points) < 2:
-        return None
-    heading = _heading(scene.path.points, config.heading_px)
-    goal = _goal(points, head, look_ahead_px)
-    straight_deg = _angle_deg(heading, (goal[0] - head[0], goal[1] - head[1]))
-    foot, first = points[0], polyline.cut(points, 0.0, 6.0)[-1]
-    # A head that has to turn into a branch beside it has the way across, not behind: one that leads back also begins backwards.
-    back_deg = min(abs(straight_deg), abs(_angle_deg(heading, _step(foot, first))))
-    behind = left_px is not None and left_px > config.arrive_px and back_deg > _BEHIND_DEG
-    arc_deg = _angle_deg(_step(foot, first), _step(foot, goal)) if not behind else 0.0
-    error_deg = straight_deg - config.follow_arc * max(-45.0, min(45.0, arc_deg))
-    radius_px, robot_px = scene.centerline.radius_px, scene.path.radius_px
-    away_px = math.hypot(head[0] - scene.centerline.nearest[0], head[1] - scene.centerline.nearest[1])
-    return Way(
-        points=points,
-        left_px=left_px,
-        error_deg=_limited(error_deg, _sharpest_deg(look_ahead_px, config)),
-        behind=behind,
-        turn_deg=_turn_deg(points, config.preview_px),
-        junction_px=_junction_px(scene.vessel_graph, points, config.preview_px),
-        wall=away_px / max(radius_px - robot_px, 0.25 * radius_px, 1.0),
-    )
 
 
 class Pursuit:
@@ -91,6 +35,8 @@ class Pursuit:
         self._last_s: float | None = None
         self._stall = Stall(self._config)
         self._contact = ContactLimit(self._config)
+        self._lean = Lean(self._config)
+        self._misses = Misses()
         self._back: BackOff | None = None
         self._behind_s = 0.0
         self._unfollowed_s = 0.0
@@ -109,9 +55,12 @@ class Pursuit:
         self._behind_s = self._behind_s + elapsed_s if way.behind else 0.0
         self._smooth(way.error_deg, elapsed_s)
         fed_mm_s = self._fed(status, elapsed_s)
-        stuck = self._stall.update(way.left_px, fed_mm_s, elapsed_s)
-        self._unfollowed_s = self._unfollowed_s + elapsed_s if self._back is not None and fed_mm_s >= 0.0 else 0.0
-        return self._backing(way, contact_n, stuck, fed_mm_s * elapsed_s) or self._forward(way, contact_n)
+        stuck = self._stall.update(way.left_px, way.head, fed_mm_s, elapsed_s)
+        gave_up = self._back is None and self._misses.count >= config.most_misses
+        otherwise = fed_mm_s >= 0.0 if self._back is not None else gave_up and fed_mm_s != 0.0
+        self._unfollowed_s = self._unfollowed_s + elapsed_s if otherwise else 0.0
+        rises = self._lean.rises(contact_n, fed_mm_s * elapsed_s)
+        return self._backing(way, contact_n, rises, stuck, fed_mm_s * elapsed_s) or self._given_up(way) or self._forward(way, rises)
 
     def _fed(self, status: RobotStatus | None, elapsed_s: float) -> float:
         """The robot's feed in mm/s: as measured, since who is advised may do otherwise; as advised where nothing is measured."""
@@ -123,15 +72,16 @@ class Pursuit:
         fed_mm_s = (self._insertion_mm - before_mm) / elapsed_s
         return fed_mm_s if abs(fed_mm_s) > _STILL_MM_S else 0.0
 
-    def _backing(self, way: Way, contact_n: float | None, stuck: bool, fed_mm: float) -> Advice | None:
+    def _backing(self, way: Way, contact_n: float | None, rises: bool, stuck: bool, fed_mm: float) -> Advice | None:
         """Backwards while there is a reason to, which one picture alone never is; None to go on. `fed_mm` since the last frame."""
         config = self._config
         if self._back is None:
             if way.behind and self._behind_s < config.behind_s:
                 return self._advise(0.0, 0.0, "the way seems to lie behind the head: looking again")
             if way.behind:
+                self._misses.add(way)
                 self._back = BackOff("the way to the target branches off behind the head", config.retry_mm)
-            elif self._contact.exceeded(contact_n, way.left_px):
+            elif self._contact.exceeded(contact_n, rises, way.left_px):
                 self._back = BackOff(f"the robot presses against the wall with {contact_n or 0.0:.2f} N", config.back_off_mm / 2)
             elif stuck:
                 self._back = BackOff("the robot is fed but its head does not move", config.back_off_mm)
@@ -144,7 +94,15 @@ class Pursuit:
         steer_deg = 0.0 if way.behind else self._steer_deg
         return self._advise(-self._words.slow_mm_s, steer_deg, f"backing off: {self._back.why}")
 
-    def _forward(self, way: Way, contact_n: float | None) -> Advice:
+    def _given_up(self, way: Way) -> Advice | None:
+        if self._unfollowed_s > _UNFOLLOWED_S:
+            self._misses.forget()  # the operator goes on by hand
+        count = self._misses.at(way)
+        if count < self._config.most_misses:
+            return None
+        return self._advise(0.0, 0.0, f"missed the branch {count} times: take over, or choose another destination")
+
+    def _forward(self, way: Way, rises: bool) -> Advice:
         config, words = self._config, self._words
         limits = [(words.fast_mm_s, "along the route")]
         if way.turn_deg > config.gentle_turn_deg:
@@ -156,15 +114,15 @@ class Pursuit:
             limits.append((max(words.slowest_mm_s, words.moderate_mm_s * share), "the head must turn first"))
         if way.wall > config.wall_share:
             limits.append((words.slow_mm_s, "the head is near the wall"))
-        if contact_n is not None and contact_n > config.contact_slow_n:
-            limits.append((words.slow_mm_s, "the robot leans on the wall"))
-        if way.left_px is not None and way.left_px < config.preview_px:
-            limits.append((max(words.slowest_mm_s, words.fast_mm_s * way.left_px / config.preview_px), "the target is near"))
+        if rises:
+            limits.append((words.slow_mm_s, "the robot meets the wall"))
+        if way.left_px is not None and way.left_px < config.brake_px:
+            limits.append((max(words.slowest_mm_s, words.fast_mm_s * way.left_px / config.brake_px), "the target is near"))
         speed_mm_s, why = min(limits)
         return self._advise(speed_mm_s, self._steer_deg, why)
 
     def _smooth(self, error_deg: float, elapsed_s: float) -> None:
-        wanted = _limited(self._config.gain * error_deg, self._words.max_steer_deg)
+        wanted = limited(self._config.gain * error_deg, self._words.max_steer_deg)
         keep = math.exp(-elapsed_s / self._config.smoothing_s) if self._config.smoothing_s > 0.0 and elapsed_s > 0.0 else 0.0
         self._steer_deg = keep * self._steer_deg + (1.0 - keep) * wanted
 
@@ -184,74 +142,3 @@ def speed_word(speed_mm_s: float, config: AdviceConfig) -> Speed:
         Speed.FAST: config.fast_mm_s,
     }
     return min(words, key=lambda word: abs(words[word] - speed_mm_s))
-
-
-def _ahead_of(piece: Points, head: Point) -> Points:
-    return polyline.cut(piece, polyline.nearest(piece, head)[1], math.inf)
-
-
-def _heading(path: Points, length_px: float) -> Point:
-    """Direction of the robot's end, from the whole stretch and not from its two end points."""
-    along = polyline.arc_length(path)
-    end = polyline.resample(polyline.cut(path, float(along[-1]) - length_px, math.inf), 2.0)
-    half = max(1, len(end) // 2)
-    back, front = end[:half].mean(axis=0), end[-half:].mean(axis=0)
-    return float(front[0] - back[0]), float(front[1] - back[1])
-
-
-def _goal(points: Points, head: Point, distance_px: float) -> Point:
-    """The first point of the way that is `distance_px` from the head; the way goes straight on beyond its end.
-
-    A head far beside the way looks farther ahead, at 45 degrees at most: its foot on the way would lie across, and look as if it
-    were behind a head that is turned a little outwards.
-    """
-    distance_px = max(distance_px, math.sqrt(2.0) * math.hypot(points[0][0] - head[0], points[0][1] - head[1]))
-    line = polyline.resample(points, 2.0)
-    last, before = line[-1], line[max(0, len(line) - 6)]
-    length = float(np.hypot(*(last - before)))
-    if length > 0.0:
-        line = np.vstack([line, last + (last - before) / length * np.arange(2.0, 3.0 * distance_px, 2.0)[:, None]])
-    far = np.hypot(line[:, 0] - head[0], line[:, 1] - head[1]) >= distance_px
-    found = line[int(np.argmax(far))] if far.any() else line[-1]
-    return float(found[0]), float(found[1])
-
-
-def _turn_deg(points: Points, preview_px: float) -> float:
-    """Largest angle between the way's first direction and any later one within the preview."""
-    line = polyline.resample(polyline.cut(points, 0.0, preview_px), 5.0)
-    if len(line) < 4:
-        return 0.0
-    steps = line[2:] - line[:-2]
-    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    return float(np.degrees(headings.max() - headings.min()))
-
-
-def _junction_px(graph: VesselGraph | None, points: Points, preview_px: float) -> float | None:
-    if graph is None or len(graph.nodes) == 0:
-        return None
-    degree = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
-    line = polyline.cut(points, 0.0, preview_px)
-    found = []
-    for x, y in graph.nodes[degree >= 3].tolist():
-        away_px, position, _ = polyline.nearest(line, (x, y))
-        if away_px <= _ON_ROUTE_PX:
-            found.append(position)
-    return min(found, default=None)
-
-
-def _sharpest_deg(look_ahead_px: float, config: PursuitConfig) -> float:
-    """The angle to a point at the look-ahead distance on the tightest arc that is steered for."""
-    return math.degrees(math.asin(min(1.0, look_ahead_px / (2.0 * config.min_bend_radius_px))))
-
-
-def _step(start: Points | Point, end: Points | Point) -> Point:
-    return float(end[0] - start[0]), float(end[1] - start[1])
-
-
-def _angle_deg(start: Point, end: Point) -> float:
-    """Signed angle from one direction to another, positive to the right on screen."""
-    return math.degrees(math.atan2(start[0] * end[1] - start[1] * end[0], start[0] * end[0] + start[1] * end[1]))
-
-
-def _limited(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))

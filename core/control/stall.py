@@ -1,22 +1,48 @@
-"""Does the head move as it is fed, and how far is it to be taken back? Small memories of the pursuit policy."""
+"""Does the head move as it is fed, how hard does it press, how far is it to be taken back? Small memories of the pursuit policy."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
+from core.control.way import Way
 from core.policy_config import PursuitConfig
+from core.types import Point
 
 _FAR_MM = 60.0
 """Farther than this the robot is not taken back for a branch that it missed."""
 _RAISE = 1.25
 _FORGET_PX = 60.0
+_SAME_BRANCH_PX = 100.0
+"""The way left jumps by the lumen's width where the head changes from one branch's centerline to the other's."""
+
+
+class Lean:
+    """Tells a head that meets the wall from a body that leans on it.
+
+    The longer a body lies in a winding vessel, the harder it leans on the wall, at any speed: going slow because of that only makes
+    it lean longer. What matters is a force that *rises* faster than the body's own, which the average over the way fed follows.
+    """
+
+    def __init__(self, config: PursuitConfig) -> None:
+        self._config = config
+        self._lean_n: float | None = None
+
+    def rises(self, contact_n: float | None, fed_mm: float) -> bool:
+        """Take in one frame, `fed_mm` after the last; `contact_n` is None where the rig does not know it."""
+        if contact_n is None:
+            return False
+        before_n = contact_n if self._lean_n is None else self._lean_n
+        self._lean_n = contact_n + (before_n - contact_n) * math.exp(-abs(fed_mm) / self._config.lean_mm)
+        return contact_n > self._lean_n + self._config.contact_slow_n
 
 
 class ContactLimit:
-    """The contact force above which the robot backs off.
+    """The contact force above which the robot backs off, if it still rises.
 
-    A long body in a winding vessel leans on the wall wherever its head is: backing off again and again at the same place would get
-    it nowhere. So each back-off raises the limit a little, up to the hard one, until the head has come well past that place.
+    A long body in a winding vessel leans on the wall wherever its head is: backing off would not get it out of there. Where a force
+    rises again and again at the same place, each back-off raises the limit a little, up to the hard one, which always counts, until
+    the head has come well past that place.
     """
 
     def __init__(self, config: PursuitConfig) -> None:
@@ -24,11 +50,11 @@ class ContactLimit:
         self._limit_n = config.contact_back_off_n
         self._raised_at_px: float | None = None
 
-    def exceeded(self, contact_n: float | None, left_px: float | None) -> bool:
-        """Whether to back off; `contact_n` is None where the rig does not know it."""
+    def exceeded(self, contact_n: float | None, rises: bool, left_px: float | None) -> bool:
+        """Whether to back off; `contact_n` is None where the rig does not know it, ``rises`` is what ``Lean`` says of it."""
         if self._raised_at_px is not None and left_px is not None and left_px < self._raised_at_px - _FORGET_PX:
             self._limit_n, self._raised_at_px = self._config.contact_back_off_n, None
-        if contact_n is None or contact_n <= self._limit_n:
+        if contact_n is None or contact_n <= self._limit_n or not (rises or contact_n > self._config.contact_limit_n):
             return False
         self._limit_n = min(_RAISE * max(contact_n, self._limit_n), self._config.contact_limit_n)
         self._raised_at_px = left_px
@@ -36,28 +62,64 @@ class ContactLimit:
 
 
 class Stall:
-    """Notices that the way left does not shrink although the robot is fed."""
+    """Notices that the robot is fed but neither the way left shrinks nor the head moves.
+
+    Both: where the way bends sharply a head slides sideways before it goes on, and one that shakes against a wall does not move on.
+    """
 
     def __init__(self, config: PursuitConfig) -> None:
         self._config = config
-        self._start_px: float | None = None
+        self._start: tuple[float, Point] | None = None
         self._fed_px = 0.0
         self._watched_s = 0.0
 
-    def update(self, left_px: float | None, speed_mm_s: float, elapsed_s: float) -> bool:
+    def update(self, left_px: float | None, head: Point, speed_mm_s: float, elapsed_s: float) -> bool:
         """Take in one frame; True when there was no progress for the configured time. Without a target it cannot tell."""
         if left_px is None or speed_mm_s <= 0.0:
-            self._start_px, self._fed_px, self._watched_s = left_px, 0.0, 0.0
+            self._watch(None)
             return False
-        if self._start_px is None:
-            self._start_px = left_px
+        if self._start is None:
+            self._watch((left_px, head))
+        assert self._start is not None
         self._fed_px += speed_mm_s * elapsed_s * self._config.pixels_per_mm
         self._watched_s += elapsed_s
         if self._watched_s < self._config.stuck_s:
             return False
-        stuck = self._start_px - left_px < self._config.stuck_share * self._fed_px
-        self._start_px, self._fed_px, self._watched_s = left_px, 0.0, 0.0
+        before_px, before = self._start
+        stuck = max(before_px - left_px, math.dist(before, head)) < self._config.stuck_share * self._fed_px
+        self._watch((left_px, head))
         return stuck
+
+    def _watch(self, start: tuple[float, Point] | None) -> None:
+        self._start, self._fed_px, self._watched_s = start, 0.0, 0.0
+
+
+class Misses:
+    """How often the same branch was missed for the same target; a head that cannot bend that far would miss it for ever."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._left_px = 0.0
+        self._target: Point | None = None
+
+    def forget(self) -> None:
+        """It may be tried again."""
+        self.count = 0
+
+    def add(self, way: Way) -> None:
+        """Missed once more."""
+        self._check(way)
+        self.count += 1
+        self._left_px, self._target = way.left_px or 0.0, way.target
+
+    def at(self, way: Way) -> int:
+        """How often the branch here was missed."""
+        self._check(way)
+        return self.count
+
+    def _check(self, way: Way) -> None:
+        if way.left_px is None or way.target != self._target or abs(way.left_px - self._left_px) > _SAME_BRANCH_PX:
+            self.count = 0
 
 
 @dataclass(slots=True)

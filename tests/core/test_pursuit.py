@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from core.config import AdviceConfig, Config
 from core.control.frame_reports import FrameReports
 from core.control.frame_watch import RouteState
 from core.control.policies import POLICY_NAMES, RandomOperator, make_policy
-from core.control.pursuit import Pursuit, look_ahead, speed_word
-from core.control.stall import BackOff, ContactLimit, Stall
+from core.control.pursuit import Pursuit, speed_word
+from core.control.way import look_ahead
 from core.perception.centerline import centerline_at
 from core.perception.pose import measure
 from core.perception.route import plan_route
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.policy_config import PursuitConfig
-from core.types import Frame, GraphEdge, Point, Points, Reason, Refusal, RobotPath, RobotStatus, Scene, Speed, VesselGraph
+from core.types import Frame, GraphEdge, Masks, Point, Points, Reason, Refusal, RobotPath, RobotStatus, Scene, Speed, VesselGraph
 
 CONFIG, WORDS = PursuitConfig(smoothing_s=0.0), AdviceConfig()
 
@@ -138,12 +140,29 @@ def test_the_nearer_the_target_the_slower_and_there_it_stops() -> None:
     assert speeds[0] > speeds[1] > speeds[2] == 0.0
 
 
-def test_contact_slows_and_then_backs_off_for_a_while() -> None:
+def _pressed(pursuit: Pursuit, forces_n: list[float], fed_mm: float) -> list[float]:
+    """The speeds that are advised, one force a frame, `fed_mm` apart."""
+    found = []
+    for k, force_n in enumerate(forces_n):
+        scene = _scene(STRAIGHT, (100 + 3 * fed_mm * k, 100), (380, 100), time_s=0.1 * k)
+        advice = pursuit(scene, _status(force_n, 50.0 + fed_mm * k))
+        assert advice is not None
+        found.append(advice.advance_mm_s)
+    return found
+
+
+def test_a_force_that_rises_slows_down_and_one_that_stays_does_not() -> None:
+    """The body's own lean is no reason to lean longer; a head that meets the wall is one."""
+    assert _pressed(Pursuit(CONFIG, WORDS), [0.05 + 0.004 * k for k in range(30)], 0.5) == [WORDS.fast_mm_s] * 30
+    speeds = _pressed(Pursuit(CONFIG, WORDS), [0.05] * 5 + [0.15] * 60, 0.5)
+    assert speeds[4] == WORDS.fast_mm_s
+    assert speeds[5] == WORDS.slow_mm_s
+    assert speeds[-1] == WORDS.fast_mm_s, "a force that stays becomes the body's own"
+
+
+def test_contact_backs_off_for_a_while() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
-    scene = _scene(STRAIGHT, (100, 100), (380, 100))
-    leaning = pursuit(scene, _status(0.15))
-    assert leaning is not None
-    assert leaning.advance_mm_s == WORDS.slow_mm_s
+    pursuit(_scene(STRAIGHT, (100, 100), (380, 100)), _status(0.0))
     speeds, insertion_mm = [], 50.0
     for k in range(1, 20):  # he who is advised does so
         scene = _scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)
@@ -155,6 +174,58 @@ def test_contact_slows_and_then_backs_off_for_a_while() -> None:
     assert speeds[-1] > 0
     backwards_mm = 0.1 * sum(-v for v in speeds if v < 0)
     assert backwards_mm == pytest.approx(CONFIG.back_off_mm / 2, abs=0.31)
+
+
+def test_a_force_above_the_hard_limit_backs_off_even_if_it_does_not_rise() -> None:
+    assert _pressed(Pursuit(CONFIG, WORDS), [CONFIG.contact_limit_n - 0.01] * 3, 0.1)[-1] > 0.0
+    assert _pressed(Pursuit(CONFIG, WORDS), [CONFIG.contact_limit_n + 0.01] * 3, 0.1)[0] < 0.0
+
+
+def _missing(pursuit: Pursuit, times: int, target: Point = (20, 100), x: float = 200.0) -> list[str]:
+    """What is advised while a robot, followed as advised, is past a way that leads back and finds it again `times` times."""
+    said, time_s, insertion_mm = [], 0.0, 50.0
+    for _ in range(times):
+        for turned in (False, True):  # past the branch, then taken back to where the way lies ahead
+            for _ in range(60):
+                time_s += 0.1
+                graph_heading = 180.0 if turned else 0.0
+                advice = pursuit(_scene(STRAIGHT, (x, 100), target, graph_heading, time_s), _status(0.0, insertion_mm))
+                assert advice is not None
+                insertion_mm += 0.1 * advice.advance_mm_s
+                said.append(advice.why)
+                if turned and not advice.why.startswith("backing off"):
+                    break
+                if not turned and advice.why.startswith("backing off"):
+                    break
+    return said
+
+
+def test_a_branch_that_is_missed_again_and_again_is_given_up_with_a_word() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    assert "take over" not in " ".join(_missing(pursuit, CONFIG.most_misses - 1))
+    last = _missing(pursuit, 1)[-1]
+    assert last == "missed the branch 3 times: take over, or choose another destination"
+    assert "take over" not in " ".join(_missing(pursuit, 1, target=(30, 100))), "another destination is another way"
+    pursuit.reset()
+    assert "take over" not in " ".join(_missing(pursuit, 1)), "taken over, it may try again"
+
+
+def test_who_drives_on_by_hand_after_it_gave_up_is_advised_again() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    assert "take over" in _missing(pursuit, CONFIG.most_misses)[-1]
+    said = []
+    for k in range(25):
+        advice = pursuit(_scene(STRAIGHT, (200 - k, 100), (20, 100), 180.0, 100.0 + 0.1 * k), _status(0.0, 20.0 + 0.3 * k))
+        assert advice is not None
+        said.append(advice.why)
+    assert "take over" in said[5]
+    assert "take over" not in said[-1]
+
+
+def test_misses_of_one_branch_do_not_count_for_the_next() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    _missing(pursuit, CONFIG.most_misses - 1, x=390.0)
+    assert "take over" not in " ".join(_missing(pursuit, 1, x=200.0))
 
 
 def test_without_a_force_sensor_contact_is_not_guessed() -> None:
@@ -178,7 +249,7 @@ def test_advice_that_nobody_follows_is_no_stall() -> None:
 def test_backing_off_that_nobody_follows_is_dropped_when_its_reason_is_gone() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
     advised = [
-        pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), _status(0.3 if k == 0 else 0.0)) for k in range(20)
+        pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), _status(0.41 if k == 0 else 0.0)) for k in range(20)
     ]
     backwards = [a is not None and a.advance_mm_s < 0 for a in advised]
     assert backwards[:10] == [True] * 10
@@ -225,6 +296,39 @@ def test_a_way_that_leads_back_is_behind_wherever_the_head_is_beside_it() -> Non
         assert way.behind
 
 
+def _seen(scene: Scene, vessel: NDArray[np.bool_]) -> Scene:
+    empty = np.zeros(vessel.shape, np.float32)
+    return replace(scene, masks=Masks(vessel, np.zeros_like(vessel), empty, empty))
+
+
+def test_a_head_that_looks_into_the_right_branch_goes_on_although_the_other_centerline_is_nearer() -> None:
+    scene = _scene(FORK, (230, 108), (300, 200), 60.0)
+    alone = look_ahead(scene, 10.0, CONFIG)
+    assert alone is not None
+    assert alone.behind, "along the graph the way leads back to the bifurcation"
+    way = look_ahead(_seen(scene, np.ones((480, 640), np.bool_)), 10.0, CONFIG)
+    assert way is not None
+    assert not way.behind
+    assert way.error_deg > 0.0, "the branch lies to the right of where it looks"
+    assert way.left_px is not None
+    assert alone.left_px is not None
+    assert math.dist((230, 108), (300, 200)) <= way.left_px < alone.left_px
+
+
+def test_a_branch_behind_a_wall_is_not_in_sight() -> None:
+    vessel = np.ones((480, 640), np.bool_)
+    vessel[112:115] = False
+    way = look_ahead(_seen(_scene(FORK, (230, 108), (300, 200), 60.0), vessel), 10.0, CONFIG)
+    assert way is not None
+    assert way.behind
+
+
+def test_a_branch_in_sight_but_far_to_the_side_is_backed_up_to() -> None:
+    way = look_ahead(_seen(_scene(FORK, (300, 100), (300, 200), 0.0), np.ones((480, 640), np.bool_)), 10.0, CONFIG)
+    assert way is not None
+    assert way.behind
+
+
 def test_no_pose_no_advice() -> None:
     assert Pursuit(CONFIG, WORDS)(Scene(0, 0.0, (640, 480), 1.0, refusal=Refusal(Reason.NO_ROBOT)), _status(0.9)) is None
 
@@ -237,35 +341,6 @@ def test_the_steering_is_smoothed_in_time() -> None:
     assert first is not None
     assert alone is not None
     assert 0 < first.steer_deg < alone.steer_deg
-
-
-def test_stall_tells_only_after_its_time_and_only_without_progress() -> None:
-    stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
-    assert not stall.update(100.0, 5.0, 0.5)
-    assert stall.update(98.0, 5.0, 0.5)  # 2 px of the 15 px that were fed
-    assert not stall.update(98.0, 5.0, 0.5)
-    assert not stall.update(88.0, 5.0, 0.5)  # 10 of 15
-    assert not stall.update(None, 5.0, 5.0)
-
-
-def test_a_way_back_counts_from_where_its_reason_is_gone() -> None:
-    back = BackOff("test", 2.0)
-    assert not back.done(True, 5.0)
-    assert not back.done(False, 1.0)
-    assert not back.done(True, 1.0)
-    assert not back.done(False, 1.9)
-    assert back.done(False, 0.2)
-
-
-def test_the_contact_limit_rises_where_the_body_leans_and_falls_back_farther_on() -> None:
-    limit = ContactLimit(PursuitConfig(contact_back_off_n=0.2, contact_limit_n=0.4))
-    assert not limit.exceeded(0.19, 300.0)
-    assert limit.exceeded(0.24, 300.0)  # now 0.3
-    assert not limit.exceeded(0.29, 290.0)
-    assert limit.exceeded(0.39, 290.0)  # now 0.4, and never more
-    assert limit.exceeded(0.41, 290.0)
-    assert limit.exceeded(0.21, 200.0)  # 90 px farther on
-    assert not limit.exceeded(None, 100.0)
 
 
 def test_speeds_have_the_papers_words() -> None:
