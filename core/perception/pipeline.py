@@ -16,12 +16,13 @@ from core.perception.evidence import Calibration, collect
 from core.perception.glance import Background, Glances, look
 from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
+from core.perception.route_memory import RouteMemory
 from core.perception.second_look import SecondLook
 from core.perception.segmentation import Mirrored, Segmenter, open_second_look, open_segmenter, to_working
 from core.perception.tracking import Memory, check_jump, recall
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
-from core.types import Frame, Image, Masks, Point, Reason, Refusal, RobotPath, Scene, Skeletons, Window
+from core.types import Frame, Image, Mask, Masks, Point, Reason, Refusal, RobotPath, Scene, Skeletons, VesselGraph, Window
 
 
 class _Stopwatch:
@@ -77,6 +78,7 @@ class Pipeline:
         self._config = config
         self._states = StateFilter(config.pose)
         self._memory: Memory | None = None
+        self._routes = RouteMemory(config.tracking)
         self._shape: tuple[int, ...] | None = None
 
     @property
@@ -101,26 +103,27 @@ class Pipeline:
     def reset(self) -> None:
         """Forget the stream's past."""
         self._memory = None
+        self._routes.forget()
         self._glances.forget()
         self._states.update(None)
 
     def perceive_single(self, frame: Frame, target: Point | None = None) -> Scene:
         """A frame by itself; `target` is the operator's destination in source pixels."""
         watch = _Stopwatch()
-        return watch.finish(self._perceive(frame, target, None, watch, self._single))
+        return watch.finish(self._perceive(frame, target, None, watch, self._single, None))
 
     def __call__(self, frame: Frame, target: Point | None = None) -> Scene:
         """The next frame of a stream; `target` is the operator's destination in source pixels."""
         tracking = self._config.tracking
         if not tracking.enabled:
             watch = _Stopwatch()
-            return watch.finish(self._perceive(frame, target, None, watch, self._stream))
+            return watch.finish(self._perceive(frame, target, None, watch, self._stream, None))
         if frame.image.shape != self._shape:  # another camera or another mode of it: what is remembered lies in other pixels
             self.reset()
             self._shape = frame.image.shape
         watch = _Stopwatch()
         previous = recall(self._memory, frame.captured_s, tracking)
-        scene = self._perceive(frame, target, previous, watch, self._stream, self._glance)
+        scene = self._perceive(frame, target, previous, watch, self._stream, self._routes, self._glance)
         if scene.pose is not None and scene.path is not None:
             jump = check_jump(scene.path, self._memory, frame.captured_s, tracking)
             if jump is None:
@@ -138,6 +141,7 @@ class Pipeline:
         previous: RobotPath | None,
         watch: _Stopwatch,
         sight: Sight,
+        routes: RouteMemory | None,
         glance: Sight | None = None,
     ) -> Scene:
         config = self._config
@@ -163,7 +167,11 @@ class Pipeline:
         if isinstance(path, Refusal):
             return replace(scene, refusal=path)
         with watch.stage("pose"):
-            return self._pose(replace(scene, path=path), path, found, target, sight.calibration)
+            if target is not None:
+                scene = _with_route(scene, graph, path.head, scene.to_working(target), found.vessel, routes)
+            elif routes is not None:
+                routes.forget()
+            return self._pose(replace(scene, path=path), path, found, sight.calibration)
 
     def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch) -> Scene:
         """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
@@ -200,15 +208,12 @@ class Pipeline:
             skeletons = gaps.repair(skeletons, config.gaps)
         return replace(scene, skeletons=skeletons, vessel_graph=known.graph)
 
-    def _pose(self, scene: Scene, path: RobotPath, found: Masks, target: Point | None, calibration: Calibration | None) -> Scene:
+    def _pose(self, scene: Scene, path: RobotPath, found: Masks, calibration: Calibration | None) -> Scene:
         """Vectors, the centerline's piece, the pose, and the quality gate's word on each."""
         config = self._config
         graph, skeletons = scene.vessel_graph, scene.skeletons
         assert graph is not None
         assert skeletons is not None
-        if target is not None:
-            way = route_or_reason(graph, path.head, scene.to_working(target))
-            scene = replace(scene, route_problem=way) if isinstance(way, str) else replace(scene, route=way)
         robot_vector = fit_robot_vector(path.points, config.vectors.robot_length_px, config.vectors.line_fit)
         refusal = quality.check_path(path, found, config)
         if robot_vector is None or refusal is not None:
@@ -229,6 +234,14 @@ class Pipeline:
         if refusal is not None:
             return replace(scene, refusal=refusal)
         return replace(scene, pose=measure(robot_vector, vessel_vector, config.pose, confidence))
+
+
+def _with_route(scene: Scene, graph: VesselGraph, head: Point, target: Point, vessel: Mask, routes: RouteMemory | None) -> Scene:
+    """The way to the target in working px, or why there is none; in a stream `routes` remembers what was found before."""
+    way = route_or_reason(graph, head, target)
+    if routes is not None:
+        way = routes.follow(way, head, target, vessel)
+    return replace(scene, route_problem=way) if isinstance(way, str) else replace(scene, route=way)
 
 
 def _port(config: PathConfig, image: Image) -> Point | None:

@@ -42,6 +42,7 @@ _LEAST_WAY_MM = 60.0
 _MARGIN_PX = 14.0
 _MEASURE_EVERY = 3
 _SETTLE_S = 0.5
+_STOPPED_S = 2.0
 _NO_PROGRESS_S, _PROGRESS_MM = 40.0, 2.0  # time to back out of a missed branch and to try again
 _HELP_S, _HELP_MM_S, _MAX_HELP = 1.0, 5.0, 5
 
@@ -137,6 +138,7 @@ class Trial:
         self._first_mm = self._left_mm = self._best_mm = math.inf
         self._best_s = 0.0
         self._reached_s: float | None = None
+        self._stopped_s: float | None = None
 
     def run(self) -> Row:
         """Turn the loop until the target is reached or nothing helps any more."""
@@ -166,7 +168,7 @@ class Trial:
         scene = self._pipeline(frame, self.target.click_px)
         status = self._world.robot.status()
         advice = self._policy(scene, status)
-        if scene.pose is not None and scene.pose.confidence < self._plan.config.safety.min_confidence:
+        if scene.pose is not None and (scene.route is None or scene.pose.confidence < self._plan.config.safety.min_confidence):
             advice = None  # where autonomy has to hold
         self._on_the_way.append(self._command(advice, frame.captured_s))
         self._world.robot.send(self._on_the_way.popleft())
@@ -246,8 +248,11 @@ class Trial:
             return "reached"
         if self._log.interventions > _MAX_HELP:
             return "lost"
+        self._stopped_s = (time_s if self._stopped_s is None else self._stopped_s) if stopped else None
+        if self._stopped_s is not None and time_s - self._stopped_s >= _STOPPED_S:
+            return "stopped short"
         if time_s - self._best_s >= _NO_PROGRESS_S:
-            return "stopped short" if stopped else "stuck"
+            return "stuck"
         return "time out" if time_s >= self._plan.max_seconds else ""
 
 

@@ -12,6 +12,7 @@ from core.perception.pipeline import Pipeline
 from core.policy_config import PolicyName
 from core.study.accuracy import TrueMasks
 from core.study.trial import Row
+from core.types import Advice, RobotStatus, Scene, Speed
 from hardware.twin.appearance import make_view, random_appearance
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.trial import FIRST_SEED, Trial, TrialPlan, _Operator, choose_target
@@ -49,6 +50,23 @@ def test_a_trial_without_any_pose_is_helped_and_then_given_up() -> None:
     assert row["outcome"] in {"lost", "stuck"}
     assert row["answered_share"] == 0.0
     assert set(row["refusals"]) == {"no robot"}
+
+
+def test_a_policy_that_gives_up_ends_the_trial_without_waiting_for_progress() -> None:
+    config = Config()
+    masks = TrueMasks()
+    trial = Trial(TrialPlan(config, true_masks=True, max_seconds=30.0), 0, "pursuit", Pipeline(masks, config.perception), masks)
+    trial._policy = _GivesUp()
+    row = trial.run()
+    assert row["outcome"] == "stopped short"
+    assert 2.0 <= row["time_s"] < 3.0
+
+
+class _GivesUp:
+    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+        return Advice(Speed.STOP, 0.0, 0.0, "missed")
+
+    def reset(self) -> None: ...
 
 
 @pytest.mark.parametrize("seed", range(0, 40, 4))
