@@ -75,6 +75,11 @@ class DriveDesk(QObject):
         return self._shown
 
     @property
+    def bus(self) -> BusStatus | None:
+        """The servo bus's latest word; None where there is none."""
+        return self._thread.bus_status()
+
+    @property
     def can_move(self) -> bool:
         """Whether anything can move now, or is about to; without a rig nothing can."""
         pilot = self._thread.pilot

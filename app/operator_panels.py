@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
@@ -70,6 +70,7 @@ class OperatorPanels(ScenePanels):
         self.events = EventLog()
         self._needle_pace = Pace(_NEEDLE_EVERY_S)
         self._blanked = ""
+        self._beside: tuple[Tick, float] | None = None
         left = holder(column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0), (self.mode_bar, 0)))
         self.help = operator_help(self._lay_out(self._header(), left, self._right_side()))
 
@@ -127,10 +128,22 @@ class OperatorPanels(ScenePanels):
         self.events.add(kind, text)
 
     def show_tick(self, tick: Tick, max_block_ms: float) -> None:
-        """Show one turn of the engine on all panels."""
+        """Show one turn of the engine on all panels: the picture now, the panels beside it in the event loop's next turn.
+
+        In one go both would block the window for twice as long.
+        """
+        self._show_beside()
+        self.live.show_frame(tick.frame, tick.scene, tick.advice)
+        self._beside = tick, max_block_ms
+        QTimer.singleShot(0, self, self._show_beside)
+
+    def _show_beside(self) -> None:
+        """What stands beside the picture, if the picture is still the one that it was put off for."""
+        if self._beside is None:
+            return
+        (tick, max_block_ms), self._beside = self._beside, None
         scene = tick.scene
         renew_text = self._renews_text(scene)
-        self.live.show_frame(tick.frame, scene, tick.advice)
         self.badge.show_scene(scene, renew_text=renew_text)
         if self._needle_pace.due() or renew_text:
             self._show_dials(scene, tick.status, renew_text=renew_text)
@@ -141,6 +154,7 @@ class OperatorPanels(ScenePanels):
 
     def blank(self, title: str, why: str) -> None:
         """Show nothing that was understood of an older picture, and say why."""
+        self._beside = None
         self.live.blank_overlays()
         self._blank_dials(title, why)
 
@@ -174,6 +188,7 @@ class OperatorPanels(ScenePanels):
 
     def forget(self) -> None:
         """Empty trends and performance: what comes next has nothing to do with them."""
+        self._beside = None
         self.performance.clear()
         self.trends.clear()
 

@@ -84,13 +84,20 @@ class LiveView(QWidget):
 
     def show_frame(self, frame: Frame, scene: Scene, advice: Advice | None = None) -> None:
         """Show a frame with its scene, and where `advice` leads; None: no ghost."""
+        is_first = self._size is None
         self._show_picture(frame.image)
         self._scene = scene
         self._ghost = predict(scene, advice, _GHOST_S, self._pixels_per_mm) if advice is not None else None
         self._image = frame.image
+        if is_first:  # nothing of an older picture is on the screen: what is drawn over it may come a moment later
+            QTimer.singleShot(0, self, self._draw_over)
+        else:
+            self._draw_over()
+
+    def _draw_over(self) -> None:
         self._show_labels()
         self._show_marks()
-        if scene.path is None or self._loupe_pace.due():
+        if self._scene is None or self._scene.path is None or self._loupe_pace.due():
             self._show_loupe()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

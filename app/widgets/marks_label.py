@@ -27,7 +27,7 @@ class MarksLabel(QLabel):
         painter = QPainter(commands)
         if glass is not None:
             painter.setClipPath(glass)
-        marks.draw(painter, to_label, QRectF(self.rect()), label_px)
+        marks.draw(painter, to_label, QRectF(self.rect()), label_px, tags=glass is None)
         painter.end()
         commands.setBoundingRect(self.rect())  # else the label would put its first mark into its corner
         self.setPicture(commands)

@@ -77,8 +77,11 @@ class Marks:
         else:
             self._visible.discard(layer)
 
-    def draw(self, painter: QPainter, to_screen: QTransform, room: QRectF, label_px: int) -> None:
-        """Draw with `to_screen` (source pixels to the screen) within `room` on the screen; labels in that size, 0 for none."""
+    def draw(self, painter: QPainter, to_screen: QTransform, room: QRectF, label_px: int, *, tags: bool = True) -> None:
+        """Draw with `to_screen` (source pixels to the screen) within `room` on the screen; labels in that size, 0 for none.
+
+        A magnified part is drawn without `tags`: the whole picture has them, and here they would lie on what is magnified.
+        """
         pencil = Pencil(painter, to_screen, label_px, room)
         shapes, pose = self._overlay.shapes, self._overlay.pose
         if shapes is not None:
@@ -100,7 +103,7 @@ class Marks:
                 pencil.ring(shapes.head, ON_PICTURE.HEAD, 8.0)
         if Layer.ROUTE in self._visible and self._overlay.target is not None:
             pencil.crosshair(self._overlay.target, ON_PICTURE.TARGET, 13.0)
-            if self._overlay.target_note:
+            if tags and self._overlay.target_note:
                 pencil.tag(self._overlay.target, self._overlay.target_note, ON_PICTURE.TARGET)
 
 

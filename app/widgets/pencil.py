@@ -145,15 +145,18 @@ class Pencil:
         self._text_box(box, text, text_font, name)
 
     def tag(self, point: Point, text: str, name: str) -> None:
-        """A text of fixed size below `point`, kept inside the window."""
+        """A text of fixed size below `point`, or above it or lower where another label is; kept inside the window."""
         text_font = theme.semi_bold(_TAG_PX)
         width, height = QFontMetricsF(text_font).horizontalAdvance(text) + 14.0, _TAG_PX + 9.0
         at = self._at(point)
-        box = QRectF(at.x() - width / 2, at.y() + 20.0, width, height)
-        box.moveLeft(max(self._room.left() + 4, min(box.left(), self._room.right() - width - 4)))
-        if box.bottom() > self._room.bottom() - 4:
-            box.moveTop(at.y() - 20.0 - height)
-        self._text_box(box, text, text_font, name)
+        below = QRectF(at.x() - width / 2, at.y() + 20.0, width, height)
+        below.moveLeft(max(self._room.left() + 4, min(below.left(), self._room.right() - width - 4)))
+        above = below.translated(0.0, -40.0 - height)
+        next_row = below.translated(0.0, height + 2.0)
+        top, bottom = self._room.top() + 4, self._room.bottom() - 4
+        places = [box for box in (below, above, next_row) if top <= box.top() and box.bottom() <= bottom]
+        free = [box for box in places if not any(box.intersects(other) for other in self._labels)]
+        self._text_box((free or places or [above])[0], text, text_font, name)
 
     def _text_box(self, box: QRectF, text: str, text_font: QFont, name: str) -> None:
         self._painter.setPen(Qt.PenStyle.NoPen)

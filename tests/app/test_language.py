@@ -278,7 +278,7 @@ def test_the_window_opens_in_chinese(
     qtbot.waitUntil(lambda: window.shown_tick is not None)
     panels = window.panels
     assert all(HAN.search(text) for text in _menu_texts(window))
-    qtbot.waitUntil(lambda: bool(HAN.search(panels.badge.title)))
+    qtbot.waitUntil(lambda: bool(HAN.search(panels.badge.why)))
     for text in (
         panels.badge.why,
         panels.advice.text,

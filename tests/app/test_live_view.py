@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QColor, QImage
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app import palette
@@ -17,6 +18,12 @@ from core.types import Advice, Frame, Masks, RobotPath, Route, Scene, Skeletons,
 from tests.app.fakes import FakeBench, make_pose, make_scene
 
 GREY = 90
+
+
+def _show(view: LiveView, frame: Frame, scene: Scene, advice: Advice | None = None) -> None:
+    """What is drawn over a first picture comes in the event loop's next turn."""
+    view.show_frame(frame, scene, advice)
+    QApplication.processEvents()
 
 
 @pytest.fixture
@@ -62,7 +69,7 @@ def head_scene(size: tuple[int, int], scale: float, head: tuple[float, float]) -
 @pytest.mark.parametrize(("size", "scale"), [((640, 480), 1.0), ((1280, 960), 0.5), ((320, 240), 2.0), ((640, 360), 1.0)])
 def test_head_is_drawn_where_it_is_in_the_source(view: LiveView, size: tuple[int, int], scale: float) -> None:
     scene = head_scene(size, scale, (400.0, 150.0))
-    view.show_frame(blank_frame(*size), scene)
+    _show(view, blank_frame(*size), scene)
     at = on_screen(view, *scene.to_source((400.0, 150.0)))
     image = picture(view)
     assert near(image, at.x(), at.y(), palette.HEAD)
@@ -71,7 +78,7 @@ def test_head_is_drawn_where_it_is_in_the_source(view: LiveView, size: tuple[int
 
 def test_the_marks_follow_a_zoom_and_a_new_size(view: LiveView) -> None:
     scene = head_scene((640, 480), 1.0, (400.0, 150.0))
-    view.show_frame(blank_frame(), scene)
+    _show(view, blank_frame(), scene)
     before = on_screen(view, 400.0, 150.0)
     view._box.setRange(xRange=(300, 500), yRange=(75, 225), padding=0)
     at = on_screen(view, 400.0, 150.0)
@@ -85,7 +92,7 @@ def test_the_marks_follow_a_zoom_and_a_new_size(view: LiveView) -> None:
 
 
 def test_picture_keeps_its_aspect_and_is_shown_whole(view: LiveView) -> None:
-    view.show_frame(blank_frame(640, 360), make_scene())
+    _show(view, blank_frame(640, 360), make_scene())
     image = picture(view)
     assert image.pixelColor(320, 240).red() == GREY
     assert image.pixelColor(320, 20).name().upper() == palette.INK, "bars above and below"
@@ -98,7 +105,7 @@ def test_masks_tint_the_picture_and_can_be_switched_off(view: LiveView) -> None:
     robot = np.zeros_like(vessel)
     robot[190:210, 100:400] = True
     masks = Masks(vessel, robot, vessel.astype(np.float32), robot.astype(np.float32))
-    view.show_frame(blank_frame(), replace(make_scene(), masks=masks))
+    _show(view, blank_frame(), replace(make_scene(), masks=masks))
     image = picture(view)
     outside, lumen, device = (image.pixelColor(*place) for place in ((550, 400), (450, 150), (300, 200)))
     assert (outside.red(), outside.blue()) == (GREY, GREY)
@@ -115,7 +122,7 @@ def test_each_layer_draws_something_and_nothing_when_off(view: LiveView, bench: 
     frame = Frame(0, 0.0, image)
     for other in Layer:
         view.set_layer(other, False)
-    view.show_frame(frame, scene, Advice(Speed.FAST, 8.0, 20.0, ""))
+    _show(view, frame, scene, Advice(Speed.FAST, 8.0, 20.0, ""))
     bare = picture(view)
     view.set_layer(layer, True)
     assert picture(view) != bare
@@ -128,7 +135,7 @@ def test_skeletons_are_shown_as_pixels_while_there_is_no_graph_and_no_path(view:
     skeleton[239:242, 100:500] = True
     nothing = np.zeros_like(skeleton)
     masks = Masks(nothing, nothing, nothing.astype(np.float32), nothing.astype(np.float32))
-    view.show_frame(blank_frame(), replace(make_scene(), masks=masks, skeletons=Skeletons(skeleton, nothing)))
+    _show(view, blank_frame(), replace(make_scene(), masks=masks, skeletons=Skeletons(skeleton, nothing)))
     assert near(picture(view), 300, 240, palette.VESSEL, reach=3)
     view.set_layer(Layer.VESSEL, False)
     assert not near(picture(view), 300, 240, palette.VESSEL, reach=3)
@@ -136,7 +143,7 @@ def test_skeletons_are_shown_as_pixels_while_there_is_no_graph_and_no_path(view:
 
 def test_stale_overlays_go_away_the_picture_stays(view: LiveView, bench: FakeBench) -> None:
     image, scene = bench.scene_at(0, 6.0)
-    view.show_frame(Frame(0, 0.0, image), scene)
+    _show(view, Frame(0, 0.0, image), scene)
     for layer in Layer:
         view.set_layer(layer, False)
     bare = picture(view)
@@ -151,13 +158,13 @@ def test_items_are_made_once(view: LiveView, bench: FakeBench) -> None:
     counts = []
     for k in range(5):
         image, scene = bench.scene_at(k, float(k))
-        view.show_frame(Frame(k, 0.0, image), scene)
+        _show(view, Frame(k, 0.0, image), scene)
         counts.append(len(view._view.scene().items()))
     assert len(set(counts)) == 1
 
 
 def test_click_gives_source_pixels(view: LiveView, qtbot: QtBot) -> None:
-    view.show_frame(blank_frame(1280, 960), replace(make_scene(), source_size=(1280, 960), scale=0.5))
+    _show(view, blank_frame(1280, 960), replace(make_scene(), source_size=(1280, 960), scale=0.5))
     at = on_screen(view, 800.0, 300.0).toPoint()
     with qtbot.waitSignal(view.clicked) as signal:
         qtbot.mouseClick(view._view.viewport(), Qt.MouseButton.LeftButton, pos=at)
@@ -165,19 +172,19 @@ def test_click_gives_source_pixels(view: LiveView, qtbot: QtBot) -> None:
 
 
 def test_click_beside_the_picture_is_no_target(view: LiveView, qtbot: QtBot) -> None:
-    view.show_frame(blank_frame(640, 240), make_scene())
+    _show(view, blank_frame(640, 240), make_scene())
     with qtbot.assertNotEmitted(view.clicked, wait=50):
         qtbot.mouseClick(view._view.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(320, 10))
 
 
 def test_right_click_clears(view: LiveView, qtbot: QtBot) -> None:
-    view.show_frame(blank_frame(), make_scene())
+    _show(view, blank_frame(), make_scene())
     with qtbot.waitSignal(view.cleared):
         qtbot.mouseClick(view._view.viewport(), Qt.MouseButton.RightButton, pos=QPoint(320, 240))
 
 
 def test_target_is_marked_without_any_scene(view: LiveView) -> None:
-    view.show_frame(blank_frame(), make_scene())
+    _show(view, blank_frame(), make_scene())
     view.show_target((200.0, 120.0))
     assert near(picture(view), 200, 120, palette.TARGET, reach=16)
     view.show_target(None)
@@ -186,9 +193,9 @@ def test_target_is_marked_without_any_scene(view: LiveView) -> None:
 
 def test_labels_stay_on_their_side_when_the_offset_is_about_zero(view: LiveView) -> None:
     pose = make_pose(head=10.0)
-    view.show_frame(blank_frame(), make_scene(pose))
+    _show(view, blank_frame(), make_scene(pose))
     assert view._marks._head_side == 1.0
-    view.show_frame(blank_frame(), make_scene(make_pose(head=-1.0)))
+    _show(view, blank_frame(), make_scene(make_pose(head=-1.0)))
     assert view._marks._head_side == 1.0, "too near to zero to change sides"
-    view.show_frame(blank_frame(), make_scene(make_pose(head=-5.0)))
+    _show(view, blank_frame(), make_scene(make_pose(head=-5.0)))
     assert view._marks._head_side == -1.0

@@ -129,6 +129,20 @@ def test_silent_camera_leaves_no_stale_overlay(running: OperatorWindow, engine: 
     assert not running.panels.notice.isVisible()
 
 
+def test_what_was_put_off_for_an_older_picture_is_not_shown_any_more(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    panels, tick = running.panels, running.shown_tick
+    assert tick is not None
+    engine.silent = True
+    until(qtbot, lambda: panels.badge.title == "No new picture")
+    panels.show_tick(tick, 0.0)
+    panels.blank("No new picture", "it was unplugged in this moment")
+    qtbot.wait(50)
+    assert panels.badge.title == "No new picture"
+    assert panels.live.scene is None
+
+
 def test_refusal_is_named_and_the_picture_goes_on(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     engine.refusal = Refusal(Reason.OUTSIDE_VESSEL, "41 % inside, 60 % needed")
     until(qtbot, lambda: running.panels.badge.title == "Robot is outside the vessel")

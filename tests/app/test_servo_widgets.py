@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QMenu, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QMenu, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app import palette
@@ -668,6 +668,7 @@ def test_ghost_is_drawn_only_with_advice_and_goes_with_the_scene(qtbot: QtBot, b
     for layer in Layer:
         live.set_layer(layer, layer is Layer.GHOST)
     live.show_frame(frame, scene)
+    QApplication.processEvents()  # what is drawn over a first picture comes a moment later
     bare = live.grab().toImage()
     live.show_frame(frame, scene, ADVICE)
     assert live.grab().toImage() != bare
