@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 NAMES = {
     "operator_window": "operator_pictures.advisory",
     "operator_driving": "operator_pictures.driving",
+    "operator_arrived": "operator_pictures.arrived",
     "operator_stopped": "operator_pictures.stopped",
     "operator_no_answer": "operator_pictures.no_answer",
     "operator_keys": "operator_pictures.keys",

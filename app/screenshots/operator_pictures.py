@@ -6,12 +6,14 @@ from app import theme
 from app.operator_window import OperatorWindow
 from app.screenshots.shots import SIZE, OperatorScene, Studio
 from core.control.hand import AT_REST, Jog
-from core.control.modes import Act
+from core.control.modes import Act, Mode
+from core.errors import UserError
 from core.types import Point
 
 _TARGET: Point = (560.0, 318.0)
 _FEED = Jog(advance=0.5)
 _OUT_OF_FOCUS_PX = 9.0
+_MOST_FRAMES = 1500
 
 
 def advisory(studio: Studio) -> None:
@@ -33,6 +35,21 @@ def driving(studio: Studio) -> None:
         scene.play(10)
         scene.aside(lambda: scene.stage.hand_over(_TARGET))
         scene.show(scene.play(70), "operator_driving")
+
+
+def arrived(studio: Studio) -> None:
+    """The program has driven to the destination, and given the robot back."""
+    with OperatorScene(studio) as scene:
+        scene.window.choose_target(*_TARGET)
+        scene.play(10)
+        scene.aside(lambda: scene.stage.hand_over(_TARGET))
+        for _ in range(_MOST_FRAMES):
+            scene.play(1)
+            if scene.stage.pilot.view.mode is not Mode.AUTONOMOUS:
+                break
+        if scene.stage.pilot.view.mode is not Mode.ARMED:
+            raise UserError("the twin did not get there: the destination was not reached")
+        scene.show(scene.play(5), "operator_arrived")
 
 
 def stopped(studio: Studio) -> None:

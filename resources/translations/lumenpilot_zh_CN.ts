@@ -827,8 +827,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>the robot leans on the wall</source>
-        <translation>机器人贴靠管壁</translation>
+        <source>the robot meets the wall</source>
+        <translation>机器人触及管壁</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -1459,6 +1459,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>backing off: {why}</source>
         <translation>后退：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>missed the branch {a} times: take over, or choose another destination</source>
+        <translation>已 {a} 次错过该分支：请接管，或另选目的地</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9494,6 +9499,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>Route gap</source>
+        <translation>路线缺口</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>gap in the vessel over which a known route still holds</source>
+        <translation>已知路线在血管多长的缺口上仍然有效</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Route reach</source>
+        <translation>路线偏距</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the head is on a known route if no farther beside it</source>
+        <translation>头端离已知路线不超过此距离即视为在路线上</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>Speeds behind the paper's words, and how theta becomes a degree of steering.</source>
         <translation>论文用语对应的速度，以及 θ 如何变为转向度数。</translation>
     </message>
@@ -9649,6 +9674,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>Brake</source>
+        <translation>减速距离</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>way left at which it begins to slow down for the target</source>
+        <translation>距目标剩余多少路程时开始减速</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>Gentle turn</source>
         <translation>缓弯</translation>
     </message>
@@ -9684,8 +9719,18 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>contact force above which the robot goes slow</source>
-        <translation>接触力大于此，机器人慢行</translation>
+        <source>rise of the contact force that slows the robot down</source>
+        <translation>接触力上升多少时机器人减速</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Lean</source>
+        <translation>贴靠路程</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>way over which a contact force becomes the body's own lean</source>
+        <translation>接触力经过多长路程后视为机器人自身贴靠</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9766,6 +9811,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>way left at which the target counts as reached</source>
         <translation>剩余路程小于此视为到达目标</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Most misses</source>
+        <translation>最多错过次数</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>after missing a branch so often it gives up and stops</source>
+        <translation>错过同一分支达此次数后放弃并停止</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
