@@ -153,6 +153,9 @@ class TrackingConfig(_Section):
     refresh_s: float = Field(1.5, ge=0.0, le=60.0, description="longest time between two whole looks")
     route_gap_px: float = Field(40.0, ge=0.0, le=1000.0, description="gap in the vessel over which a known route still holds")
     route_reach_px: float = Field(30.0, ge=0.0, le=1000.0, description="the head is on a known route if no farther beside it")
+    lookalike_px: float = Field(
+        15.0, ge=0.0, le=1000.0, description="a piece that stays while the robot's end moves so far is no robot; 0 = it may be"
+    )
 
 
 class PerceptionConfig(_Section):

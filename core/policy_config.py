@@ -25,7 +25,7 @@ class PursuitConfig(_Section):
     min_bend_radius_px: float = Field(30.0, ge=5.0, le=500.0, description="tightest arc that is steered for")
     smoothing_s: float = Field(0.08, ge=0.0, le=1.0, description="time constant of the steering's low-pass")
     preview_px: float = Field(50.0, ge=5.0, le=400.0, description="bends and bifurcations so far ahead slow the robot down")
-    brake_px: float = Field(25.0, ge=5.0, le=400.0, description="way left at which it begins to slow down for the target")
+    brake_px: float = Field(16.0, ge=5.0, le=400.0, description="way left at which it begins to slow down for the target")
     gentle_turn_deg: float = Field(25.0, gt=0.0, le=180.0, description="turn within the preview that still allows full speed")
     slow_steer_deg: float = Field(8.0, gt=0.0, le=180.0, description="steering error above which the robot goes slow")
     wall_share: float = Field(0.85, gt=0.1, le=1.5, description="head's distance over the room it has: above, near the wall")

@@ -92,7 +92,7 @@ class Pursuit:
             self._back, self._unfollowed_s = None, 0.0
             return None
         steer_deg = 0.0 if way.behind else self._steer_deg
-        return self._advise(-self._words.slow_mm_s, steer_deg, f"backing off: {self._back.why}")
+        return self._advise(-self._words.moderate_mm_s, steer_deg, f"backing off: {self._back.why}")
 
     def _given_up(self, way: Way) -> Advice | None:
         if self._unfollowed_s > _UNFOLLOWED_S:

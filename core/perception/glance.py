@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from core.config import TrackingConfig
 from core.perception.segmentation import Segmenter
-from core.perception.windows import MARGIN_PX, window_around
+from core.perception.windows import inner_area, window_around
 from core.types import Image, Mask, Point, Scene, VesselGraph, Window
 
 CELL_PX = 8
@@ -111,9 +111,7 @@ def look(segment: Segmenter, image: Image, window: Window, robot_probability: ND
     """`robot_probability` (h, w) with the window seen anew; at the window's inner edges the old values stay."""
     x, y, width, height = window
     seen = segment(np.ascontiguousarray(image[y : y + height, x : x + width]))[1]
-    left, top = (MARGIN_PX if x > 0 else 0), (MARGIN_PX if y > 0 else 0)
-    right = width - (MARGIN_PX if x + width < image.shape[1] else 0)
-    bottom = height - (MARGIN_PX if y + height < image.shape[0] else 0)
+    rows, columns = inner_area(window, (image.shape[1], image.shape[0]))
     renewed = robot_probability.copy()
-    renewed[y + top : y + bottom, x + left : x + right] = seen[top:bottom, left:right]
+    renewed[rows, columns] = seen[rows.start - y : rows.stop - y, columns.start - x : columns.stop - x]
     return renewed

@@ -9,11 +9,12 @@ from time import perf_counter
 
 import numpy as np
 
-from core.config import PathConfig, PerceptionConfig
+from core.config import PathConfig, PerceptionConfig, TrackingConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton
 from core.perception.centerline import find as find_centerline
 from core.perception.evidence import Calibration, collect
 from core.perception.glance import Background, Glances, look
+from core.perception.lookalikes import Lookalikes
 from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
 from core.perception.route_memory import RouteMemory
@@ -53,6 +54,21 @@ class Sight:
     calibration: Calibration | None = None
 
 
+class _Past:
+    """What a stream remembers of its frames."""
+
+    def __init__(self, config: TrackingConfig) -> None:
+        self.memory: Memory | None = None
+        self.routes = RouteMemory(config)
+        self.lookalikes = Lookalikes(config)
+        self.glances = Glances(config)
+
+    def forget(self) -> None:
+        self.memory = None
+        for part in (self.routes, self.lookalikes, self.glances):
+            part.forget()
+
+
 class Pipeline:
     """Perception of single images or of a stream.
 
@@ -74,11 +90,9 @@ class Pipeline:
         self._single = single or self._stream
         self._offered = glance
         self._glance = glance if config.tracking.window_px else None
-        self._glances = Glances(config.tracking)
         self._config = config
         self._states = StateFilter(config.pose)
-        self._memory: Memory | None = None
-        self._routes = RouteMemory(config.tracking)
+        self._past = _Past(config.tracking)
         self._shape: tuple[int, ...] | None = None
 
     @property
@@ -102,84 +116,77 @@ class Pipeline:
 
     def reset(self) -> None:
         """Forget the stream's past."""
-        self._memory = None
-        self._routes.forget()
-        self._glances.forget()
+        self._past.forget()
         self._states.update(None)
 
     def perceive_single(self, frame: Frame, target: Point | None = None) -> Scene:
         """A frame by itself; `target` is the operator's destination in source pixels."""
         watch = _Stopwatch()
-        return watch.finish(self._perceive(frame, target, None, watch, self._single, None))
+        return watch.finish(self._perceive(frame, target, watch, self._single))
 
     def __call__(self, frame: Frame, target: Point | None = None) -> Scene:
         """The next frame of a stream; `target` is the operator's destination in source pixels."""
-        tracking = self._config.tracking
+        tracking, past = self._config.tracking, self._past
         if not tracking.enabled:
             watch = _Stopwatch()
-            return watch.finish(self._perceive(frame, target, None, watch, self._stream, None))
+            return watch.finish(self._perceive(frame, target, watch, self._stream))
         if frame.image.shape != self._shape:  # another camera or another mode of it: what is remembered lies in other pixels
             self.reset()
             self._shape = frame.image.shape
         watch = _Stopwatch()
-        previous = recall(self._memory, frame.captured_s, tracking)
-        scene = self._perceive(frame, target, previous, watch, self._stream, self._routes, self._glance)
+        scene = self._perceive(frame, target, watch, self._stream, past)
         if scene.pose is not None and scene.path is not None:
-            jump = check_jump(scene.path, self._memory, frame.captured_s, tracking)
+            jump = check_jump(scene.path, past.memory, frame.captured_s, tracking)
             if jump is None:
-                self._memory = Memory(scene.path, frame.captured_s)
+                past.memory = Memory(scene.path, frame.captured_s)
+                past.lookalikes.learn(scene.path, frame.captured_s)
             else:
                 scene = replace(scene, pose=None, refusal=jump)
         if self._glance is not None:
-            self._glances.remember(scene)
+            past.glances.remember(scene)
         return watch.finish(replace(scene, pose=self._states.update(scene.pose)))
 
-    def _perceive(
-        self,
-        frame: Frame,
-        target: Point | None,
-        previous: RobotPath | None,
-        watch: _Stopwatch,
-        sight: Sight,
-        routes: RouteMemory | None,
-        glance: Sight | None = None,
-    ) -> Scene:
+    def _perceive(self, frame: Frame, target: Point | None, watch: _Stopwatch, sight: Sight, past: _Past | None = None) -> Scene:
         config = self._config
         height, width = frame.image.shape[:2]
         with watch.stage("prepare"):
             image, scale_xy = to_working(frame.image, config.working_size_px)
             refusal = quality.check_image(image, config.quality)
-            chosen = self._glances.choose(image, frame.captured_s) if glance is not None and refusal is None else None
+            chosen = past.glances.choose(image, frame.captured_s) if past and self._glance and refusal is None else None
         scene = Scene(frame.index, frame.captured_s, (width, height), scale_xy[0 if width >= height else 1], scale_xy=scale_xy)
         if refusal is not None:
             return replace(scene, refusal=refusal)
-        if chosen is not None and glance is not None:
-            sight = glance
-            scene = self._see_window(scene, image, *chosen, sight, watch)
+        if chosen is not None and self._glance is not None:
+            sight = self._glance
+            scene = self._see_window(scene, image, chosen, sight, watch, past)
         else:
-            scene = self._see_all(scene, image, sight, watch)
+            scene = self._see_all(scene, image, sight, watch, past)
         if scene.refusal is not None:
             return scene
         found, skeletons, graph = scene.masks, scene.skeletons, scene.vessel_graph
         assert found is not None and skeletons is not None and graph is not None
         with watch.stage("path"):
+            previous = recall(past.memory, frame.captured_s, config.tracking) if past is not None else None
             path = robot_path.find(skeletons, found, config, previous, graph, _port(config.path, image))
         if isinstance(path, Refusal):
             return replace(scene, refusal=path)
         with watch.stage("pose"):
             if target is not None:
+                routes = past.routes if past is not None else None
                 scene = _with_route(scene, graph, path.head, scene.to_working(target), found.vessel, routes)
-            elif routes is not None:
-                routes.forget()
+            elif past is not None:
+                past.routes.forget()
             return self._pose(replace(scene, path=path), path, found, sight.calibration)
 
-    def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch) -> Scene:
+    def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch, past: _Past | None) -> Scene:
         """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
         config = self._config
         with watch.stage("network"):
             vessel_probability, robot_probability = sight.segment(image)
         with watch.stage("masks"):
             found = masks.clean(vessel_probability, robot_probability, config)
+            if past is not None:
+                found = replace(found, robot=past.lookalikes.without(found.robot, image, scene.captured_s))
         scene = replace(scene, masks=found, refusal=quality.check_masks(found))
         if scene.refusal is not None:
             return scene
@@ -191,13 +198,16 @@ class Pipeline:
             graph = build_graph(skeletons.vessel, found.vessel, config.cleaning)
         return replace(scene, skeletons=skeletons, vessel_graph=graph, refusal=quality.check_graph(graph, config.vectors))
 
-    def _see_window(self, scene: Scene, image: Image, known: Background, window: Window, sight: Sight, watch: _Stopwatch) -> Scene:
+    def _see_window(
+        self, scene: Scene, image: Image, chosen: tuple[Background, Window], sight: Sight, watch: _Stopwatch, past: _Past | None
+    ) -> Scene:
         """The same, with only the robot in the window seen anew."""
-        config = self._config
+        config, (known, window) = self._config, chosen
         with watch.stage("network"):
             robot_probability = look(sight.segment, image, window, known.robot_probability)
         with watch.stage("masks"):
             robot = masks.clean_robot(robot_probability, config)
+            robot = past.lookalikes.without(robot, image, scene.captured_s) if past is not None else robot
             found = Masks(known.vessel, robot, known.vessel_probability, robot_probability)
         scene = replace(scene, window=window, masks=found, refusal=quality.check_masks(found))
         if scene.refusal is not None:

@@ -357,3 +357,17 @@ def test_half_a_port_is_none(network: DrawnNetwork) -> None:
     found = Pipeline(network, CONFIG.model_copy(update={"path": path})).perceive_single(frame())
     assert found.path is not None
     assert found.path.head[0] == pytest.approx(300, abs=1.5)
+
+
+def test_in_a_stream_text_beneath_the_vessel_does_not_become_the_robots_end(network: DrawnNetwork) -> None:
+    """The robot comes nearer to a piece that lies still, until it could be what a gap parts from it."""
+    text = VESSEL[(VESSEL[:, 0] >= 420) & (VESSEL[:, 0] <= 450)]
+    refused = dict.fromkeys((0.0, CONFIG.tracking.lookalike_px), 0)
+    for lookalike_px in refused:
+        pipeline = Pipeline(network, PerceptionConfig(tracking=TrackingConfig(lookalike_px=lookalike_px)))
+        for k, x in enumerate(range(280, 416, 5)):
+            network.draw(VESSEL[VESSEL[:, 0] <= x], text)
+            scene = pipeline(frame(k * FRAME_S))
+            refused[lookalike_px] += scene.pose is None or scene.path is None or abs(scene.path.head[0] - x) > 5.0
+    assert refused[0.0] > 10
+    assert refused[CONFIG.tracking.lookalike_px] == 0

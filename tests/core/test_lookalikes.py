@@ -1,0 +1,169 @@
+"""What looks like a piece of robot and stays while the robot moves is none; what moves with it, or was robot, is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from core.config import TrackingConfig
+from core.perception.lookalikes import Lookalikes
+from core.types import Image, Mask, RobotPath
+
+HEIGHT, WIDTH = 200, 400
+ROW = 100
+TEXT = (300, 330)
+FRAME_S = 1 / 30
+TRAVEL_PX = 15.0
+
+
+def _stretch(*columns: tuple[float, float], row: int = ROW) -> Mask:
+    """A mask of stretches along a row, 8 px wide."""
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+    for left, right in columns:
+        cv2.rectangle(mask, (round(left), row - 4), (round(right), row + 3), 1, cv2.FILLED)
+    return mask.view(np.bool_)
+
+
+def _path(head_x: float) -> RobotPath:
+    points = np.column_stack([np.arange(0.0, head_x + 1.0), np.full(int(head_x) + 1, float(ROW))])
+    return RobotPath(points, 0.9, None, True, 0.0, 4.0)
+
+
+@dataclass
+class Stream:
+    """Frames in which the path up to ``head_x`` is believed. The board has a structure, and noise of 6 levels."""
+
+    lookalikes: Lookalikes = field(default_factory=lambda: Lookalikes(TrackingConfig(lookalike_px=TRAVEL_PX)))
+    now_s: float = 5.0
+    board: NDArray[np.float64] = field(
+        default_factory=lambda: 150.0 + 30.0 * np.sin(np.arange(WIDTH) / 9.0)[None, :, None] * np.ones((HEIGHT, WIDTH, 3))
+    )
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(3))
+
+    def image(self, *robots: tuple[float, float]) -> Image:
+        """The board with the robot, dark, where it really is."""
+        picture = self.board + self.rng.normal(0.0, 6.0, self.board.shape)
+        picture[_stretch(*robots)] = 40.0
+        return np.clip(picture, 0, 255).astype(np.uint8)
+
+    def see(self, mask: Mask, head_x: float | None, *, after_s: float = FRAME_S, image: Image | None = None) -> Mask:
+        self.now_s += after_s
+        left = self.lookalikes.without(mask, self.image() if image is None else image, self.now_s)
+        if head_x is not None:
+            self.lookalikes.learn(_path(head_x), self.now_s)
+        return left
+
+    def advance(self, first: int, last: int, *others: tuple[float, float]) -> Mask:
+        """A robot whose end moves from one column to another, a pixel a frame, with other pieces that stay."""
+        left = _stretch()
+        for x in range(first, last + 1):
+            left = self.see(_stretch((0, x), *others), x)
+        return left
+
+
+@pytest.fixture
+def stream() -> Stream:
+    return Stream()
+
+
+def test_a_piece_that_stays_while_the_robot_moves_on_is_none(stream: Stream) -> None:
+    assert np.array_equal(stream.advance(100, 110, TEXT), _stretch((0, 110), TEXT)), "not known yet"
+    assert np.array_equal(stream.advance(111, 125, TEXT), _stretch((0, 125)))
+
+
+def test_it_is_enough_to_have_seen_it_now_and_then(stream: Stream) -> None:
+    stream.see(_stretch((0, 120)), 120)
+    stream.see(_stretch((0, 120), TEXT), None)  # and no answer to that frame
+    stream.advance(121, 138)
+    stream.see(_stretch((0, 138), TEXT), None)
+    assert np.array_equal(stream.see(_stretch((0, 138), (TEXT[0] + 1, TEXT[1] - 2)), 138), _stretch((0, 138)))
+
+
+def test_a_tip_that_shows_beyond_a_fitting_is_robot(stream: Stream) -> None:
+    """The end that is seen stays at the fitting, and the tip moves."""
+    for tip_x in range(260, 330):
+        mask = _stretch((0, 200), (255, tip_x))
+        assert np.array_equal(stream.see(mask, 200), mask)
+
+
+def test_where_the_robot_was_nothing_is_learnt(stream: Stream) -> None:
+    """A reflection that cuts the robot in two, and a path that ends there for once."""
+    stream.advance(200, 260)
+    for x in range(150, 190):
+        mask = _stretch((0, x), (225, 260))
+        assert np.array_equal(stream.see(mask, x), mask)
+
+
+def test_what_touches_the_border_or_is_large_is_another_robot_perhaps(stream: Stream) -> None:
+    for x in range(100, 140):
+        for other in (_stretch((370, WIDTH - 1)), _stretch((220, 300))):
+            mask = _stretch((0, x)) | other
+            assert np.array_equal(stream.see(mask, x), mask)
+
+
+def test_a_robot_that_reaches_it_ends_where_the_picture_has_changed(stream: Stream) -> None:
+    stream.advance(100, 160, TEXT)
+    for head_x in (296, 310, 324):
+        image = stream.image((0, head_x))
+        left = stream.see(_stretch((0, TEXT[1])), head_x, image=image)
+        end_x = int(np.flatnonzero(left[ROW]).max())
+        assert end_x == pytest.approx(head_x, abs=5)
+        assert left[ROW, : end_x + 1].all()
+
+
+def test_another_light_makes_it_robot_again_rather_than_hiding_one(stream: Stream) -> None:
+    stream.advance(100, 160, TEXT)
+    stream.board = stream.board - 40.0
+    mask = _stretch((0, 160), TEXT)
+    assert np.array_equal(stream.see(mask, 160), mask)
+
+
+def test_a_slow_change_of_light_is_followed(stream: Stream) -> None:
+    stream.advance(100, 120, TEXT)
+    for x in range(121, 221):
+        stream.board = stream.board - 0.5
+        assert np.array_equal(stream.see(_stretch((0, x), TEXT), x), _stretch((0, x)))
+
+
+def test_what_was_not_seen_for_long_is_forgotten(stream: Stream) -> None:
+    stream.advance(100, 160, TEXT)
+    stream.see(_stretch((0, 160)), 160, after_s=21.0)
+    mask = _stretch((0, 160), TEXT)
+    assert np.array_equal(stream.see(mask, 160), mask)
+
+
+@pytest.mark.parametrize("how", ["forget", "another size"])
+def test_another_stream_begins_anew(stream: Stream, how: str) -> None:
+    stream.advance(100, 160, TEXT)
+    if how == "forget":
+        stream.lookalikes.forget()
+    else:
+        stream.lookalikes.without(np.zeros((50, 60), np.bool_), np.zeros((50, 60, 3), np.uint8), stream.now_s)
+    mask = _stretch((0, 160), TEXT)
+    assert np.array_equal(stream.see(mask, 160), mask)
+
+
+def test_without_an_answer_lately_nothing_is_learnt(stream: Stream) -> None:
+    stream.see(_stretch((0, 100), TEXT), 100)
+    for x in range(101, 160):
+        mask = _stretch((0, x), TEXT)
+        assert np.array_equal(stream.see(mask, None, after_s=1.0), mask)
+
+
+def test_it_can_be_switched_off() -> None:
+    stream = Stream(Lookalikes(TrackingConfig(lookalike_px=0.0)))
+    mask = _stretch((0, 160), TEXT)
+    stream.advance(100, 160, TEXT)
+    assert stream.see(mask, 160) is mask
+
+
+def test_nothing_is_copied_where_there_is_no_such_piece(stream: Stream) -> None:
+    mask = _stretch((0, 160))
+    stream.advance(100, 160)
+    assert stream.see(mask, 160) is mask
+    nothing = _stretch()
+    assert stream.see(nothing, None) is nothing
