@@ -7,6 +7,7 @@ comes near and the gap to it can be bridged, or when it touches it; it is robot 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -40,16 +41,25 @@ class Lookalikes:
 
     def forget(self) -> None:
         """Another stream."""
-        self._end: tuple[Point, float] | None = None
         self._pieces: list[_Piece] = []
         self._begin((0, 0))
+
+    def _begin(self, shape: tuple[int, ...]) -> None:
+        self._last_s = -math.inf
+        self._end: tuple[Point, float] | None = None
+        self._known: Mask = np.zeros(shape, np.bool_)
+        self._seen_s: NDArray[np.float64] = np.full(shape, -np.inf)
+        self._robots_s: NDArray[np.float64] = np.full(shape, -np.inf)
+        self._ends: NDArray[np.float32] = np.zeros((*shape, 2), np.float32)  # the robot's, when the pixel was first seen
+        self._picture: NDArray[np.float32] = np.zeros((*shape, 3), np.float32)
 
     def without(self, robot: Mask, image: Image, captured_s: float) -> Mask:
         """The robot's mask (h, w) of the next frame, RGB (h, w, 3), without what is none; the same object where nothing is."""
         if self._travel_px == 0.0:
             return robot
-        if self._known.shape != robot.shape:
+        if self._known.shape != robot.shape or captured_s < self._last_s:  # a stream that was wound back
             self._begin(robot.shape)
+        self._last_s = captured_s
         self._pieces = _pieces_of(robot)
         self._sight(self._apart(captured_s), image, captured_s)
         none = self._none(robot, image, captured_s)
@@ -68,16 +78,12 @@ class Lookalikes:
         if self._travel_px == 0.0:
             return
         self._end = path.head, captured_s
-        body = _piece_under(path.points, self._pieces)  # what lies beyond a bridged gap may be none of it
-        if body is not None:
+        pieces = _pieces_under(path.points, self._pieces)
+        for body in pieces[:1]:
             self._robots_s[body.box][body.mask] = captured_s
-
-    def _begin(self, shape: tuple[int, ...]) -> None:
-        self._known: Mask = np.zeros(shape, np.bool_)
-        self._seen_s: NDArray[np.float64] = np.full(shape, -np.inf)
-        self._robots_s: NDArray[np.float64] = np.full(shape, -np.inf)
-        self._ends: NDArray[np.float32] = np.zeros((*shape, 2), np.float32)  # the robot's, when the pixel was first seen
-        self._picture: NDArray[np.float32] = np.zeros((*shape, 3), np.float32)
+        for bridged in pieces[1:]:  # perhaps the robot's tip, perhaps none of it: at least not seen apart
+            box, mask = bridged.widened(_EDGE_PX, self._known.shape)
+            self._seen_s[box][mask] = -math.inf
 
     def _apart(self, captured_s: float) -> list[_Piece]:
         """Small pieces that hang together neither with where the robot was, nor with the border that it comes in by."""
@@ -164,11 +170,15 @@ def _pieces_of(mask: Mask) -> list[_Piece]:
     return pieces
 
 
-def _piece_under(points: Points, pieces: list[_Piece]) -> _Piece | None:
-    """The piece that the first of the points (N, 2) which lies in any lies in."""
-    for x, y in np.rint(points).astype(int).tolist():
-        for piece in pieces:
-            rows, columns = piece.box
-            if rows.start <= y < rows.stop and columns.start <= x < columns.stop and piece.mask[y - rows.start, x - columns.start]:
-                return piece
-    return None
+def _pieces_under(points: Points, pieces: list[_Piece]) -> list[_Piece]:
+    """The pieces that a path (N, 2) runs through, in its order."""
+    columns, rows = np.rint(points).T.astype(np.intp)
+    found = []
+    for piece in pieces:
+        height, width = piece.mask.shape
+        x, y = columns - piece.x, rows - piece.y
+        within = np.flatnonzero((x >= 0) & (x < width) & (y >= 0) & (y < height))
+        on_it = within[piece.mask[y[within], x[within]]]
+        if len(on_it):
+            found.append((int(on_it[0]), piece))
+    return [piece for _, piece in sorted(found, key=lambda pair: pair[0])]

@@ -90,6 +90,13 @@ def test_a_tip_that_shows_beyond_a_fitting_is_robot(stream: Stream) -> None:
         assert np.array_equal(stream.see(mask, 200), mask)
 
 
+def test_a_tip_beyond_a_gap_that_is_bridged_is_robot(stream: Stream) -> None:
+    """A highlight hides a stretch of it; the path runs on to the tip, and its end moves with the tip."""
+    for tip_x in range(235, 300):
+        mask = _stretch((0, 200), (225, tip_x))
+        assert np.array_equal(stream.see(mask, tip_x, image=stream.image((0, tip_x))), mask)
+
+
 def test_where_the_robot_was_nothing_is_learnt(stream: Stream) -> None:
     """A reflection that cuts the robot in two, and a path that ends there for once."""
     stream.advance(200, 260)
@@ -145,6 +152,12 @@ def test_another_stream_begins_anew(stream: Stream, how: str) -> None:
         stream.lookalikes.without(np.zeros((50, 60), np.bool_), np.zeros((50, 60, 3), np.uint8), stream.now_s)
     mask = _stretch((0, 160), TEXT)
     assert np.array_equal(stream.see(mask, 160), mask)
+
+
+def test_a_stream_that_is_wound_back_begins_anew(stream: Stream) -> None:
+    stream.advance(100, 160, TEXT)
+    mask = _stretch((0, 160), TEXT)
+    assert np.array_equal(stream.see(mask, 160, after_s=-1.0), mask)
 
 
 def test_without_an_answer_lately_nothing_is_learnt(stream: Stream) -> None:
