@@ -19,6 +19,7 @@ class PursuitConfig(_Section):
     pixels_per_mm: float = Field(3.0, gt=0.1, le=50.0, description="of the view, roughly; a calibrated rig has its own scale")
     look_ahead_px: float = Field(10.0, ge=4.0, le=200.0, description="distance of the look-ahead point from a resting head")
     look_ahead_s: float = Field(0.15, ge=0.0, le=5.0, description="so much way at the present speed is added to it")
+    rounding_px: float = Field(8.0, ge=0.0, le=100.0, description="corners of the way are rounded over so much")
     heading_px: float = Field(16.0, ge=4.0, le=100.0, description="end of the robot whose direction is the head's")
     follow_arc: float = Field(0.9, ge=0.0, le=1.0, description="0 = point at the look-ahead point, 1 = lie along the route")
     gain: float = Field(1.0, gt=0.0, le=5.0, description="degrees of steering per degree of error")
@@ -39,13 +40,14 @@ class PursuitConfig(_Section):
     behind_s: float = Field(0.3, ge=0.0, le=5.0, description="the way must have lain behind the head for so long to back off")
     retry_mm: float = Field(9.0, gt=0.0, le=50.0, description="way back from where a missed branch lies beside the head")
     arrive_px: float = Field(8.0, ge=1.0, le=100.0, description="way left at which the target counts as reached")
-
     most_misses: int = Field(3, ge=1, le=100, description="after missing a branch so often it gives up and stops")
 
     @model_validator(mode="after")
-    def _check_forces(self) -> Self:
+    def _check_limits(self) -> Self:
         if not self.contact_slow_n < self.contact_back_off_n <= self.contact_limit_n:
             raise ValueError("contact_slow_n must be below contact_back_off_n, and that not above contact_limit_n")
+        if self.brake_px <= self.arrive_px:
+            raise ValueError("brake_px must be above arrive_px, or it would never brake")
         return self
 
 

@@ -50,9 +50,10 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig) -> Way
     if len(points) < 2:
         return None
     heading = _heading(scene.path.points, config.heading_px)
-    goal = _goal(points, head, look_ahead_px)
+    rounded = polyline.smooth(polyline.resample(points, 2.0), config.rounding_px / 2.0) if config.rounding_px > 0.0 else points
+    goal = _goal(rounded, head, look_ahead_px)
     straight_deg = _angle_deg(heading, _step(head, goal))
-    foot, first = points[0], polyline.cut(points, 0.0, 6.0)[-1]
+    foot, first = rounded[0], polyline.cut(rounded, 0.0, 6.0)[-1]
     # A head that has to turn into a branch beside it has the way across, not behind: one that leads back also begins backwards.
     back_deg = min(abs(straight_deg), abs(_angle_deg(heading, _step(foot, first))))
     behind = left_px is not None and left_px > config.arrive_px and back_deg > _BEHIND_DEG

@@ -141,6 +141,7 @@ class Pipeline:
                 past.memory = Memory(scene.path, frame.captured_s)
                 past.lookalikes.learn(scene.path, frame.captured_s)
             else:
+                past.lookalikes.forget()  # the camera was moved, perhaps
                 scene = replace(scene, pose=None, refusal=jump)
         if self._glance is not None:
             past.glances.remember(scene)
@@ -207,7 +208,7 @@ class Pipeline:
             robot_probability = look(sight.segment, image, window, known.robot_probability)
         with watch.stage("masks"):
             robot = masks.clean_robot(robot_probability, config)
-            robot = past.lookalikes.without(robot, image, scene.captured_s) if past is not None else robot
+            robot = past.lookalikes.without(robot, image, scene.captured_s, window) if past is not None else robot
             found = Masks(known.vessel, robot, known.vessel_probability, robot_probability)
         scene = replace(scene, window=window, masks=found, refusal=quality.check_masks(found))
         if scene.refusal is not None:
