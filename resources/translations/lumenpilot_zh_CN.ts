@@ -9519,6 +9519,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>Lookalike</source>
+        <translation>相似物</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>a piece that stays while the robot's end moves so far is no robot; 0 = it may be</source>
+        <translation>机器人末端移动这么远而自身不动的片段不是机器人；0 = 也可能是</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>Speeds behind the paper's words, and how theta becomes a degree of steering.</source>
         <translation>论文用语对应的速度，以及 θ 如何变为转向度数。</translation>
     </message>
@@ -9621,6 +9631,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>so much way at the present speed is added to it</source>
         <translation>再加上以当前速度走这么久的路程</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Rounding</source>
+        <translation>圆角</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>corners of the way are rounded over so much</source>
+        <translation>路径拐角在此长度内圆滑处理</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

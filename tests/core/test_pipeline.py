@@ -365,7 +365,7 @@ def test_in_a_stream_text_beneath_the_vessel_does_not_become_the_robots_end(netw
     refused = dict.fromkeys((0.0, CONFIG.tracking.lookalike_px), 0)
     for lookalike_px in refused:
         pipeline = Pipeline(network, PerceptionConfig(tracking=TrackingConfig(lookalike_px=lookalike_px)))
-        for k, x in enumerate(range(280, 416, 5)):
+        for k, x in enumerate(range(270, 416, 5)):
             network.draw(VESSEL[VESSEL[:, 0] <= x], text)
             scene = pipeline(frame(k * FRAME_S))
             refused[lookalike_px] += scene.pose is None or scene.path is None or abs(scene.path.head[0] - x) > 5.0

@@ -412,3 +412,19 @@ def test_another_destination_is_looked_at_anew() -> None:
         for k, target in enumerate([(380.0, 100.0), (20.0, 100.0), (380.0, 100.0)])
     ]
     assert routes == [RouteState.READY, RouteState.BEHIND, RouteState.READY]
+
+
+def test_a_sharp_corner_of_the_way_is_steered_for_earlier_when_it_is_rounded() -> None:
+    def missing_deg(x: float, rounding_px: float) -> float:
+        way = look_ahead(_scene(FORK, (x, 100), (300, 200)), 10.0, CONFIG.model_copy(update={"rounding_px": rounding_px}))
+        assert way is not None
+        return way.error_deg
+
+    assert missing_deg(186.0, 0.0) == pytest.approx(0.0, abs=0.5)
+    assert missing_deg(186.0, 8.0) > 3.0
+    assert missing_deg(120.0, 8.0) == pytest.approx(0.0, abs=0.5)
+
+
+def test_braking_begins_before_the_target_counts_as_reached() -> None:
+    with pytest.raises(ValueError, match="brake_px must be above arrive_px"):
+        PursuitConfig(brake_px=8.0, arrive_px=8.0)
