@@ -3,79 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from core.config import AdviceConfig, Config
 from core.control.frame_reports import FrameReports
 from core.control.frame_watch import RouteState
 from core.control.policies import POLICY_NAMES, RandomOperator, make_policy
 from core.control.pursuit import Pursuit, speed_word
-from core.control.way import look_ahead
-from core.perception.centerline import centerline_at
-from core.perception.pose import measure
-from core.perception.route import plan_route
-from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.policy_config import PursuitConfig
-from core.types import Frame, GraphEdge, Masks, Point, Points, Reason, Refusal, RobotPath, RobotStatus, Scene, Speed, VesselGraph
+from core.types import Frame, Point, Reason, Refusal, Scene, Speed
+from tests.core.driving_scenes import BEND, FORK, STRAIGHT, scene_at, status
 
 CONFIG, WORDS = PursuitConfig(smoothing_s=0.0), AdviceConfig()
 
 
-def _edge(start: int, end: int, points: Points) -> GraphEdge:
-    return GraphEdge(start, end, points, np.full(len(points), 15.0))
-
-
-def _line(a: Point, b: Point) -> Points:
-    return np.linspace(a, b, 101)
-
-
-STRAIGHT = VesselGraph(np.array([(0.0, 100.0), (400.0, 100.0)]), (_edge(0, 1, _line((0, 100), (400, 100))),))
-_ARC = np.array([(200 + 60 * math.sin(t), 160 - 60 * math.cos(t)) for t in np.linspace(0, math.pi / 2, 60)])
-BEND = VesselGraph(
-    np.array([(0.0, 100.0), (260.0, 300.0)]),
-    (_edge(0, 1, np.vstack([_line((0, 100), (199, 100)), _ARC, _line((260, 161), (260, 300))])),),
-)
-FORK = VesselGraph(
-    np.array([(0.0, 100.0), (200.0, 100.0), (400.0, 100.0), (300.0, 200.0)]),
-    (
-        _edge(0, 1, _line((0, 100), (200, 100))),
-        _edge(1, 2, _line((200, 100), (400, 100))),
-        _edge(1, 3, _line((200, 100), (300, 200))),
-    ),
-)
-
-
-def _scene(
-    graph: VesselGraph, head: Point, target: Point | None, heading_deg: float = 0.0, time_s: float = 0.0, length_px: float = 60.0
-) -> Scene:
-    """A straight robot that points along `heading_deg` (0: right, 90: down)."""
-    way = np.array([math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg))])
-    points = np.asarray(head) - np.arange(length_px, -1.0, -2.0)[:, None] * way
-    robot = fit_robot_vector(points, 40.0)
-    assert robot is not None
-    route = plan_route(graph, head, target) if target is not None else None
-    centerline = centerline_at(graph, head, robot.direction, 20.0, route)
-    assert centerline is not None
-    vessel = fit_vessel_vector(centerline)
-    assert vessel is not None
-    pose = measure(robot, vessel, Config().perception.pose)
-    path = RobotPath(points, 1.0, None, True, 0.0, 3.5)
-    return Scene(
-        0, time_s, (640, 480), 1.0, path=path, vessel_graph=graph, route=route, centerline=centerline,
-        robot_vector=robot, vessel_vector=vessel, pose=pose,
-    )  # fmt: skip
-
-
-def _status(contact_n: float | None, insertion_mm: float = 50.0) -> RobotStatus:
-    return RobotStatus(0.0, insertion_mm, 0.0, (0, 0, 0, 0), (0, 0, 0, 0), contact_n)
-
-
 def test_in_the_middle_and_along_it_goes_fast_and_straight() -> None:
-    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 100), (380, 100)))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 100), (380, 100)))
     assert advice is not None
     assert (advice.speed, advice.advance_mm_s) == (Speed.FAST, WORDS.fast_mm_s)
     assert advice.steer_deg == pytest.approx(0.0, abs=0.2)
@@ -83,50 +28,36 @@ def test_in_the_middle_and_along_it_goes_fast_and_straight() -> None:
 
 @pytest.mark.parametrize(("y", "heading", "sign"), [(94, 0, 1), (106, 0, -1), (100, 20, -1), (100, -20, 1)])
 def test_it_turns_towards_the_route(y: float, heading: float, sign: int) -> None:
-    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, y), (380, 100), heading))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, y), (380, 100), heading))
     assert advice is not None
     assert math.copysign(1, advice.steer_deg) == sign
 
 
-def test_the_error_is_the_angle_to_the_look_ahead_point() -> None:
-    config = CONFIG.model_copy(update={"follow_arc": 0.0, "min_bend_radius_px": 10.0})
-    way = look_ahead(_scene(STRAIGHT, (100, 94), (380, 100)), 12.0, config)
-    assert way is not None
-    # The route is walked in steps of 2 px: its first point at least 12 px away lies 12 px ahead and 6 px aside.
-    assert way.error_deg == pytest.approx(math.degrees(math.atan2(6, 12)), abs=0.1)
-
-
-def test_steering_is_limited_to_the_tightest_arc() -> None:
-    way = look_ahead(_scene(STRAIGHT, (100, 90), (380, 100), -60), 12.0, CONFIG)
-    assert way is not None
-    assert way.error_deg == pytest.approx(math.degrees(math.asin(12.0 / (2 * CONFIG.min_bend_radius_px))))
-
-
 def test_without_a_target_it_follows_the_centerlines_piece() -> None:
-    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 94), None))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 94), None))
     assert advice is not None
     assert advice.steer_deg > 0
     assert advice.advance_mm_s > 0
 
 
 def test_a_bend_ahead_slows_it_down() -> None:
-    advice = Pursuit(CONFIG, WORDS)(_scene(BEND, (190, 100), (260, 290)))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(BEND, (190, 100), (260, 290)))
     assert advice is not None
     assert 0 < advice.advance_mm_s < WORDS.fast_mm_s
     assert advice.why == "a bend ahead"
 
 
 def test_a_bifurcation_ahead_slows_it_down_even_straight_on() -> None:
-    advice = Pursuit(CONFIG, WORDS)(_scene(FORK, (165, 100), (390, 100)))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(FORK, (165, 100), (390, 100)))
     assert advice is not None
     assert (advice.speed, advice.why) == (Speed.MODERATE, "a bifurcation ahead")
-    far = Pursuit(CONFIG, WORDS)(_scene(FORK, (100, 100), (390, 100)))
+    far = Pursuit(CONFIG, WORDS)(scene_at(FORK, (100, 100), (390, 100)))
     assert far is not None
     assert far.speed is Speed.FAST
 
 
 def test_near_the_wall_it_goes_slow() -> None:
-    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 111), (380, 100)))  # 11 of 15 - 3.5 px
+    advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 111), (380, 100)))  # 11 of 15 - 3.5 px
     assert advice is not None
     assert advice.advance_mm_s <= WORDS.slow_mm_s
 
@@ -134,7 +65,7 @@ def test_near_the_wall_it_goes_slow() -> None:
 def test_the_nearer_the_target_the_slower_and_there_it_stops() -> None:
     speeds = []
     for x in (340.0, 368.0, 375.0):
-        advice = make_policy("pursuit", Config())(_scene(STRAIGHT, (x, 100), (380, 100)))
+        advice = make_policy("pursuit", Config())(scene_at(STRAIGHT, (x, 100), (380, 100)))
         assert advice is not None
         speeds.append(advice.advance_mm_s)
     assert speeds[0] > speeds[1] > speeds[2] == 0.0
@@ -144,8 +75,8 @@ def _pressed(pursuit: Pursuit, forces_n: list[float], fed_mm: float) -> list[flo
     """The speeds that are advised, one force a frame, `fed_mm` apart."""
     found = []
     for k, force_n in enumerate(forces_n):
-        scene = _scene(STRAIGHT, (100 + 3 * fed_mm * k, 100), (380, 100), time_s=0.1 * k)
-        advice = pursuit(scene, _status(force_n, 50.0 + fed_mm * k))
+        scene = scene_at(STRAIGHT, (100 + 3 * fed_mm * k, 100), (380, 100), time_s=0.1 * k)
+        advice = pursuit(scene, status(force_n, 50.0 + fed_mm * k))
         assert advice is not None
         found.append(advice.advance_mm_s)
     return found
@@ -162,11 +93,11 @@ def test_a_force_that_rises_slows_down_and_one_that_stays_does_not() -> None:
 
 def test_contact_backs_off_for_a_while() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
-    pursuit(_scene(STRAIGHT, (100, 100), (380, 100)), _status(0.0))
+    pursuit(scene_at(STRAIGHT, (100, 100), (380, 100)), status(0.0))
     speeds, insertion_mm = [], 50.0
     for k in range(1, 20):  # he who is advised does so
-        scene = _scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)
-        advice = pursuit(scene, _status(0.3 if k == 1 else 0.0, insertion_mm))
+        scene = scene_at(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)
+        advice = pursuit(scene, status(0.3 if k == 1 else 0.0, insertion_mm))
         assert advice is not None
         speeds.append(advice.advance_mm_s)
         insertion_mm += 0.1 * advice.advance_mm_s
@@ -189,7 +120,7 @@ def _missing(pursuit: Pursuit, times: int, target: Point = (20, 100), x: float =
             for _ in range(60):
                 time_s += 0.1
                 graph_heading = 180.0 if turned else 0.0
-                advice = pursuit(_scene(STRAIGHT, (x, 100), target, graph_heading, time_s), _status(0.0, insertion_mm))
+                advice = pursuit(scene_at(STRAIGHT, (x, 100), target, graph_heading, time_s), status(0.0, insertion_mm))
                 assert advice is not None
                 insertion_mm += 0.1 * advice.advance_mm_s
                 said.append(advice.why)
@@ -215,7 +146,7 @@ def test_who_drives_on_by_hand_after_it_gave_up_is_advised_again() -> None:
     assert "take over" in _missing(pursuit, CONFIG.most_misses)[-1]
     said = []
     for k in range(25):
-        advice = pursuit(_scene(STRAIGHT, (200 - k, 100), (20, 100), 180.0, 100.0 + 0.1 * k), _status(0.0, 20.0 + 0.3 * k))
+        advice = pursuit(scene_at(STRAIGHT, (200 - k, 100), (20, 100), 180.0, 100.0 + 0.1 * k), status(0.0, 20.0 + 0.3 * k))
         assert advice is not None
         said.append(advice.why)
     assert "take over" in said[5]
@@ -229,27 +160,27 @@ def test_misses_of_one_branch_do_not_count_for_the_next() -> None:
 
 
 def test_without_a_force_sensor_contact_is_not_guessed() -> None:
-    advice = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 100), (380, 100)), _status(None))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 100), (380, 100)), status(None))
     assert advice is not None
     assert advice.speed is Speed.FAST
 
 
 def test_a_head_that_is_fed_and_does_not_move_is_taken_back() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
-    advised = [pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)) for k in range(20)]
+    advised = [pursuit(scene_at(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)) for k in range(20)]
     assert [a for a in advised if a is not None and a.advance_mm_s < 0 and "does not move" in a.why]
 
 
 def test_advice_that_nobody_follows_is_no_stall() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
-    advised = [pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), _status(0.0)) for k in range(60)]
+    advised = [pursuit(scene_at(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), status(0.0)) for k in range(60)]
     assert all(a is not None and a.advance_mm_s > 0 for a in advised)
 
 
 def test_backing_off_that_nobody_follows_is_dropped_when_its_reason_is_gone() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
     advised = [
-        pursuit(_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), _status(0.41 if k == 0 else 0.0)) for k in range(20)
+        pursuit(scene_at(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k), status(0.41 if k == 0 else 0.0)) for k in range(20)
     ]
     backwards = [a is not None and a.advance_mm_s < 0 for a in advised]
     assert backwards[:10] == [True] * 10
@@ -261,7 +192,7 @@ def test_a_missed_branch_is_backed_out_of_until_it_lies_well_ahead() -> None:
     seen = []
     x = 230.0
     for frame in range(300):
-        advice = pursuit(_scene(FORK, (x, 100), (290, 190), time_s=0.1 * frame))
+        advice = pursuit(scene_at(FORK, (x, 100), (290, 190), time_s=0.1 * frame))
         assert advice is not None
         seen.append((x, advice.advance_mm_s))
         if advice.advance_mm_s > 0:
@@ -273,71 +204,15 @@ def test_a_missed_branch_is_backed_out_of_until_it_lies_well_ahead() -> None:
     assert seen[-1][0] < 190.0
 
 
-@pytest.mark.parametrize("heading", [70.0, 95.0])
-def test_a_branch_beside_the_head_is_turned_into_and_not_backed_away_from(heading: float) -> None:
-    """At a T the head enters across the way, and is past its middle before it has turned: the way is not behind it."""
-    way = look_ahead(_scene(STRAIGHT, (100, 112), (380, 100), heading), 10.0, CONFIG)
-    assert way is not None
-    assert not way.behind
-    assert way.error_deg < 0.0, "to the left, where the way goes on"
-
-
-def test_a_head_far_beside_the_way_looks_at_a_place_ahead_and_not_across() -> None:
-    config = CONFIG.model_copy(update={"follow_arc": 0.0, "min_bend_radius_px": 5.0})
-    way = look_ahead(_scene(STRAIGHT, (100, 113), (380, 100), 0.0), 10.0, config)
-    assert way is not None
-    assert way.error_deg == pytest.approx(-45.0, abs=3.0)
-
-
-def test_a_way_that_leads_back_is_behind_wherever_the_head_is_beside_it() -> None:
-    for y in (90.0, 100.0, 112.0):
-        way = look_ahead(_scene(STRAIGHT, (300, y), (20, 100), 0.0), 10.0, CONFIG)
-        assert way is not None
-        assert way.behind
-
-
-def _seen(scene: Scene, vessel: NDArray[np.bool_]) -> Scene:
-    empty = np.zeros(vessel.shape, np.float32)
-    return replace(scene, masks=Masks(vessel, np.zeros_like(vessel), empty, empty))
-
-
-def test_a_head_that_looks_into_the_right_branch_goes_on_although_the_other_centerline_is_nearer() -> None:
-    scene = _scene(FORK, (230, 108), (300, 200), 60.0)
-    alone = look_ahead(scene, 10.0, CONFIG)
-    assert alone is not None
-    assert alone.behind, "along the graph the way leads back to the bifurcation"
-    way = look_ahead(_seen(scene, np.ones((480, 640), np.bool_)), 10.0, CONFIG)
-    assert way is not None
-    assert not way.behind
-    assert way.error_deg > 0.0, "the branch lies to the right of where it looks"
-    assert way.left_px is not None
-    assert alone.left_px is not None
-    assert math.dist((230, 108), (300, 200)) <= way.left_px < alone.left_px
-
-
-def test_a_branch_behind_a_wall_is_not_in_sight() -> None:
-    vessel = np.ones((480, 640), np.bool_)
-    vessel[112:115] = False
-    way = look_ahead(_seen(_scene(FORK, (230, 108), (300, 200), 60.0), vessel), 10.0, CONFIG)
-    assert way is not None
-    assert way.behind
-
-
-def test_a_branch_in_sight_but_far_to_the_side_is_backed_up_to() -> None:
-    way = look_ahead(_seen(_scene(FORK, (300, 100), (300, 200), 0.0), np.ones((480, 640), np.bool_)), 10.0, CONFIG)
-    assert way is not None
-    assert way.behind
-
-
 def test_no_pose_no_advice() -> None:
-    assert Pursuit(CONFIG, WORDS)(Scene(0, 0.0, (640, 480), 1.0, refusal=Refusal(Reason.NO_ROBOT)), _status(0.9)) is None
+    assert Pursuit(CONFIG, WORDS)(Scene(0, 0.0, (640, 480), 1.0, refusal=Refusal(Reason.NO_ROBOT)), status(0.9)) is None
 
 
 def test_the_steering_is_smoothed_in_time() -> None:
     pursuit = Pursuit(PursuitConfig(smoothing_s=0.1), WORDS)
-    pursuit(_scene(STRAIGHT, (100, 100), (380, 100)))
-    first = pursuit(_scene(STRAIGHT, (100, 94), (380, 100), time_s=0.1))
-    alone = Pursuit(CONFIG, WORDS)(_scene(STRAIGHT, (100, 94), (380, 100)))
+    pursuit(scene_at(STRAIGHT, (100, 100), (380, 100)))
+    first = pursuit(scene_at(STRAIGHT, (100, 94), (380, 100), time_s=0.1))
+    alone = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 94), (380, 100)))
     assert first is not None
     assert alone is not None
     assert 0 < first.steer_deg < alone.steer_deg
@@ -352,16 +227,16 @@ def test_speeds_have_the_papers_words() -> None:
 @pytest.mark.parametrize("name", POLICY_NAMES)
 def test_every_policy_stops_at_the_target(name: str) -> None:
     policy = make_policy(name, Config())  # type: ignore[arg-type]
-    advice = policy(_scene(STRAIGHT, (375, 100), (380, 100)), _status(0.0))
+    advice = policy(scene_at(STRAIGHT, (375, 100), (380, 100)), status(0.0))
     assert advice is not None
     assert (advice.speed, advice.advance_mm_s, advice.steer_deg) == (Speed.STOP, 0.0, 0.0)
 
 
 def test_push_never_steers_and_the_random_operator_is_seeded() -> None:
-    push = make_policy("push", Config())(_scene(STRAIGHT, (100, 110), (380, 100), 30))
+    push = make_policy("push", Config())(scene_at(STRAIGHT, (100, 110), (380, 100), 30))
     assert push is not None
     assert (push.steer_deg, push.speed) == (0.0, Speed.MODERATE)
-    scenes = [_scene(STRAIGHT, (100, 100), (380, 100), time_s=0.5 * k) for k in range(12)]
+    scenes = [scene_at(STRAIGHT, (100, 100), (380, 100), time_s=0.5 * k) for k in range(12)]
 
     def played(operator: RandomOperator) -> list[object]:
         return [operator(scene) for scene in scenes]
@@ -385,7 +260,7 @@ def _routes_reported(headings: list[tuple[float, float]], target: Point = (380, 
     image = np.zeros((480, 640, 3), np.uint8)
     found = []
     for index, (time_s, heading_deg) in enumerate(headings):
-        scene = _scene(STRAIGHT, (100, 100), target, heading_deg, time_s)
+        scene = scene_at(STRAIGHT, (100, 100), target, heading_deg, time_s)
         found.append(reports.report(Frame(index, time_s, image), scene, None, has_target=True).route)
     return found
 
@@ -408,21 +283,10 @@ def test_another_destination_is_looked_at_anew() -> None:
     reports = FrameReports(PursuitConfig(behind_s=0.3))
     image = np.zeros((480, 640, 3), np.uint8)
     routes = [
-        reports.report(Frame(k, 0.03 * k, image), _scene(STRAIGHT, (200, 100), target, 0, 0.03 * k), None, has_target=True).route
+        reports.report(Frame(k, 0.03 * k, image), scene_at(STRAIGHT, (200, 100), target, 0, 0.03 * k), None, has_target=True).route
         for k, target in enumerate([(380.0, 100.0), (20.0, 100.0), (380.0, 100.0)])
     ]
     assert routes == [RouteState.READY, RouteState.BEHIND, RouteState.READY]
-
-
-def test_a_sharp_corner_of_the_way_is_steered_for_earlier_when_it_is_rounded() -> None:
-    def missing_deg(x: float, rounding_px: float) -> float:
-        way = look_ahead(_scene(FORK, (x, 100), (300, 200)), 10.0, CONFIG.model_copy(update={"rounding_px": rounding_px}))
-        assert way is not None
-        return way.error_deg
-
-    assert missing_deg(186.0, 0.0) == pytest.approx(0.0, abs=0.5)
-    assert missing_deg(186.0, 8.0) > 3.0
-    assert missing_deg(120.0, 8.0) == pytest.approx(0.0, abs=0.5)
 
 
 def test_braking_begins_before_the_target_counts_as_reached() -> None:
