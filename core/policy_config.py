@@ -19,7 +19,9 @@ class PursuitConfig(_Section):
     pixels_per_mm: float = Field(3.0, gt=0.1, le=50.0, description="of the view, roughly; a calibrated rig has its own scale")
     look_ahead_px: float = Field(10.0, ge=4.0, le=200.0, description="distance of the look-ahead point from a resting head")
     look_ahead_s: float = Field(0.15, ge=0.0, le=5.0, description="so much way at the present speed is added to it")
-    rounding_px: float = Field(8.0, ge=0.0, le=100.0, description="corners of the way are rounded over so much")
+    rounding_px: float = Field(
+        8.0, ge=0.0, le=100.0, description="after each miss of a branch its corner is rounded over so much more"
+    )
     heading_px: float = Field(16.0, ge=4.0, le=100.0, description="end of the robot whose direction is the head's")
     follow_arc: float = Field(0.9, ge=0.0, le=1.0, description="0 = point at the look-ahead point, 1 = lie along the route")
     gain: float = Field(1.0, gt=0.0, le=5.0, description="degrees of steering per degree of error")

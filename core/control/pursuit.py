@@ -46,7 +46,8 @@ class Pursuit:
         """Advice for a scene; `status` adds the contact force and how fast the robot is really fed. None when there is no pose."""
         config = self._config
         ahead_px = config.look_ahead_px + config.look_ahead_s * max(0.0, self._speed_mm_s) * config.pixels_per_mm
-        way = look_ahead(scene, ahead_px, config)
+        # Who missed a branch has turned too late: each new try begins to turn earlier.
+        way = look_ahead(scene, ahead_px, config, self._misses.count * config.rounding_px)
         if way is None:
             return None
         elapsed_s = 0.0 if self._last_s is None else max(0.0, scene.captured_s - self._last_s)

@@ -40,8 +40,8 @@ class Way:
     wall: float
 
 
-def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig) -> Way | None:
-    """What lies ahead in a scene; None when it has no pose."""
+def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, rounding_px: float = 0.0) -> Way | None:
+    """What lies ahead in a scene, on a way whose corners are rounded over `rounding_px`; None when it has no pose."""
     if scene.pose is None or scene.path is None or scene.centerline is None:
         return None
     head = scene.path.head
@@ -50,7 +50,7 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig) -> Way
     if len(points) < 2:
         return None
     heading = _heading(scene.path.points, config.heading_px)
-    rounded = polyline.smooth(polyline.resample(points, 2.0), config.rounding_px / 2.0) if config.rounding_px > 0.0 else points
+    rounded = polyline.smooth(polyline.resample(points, 2.0), rounding_px / 2.0) if rounding_px > 0.0 else points
     goal = _goal(rounded, head, look_ahead_px)
     straight_deg = _angle_deg(heading, _step(head, goal))
     foot, first = rounded[0], polyline.cut(rounded, 0.0, 6.0)[-1]

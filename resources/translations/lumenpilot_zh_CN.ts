@@ -9639,8 +9639,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>corners of the way are rounded over so much</source>
-        <translation>路径拐角在此长度内圆滑处理</translation>
+        <source>after each miss of a branch its corner is rounded over so much more</source>
+        <translation>每错过一次分支，其拐角的圆滑长度增加这么多</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

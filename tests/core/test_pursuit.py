@@ -13,7 +13,7 @@ from core.control.frame_watch import RouteState
 from core.control.policies import POLICY_NAMES, RandomOperator, make_policy
 from core.control.pursuit import Pursuit, speed_word
 from core.policy_config import PursuitConfig
-from core.types import Frame, Point, Reason, Refusal, Scene, Speed
+from core.types import Advice, Frame, Point, Reason, Refusal, Scene, Speed
 from tests.core.driving_scenes import BEND, FORK, STRAIGHT, scene_at, status
 
 CONFIG, WORDS = PursuitConfig(smoothing_s=0.0), AdviceConfig()
@@ -151,6 +151,23 @@ def test_who_drives_on_by_hand_after_it_gave_up_is_advised_again() -> None:
         said.append(advice.why)
     assert "take over" in said[5]
     assert "take over" not in said[-1]
+
+
+def test_after_a_miss_it_turns_into_the_branch_earlier() -> None:
+    def asked(pursuit: Pursuit, x: float, time_s: float, insertion_mm: float) -> Advice:
+        advice = pursuit(scene_at(FORK, (x, 100), (300, 200), time_s=time_s), status(0.0, insertion_mm))
+        assert advice is not None
+        return advice
+
+    pursuit = Pursuit(CONFIG, WORDS)
+    x, time_s, insertion_mm, said = 250.0, 0.0, 50.0, ""
+    while not (x < 200.0 and not said.startswith("backing off")):
+        advice = asked(pursuit, x, time_s, insertion_mm)
+        time_s, said = time_s + 0.1, advice.why
+        insertion_mm, x = insertion_mm + 0.1 * advice.advance_mm_s, x + 0.3 * advice.advance_mm_s
+        assert time_s < 30.0
+    assert asked(pursuit, 186.0, time_s, insertion_mm).steer_deg > 3.0
+    assert asked(Pursuit(CONFIG, WORDS), 186.0, time_s, insertion_mm).steer_deg == pytest.approx(0.0, abs=0.5)
 
 
 def test_misses_of_one_branch_do_not_count_for_the_next() -> None:

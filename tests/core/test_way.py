@@ -89,7 +89,7 @@ def test_a_branch_in_sight_but_far_to_the_side_is_backed_up_to() -> None:
 
 def test_a_sharp_corner_of_the_way_is_steered_for_earlier_when_it_is_rounded() -> None:
     def missing_deg(x: float, rounding_px: float) -> float:
-        way = look_ahead(scene_at(FORK, (x, 100), (300, 200)), 10.0, CONFIG.model_copy(update={"rounding_px": rounding_px}))
+        way = look_ahead(scene_at(FORK, (x, 100), (300, 200)), 10.0, CONFIG, rounding_px)
         assert way is not None
         return way.error_deg
 
