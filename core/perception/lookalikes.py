@@ -22,6 +22,7 @@ from core.types import Image, Mask, Point, Points, RobotPath, Window
 
 _EDGE_PX = 2
 """So far the edge of a piece comes and goes with the noise."""
+_ELLIPSE = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1))
 _MOST_SHARE = 0.3
 """Of the largest piece's pixels. What is larger is another robot or a part of this one, and the quality gate's to judge."""
 _MOST_PIECES = 10
@@ -184,9 +185,6 @@ def _looks_alike(now: NDArray[Any], before: NDArray[np.float32], where: Mask, le
     difference = np.abs(now - before).mean(axis=2, dtype=np.float32) * weight
     around = (_AROUND_PX, _AROUND_PX)
     return np.asarray(cv2.blur(difference, around) < levels * cv2.blur(weight, around))
-
-
-_ELLIPSE = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
