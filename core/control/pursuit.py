@@ -93,7 +93,8 @@ class Pursuit:
             self._back, self._unfollowed_s = None, 0.0
             return None
         steer_deg = 0.0 if way.behind else self._steer_deg
-        return self._advise(-self._words.moderate_mm_s, steer_deg, f"backing off: {self._back.why}")
+        # The way back is free, the head follows its own body: only time is lost here, and the body leans meanwhile.
+        return self._advise(-self._words.fast_mm_s, steer_deg, f"backing off: {self._back.why}")
 
     def _given_up(self, way: Way) -> Advice | None:
         if self._unfollowed_s > _UNFOLLOWED_S:
@@ -111,8 +112,9 @@ class Pursuit:
         if way.junction_px is not None:
             limits.append((words.moderate_mm_s, "a bifurcation ahead"))
         if abs(self._steer_deg) > config.slow_steer_deg:
-            share = config.slow_steer_deg / abs(self._steer_deg)
-            limits.append((max(words.slowest_mm_s, words.moderate_mm_s * share), "the head must turn first"))
+            # No jump where it begins: an error that trembles about the limit must not make the feed stutter.
+            share = (config.slow_steer_deg / abs(self._steer_deg)) ** 2
+            limits.append((max(words.slowest_mm_s, words.fast_mm_s * share), "the head must turn first"))
         if way.wall > config.wall_share:
             limits.append((words.slow_mm_s, "the head is near the wall"))
         if rises:

@@ -56,6 +56,22 @@ def test_a_bifurcation_ahead_slows_it_down_even_straight_on() -> None:
     assert far.speed is Speed.FAST
 
 
+def test_the_more_the_head_must_turn_the_slower_and_never_by_a_jump() -> None:
+    pointing = PursuitConfig(smoothing_s=0.0, follow_arc=0.0, min_bend_radius_px=5.0)  # the error is the heading
+    errors_deg, speeds = [], []
+    for heading in np.arange(0.0, 40.0, 0.25):
+        advice = Pursuit(pointing, WORDS)(scene_at(STRAIGHT, (100, 100), (380, 100), float(heading)))
+        assert advice is not None
+        errors_deg.append(abs(advice.steer_deg))
+        speeds.append(advice.advance_mm_s)
+    small = np.array(errors_deg) < CONFIG.slow_steer_deg
+    assert small.any()
+    assert np.array(speeds)[small] == pytest.approx(WORDS.fast_mm_s)
+    assert (np.diff(speeds) <= 1e-9).all()
+    assert np.diff(speeds).min() > -0.1 * WORDS.fast_mm_s
+    assert speeds[-1] < WORDS.slow_mm_s
+
+
 def test_near_the_wall_it_goes_slow() -> None:
     advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 111), (380, 100)))  # 11 of 15 - 3.5 px
     assert advice is not None
@@ -95,16 +111,16 @@ def test_contact_backs_off_for_a_while() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
     pursuit(scene_at(STRAIGHT, (100, 100), (380, 100)), status(0.0))
     speeds, insertion_mm = [], 50.0
-    for k in range(1, 20):  # he who is advised does so
+    for k in range(1, 12):  # he who is advised does so; longer, and this head that never moves would be stuck
         scene = scene_at(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)
         advice = pursuit(scene, status(0.3 if k == 1 else 0.0, insertion_mm))
         assert advice is not None
         speeds.append(advice.advance_mm_s)
         insertion_mm += 0.1 * advice.advance_mm_s
-    assert speeds[0] == -WORDS.moderate_mm_s
+    assert speeds[0] == -WORDS.fast_mm_s
     assert speeds[-1] > 0
     backwards_mm = 0.1 * sum(-v for v in speeds if v < 0)
-    assert backwards_mm == pytest.approx(CONFIG.back_off_mm / 2, abs=0.31)
+    assert backwards_mm == pytest.approx(CONFIG.back_off_mm / 2, abs=0.1 * WORDS.fast_mm_s)
 
 
 def test_a_force_above_the_hard_limit_backs_off_even_if_it_does_not_rise() -> None:
