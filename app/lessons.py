@@ -18,7 +18,7 @@ from core.learning.growing import deepened, with_first_look
 from core.learning.model_file import INFO, SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX
-from core.perception.segmentation import Mirrored, open_second_look, open_segmenter
+from core.perception.segmentation import Turned, open_second_look, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 from core.study.difficulty import difficulty
 
@@ -100,8 +100,8 @@ class SecondLookLesson:
 
     def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> NearCrops | None:
         plain = open_segmenter(SegmentationConfig(model=self._init))
-        # Streams look once at the whole, single pictures twice: the second look has to get on with both.
-        ways = (plain, Mirrored(plain))
+        # Streams look once at the whole, single pictures more often: the second look has to get on with both.
+        ways = (plain, Turned(plain, turns=(0,)))
         # What the second look still gets wrong is worth more of its time than what only the first one did.
         near = open_second_look(SegmentationConfig(model=self._init)) if self._has_one and plan.focus_share > 0 else None
         looks: dict[Path, FirstLook] = {}  # a sample that is shown more often is looked at once

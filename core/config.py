@@ -42,7 +42,7 @@ class SegmentationConfig(_Section):
     precision: Literal["auto", "int8", "fp32"] = Field("auto", description="of OpenVINO; auto = int8 where the model has it")
     threads: int = Field(0, ge=0, le=64, description="CPU threads; 0 = all cores")
     mirrored: Literal["pictures", "always", "never"] = Field(
-        "pictures", description="average over picture and mirror image: of single pictures, always, never"
+        "pictures", description="average over a picture's eight orientations: of single pictures, always, never"
     )
     second_look: bool = Field(True, description="look again, closely, at the robot's ends, where the model has a network for it")
     vessel_threshold: float = Field(0.5, gt=0.0, lt=1.0, description="probability from which on a pixel is vessel")

@@ -17,7 +17,7 @@ from torch.utils.data import Dataset
 from core.learning.augment import random_clutter, random_crop, random_look
 from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.training import TrainingPlan
-from core.perception.second_look import WINDOW_PX, PlaneSegmenter, look_again, places_to_look
+from core.perception.second_look import WINDOW_PX, look_again, places_to_look
 from core.perception.segmentation import Segmenter
 from core.perception.windows import window_around
 from core.types import Image, Mask, Point
@@ -121,12 +121,12 @@ class FirstLook:
     wrong: tuple[Point, ...] = ()
 
     @classmethod
-    def at(cls, sample: Sample, segment: Segmenter, near: PlaneSegmenter | None = None) -> FirstLook:
+    def at(cls, sample: Sample, segment: Segmenter, near: Segmenter | None = None) -> FirstLook:
         """Look at a frame, with a second look by `near`; raises DatasetError."""
         image, _, truth = sample.load(WORKING_SIZE_PX)
         vessel, robot = segment(image)
         packed = [cv2.imencode(".png", np.rint(seen * 255).astype(np.uint8))[1].tobytes() for seen in (vessel, robot)]
-        found = look_again(image, (vessel, robot), near, mirrored=False)[1] if near is not None else robot
+        found = look_again(image, (vessel, robot), near)[1] if near is not None else robot
         return cls(packed[0], packed[1], tuple(places_to_look(robot)), tuple(_wrong_places(found >= np.float32(0.5), truth)))
 
     def probabilities(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:

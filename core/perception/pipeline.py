@@ -19,7 +19,7 @@ from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
 from core.perception.route_memory import RouteMemory
 from core.perception.second_look import SecondLook
-from core.perception.segmentation import Mirrored, Segmenter, open_second_look, open_segmenter, to_working
+from core.perception.segmentation import Segmenter, Turned, open_second_look, open_segmenter, to_working
 from core.perception.tracking import Memory, check_jump, recall
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
@@ -265,21 +265,21 @@ def _port(config: PathConfig, image: Image) -> Point | None:
 
 def open_pipeline(config: PerceptionConfig) -> Pipeline:
     """Load the configured model and build the pipeline around it; raises ModelError."""
-    plain, twice = open_sights(config)
-    stream = twice if config.segmentation.mirrored == "always" else plain
-    single = plain if config.segmentation.mirrored == "never" else twice
+    plain, turned = open_sights(config)
+    stream = turned if config.segmentation.mirrored == "always" else plain
+    single = plain if config.segmentation.mirrored == "never" else turned
     return Pipeline(stream.segment, config, stream.calibration, single, glance=stream)
 
 
 def open_sights(config: PerceptionConfig) -> tuple[Sight, Sight]:
-    """The configured model as it looks at a picture, and as it looks at picture and mirror image; raises ModelError."""
+    """The configured model as it looks at a picture once, and in all its orientations; raises ModelError."""
     segmenter, near = open_segmenter(config.segmentation), open_second_look(config.segmentation)
     info = segmenter.info
     plain: Segmenter = segmenter
-    twice: Segmenter = Mirrored(segmenter)
+    turned: Segmenter = Turned(segmenter)
     if near is not None:
-        plain, twice = SecondLook(plain, near, mirrored=False), SecondLook(twice, near)
-    return Sight(plain, info.calibration), Sight(twice, info.calibration_mirrored or info.calibration)
+        plain, turned = SecondLook(plain, near), SecondLook(turned, Turned(near))
+    return Sight(plain, info.calibration), Sight(turned, info.calibration_mirrored or info.calibration)
 
 
 class NoPerception:

@@ -8,7 +8,6 @@ got wrong. What it says replaces the first look's probabilities there, of robot 
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -34,12 +33,6 @@ _MIN_AREA_PX = 20
 
 Planes = NDArray[np.uint8]
 """Shape (h, w, 5): red, green, blue, and the first look's probabilities of vessel and robot as 0..255."""
-
-
-class PlaneSegmenter(Protocol):
-    """Vessel and robot probabilities, float32 (h, w) each, of what is in ``Planes``."""
-
-    def __call__(self, planes: Planes, /) -> tuple[Probability, Probability]: ...
 
 
 def planes_of(image: Image, vessel: Probability, robot: Probability) -> Planes:
@@ -80,12 +73,11 @@ class SecondLook:
     Parameters
     ----------
     first : the first look, at all of the picture.
-    near : the second network.
-    mirrored : whether it is asked about the mirror image of a window, too, and the mean taken.
+    near : the second network, which is asked about ``Planes``.
     """
 
-    def __init__(self, first: Segmenter, near: PlaneSegmenter, *, mirrored: bool = True) -> None:
-        self._first, self._near, self._mirrored = first, near, mirrored
+    def __init__(self, first: Segmenter, near: Segmenter) -> None:
+        self._first, self._near = first, near
 
     @property
     def engine(self) -> str:
@@ -96,12 +88,10 @@ class SecondLook:
         self._near(np.zeros((WINDOW_PX, WINDOW_PX, 5), np.uint8))
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        return look_again(image, self._first(image), self._near, mirrored=self._mirrored)
+        return look_again(image, self._first(image), self._near)
 
 
-def look_again(
-    image: Image, seen: tuple[Probability, Probability], near: PlaneSegmenter, *, mirrored: bool
-) -> tuple[Probability, Probability]:
+def look_again(image: Image, seen: tuple[Probability, Probability], near: Segmenter) -> tuple[Probability, Probability]:
     """Probabilities of vessel and robot after a second look at the ends of what the first one has `seen` in the picture."""
     vessel, robot = (probability.copy() for probability in seen)
     looked: list[Point] = []
@@ -111,7 +101,7 @@ def look_again(
             if len(looked) < _MAX_LOOKS and all(math.dist(place, other) > _SEEN_PX for other in looked):
                 looked.append(place)
         for place in looked[before:]:
-            _look_at(place, image, seen, near, mirrored, (vessel, robot))
+            _look_at(place, image, seen, near, (vessel, robot))
         if len(looked) == before:
             break
     return vessel, robot
@@ -121,19 +111,14 @@ def _look_at(
     place: Point,
     image: Image,
     seen: tuple[Probability, Probability],
-    near: PlaneSegmenter,
-    mirrored: bool,
+    near: Segmenter,
     probabilities: tuple[Probability, Probability],
 ) -> None:
     """Replace both probabilities in the window around `place`; the network is shown those of the first look."""
     height, width = image.shape[:2]
     x, y, across, down = window_around(place, (width, height), WINDOW_PX)
     part = np.s_[y : y + down, x : x + across]
-    cut = planes_of(image[part], seen[0][part], seen[1][part])
-    found = near(cut)
-    if mirrored:
-        other = near(np.ascontiguousarray(cut[:, ::-1]))
-        found = (0.5 * (found[0] + other[0][:, ::-1]), 0.5 * (found[1] + other[1][:, ::-1]))
+    found = near(planes_of(image[part], seen[0][part], seen[1][part]))
     columns = _fade(across, x > 0, x + across < width)
     rows = _fade(down, y > 0, y + down < height)
     weight = rows[:, None] * columns[None, :]

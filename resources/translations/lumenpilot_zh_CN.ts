@@ -8919,8 +8919,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>average over picture and mirror image: of single pictures, always, never</source>
-        <translation>对图像及其镜像取平均：仅单张图片、总是、从不</translation>
+        <source>average over a picture's eight orientations: of single pictures, always, never</source>
+        <translation>对图像的八种朝向（旋转与镜像）取平均：仅单张图片、总是、从不</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

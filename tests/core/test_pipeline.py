@@ -7,7 +7,7 @@ import pytest
 from core.config import Config, PerceptionConfig, TrackingConfig
 from core.learning.model_file import ModelInfo
 from core.perception.pipeline import NoPerception, Pipeline, Sight, open_pipeline
-from core.perception.segmentation import Mirrored, open_segmenter
+from core.perception.segmentation import Turned, open_segmenter
 from core.types import Frame, Image, Points, PoseState, Reason, Scene
 from hardware.twin.world import TwinWorld
 from tests.core.drawing import SIZE, curve, depth, probability
@@ -276,22 +276,46 @@ class _LooksLeft:
 
 
 def test_a_picture_and_its_mirror_image_are_averaged() -> None:
-    vessel, robot = Mirrored(_LooksLeft())(np.zeros((4, 6, 3), np.uint8))
+    vessel, robot = Turned(_LooksLeft(), turns=(0,))(np.zeros((4, 6, 3), np.uint8))
     assert np.array_equal(vessel, np.full((4, 6), 0.5, np.float32))
     assert vessel.dtype == robot.dtype == np.float32
 
 
-def test_single_pictures_may_be_looked_at_twice_while_a_stream_is_not() -> None:
+def test_all_eight_orientations_are_asked_about_and_turned_back() -> None:
+    class Copies:
+        engine = "copies"
+
+        def __init__(self) -> None:
+            self.shown: list[np.ndarray] = []
+
+        def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            assert image.flags.c_contiguous
+            self.shown.append(image)
+            return image[:, :, 0].astype(np.float32), image[:, :, 1].astype(np.float32)
+
+    image = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
+    copies = Copies()
+    turned = Turned(copies)
+    vessel, robot = turned(image)
+    assert len({(shown.shape, shown.tobytes()) for shown in copies.shown}) == 8
+    assert vessel == pytest.approx(image[:, :, 0])
+    assert robot == pytest.approx(image[:, :, 1])
+    assert turned.engine == "copies, 8 orientations"
+
+
+def test_single_pictures_may_be_looked_at_more_often_than_a_stream() -> None:
     network = _LooksLeft()
-    pipeline = Pipeline(network, CONFIG, None, Sight(Mirrored(network)))
+    pipeline = Pipeline(network, CONFIG, None, Sight(Turned(network)))
     pipeline(frame())
     assert network.calls == 1
     pipeline.perceive_single(frame())
-    assert network.calls == 3
+    assert network.calls == 9
 
 
-@pytest.mark.parametrize(("mirrored", "stream", "single"), [("pictures", 1, 2), ("always", 2, 2), ("never", 1, 1)])
-def test_the_configuration_says_what_is_mirrored(mirrored: str, stream: int, single: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("mirrored", "stream", "single"), [("pictures", 1, 8), ("always", 8, 8), ("never", 1, 1)])
+def test_the_configuration_says_what_is_seen_in_all_orientations(
+    mirrored: str, stream: int, single: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     config = PerceptionConfig.model_validate({"segmentation": {"mirrored": mirrored}})
     pipeline = open_pipeline(config)
     seen: list[tuple[int, ...]] = []
