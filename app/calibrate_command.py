@@ -14,7 +14,7 @@ from core.perception.evidence import Calibration
 
 
 def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None:
-    """Perceive every frame of a labelled set, plain and mirrored; fit a calibration of each, store both in the model's manifest."""
+    """Perceive every frame of a labelled set, once and in all orientations; store a calibration of each in the model's manifest."""
     from core.learning.dataset import find_labelled
     from core.learning.model_file import model_folder, sha256_of, write_calibration
     from core.perception.pipeline import open_pipeline
@@ -31,7 +31,7 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None
             segmentation = {"model": model, "mirrored": mirrored}
             overrides = {"perception": {"segmentation": segmentation, "quality": {"min_confidence": 0.0}}}
             pipeline = open_pipeline(load_config(config_path, None, overrides).perception)
-            title = "frames" if mirrored == "never" else "mirrored too"
+            title = "frames" if mirrored == "never" else "all orientations"
             scores = list(bar.track(score_set(samples, truth, pipeline, TrueMasks()), total=len(samples), description=title))
             pairs = [(score.evidence, is_right(score)) for score in scores if score.answered and score.evidence is not None]
             calibrations.append(fit([evidence for evidence, _ in pairs], [right for _, right in pairs], described))

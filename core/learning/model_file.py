@@ -238,7 +238,7 @@ def write_figures(folder: Path, figures: dict[str, Any]) -> None:
 def write_calibration(folder: Path, calibration: Calibration, mirrored: Calibration | None = None) -> None:
     """Store how evidence becomes confidence in the manifest of a model, atomically. Figures measured before are no longer true.
 
-    `mirrored` is for masks averaged over picture and mirror image; None: the same.
+    `mirrored` is for masks averaged over all orientations of a picture; None: the same.
     """
     _update(folder, {"calibration": calibration, "calibration_mirrored": mirrored, "figures": {}})
 
