@@ -32,6 +32,15 @@ def _config(model: str | None, preset: str | None, config_path: Path | None) -> 
     return load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model else None)
 
 
+def _as_in_a_stream(config: Config) -> Config:
+    """What is timed frame by frame is what a stream would cost: there a frame is seen in all orientations only on request."""
+    segmentation = config.perception.segmentation
+    if segmentation.mirrored != "pictures":
+        return config
+    once = config.perception.model_copy(update={"segmentation": segmentation.model_copy(update={"mirrored": "never"})})
+    return config.model_copy(update={"perception": once})
+
+
 def quantiles(values: Sequence[float]) -> dict[str, float]:
     """Median and 95th percentile, rounded to microseconds when the values are milliseconds."""
     return {"p50": round(float(np.median(values)), 3), "p95": round(float(np.percentile(values, 95)), 3)}
@@ -41,10 +50,7 @@ def run_speed(frames: int, *, model: str | None, preset: str | None, config_path
     """Time perception frame by frame on twin pictures, with a baseline frame in between every eighth."""
     from core.perception.pipeline import open_pipeline
 
-    config = _config(model, preset, config_path)
-    if config.perception.segmentation.mirrored == "pictures":  # frames of a stream are what is timed
-        overrides = {"perception": {"segmentation": {"mirrored": "never"} | ({"model": model} if model else {})}}
-        config = load_config(config_path, preset, overrides)
+    config = _as_in_a_stream(_config(model, preset, config_path))
     pipeline = open_pipeline(config.perception)
     first_frame_s = _first_frame_s()
     peak_memory_mb, baseline = _warm_up(pipeline)
@@ -157,7 +163,7 @@ def run_recording(frames: int, *, model: str | None, preset: str | None, config_
     """How much a recording slows perception down."""
     from app.benchmark_recording import measure_recording
 
-    _print(measure_recording(_config(model, preset, config_path), frames), as_json, "recording")
+    _print(measure_recording(_as_in_a_stream(_config(model, preset, config_path)), frames), as_json, "recording")
 
 
 def run_accuracy(

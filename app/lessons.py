@@ -100,7 +100,8 @@ class SecondLookLesson:
 
     def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> NearCrops | None:
         plain = open_segmenter(SegmentationConfig(model=self._init))
-        # Streams look once at the whole, single pictures more often: the second look has to get on with both.
+        # Streams look once at the whole, single pictures eight times: the second look has to get on with both. Two stand for
+        # eight here, where thousands of frames are looked at.
         ways = (plain, Turned(plain, turns=(0,)))
         # What the second look still gets wrong is worth more of its time than what only the first one did.
         near = open_second_look(SegmentationConfig(model=self._init)) if self._has_one and plan.focus_share > 0 else None
