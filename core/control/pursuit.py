@@ -53,7 +53,8 @@ class Pursuit:
         elapsed_s = 0.0 if self._last_s is None else max(0.0, scene.captured_s - self._last_s)
         self._last_s = scene.captured_s
         contact_n = status.wall_contact_n if status is not None else None
-        self._behind_s = self._behind_s + elapsed_s if way.behind else 0.0
+        # Counted down, not forgotten: where head and branch lie in a wide bifurcation, single frames still see the way ahead.
+        self._behind_s = max(0.0, self._behind_s + (elapsed_s if way.behind else -elapsed_s))
         self._smooth(way.error_deg, elapsed_s)
         fed_mm_s = self._fed(status, elapsed_s)
         stuck = self._stall.update(way.left_px, way.head, fed_mm_s, elapsed_s)

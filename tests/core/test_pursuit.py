@@ -257,6 +257,18 @@ def test_speeds_have_the_papers_words() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(("ahead_every", "backs_off"), [(3, True), (2, False)])
+def test_single_frames_that_see_the_way_ahead_do_not_keep_the_robot_waiting(ahead_every: int, backs_off: bool) -> None:
+    policy = Pursuit(PursuitConfig(behind_s=0.3), AdviceConfig())
+    speeds = []
+    for k in range(16):
+        heading = 0.0 if k % ahead_every == ahead_every - 1 else 180.0
+        advice = policy(scene_at(STRAIGHT, (200, 100), (380, 100), heading, 0.1 * k), status(0.0))
+        assert advice is not None
+        speeds.append(advice.advance_mm_s)
+    assert (min(speeds) < 0.0) is backs_off
+
+
 @pytest.mark.parametrize("name", POLICY_NAMES)
 def test_every_policy_stops_at_the_target(name: str) -> None:
     policy = make_policy(name, Config())  # type: ignore[arg-type]
