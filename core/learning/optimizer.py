@@ -18,15 +18,25 @@ _QUINTIC = (3.4445, -4.7750, 2.0315)
 
 
 def orthogonalised(matrix: Tensor, rounds: int = 5) -> Tensor:
-    """The (rows, columns) matrix with its singular values brought near 1, by a Newton-Schulz iteration."""
+    """The (rows, columns) matrix with its singular values brought near 1, by a Newton-Schulz iteration.
+
+    Every round multiplies by a polynomial of the Gram matrix, and all of these commute. So they are gathered in matrices of the
+    shorter side, and the long one is multiplied once instead of twice a round: a third of the work for the kernels here.
+    """
     a, b, c = _QUINTIC
     x: Tensor = matrix / (matrix.norm() + 1e-7)
     tall = x.shape[0] > x.shape[1]
     if tall:
         x = x.T
-    for _ in range(rounds):
-        gram = x @ x.T
-        x = a * x + (b * gram + c * gram @ gram) @ x
+    gram = x @ x.T
+    unit = torch.eye(len(gram), dtype=gram.dtype, device=gram.device)
+    product = unit
+    for left in reversed(range(rounds)):
+        factor = a * unit + b * gram + c * gram @ gram
+        product = factor @ product
+        if left:
+            gram = factor @ gram @ factor
+    x = product @ x
     return x.T if tall else x
 
 

@@ -77,6 +77,14 @@ def loss_of(logits: Tensor, target: Tensor, robot_weight: float) -> tuple[Tensor
     return ((entropy + 1 - 0.5 * (dice + each)) * weights).sum(), dice.detach()
 
 
+def computes_in_bf16(device: torch.device) -> bool:
+    """Whether bf16 is native here: elsewhere it is emulated, and slower than float32."""
+    if device.type == "cuda":
+        return True
+    able = torch.cpu.get_capabilities()
+    return bool(able.get("avx512_bf16") or able.get("amx_bf16"))
+
+
 def _learning_rate(plan: TrainingPlan, step: int) -> float:
     if step < plan.warmup_steps:
         return plan.learning_rate * (step + 1) / plan.warmup_steps
@@ -102,7 +110,8 @@ def train(
     """Train `network` in place; returns the network with averaged weights and the number of steps done.
 
     `crops` (``crops.py``) gives ``plan.steps * plan.batch`` crops with their labels.
-    `should_stop` is asked after every step; what was learnt until then is returned. On a CUDA device bf16 autocast is used.
+    `should_stop` is asked after every step; what was learnt until then is returned. Where the device computes
+    in bf16, autocast is used.
     """
     torch.manual_seed(plan.seed)
     if plan.threads:
@@ -114,6 +123,7 @@ def train(
             if isinstance(module, torch.nn.BatchNorm2d):
                 module.eval()
     average = copy.deepcopy(network).eval()
+    in_bf16 = computes_in_bf16(device)
     optimizers = make_optimizers(network, plan.learning_rate, plan.weight_decay)
     shares = [[group["lr"] / plan.learning_rate for group in optimizer.param_groups] for optimizer in optimizers]
     smooth_loss, smooth_dice = 0.0, np.zeros(2)
@@ -123,7 +133,7 @@ def train(
             for group, part in zip(optimizer.param_groups, parts, strict=True):
                 group["lr"] = part * _learning_rate(plan, done)
         batch = (image.to(device).float() / 255).contiguous(memory_format=torch.channels_last)
-        with torch.autocast(device.type, torch.bfloat16, enabled=device.type == "cuda"):
+        with torch.autocast(device.type, torch.bfloat16, enabled=in_bf16):
             logits = network(batch)
         loss, dice = loss_of(logits.float(), target.to(device).float(), plan.robot_weight)
         for optimizer in optimizers:

@@ -10,7 +10,7 @@ from core.learning.augment import random_clutter, random_crop, random_look
 from core.learning.crops import FrameCrops
 from core.learning.dataset import DatasetError, find_samples, read_truth, write_mask, write_png
 from core.learning.optimizer import make_optimizers, orthogonalised
-from core.learning.training import Progress, TrainingPlan, train
+from core.learning.training import Progress, TrainingPlan, computes_in_bf16, train
 from core.perception.unet import DualUNet, UNetShape
 
 
@@ -137,6 +137,33 @@ def test_orthogonalised_directions_have_singular_values_near_one() -> None:
         values = torch.linalg.svdvals(orthogonalised(matrix))
         assert float(values.max()) < 1.3
         assert float(values.max() / values.min()) < 2.5
+
+
+def test_gathered_rounds_are_the_newton_schulz_iteration() -> None:
+    import torch
+
+    torch.manual_seed(0)
+    for shape in ((12, 60), (60, 12)):
+        # Nearly of rank three, as directions are late in training.
+        matrix = torch.randn(shape[0], 3) @ torch.randn(3, shape[1]) + 1e-3 * torch.randn(shape)
+        x = (matrix if shape[0] < shape[1] else matrix.T) / matrix.norm()
+        for _ in range(5):
+            gram = x @ x.T
+            x = 3.4445 * x + (-4.7750 * gram + 2.0315 * gram @ gram) @ x
+        expected = x if shape[0] < shape[1] else x.T
+        assert float((orthogonalised(matrix) - expected).norm() / expected.norm()) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("able", "expected"),
+    [({}, False), ({"avx512_f": True}, False), ({"avx512_bf16": True}, True), ({"amx_bf16": True, "avx512_bf16": False}, True)],
+)
+def test_bf16_is_used_only_where_it_is_native(monkeypatch: pytest.MonkeyPatch, able: dict[str, bool], expected: bool) -> None:
+    import torch
+
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: able)
+    assert computes_in_bf16(torch.device("cpu")) is expected
+    assert computes_in_bf16(torch.device("cuda"))
 
 
 def test_the_kernels_go_to_muon_and_the_rest_to_adamw() -> None:
