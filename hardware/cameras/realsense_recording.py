@@ -16,6 +16,9 @@ from hardware.cameras.realsense import colour_image, describe_device
 _WAIT_MS = 200
 _GIVE_UP_AFTER = 50
 """Waits in a row without a frame, though the library says that it plays: ten seconds."""
+_END_AFTER = 3
+"""Waits in a row without a frame once the library has read the file to its end. Its last frames may still be on their way then,
+and on a machine that stands still for a moment one wait can pass before they come."""
 
 
 class RealSenseRecording:
@@ -93,6 +96,7 @@ class RealSenseRecording:
     def _wait(self) -> Any:
         if self._pipeline is None:
             raise DeviceError(f"{self._path}: not open")
+        ended = 0
         for _ in range(_GIVE_UP_AFTER):
             try:
                 came, frames = self._pipeline.try_wait_for_frames(_WAIT_MS)
@@ -102,7 +106,8 @@ class RealSenseRecording:
             if frame:
                 return frame
             # Nothing came in time: so the end looks, too.
-            if not came and self._playback.current_status() == rs.playback_status.stopped:
+            ended = ended + 1 if not came and self._playback.current_status() == rs.playback_status.stopped else 0
+            if ended == _END_AFTER:
                 raise EndOfStream(f"{self._path}: end of the recording")
         raise DeviceError(f"{self._path}: gives no more pictures; it may be damaged")
 

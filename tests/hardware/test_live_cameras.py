@@ -396,6 +396,36 @@ def test_sixty_of_sixty_frames_come_exactly_from_a_recording(bag: Path) -> None:
         assert frame.lost == 0
 
 
+def test_a_moment_of_silence_before_the_last_frames_is_not_the_end(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Stalled:
+        """The library on a machine that stands still: it has read the whole file, and what it read comes late."""
+
+        def __init__(self, pipeline: rs.pipeline) -> None:
+            self._pipeline, self._waits = pipeline, 0
+
+        def try_wait_for_frames(self, timeout_ms: int) -> tuple[bool, rs.composite_frame | None]:
+            self._waits += 1
+            return (False, None) if self._waits in (45, 46) else self._pipeline.try_wait_for_frames(timeout_ms)
+
+        def stop(self) -> None:
+            self._pipeline.stop()
+
+    class HasReadAll:
+        def current_status(self) -> rs.playback_status:
+            return rs.playback_status.stopped
+
+    recording = RealSenseRecording(bag, paced=False)
+    recording.open()
+    monkeypatch.setattr(recording, "_pipeline", Stalled(recording._pipeline))
+    monkeypatch.setattr(recording, "_playback", HasReadAll())
+    frames = []
+    with pytest.raises(EndOfStream, match="end of the recording"):
+        while True:
+            frames.append(recording.read(0.0))
+    recording.close()
+    assert [frame.index for frame in frames if frame] == list(range(60))
+
+
 def test_frames_that_the_recording_lacks_are_lost(tmp_path: Path) -> None:
     recording = RealSenseRecording(write_bag(tmp_path / "gaps.bag", [0, 1, 4, 5]), paced=False)
     recording.open()
