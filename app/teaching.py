@@ -75,19 +75,23 @@ class Classroom:
                 held_out.look(network, step)
             keep(network, step, whole=whole)
 
+        def keep_at_once(network: DualUNet, step: int) -> None:
+            # Hours of learning must not hang on the eight-bit copy, which takes a while, nor on the workers' end.
+            if step > _MAY_BE_LOST:
+                keep(network, step, whole=False)
+
         network, done = train(
             lesson.network,
             crops,
             plan,
             on_progress=report,
             on_checkpoint=look_and_keep,
+            on_last=keep_at_once,
             # a window that has gone can no longer ask for the end
             should_stop=lambda: self.interrupt.asked or (self.teller is not None and not self.teller.is_heard),
             report_every=50 if self.teller is None else _TOLD_EVERY,
             checkpoint_every=1000 if not self.watch.is_on else max(_TOLD_EVERY, plan.steps // _LOOKS),
         )
-        if done > _MAY_BE_LOST:  # at once: hours of learning must not hang on the eight-bit copy, which takes a while
-            keep(network, done, whole=False)
         look_and_keep(network, done, whole=True)
         self.steps_before += done
         return done

@@ -103,6 +103,7 @@ def train(
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
     on_checkpoint: Callable[[DualUNet, int], None] = lambda _network, _step: None,
+    on_last: Callable[[DualUNet, int], None] = lambda _network, _step: None,
     should_stop: Callable[[], bool] = lambda: False,
     report_every: int = 50,
     checkpoint_every: int = 1000,
@@ -110,8 +111,8 @@ def train(
     """Train `network` in place; returns the network with averaged weights and the number of steps done.
 
     `crops` (``crops.py``) gives ``plan.steps * plan.batch`` crops with their labels.
-    `should_stop` is asked after every step; what was learnt until then is returned. Where the device computes
-    in bf16, autocast is used.
+    `should_stop` is asked after every step; what was learnt until then is returned. `on_last` is given it first, while the crops'
+    workers still run: processes have broken down when these ended. Where the device computes in bf16, autocast is used.
     """
     torch.manual_seed(plan.seed)
     if plan.threads:
@@ -154,7 +155,8 @@ def train(
             mark, marked = now, done
         if done % checkpoint_every == 0 and done < plan.steps:
             on_checkpoint(average, done)
-        if should_stop() or done == plan.stop_after:
+        if should_stop() or done in (plan.steps, plan.stop_after):
+            on_last(average, done)
             break
     return average.to("cpu"), done
 

@@ -99,6 +99,7 @@ def _toy_training(folder: Path, steps: int, **kwargs: object) -> tuple[DualUNet,
 def test_training_learns_a_toy_task_and_reports(tmp_path: Path) -> None:
     reports: list[Progress] = []
     checkpoints: list[int] = []
+    last: list[int] = []
     folder = _toy_set(tmp_path / "set", 6)
     _, done = _toy_training(
         folder,
@@ -107,6 +108,7 @@ def test_training_learns_a_toy_task_and_reports(tmp_path: Path) -> None:
         report_every=10,
         checkpoint_every=20,
         on_checkpoint=lambda _n, s: checkpoints.append(s),
+        on_last=lambda _n, s: last.append(s),
     )
     assert done == 40
     assert [r.step for r in reports] == [10, 20, 30, 40]
@@ -114,6 +116,7 @@ def test_training_learns_a_toy_task_and_reports(tmp_path: Path) -> None:
     assert reports[-1].vessel_dice > 1.2 * reports[0].vessel_dice
     assert reports[-1].robot_dice > 1.2 * reports[0].robot_dice
     assert checkpoints == [20]
+    assert last == [40]
 
 
 def test_training_repeats_bit_for_bit_and_can_be_stopped(tmp_path: Path) -> None:
@@ -123,8 +126,10 @@ def test_training_repeats_bit_for_bit_and_can_be_stopped(tmp_path: Path) -> None
     for a, b in zip(first.state_dict().values(), second.state_dict().values(), strict=True):
         assert a.equal(b)
     stops = iter([False, False, True])
-    _, done = _toy_training(folder, 6, should_stop=lambda: next(stops))
+    last: list[tuple[DualUNet, int]] = []
+    stopped, done = _toy_training(folder, 6, should_stop=lambda: next(stops), on_last=lambda n, s: last.append((n, s)))
     assert done == 3
+    assert last == [(stopped, 3)]
 
 
 def test_orthogonalised_directions_have_singular_values_near_one() -> None:
