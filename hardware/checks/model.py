@@ -35,10 +35,12 @@ GOLDEN = TwinConfig(phantom="s_curve", appearance_seed=0, image_width_px=640, im
 _GOLDEN_MM = 70.0
 _THETA_DEG, _HEAD_PX = 8.0, 8.0
 _OVERLAP = 0.5
-_EIGHT_BIT_OFF, _EIGHT_BIT_NEAR_OFF = 0.02, 0.05
-"""Mean difference of probability between eight-bit and exact network, in a whole picture (0.002 to 0.014 where all is well, as the
-weights go; 0.035 where sums overflowed) and in a window around the robot's end, much of which is uncertain (0.014 where all is
-well)."""
+_BRIGHTER = 1.5
+"""Sums are large in a bright picture. Twice as bright the walls of the golden one are gone: there networks that differ by nothing
+but rounding are 0.014 apart, and sums that overflow 0.025."""
+_EIGHT_BIT_OFF, _EIGHT_BIT_NEAR_OFF = 0.01, 0.05
+"""Mean difference of probability between eight-bit and exact network, in a whole picture (0.001 where all is well, 0.073 where sums
+overflowed) and in a window around the robot's end, much of which is uncertain (0.004 where all is well)."""
 _RESTORE = "git checkout -- resources/models   (or unpack the program again)"
 
 
@@ -92,7 +94,7 @@ def check_self_test(config: PerceptionConfig) -> Check:
 
 
 def _eight_bit_off(config: SegmentationConfig, image: Image) -> str | None:
-    """How far an eight-bit network is off where its sums are largest, in a picture twice as bright; None: no more than it may."""
+    """How far an eight-bit network is off where its sums are large, in a brighter picture; None: no more than it may."""
     from core.perception.second_look import WINDOW_PX, planes_of
     from core.perception.segmentation import OpenVinoSegmenter, open_second_look, open_segmenter
     from core.perception.windows import window_around
@@ -101,7 +103,7 @@ def _eight_bit_off(config: SegmentationConfig, image: Image) -> str | None:
     if not isinstance(used, OpenVinoSegmenter) or not used.is_eight_bit:
         return None
     exact = config.model_copy(update={"device": "openvino", "precision": "fp32"})
-    bright = np.asarray(cv2.convertScaleAbs(image, alpha=2.0), np.uint8)
+    bright = np.asarray(cv2.convertScaleAbs(image, alpha=_BRIGHTER), np.uint8)
     seen = open_segmenter(exact)(bright)
     found = [(_apart(used(bright), seen), _EIGHT_BIT_OFF)]
     near = open_second_look(exact)

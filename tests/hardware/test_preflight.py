@@ -181,7 +181,7 @@ def test_an_eight_bit_network_that_a_processor_gets_wrong_is_told(monkeypatch: p
     monkeypatch.setattr(model, "_EIGHT_BIT_OFF", 1e-9)  # no eight-bit network is as exact as that
     _bad(
         model.check_self_test(_segmentation("default")),
-        r"on this processor the eight-bit network is off by 0\.0",
+        "on this processor the eight-bit network is off by 0.00",
         "precision to fp32",
     )
 
