@@ -46,6 +46,7 @@ def train(
     rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 1e-2,
     crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 256,
     look_share: Annotated[float, typer.Option(min=0, max=1, help="share of the crops whose look is changed at random")] = 1.0,
+    strips: Annotated[float, typer.Option(min=0, max=1, help="share of the crops in which clips are laid over the robot")] = 0.0,
     focus: Annotated[
         float, typer.Option(min=0, max=0.9, help="share of the crops that show what the --init model finds hard")
     ] = 0.0,
@@ -72,6 +73,7 @@ def train(
         warmup_steps=min(100, max(1, steps // 10)),
         crop=(crop, crop),
         look_share=look_share,
+        strip_share=strips,
         focus_share=focus,
         keeps_statistics=remember > 0,
         stop_after=stop_after,

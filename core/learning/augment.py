@@ -43,6 +43,58 @@ def _center(robot: Mask, rng: Generator) -> tuple[float, float]:
     return float(rng.uniform(0.2, 0.8) * width), float(rng.uniform(0.2, 0.8) * height)
 
 
+def with_strips(image: Image, vessel: Mask, robot: Mask, rng: Generator) -> Image:
+    """`image` with one or two clips across the lumen, most of them over the robot and more often near its ends than on its body.
+
+    The labels stay: robot and lumen go on beneath. Of the twin's own clips few lie where the robot happens to be.
+    """
+    painted = image.copy()
+    for _ in range(int(rng.integers(1, 3))):
+        under = robot if rng.random() < 0.75 and robot.any() else vessel
+        found = np.argwhere(under)[:, ::-1]
+        if not len(found):
+            break
+        some = found[rng.integers(len(found), size=6)].astype(float)
+        far = np.linalg.norm(some - found.mean(axis=0), axis=1)
+        middle = some[int(np.argmax(far))] if rng.random() < 0.5 else some[0]
+        _strip(painted, middle + rng.normal(0, 4, 2), _across(found, middle) + rng.normal(0, 0.3), rng)
+    return painted
+
+
+def _across(found: np.ndarray, middle: np.ndarray) -> float:
+    """The angle in radians at a right angle to what lies near `middle`; `found` (N, 2) in px."""
+    near = found[np.linalg.norm(found - middle, axis=1) < 25] - middle
+    if len(near) < 3:
+        return 0.0
+    along = np.linalg.eigh(near.T @ near)[1][:, 1]
+    return float(np.arctan2(along[0], -along[1]))
+
+
+def _strip(image: Image, middle: np.ndarray, angle: float, rng: Generator) -> None:
+    """Paint a half see-through rectangle with a rim, a raised middle and a bit of shadow into `image`."""
+    tone = rng.uniform(0.1, 1.0) * np.ones(3) if rng.random() < 0.7 else rng.uniform(0.1, 0.95, 3)
+    opacity, shade = rng.uniform(0.35, 0.92), rng.uniform(0.6, 1.0)
+    half = np.array([rng.uniform(14, 40), rng.uniform(4, 12)])
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+    def corners(share: tuple[float, float], shift: float = 0.0) -> np.ndarray:
+        box = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half * share @ turn + middle + shift
+        return np.rint(box * 16).astype(np.int32)
+
+    shadow = np.ones(image.shape[:2], np.float32)
+    cv2.fillPoly(shadow, [corners((1, 1), rng.uniform(-3, 3))], float(shade), cv2.LINE_AA, 4)
+    paint: np.ndarray = image * shadow[:, :, None]
+    cover = np.zeros(image.shape[:2], np.float32)
+    color = np.zeros(image.shape, np.float32)
+    for share, lightness in (((1.0, 1.0), 1.0), ((0.96, 0.45), rng.uniform(0.9, 1.2))):
+        level = tuple(float(v) for v in np.clip(255 * tone * lightness, 0, 255))
+        cv2.fillPoly(cover, [corners(share)], opacity, cv2.LINE_AA, 4)
+        cv2.fillPoly(color, [corners(share)], level, cv2.LINE_AA, 4)
+    cv2.polylines(color, [corners((1, 1))], True, tuple(float(v) for v in 150 * tone), 1, cv2.LINE_AA, 4)
+    paint += (color - paint) * cover[:, :, None]
+    image[:] = np.clip(paint, 0, 255).astype(np.uint8)
+
+
 def random_look(image: Image, rng: Generator) -> Image:
     """Exposure, contrast, gamma, white balance, uneven light, blur, noise and compression, each now and then."""
     pixels: np.ndarray = image.astype(np.float32) / 255.0

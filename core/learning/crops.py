@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from core.learning.augment import random_clutter, random_crop, random_look
+from core.learning.augment import random_clutter, random_crop, random_look, with_strips
 from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX, look_again, places_to_look
@@ -103,6 +103,8 @@ class FrameCrops(Dataset[Crop]):
             if self._chances is not None and rng.random() < self._plan.focus_share:
                 place = int(np.searchsorted(self._chances, rng.random(), side="right"))
             image, vessel, robot = random_crop(*self._frames[place], size, rng)
+            if self._plan.strip_share > 0 and rng.random() < self._plan.strip_share:
+                image = with_strips(image, vessel, robot, rng)
         if rng.random() < self._plan.look_share:
             image = random_look(image, rng)
         return _tensors(image, vessel, robot)

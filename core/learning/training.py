@@ -22,10 +22,11 @@ _SMALL_AREA_PX = 50.0
 
 @dataclass(frozen=True, slots=True)
 class TrainingPlan:
-    """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours, and
-    ``look_share`` of them are changed in exposure, colour, sharpness and noise. ``stop_after`` ends before the learning rate has
-    come down: for a run that another one goes on from. ``focus_share`` of the samples are drawn by difficulty. With
-    ``keeps_statistics`` the normalisation stays as it was learnt: that of a few frames alike would ruin it for all others."""
+    """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours,
+    ``look_share`` of them are changed in exposure, colour, sharpness and noise, and in ``strip_share`` of the first look's ones
+    clips lie over the robot. ``stop_after`` ends before the learning rate has come down: for a run that another one goes on from.
+    ``focus_share`` of the samples are drawn by difficulty. With ``keeps_statistics`` the normalisation stays as it was learnt:
+    that of a few frames alike would ruin it for all others."""
 
     steps: int = 6000
     batch: int = 12
@@ -37,6 +38,7 @@ class TrainingPlan:
     average_decay: float = 0.998
     robot_weight: float = 1.5
     look_share: float = 1.0
+    strip_share: float = 0.0
     focus_share: float = 0.0
     keeps_statistics: bool = False
     stop_after: int | None = None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.images import read_image
-from core.learning.augment import random_clutter, random_crop, random_look
+from core.learning.augment import random_clutter, random_crop, random_look, with_strips
 from core.learning.crops import FrameCrops
 from core.learning.dataset import DatasetError, find_samples, read_truth, write_mask, write_png
 from core.learning.optimizer import make_optimizers, orthogonalised
@@ -94,6 +94,35 @@ def _toy_training(folder: Path, steps: int, **kwargs: object) -> tuple[DualUNet,
         steps=steps, batch=4, learning_rate=4e-2, warmup_steps=5, crop=(64, 64), workers=0, average_decay=0.9, threads=1
     )
     return train(network, FrameCrops(find_samples([folder]), plan), plan, **kwargs)  # type: ignore[arg-type]
+
+
+def test_strips_lie_across_the_robot_and_leave_the_rest() -> None:
+    image = np.full((200, 300, 3), 128, np.uint8)
+    robot = np.zeros((200, 300), bool)
+    robot[98:102, 100:200] = True
+    vessel = np.zeros((200, 300), bool)
+    vessel[85:115, 80:220] = True
+    over, across = 0, 0
+    for seed in range(40):
+        painted = with_strips(image, vessel, robot, np.random.default_rng(seed))
+        assert painted.shape == image.shape
+        assert painted.dtype == np.uint8
+        changed = np.any(painted != image, axis=2)
+        assert 0 < changed.sum() < 0.15 * changed.size
+        assert not changed[:, :20].any()
+        assert not changed[:, 280:].any()
+        over += bool((changed & robot).any())
+        rows = np.flatnonzero(changed[:, 100:200].any(axis=1))
+        across += len(rows) > 0 and np.ptp(rows) > 20
+    assert (image == 128).all()
+    assert over > 30
+    assert across > 30
+
+
+def test_strips_need_something_to_lie_on() -> None:
+    image = np.full((64, 64, 3), 128, np.uint8)
+    nothing = np.zeros((64, 64), bool)
+    assert (with_strips(image, nothing, nothing, np.random.default_rng(0)) == image).all()
 
 
 def test_training_learns_a_toy_task_and_reports(tmp_path: Path) -> None:
