@@ -38,13 +38,12 @@ def run_synth(
     out: Path, count: int, seed: int, size: tuple[int, int], families: tuple[str, ...] | None, phantom: str | None, workers: int
 ) -> None:
     """Write a labelled set; raises SynthError."""
-    from hardware.twin.appearance import LOOK_FAMILIES
     from hardware.twin.phantoms import make_phantom
-    from hardware.twin.synth import SynthError, SynthPlan, write_set
+    from hardware.twin.synth import LOOKS, SynthError, SynthPlan, write_set
 
-    unknown = [name for name in families or () if name not in LOOK_FAMILIES]
+    unknown = [name for name in families or () if name not in LOOKS]
     if unknown:
-        raise SynthError(f"unknown look family {unknown[0]!r}; known: {', '.join(LOOK_FAMILIES)}")
+        raise SynthError(f"unknown look family {unknown[0]!r}; known: {', '.join(LOOKS)}")
     if phantom is not None:
         try:
             make_phantom(phantom)

@@ -79,7 +79,7 @@ def _strip(image: Image, middle: np.ndarray, angle: float, rng: Generator) -> No
 
     def corners(share: tuple[float, float], shift: float = 0.0) -> np.ndarray:
         box = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half * share @ turn + middle + shift
-        return np.rint(box * 16).astype(np.int32)
+        return np.asarray(np.rint(box * 16).astype(np.int32))
 
     shadow = np.ones(image.shape[:2], np.float32)
     cv2.fillPoly(shadow, [corners((1, 1), rng.uniform(-3, 3))], float(shade), cv2.LINE_AA, 4)

@@ -13,7 +13,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from core.config import PerceptionConfig
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.types import Points
-from hardware.twin.appearance import Appearance, make_view, random_appearance
+from hardware.twin.appearance import LOOK_FAMILIES, Appearance, default_appearance, make_view, random_appearance
 from hardware.twin.autopilot import RouteFollower
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
@@ -32,6 +32,9 @@ from hardware.twin.renderer import Picture, Renderer
 from hardware.twin.truth import truth_of
 
 FRAMES_PER_EPISODE = 16
+BENCH_LOOK = "bench"
+LOOKS = (*LOOK_FAMILIES, BENCH_LOOK)
+"""What a set may be limited to: families of random looks, and the twin's own fixed look, which is in none of them."""
 _EMPTY_SHARE = 0.03
 _STEP_S = 0.02
 _FEED_MM_S = 40.0
@@ -39,7 +42,8 @@ _FEED_MM_S = 40.0
 
 @dataclass(frozen=True, slots=True)
 class SynthPlan:
-    """What to write. ``families`` limits the looks (None: all), ``phantom`` fixes the phantom (None: random ones)."""
+    """What to write. ``families`` of ``LOOKS`` limits the looks (None: all random ones), ``phantom`` fixes the phantom (None:
+    random ones)."""
 
     out: Path
     count: int
@@ -115,6 +119,8 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
 
 def _look(plan: SynthPlan, look_seed: int, rng: np.random.Generator) -> Appearance:
     family = str(rng.choice(plan.families)) if plan.families else None
+    if family == BENCH_LOOK:
+        return replace(default_appearance(), family=BENCH_LOOK)
     return random_appearance(look_seed, family)
 
 

@@ -379,15 +379,21 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_bag(tmp_path_factory.mktemp("bag") / "run.bag", list(range(60)))
 
 
-def test_sixty_of_sixty_frames_come_exactly_from_a_recording(bag: Path) -> None:
-    recording = RealSenseRecording(bag, paced=False)
-    recording.open()
-    assert recording.recorded_with == "Intel RealSense L515 f1, firmware 1.5.8.1, USB 3.2"
-    frames = []
+def _until_the_end(recording: RealSenseRecording) -> list[Frame | None]:
+    """All that a recording gives; it is closed then."""
+    frames: list[Frame | None] = []
     with pytest.raises(EndOfStream, match="end of the recording"):
         while True:
             frames.append(recording.read(0.0))
     recording.close()
+    return frames
+
+
+def test_sixty_of_sixty_frames_come_exactly_from_a_recording(bag: Path) -> None:
+    recording = RealSenseRecording(bag, paced=False)
+    recording.open()
+    assert recording.recorded_with == "Intel RealSense L515 f1, firmware 1.5.8.1, USB 3.2"
+    frames = _until_the_end(recording)
     assert [frame.index for frame in frames if frame] == list(range(60))
     for frame in frames:
         assert frame is not None
@@ -418,11 +424,7 @@ def test_a_moment_of_silence_before_the_last_frames_is_not_the_end(bag: Path, mo
     recording.open()
     monkeypatch.setattr(recording, "_pipeline", Stalled(recording._pipeline))
     monkeypatch.setattr(recording, "_playback", HasReadAll())
-    frames = []
-    with pytest.raises(EndOfStream, match="end of the recording"):
-        while True:
-            frames.append(recording.read(0.0))
-    recording.close()
+    frames = _until_the_end(recording)
     assert [frame.index for frame in frames if frame] == list(range(60))
 
 

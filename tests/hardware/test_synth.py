@@ -7,6 +7,9 @@ import pytest
 
 from core.learning.dataset import find_samples, read_truth
 from hardware.twin import synth
+from hardware.twin.appearance import default_appearance
+from hardware.twin.phantoms import make_phantom
+from hardware.twin.renderer import Renderer
 from hardware.twin.synth import SynthError, SynthPlan, write_set
 
 
@@ -67,6 +70,15 @@ def test_masks_fit_the_picture_of_a_clear_look() -> None:
     frame = next(synth.episode_frames(SynthPlan(Path("unused"), 1, 8, size=(320, 240), families=("silicone_white",)), 0))
     assert frame.picture.vessel.shape == (240, 320)
     assert 0.01 < np.mean(frame.picture.vessel) < 0.6
+
+
+def test_the_benchs_own_look_is_the_trials_one() -> None:
+    frame = next(synth.episode_frames(SynthPlan(Path("unused"), 1, 8, size=(320, 240), families=("bench",)), 0))
+    phantom = make_phantom("random:8")
+    renderer = Renderer(phantom, default_appearance(), (320, 240), 8)
+    points, sheath_mm, _ = synth.robot_shapes(phantom, 8, synth.FRAMES_PER_EPISODE)[0]
+    assert np.array_equal(frame.picture.image, renderer.render(points, sheath_mm, noise_seed=0).image)
+    assert frame.truth["family"] == "bench"
 
 
 def test_a_smaller_count_is_refused_not_mixed(small_set: SynthPlan) -> None:
