@@ -126,16 +126,16 @@ class JogKeys(HeldInput):
         if isinstance(focus, QAbstractItemView) and key in SCROLL_KEYS:
             return False
         if not event.isAutoRepeat():
-            self.press(key, motion)
+            self.press(_place(event), motion)
         return True
 
     def _on_release(self, event: QKeyEvent) -> bool:
         """A release counts wherever it goes to, or motion would go on after a menu opened over the window."""
-        key = Qt.Key(event.key())
+        place = _place(event)
         if event.isAutoRepeat():
-            return key in self._held
-        if key in self._held:
-            self.release(key)
+            return place in self._held
+        if place in self._held:
+            self.release(place)
             return True
         return False
 
@@ -145,6 +145,15 @@ class JogKeys(HeldInput):
     def _announce(self) -> None:
         self.held_changed.emit(self.held)
         self.changed.emit(self.jog if self._held else AT_REST)
+
+
+def _place(event: QKeyEvent) -> tuple[str, int]:
+    """Which key of the keyboard it is.
+
+    What a key means may change while it is down: with NumLock the keypad's Up, pressed beside Shift, is let go as an 8.
+    """
+    scan_code = event.nativeScanCode()
+    return ("place", scan_code) if scan_code else ("key", event.key())
 
 
 def _sign(held: frozenset[Motion], plus: Motion, minus: Motion) -> int:

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QApplication, QSizePolicy, QWidget
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy
 
 from app import palette, theme
 from app.language import tr
 from app.next_step import DEADMAN_KEY
 from app.tool_tips import tip
+from app.widgets.mouse_held import MouseHeld
 from app.widgets.signs import key_cap_width, paint_key_cap
 
-_WINDOW_LOST = (QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked, QEvent.Type.Hide, QEvent.Type.Close)
 
-
-class DeadmanField(QWidget):
-    """``held_changed`` carries whether the left mouse button holds it.
-
-    Whatever might have swallowed the release counts as one: the field is hidden or disabled, the window is left by the pointer,
-    loses the focus or is blocked by a dialog, the grab is lost, or the release went to somebody else.
-    """
+class DeadmanField(MouseHeld):
+    """``held_changed`` carries whether the left mouse button holds it."""
 
     held_changed = Signal(bool)
 
     def __init__(self) -> None:
         super().__init__()
-        self._held = False
         self._deadman: bool | None = None
         self._matters = False
         self.setMinimumSize(96, 44)
@@ -35,11 +29,6 @@ class DeadmanField(QWidget):
         self.setAccessibleName(tr("Deadman: hold to drive ({key})", key=DEADMAN_KEY))
         self.setToolTip(tip("deadman"))
         self._describe()
-
-    @property
-    def is_held(self) -> bool:
-        """Held with the mouse here."""
-        return self._held
 
     @property
     def is_lit(self) -> bool:
@@ -60,62 +49,12 @@ class DeadmanField(QWidget):
             self._describe()
             self.update()
 
-    def let_go(self) -> None:
-        """No longer held with the mouse."""
-        if self._held:
-            self._held = False
-            application = QApplication.instance()
-            if application is not None:
-                application.removeEventFilter(self)
-            self.update()
-            self.held_changed.emit(False)
-
     def _describe(self) -> None:
         self.setAccessibleDescription(self.word)
 
-    # ---- the mouse
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        if event.button() == Qt.MouseButton.LeftButton and not self._held:
-            self._held = True
-            application = QApplication.instance()
-            if application is not None:
-                application.installEventFilter(self)
-            self.update()
-            self.held_changed.emit(True)
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        window = self.window()
-        if not window.rect().contains(self.mapTo(window, event.position().toPoint())):
-            self.let_go()
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        if event.button() == Qt.MouseButton.LeftButton:
-            self.let_go()
-
-    def hideEvent(self, event: QHideEvent) -> None:
-        self.let_go()
-        super().hideEvent(event)
-
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.EnabledChange and not self.isEnabled():
-            self.let_go()
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Of the whole application, while held: a menu that opens meanwhile gets the release instead of us."""
-        kind = event.type()
-        lost = (
-            (kind == QEvent.Type.MouseButtonRelease and isinstance(event, QMouseEvent) and _is_left(event))
-            or (kind in _WINDOW_LOST and watched is self.window())
-            or (kind == QEvent.Type.UngrabMouse and watched is self)
-            or kind == QEvent.Type.ApplicationDeactivate
-        )
-        if lost:
-            self.let_go()
-        return False
-
-    # ---- the look
+    def on_held(self, held: bool) -> None:
+        self.update()
+        self.held_changed.emit(held)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -151,7 +90,3 @@ class DeadmanField(QWidget):
         painter.setPen(ink)
         painter.setFont(word_font)
         painter.drawText(QRectF(left + cap + 20, middle.y() - 9, word + 4, 18), Qt.AlignmentFlag.AlignVCenter, self.word)
-
-
-def _is_left(event: QMouseEvent) -> bool:
-    return event.button() == Qt.MouseButton.LeftButton

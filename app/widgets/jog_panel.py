@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QComboBox, QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette, theme
 from app.jog_keys import Motion
 from app.language import tr
 from app.tool_tips import tip
+from app.widgets.mouse_held import MouseHeld
 from app.widgets.quiet_combo import QuietCombo
 from core.types import RobotStatus
 
@@ -101,7 +102,7 @@ class JogPanel(QWidget):
         self.setAccessibleDescription(why)
 
 
-class _Cap(QWidget):
+class _Cap(MouseHeld):
     """A key cap. Holding it with the left button is holding the key."""
 
     pressed = Signal()
@@ -114,7 +115,6 @@ class _Cap(QWidget):
         self._text = text
         self._wide = wide
         self._lit = False
-        self._held_by_mouse = False
         self.setMinimumSize(46, self.sizeHint().height())
         self.setMaximumHeight(28 if wide else 44)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -131,23 +131,8 @@ class _Cap(QWidget):
             self._lit = on
             self.update()
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        if event.button() == Qt.MouseButton.LeftButton:
-            self._held_by_mouse = True
-            self.pressed.emit()
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        if event.button() == Qt.MouseButton.LeftButton:
-            self._let_go()
-
-    def hideEvent(self, event: QHideEvent) -> None:
-        self._let_go()
-        super().hideEvent(event)
-
-    def _let_go(self) -> None:
-        if self._held_by_mouse:
-            self._held_by_mouse = False
-            self.released.emit()
+    def on_held(self, held: bool) -> None:
+        (self.pressed if held else self.released).emit()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)

@@ -148,6 +148,20 @@ def test_a_release_counts_wherever_it_goes_to(bench: Bench, qtbot: QtBot) -> Non
     assert bench.jogs[-1] == AT_REST
 
 
+def test_a_key_that_means_something_else_when_it_is_let_go_lets_go(bench: Bench) -> None:
+    """With NumLock and Shift (the deadman) down, the keypad's 8 goes down as Up, and comes up as 8 once Shift is up."""
+    keypad, scan_code = Qt.KeyboardModifier.KeypadModifier, 80
+    down = QKeyEvent(QEvent.Type.KeyPress, Key.Key_Up, keypad | Qt.KeyboardModifier.ShiftModifier, scan_code, 0, 0)
+    QApplication.sendEvent(bench.window, down)
+    assert bench.jogs[-1] == Jog(advance=1.0)
+    other = QKeyEvent(QEvent.Type.KeyRelease, Key.Key_8, keypad, scan_code + 1, 0, 0)
+    QApplication.sendEvent(bench.window, other)
+    assert bench.jog.held == {Motion.ADVANCE}
+    up = QKeyEvent(QEvent.Type.KeyRelease, Key.Key_8, keypad, scan_code, 0, 0)
+    QApplication.sendEvent(bench.window, up)
+    assert bench.jogs[-1] == AT_REST
+
+
 def test_space_stops_once_and_lets_go_even_in_a_text_field(bench: Bench) -> None:
     bench.press(Key.Key_Right)
     bench.press(Key.Key_Space, to=bench.text)

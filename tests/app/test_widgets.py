@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QMenu, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
 from app import palette
@@ -16,6 +16,7 @@ from app.widgets.advice_line import AdviceLine
 from app.widgets.distance_bars import DistanceBars
 from app.widgets.jog_panel import JogPanel
 from app.widgets.mode_badge import ModeBadge
+from app.widgets.mouse_held import MouseHeld
 from app.widgets.notice import Notice, NoticeKind
 from app.widgets.overlay_bar import OverlayBar
 from app.widgets.overlays import Layer
@@ -273,6 +274,25 @@ def test_the_wheel_chooses_nothing(qtbot: QtBot) -> None:
             QApplication.sendEvent(widget, event)
     assert chosen == []
     assert picker.name == "random:5"
+
+
+def test_a_motion_held_with_the_mouse_ends_with_a_release_that_a_menu_got(qtbot: QtBot) -> None:
+    panel, menu = JogPanel(2.0), QMenu()
+    qtbot.addWidget(panel)
+    qtbot.addWidget(menu)
+    menu.addAction("Open")
+    panel.show()
+    heard: list[tuple[str, Motion]] = []
+    panel.pressed.connect(lambda motion: heard.append(("down", motion)))
+    panel.released.connect(lambda motion: heard.append(("up", motion)))
+    cap = next(cap for cap in panel.findChildren(MouseHeld) if cap.accessibleName().startswith("advance"))
+    QTest.mousePress(cap, Qt.MouseButton.LeftButton)
+    menu.popup(panel.mapToGlobal(panel.rect().topLeft()))
+    QTest.mouseRelease(menu, Qt.MouseButton.RightButton)
+    assert heard == [("down", Motion.ADVANCE)]
+    QTest.mouseRelease(menu, Qt.MouseButton.LeftButton)
+    assert heard == [("down", Motion.ADVANCE), ("up", Motion.ADVANCE)]
+    menu.close()
 
 
 def test_jog_panel_says_aloud_what_it_shows(qtbot: QtBot) -> None:
