@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.control.frame_watch import FrameReport, RouteState
 from core.control.landmarks import Landmarks
@@ -26,8 +27,11 @@ class FrameReports:
         self._landmarks = Landmarks()
         self._direction = _Direction(config.behind_s)
 
-    def report(self, frame: Frame, scene: Scene, advice: Advice | None, *, has_target: bool) -> FrameReport:
-        """The report of a frame, what was understood of it and what was advised."""
+    def report(self, frame: Frame, scene: Scene, advice: Advice | None, *, has_target: bool, sound: bool = True) -> FrameReport:
+        """The report of a frame, what was understood of it and what was advised.
+
+        Of a scene that is not `sound` (``is_sound``) nothing else is read: a comparison with NaN is always false.
+        """
         before, self._before = self._before, frame
         image, well_formed = frame.image, is_picture(frame.image)
         if well_formed and self._shape is None:
@@ -38,8 +42,8 @@ class FrameReports:
             captured_s=frame.captured_s,
             refusal=scene.refusal.reason if scene.refusal is not None else None,
             confidence=scene.pose.confidence if scene.pose is not None else 0.0,
-            route=self._route(scene, has_target),
-            finite=_is_finite(scene) and is_finite(advice),
+            route=self._route(scene, has_target) if sound else RouteState.READY if has_target else RouteState.NONE,
+            finite=sound and is_finite(advice),
             format_ok=format_ok,
             same_picture=before is not None and _same(before.image, image),
             delivered=1 if before is None else max(1, frame.index - before.index),
@@ -97,15 +101,22 @@ def _same(before: Image, image: Image) -> bool:
     return bool(np.array_equal(before, image))
 
 
-def _is_finite(scene: Scene) -> bool:
+def is_sound(scene: Scene) -> bool:
+    """Whether every number of a scene that anything is decided by is finite."""
+    arrays: list[NDArray[np.floating]] = []
+    numbers: list[float] = []
     if scene.masks is not None:
-        seen = scene.masks.vessel_probability, scene.masks.robot_probability
-        # one number that is none spoils the sum, which takes a tenth of the time of looking at each
-        if not all(math.isfinite(float(np.sum(probability))) for probability in seen):
-            return False
-    if scene.pose is None:
-        return True
-    pose = scene.pose
-    numbers = [pose.theta_deg, pose.theta_signed_deg, pose.c_head_px, pose.c_tail_px, pose.confidence]
-    numbers += list(scene.path.head) if scene.path is not None else []
-    return all(math.isfinite(number) for number in numbers)
+        arrays += [scene.masks.vessel_probability, scene.masks.robot_probability]
+    if (pose := scene.pose) is not None:
+        numbers += [pose.theta_deg, pose.theta_signed_deg, pose.c_head_px, pose.c_tail_px, pose.confidence]
+    if (path := scene.path) is not None:
+        arrays.append(path.points)
+        numbers += [path.bridged_px, path.radius_px]
+    if (centerline := scene.centerline) is not None:
+        arrays.append(centerline.piece)
+        numbers += [*centerline.nearest, centerline.radius_px, centerline.ambiguity]
+    if (route := scene.route) is not None:
+        arrays.append(route.points)
+        numbers += [route.length_px, *route.target]
+    # one number that is none spoils the sum, which takes a tenth of the time of looking at each
+    return all(math.isfinite(number) for number in (*numbers, *(float(np.sum(array)) for array in arrays)))

@@ -38,9 +38,13 @@ class Beat:
 
 @dataclass(frozen=True, slots=True)
 class DeadmanReport:
-    """The deadman key or pedal as it is now; repeated many times a second, for silence counts as released."""
+    """The deadman key or pedal as it is; repeated many times a second, for silence counts as released.
+
+    ``said_s`` is when it was said, which may be a turn of the pilot earlier (None: now).
+    """
 
     pressed: bool
+    said_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,8 +155,9 @@ def take(health: Health, report: Report, *, armed: bool, now_s: float, servos: S
             return replace(health, window_s=now_s)
         case Beat():
             return replace(health, worker_s=now_s)
-        case DeadmanReport(pressed):
-            return replace(health, deadman=_see_deadman(health.deadman, pressed, armed, now_s, safety))
+        case DeadmanReport(pressed, said_s):
+            at_s = now_s if said_s is None else min(said_s, now_s)
+            return replace(health, deadman=_see_deadman(health.deadman, pressed, armed, at_s, safety))
         case ModelReport():
             return replace(health, model=report)
         case ServosChecked(problems):
@@ -178,11 +183,11 @@ def _see_bus(health: Health, safety: SafetyConfig) -> Health:
     return replace(health, servo_problems=None, reported=(*health.reported, ended))
 
 
-def _see_deadman(deadman: Deadman, pressed: bool, armed: bool, now_s: float, safety: SafetyConfig) -> Deadman:
+def _see_deadman(deadman: Deadman, pressed: bool, armed: bool, said_s: float, safety: SafetyConfig) -> Deadman:
     # after a long silence nobody knows whether the key was let go meanwhile: it is as at the start
-    before = None if now_s - deadman.reported_s > safety.hold_clear_s else deadman.pressed
+    before = None if said_s - deadman.reported_s > safety.hold_clear_s else deadman.pressed
     counts = pressed and ((before is True and deadman.counts) or (before is False and armed))
-    return Deadman(pressed, now_s, counts)
+    return Deadman(pressed, said_s, counts)
 
 
 def _see_gate(health: Health, rejection: RejectReason | None) -> Health:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
@@ -26,13 +27,14 @@ class Inputs:
     """Everything heard since the turn before.
 
     ``deadman`` is whether one is held (None: none has ever reported); ``deadman_news`` what to tell the mode machine of it (None:
-    nothing was heard that it does not know).
+    nothing was heard that it does not know), and ``deadman_said_s`` when that was said.
     """
 
     events: list[Event]
     jog: Jog = AT_REST
     deadman: bool | None = None
     deadman_news: bool | None = None
+    deadman_said_s: float = -math.inf
     seen: Seen | None = None
 
 
@@ -82,8 +84,8 @@ class Inbox:
         with self._lock:
             events, self._events = self._events, []
             jogs = [jog for jog, at_s in self._jogs.values() if now_s - at_s <= self._safety.command_max_age_s]
-            held, news = self._deadmen.take(now_s)
-            return Inputs(events, combined(jogs), held, news, self._seen)
+            held, news, said_s = self._deadmen.take(now_s)
+            return Inputs(events, combined(jogs), held, news, said_s, self._seen)
 
 
 class _Deadmen:
@@ -111,16 +113,16 @@ class _Deadmen:
         self._said[source] = (pressed, now_s)
         self._spoke.add(source)
 
-    def take(self, now_s: float) -> tuple[bool | None, bool | None]:
-        """Whether one is held (None: there is none), and what is new about it."""
+    def take(self, now_s: float) -> tuple[bool | None, bool | None, float]:
+        """Whether one is held (None: there is none), what is new about it, and when that was said."""
         spoke, self._spoke = self._spoke, set()
         released, self._released = self._released, False
         down = {source: at_s for source, (pressed, at_s) in self._said.items() if pressed}
         held = {source for source, at_s in down.items() if now_s - at_s <= self._safety.deadman_timeout_s}
         maybe_held = {source for source, at_s in down.items() if now_s - at_s <= self._safety.hold_clear_s}
-        news: bool | None = None
-        if (held & spoke) - self._doubted:
-            news = True
+        news, said_s = None, now_s
+        if sure := (held & spoke) - self._doubted:
+            news, said_s = True, max(down[source] for source in sure)
         elif released or (spoke and not maybe_held - self._doubted):
             news = False
-        return (bool(held) if self._said else None), news
+        return (bool(held) if self._said else None), news, said_s

@@ -20,7 +20,7 @@ from core.control.drive import Drive
 from core.control.drive_view import DriveNews, DriveView, LeftOver
 from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
 from core.control.follow import Follow
-from core.control.frame_reports import FrameReports, is_finite
+from core.control.frame_reports import FrameReports, is_finite, is_sound
 from core.control.frame_watch import FrameArrived, RouteState
 from core.control.gate_checks import RejectReason, Source
 from core.control.guarded_robot import GuardedRobot, SentMotion
@@ -78,7 +78,7 @@ class Pilot:
         self._busy_s = -math.inf
         self._hand, self._drive, self._follow = Hand(config.hand), Drive(config.policy.drive), Follow()
         self._latency = CommandLatency()
-        self._must_rest = False
+        self._must_rest, self._was_at_rest = False, True
         self._asked = Command()
         self._told_cycle = -1
         self._asked_s: float | None = None
@@ -86,6 +86,7 @@ class Pilot:
         self._queue = AlertQueue()
         self._lock = threading.Lock()  # of what follows: other threads read or write it
         self._forget = False
+        self._turns_back = False
         self._halted = False
         self._alerts: list[Alert] = []
         self._changes: list[DriveView] = []
@@ -145,8 +146,8 @@ class Pilot:
     def target_changed(self) -> None:
         """Another destination, or none: the operator has the hand again, and no advice for the old one is followed any more."""
         self._inbox.forget_seen()
+        self._inbox.post(Act.TAKE_BACK)  # in any mode: a hand-over may have been asked for since the last turn
         if self.view.mode in DRIVING_MODES:
-            self._inbox.post(Act.TAKE_BACK)
             self._raise([(Note.NEW_TARGET, "")], self._clock(), armed=True)
 
     def jog(self, source: Hashable, jog: Jog) -> None:
@@ -202,15 +203,16 @@ class Pilot:
         """Take in what was understood of a frame; returns the advice that may be shown."""
         with self._lock:
             forget, self._forget = self._forget, False
-            driving, blanked = self._view.mode in DRIVING_MODES, self._view.blanked
+            turns_back, blanked = self._turns_back, self._view.blanked
         if forget:
             self._policy.reset()
-        advice = self._policy(scene, status)
-        report = self._reports.report(frame, scene, advice, has_target=has_target)
+        sound = is_sound(scene)
+        advice = self._policy(scene, status) if sound else None
+        report = self._reports.report(frame, scene, advice, has_target=has_target, sound=sound)
         advice = advice if is_finite(advice) else None
-        if driving and report.route is RouteState.BEHIND:
+        if turns_back and report.route is RouteState.BEHIND:
             report = replace(report, route=RouteState.READY)  # a policy backs out of a branch that it missed by itself
-        arrived = scene.route is not None and scene.route.length_px <= self._config.policy.pursuit.arrive_px
+        arrived = sound and scene.route is not None and scene.route.length_px <= self._config.policy.pursuit.arrive_px
         self._inbox.see(Seen(frame.captured_s, advice, arrived), report, Beat(Part.WORKER))
         return advice if not blanked or blanked in _OVER_WITH_A_FRAME else None
 
@@ -240,6 +242,7 @@ class Pilot:
             if _has_changed(self._view, view):
                 self._changes = [*self._changes, view][-_MOST_ALERTS:]
             self._view = view
+            self._turns_back = decision.mode in DRIVING_MODES and not decision.hold_expired
             self._stop_asked = self._stop_asked and Act.STOP not in inputs.events
         return view
 
@@ -277,7 +280,7 @@ class Pilot:
             self._busy_s = now_s
             events.append(ServosBusy())
         if inputs.deadman_news is not None:
-            events.append(DeadmanReport(inputs.deadman_news))
+            events.append(DeadmanReport(inputs.deadman_news, inputs.deadman_said_s))
         if not inputs.jog.is_rest:
             events.append(Act.INPUT)
             self._asked_s = now_s
@@ -304,6 +307,7 @@ class Pilot:
         permitted = decision.permitted if sent is not None else None
         if permitted is not self._permitted:
             self._change(permitted, sent)
+        self._was_at_rest = jog.is_rest
         self._asked, commanded = Command(), None
         try:
             if permitted is Source.OPERATOR:
@@ -331,7 +335,8 @@ class Pilot:
         at = sent.motion if sent is not None else Command()
         self._hand.take_over(at.bend, at.pitch)
         self._drive.take_over(at.bend, at.pitch)
-        self._must_rest = self._permitted is None and permitted is Source.OPERATOR
+        # a press that itself ended a hold is a new one
+        self._must_rest = self._permitted is None and permitted is Source.OPERATOR and not self._was_at_rest
         self._permitted = permitted
         if permitted is Source.PROGRAM:
             with self._lock:
@@ -420,6 +425,6 @@ def _matters(fault: Fault, before: SupervisorState) -> bool:
     """Is it worth an alert? In ADVISORY perception's doubts are on the screen anyway, and idle servos endanger nobody."""
     if before.mode in ARMED_MODES or fault.cause in {Cause.STOP_PRESSED, Cause.SERVOS_WRONG}:
         return True
-    if AREA[fault.cause] is Area.SERVOS:
+    if AREA[fault.cause] is Area.SERVOS or fault.cause is Cause.CLOCK:
         return before.health.servos_ready
     return AREA[fault.cause] is Area.HOST and REACTION[fault.cause] is Reaction.WARN

@@ -92,7 +92,7 @@ class ServoRequests:
     def _switch_on(self, stops: int) -> None:
         robot = self._robot
         self._post(ServosOff())
-        if robot.failure is not None:
+        if robot.failure is not None and self._may_go_on(stops):
             robot.connect()
         for step in (robot.disarm, robot.acknowledge, robot.arm):
             if not self._may_go_on(stops):

@@ -43,6 +43,7 @@ def supervise(
     events : what was reported and asked for since then, in any order.
     now_s : monotonic clock of the frames.
     """
+    were_on = state.health.servos_ready
     state, now_s, clock = _read_clock(state, now_s, safety)
     acts = {event for event in events if isinstance(event, Act)}
     if Act.ACKNOWLEDGE in acts:
@@ -53,7 +54,7 @@ def supervise(
     before = state.active
     health, active = _listen(state, reports, now_s, servos, safety)
     stop = [Fault(Cause.STOP_PRESSED)] if Act.STOP in acts else []
-    in_use = state.health.servos_ready or health.servos_ready
+    in_use = were_on or health.servos_ready
     state = _react(replace(state, health=health, active=(*stop, *clock, *active)), in_use, now_s, safety)
     refused = []
     if Act.ACKNOWLEDGE in acts and state.latched is not None:
@@ -99,7 +100,7 @@ def _listen(
         health = take(health, report, armed=state.mode in ARMED_MODES, now_s=now_s, servos=servos, safety=safety)
         before, active = active, faults(health)
         brought |= {cause: fault for cause, fault in active.items() if cause not in before}
-        if driving and report == DeadmanReport(False):
+        if driving and isinstance(report, DeadmanReport) and not report.pressed:
             brought[Cause.DEADMAN] = Fault(Cause.DEADMAN)
     return health, tuple((brought | active).values())
 
@@ -115,7 +116,9 @@ def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyCon
     recheck = any(fault.cause in RECHECK for fault in state.active)
     stop, disarm = worst(faults, Reaction.STOP), worst(faults, Reaction.DISARM)
     if state.mode is Mode.ADVISORY:
-        disarm = worst(tuple(fault for fault in faults if AREA[fault.cause] is Area.SERVOS), Reaction.DISARM)
+        # what was known of the servos is forgotten with the clock: they are off, and the operator is told
+        told = (fault for fault in faults if AREA[fault.cause] is Area.SERVOS or (in_use and fault.cause is Cause.CLOCK))
+        disarm = worst(tuple(told), Reaction.DISARM)
     if stop is not None:
         state, recheck = _leave(state, Mode.STOPPED, stop, now_s), True
     elif disarm is not None and state.mode is not Mode.STOPPED:

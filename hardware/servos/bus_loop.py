@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import time
 from collections.abc import Callable
@@ -22,6 +23,7 @@ from hardware.servos.stopwatch import Stopwatch
 _LINGER_S = 0.2
 """So long after disarming for silence the servos are still polled, to see that they hold."""
 _REOPEN_S = 1.0
+_SAME_STOP_S = 0.5
 _SETTLE_CYCLES = 5
 _SETTLED_MM = 0.2
 _WINDOW_S = 10.0
@@ -41,6 +43,7 @@ class BusLoop:
         self._settle = 0
         self._ended = self._quiet = self._lost = False
         self._reopen_at_s = 0.0
+        self._stop_s = -math.inf
         self._does: dict[str, Callable[[Request], None]] = {
             "open": lambda _: self._open(),
             "zero": lambda request: bus.set_zero(request.details.get("names")),
@@ -72,13 +75,22 @@ class BusLoop:
         while not self._ended:
             left_s = due_s - time.monotonic()
             line, requests = self._end.wait(left_s)
-            if line and self._end.take_stop():
-                self._guard_port(lambda: self._end_motion(Fault(Cause.STOP_PRESSED)))
+            stop = line and self._end.take_stop()
+            if stop:
+                self._hear_stop()
             if requests and (request := self._end.take_request()) is not None:
-                self._serve(request)
+                self._serve(request, after_stop=stop)
             self._ended = self._ended or self._end.is_alone
             if left_s <= 0.0:
                 return
+
+    def _hear_stop(self) -> None:
+        """A key that stays down and a broken wire say it fifty times a second; held as often, a tendon under load would creep."""
+        now_s = time.monotonic()
+        is_same = self._guard.stopped and now_s - self._stop_s < _SAME_STOP_S
+        self._stop_s = now_s
+        if not is_same:
+            self._guard_port(lambda: self._end_motion(Fault(Cause.STOP_PRESSED)))
 
     def _turn(self) -> None:
         """One cycle."""
@@ -133,7 +145,8 @@ class BusLoop:
             except PortLost:
                 raise
             except ServoError as error:
-                self._guard.latched = replace(fault, detail=f"{fault.detail} {error}".strip())
+                first = self._guard.latched or fault  # the first cause stays
+                self._guard.latched = replace(first, detail=f"{first.detail} {error}".strip())
 
     def _holds(self) -> bool:
         """Whether all servos that tell have a goal where they are; a hold has no answer, and may have got lost."""
@@ -192,7 +205,8 @@ class BusLoop:
         self._settle = 0
         self._bus.torque_off()
 
-    def _serve(self, request: Request) -> None:
+    def _serve(self, request: Request, *, after_stop: bool) -> None:
+        """Do it and answer. `after_stop`: STOP came while the request waited, and nobody can have seen that who asked before."""
         if request.what == "end":
             self._ended = True
             return
@@ -200,6 +214,8 @@ class BusLoop:
         try:
             if (action := self._does.get(request.what)) is None:
                 raise NotReady(f"the servo bus process does not know how to {request.what}")
+            if after_stop and request.what == "acknowledge":
+                raise NotReady("STOP was pressed meanwhile: acknowledge again")
             action(request)
         except PortLost as lost:
             error = lost

@@ -137,7 +137,7 @@ class ServoBus:
         NotReady
             A joint has no zero, or a servo reports a hardware error.
         WrongServo, NoAnswer, Refused
-            The torque of all servos is off again.
+            The torque of all servos is off again, or the message says of which one it may be on.
         """
         self._armed = False
         self._check_ready()
@@ -157,9 +157,13 @@ class ServoBus:
             setup.start_watchdogs(self._line, self.config)
         except PortLost:
             raise
-        except ServoError:
-            with contextlib.suppress(ServoError):
+        except ServoError as error:
+            try:
                 self.torque_off()
+            except PortLost:
+                raise
+            except ServoError as still_on:
+                raise type(error)(f"{error}; {still_on}") from error
             raise
         self._armed = True
 

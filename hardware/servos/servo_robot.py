@@ -61,6 +61,7 @@ class ServoRobot:
         self._truth, self._on_close, self._kept_zero = truth, on_close, kept_zero
         self._lock = threading.Lock()
         self._link: BusLink | None = None
+        self._closes = 0
         self._supervised = False
         self._states: tuple[ServoReading, ...] = ()
         self._reported = (0, 0, 0)  # cycle, bad packets and restarts of the last report
@@ -84,6 +85,7 @@ class ServoRobot:
         ServoError
             What is wrong with port or servos; all is closed again.
         """
+        closes = self._closes
         self._disconnect()
         if self._servos.port is None:
             raise NotReady("no servo port is configured: set servos.port")
@@ -92,15 +94,18 @@ class ServoRobot:
                 link = BusLink(self._servos, self._safety)
                 undo.callback(link.close)
                 link.request("open", _OPEN_S)
+                with self._lock:
+                    if self._closes != closes:
+                        raise NotReady(f"the {self._name} was closed meanwhile")
+                    self._not_connected = None
+                    self._reported = (0, 0, 0)
+                    self._states = ()
+                    self._supervised = False
+                    self._link = link
                 undo.pop_all()
         except ServoError as error:
             self._not_connected = str(error)
             raise
-        self._not_connected = None
-        self._reported = (0, 0, 0)
-        self._states = ()
-        self._supervised = False
-        self._link = link
 
     def zero(self, names: Sequence[JointName] | None = None) -> None:
         """The present positions are zero, of all joints or of those named; the wires must be slack.
@@ -274,6 +279,8 @@ class ServoRobot:
 
     def close(self) -> None:
         """Hold, end the bus process and give the port back. The torque stays on."""
+        with self._lock:
+            self._closes += 1  # a connection that is being made by another thread is given up
         self._disconnect()
         on_close, self._on_close = self._on_close, None
         if on_close is not None:

@@ -6,7 +6,9 @@ import math
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from core.config import Config
@@ -18,7 +20,8 @@ from core.control.hand import AT_REST, Jog
 from core.control.health import ModelReport
 from core.control.modes import Act, Hindrance, Mode
 from core.control.pilot import PERIOD_S, Pilot
-from core.types import Advice, Reason, Refusal, Speed
+from core.control.policies import make_policy
+from core.types import Advice, Points, Reason, Refusal, Route, Scene, Speed
 from tests.core.pilot_bench import ADVICE, WELL, Bench, Policy, scene_at
 
 
@@ -579,3 +582,125 @@ def test_a_late_frame_is_counted_and_told_and_changes_nothing(bench: Bench) -> N
     assert bench.mode is Mode.AUTONOMOUS
     assert Fault(Cause.OUT_OF_ORDER, "1 until now") in bench.pilot.view.active
     assert bench.alerts() == {Cause.OUT_OF_ORDER}
+
+
+# ---- orders of events that are seldom
+
+
+@pytest.mark.parametrize("said_after_turn_s", [0.001, 0.01, 0.019])
+def test_the_deadmans_silence_counts_from_when_it_was_said(bench: Bench, said_after_turn_s: float) -> None:
+    bench.handed_over()
+    turned_s = bench.now_s
+    said_s = bench.now_s = turned_s + said_after_turn_s
+    bench.pilot.deadman("key", True)
+    bench.now_s = turned_s
+    while bench.mode is Mode.AUTONOMOUS:
+        bench.now_s += PERIOD_S
+        bench.pilot.window_alive()
+        bench.pilot.worker_alive()
+        bench.pilot.tick()
+    assert bench.mode is Mode.HOLD
+    assert bench.now_s - said_s <= 0.1 + 1e-9
+
+
+def test_another_destination_in_the_turn_of_the_hand_over_ends_it(bench: Bench) -> None:
+    bench.armed().held = True
+    bench.turn(2)
+    bench.pilot.ask(Act.HAND_OVER)
+    bench.pilot.target_changed()
+    bench.turn(6)
+    assert bench.mode is Mode.ARMED
+    assert all(source is Source.OPERATOR for source, _, _ in bench.robot.sent)
+
+
+def _behind(scene: Scene) -> Scene:
+    way = np.column_stack([np.arange(200.0, 20.0, -1.0), np.full(180, 60.0)])
+    return replace(scene, route=Route(way, 180.0, (20.0, 60.0)))
+
+
+def test_an_expired_hold_does_not_excuse_a_destination_behind_the_robot(bench: Bench) -> None:
+    bench.handed_over().held = False
+    bench.seconds(0.3)
+    bench.scene = _behind
+    bench.seconds(30.0)
+    assert bench.mode is Mode.HOLD
+    assert Hindrance.DESTINATION_BEHIND in bench.pilot.view.against_hand_over
+    bench.alerts()
+    bench.held = True
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    assert Hindrance.DESTINATION_BEHIND in bench.alerts()
+
+
+@pytest.mark.parametrize("handed_over", [True, False])
+def test_a_press_that_ends_a_hold_moves_at_once(bench: Bench, handed_over: bool) -> None:
+    bench.handed_over().held = handed_over
+    bench.seconds(0.3)
+    assert bench.mode is (Mode.AUTONOMOUS if handed_over else Mode.HOLD)
+    bench.jog = Jog(advance=-1.0)
+    bench.turn(2)
+    assert bench.mode is Mode.ARMED
+    assert bench.robot.sent[-1][1].advance_mm_s == -10.0
+
+
+def _spoilt(points: Points, value: float) -> Points:
+    spoilt = points.copy()
+    spoilt[len(spoilt) // 2] = value
+    return spoilt
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    "part",
+    ["path", "path radius", "bridged", "piece", "nearest", "radius", "ambiguity", "route", "length", "target", "theta"],
+)
+def test_any_number_that_is_none_holds_and_the_policy_is_not_asked(bench: Bench, part: str, value: float) -> None:
+    def spoil(scene: Scene) -> Scene:
+        path, line, route, pose = scene.path, scene.centerline, scene.route, scene.pose
+        assert path is not None
+        assert line is not None
+        assert route is not None
+        assert pose is not None
+        changes: dict[str, dict[str, Any]] = {
+            "path": {"path": replace(path, points=_spoilt(path.points, value))},
+            "path radius": {"path": replace(path, radius_px=value)},
+            "bridged": {"path": replace(path, bridged_px=value)},
+            "piece": {"centerline": replace(line, piece=_spoilt(line.piece, value))},
+            "nearest": {"centerline": replace(line, nearest=(value, 60.0))},
+            "radius": {"centerline": replace(line, radius_px=value)},
+            "ambiguity": {"centerline": replace(line, ambiguity=value)},
+            "route": {"route": replace(route, points=_spoilt(route.points, value))},
+            "length": {"route": replace(route, length_px=value)},
+            "target": {"route": replace(route, target=(value, 60.0))},
+            "theta": {"pose": replace(pose, theta_deg=value)},
+        }
+        return replace(scene, **changes[part])
+
+    bench.pilot._policy = make_policy("pursuit", Config())
+    bench.handed_over()
+    assert bench.mode is Mode.AUTONOMOUS
+    bench.scene = spoil
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    assert Cause.NOT_FINITE in {fault.cause for fault in bench.pilot.view.active}
+    assert bench.shown is None
+
+
+def test_a_jump_of_the_clock_with_the_servos_on_is_told_and_must_be_acknowledged(bench: Bench) -> None:
+    bench.on().alerts()
+    bench.now_s += 2.0
+    bench.turn(5)
+    view = bench.pilot.view
+    assert (view.mode, view.servos_on) == (Mode.ADVISORY, False)
+    assert view.latched is not None
+    assert view.latched.cause is Cause.CLOCK
+    assert Cause.CLOCK in bench.alerts()
+
+
+def test_a_jump_of_the_clock_with_the_servos_off_is_nobodys_concern(bench: Bench) -> None:
+    bench.seconds(0.2).alerts()
+    bench.now_s += 2.0
+    bench.turn(5)
+    assert bench.pilot.view.latched is None
+    assert bench.alerts() == set()

@@ -475,6 +475,24 @@ def test_arming_that_fails_midway_leaves_no_torque(twin: SoftServoBus, bus: Serv
     assert not bus.is_armed
 
 
+def test_arming_that_fails_says_of_which_servo_the_torque_may_be_on(
+    twin: SoftServoBus, bus: ServoBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus.set_zero()
+    write = ServoLine.write
+
+    def fail_at_the_fifth(line: ServoLine, servo_id: int, address: int, data: bytes) -> None:
+        if (servo_id, address, data) == (5, 64, b"\1"):
+            twin.faults.mute(1)
+            raise Refused("servo 5 did not take it")
+        write(line, servo_id, address, data)
+
+    monkeypatch.setattr(ServoLine, "write", fail_at_the_fifth)
+    with pytest.raises(Refused, match=r"servo 5 did not take it; torque of right is not proven to be off: cut the servos' power"):
+        bus.arm()
+    assert not bus.is_armed
+
+
 def test_armed_it_cannot_be_zeroed(armed: ServoBus) -> None:
     with pytest.raises(NotReady, match="disarm"):
         armed.set_zero()

@@ -1,0 +1,185 @@
+"""The bus process's loop with a bus and an application of paper: orders of events that are seldom on a real line."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from core.control.faults import Cause, Fault
+from core.safety_config import SafetyConfig
+from core.servo_config import ServosConfig
+from hardware.servos import bus_loop, servo_robot
+from hardware.servos.bus_loop import BusLoop
+from hardware.servos.errors import NotReady, ServoError, TorqueStillOn
+from hardware.servos.guard_end import Request
+from hardware.servos.line import LineCounts
+from hardware.servos.servo_robot import ServoRobot
+
+
+class PaperBus:
+    """Writes down what it is told."""
+
+    is_open, is_armed, zero_ticks = True, False, (0,) * 7
+
+    def __init__(self) -> None:
+        self.counts = LineCounts()
+        self.told: list[str] = []
+        self.torque_stays = False
+
+    def disarm(self) -> None:
+        self.told.append("hold")
+
+    def set_zero(self, names: object) -> None:
+        self.told.append("zero")
+
+    def torque_off(self) -> None:
+        if self.torque_stays:
+            raise TorqueStillOn("torque of right is not proven to be off: cut the servos' power")
+        self.told.append("torque off")
+
+
+class PaperEnd:
+    """The application's side: what waits now."""
+
+    is_alone = False
+
+    def __init__(self) -> None:
+        self.stop = False
+        self.waiting: Request | None = None
+        self.answers: list[tuple[str, ServoError | None]] = []
+
+    def wait(self, timeout_s: float) -> tuple[bool, bool]:
+        return self.stop, self.waiting is not None
+
+    def take_stop(self) -> bool:
+        taken, self.stop = self.stop, False
+        return taken
+
+    def take_request(self) -> Request | None:
+        taken, self.waiting = self.waiting, None
+        return taken
+
+    def publish(self, status: object) -> None: ...
+
+    def answer(self, request: Request, error: ServoError | None) -> None:
+        self.answers.append((request.what, error))
+
+
+class Paper:
+    """Loop, bus and application, with a clock that the test turns."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, **servos: bool) -> None:
+        self.now_s = 100.0
+        monkeypatch.setattr(bus_loop.time, "monotonic", lambda: self.now_s)
+        self.bus, self.end = PaperBus(), PaperEnd()
+        self.loop = BusLoop(self.end, self.bus, ServosConfig(**servos), SafetyConfig())  # type: ignore[arg-type]
+
+    def hear(self, *, stop: bool = False, request: str | None = None) -> None:
+        self.end.stop = stop
+        self.end.waiting = Request(1, request) if request is not None else None
+        self.loop._listen_until(self.now_s)
+
+    @property
+    def stopped(self) -> bool:
+        return self.loop._guard.stopped
+
+    @property
+    def latched(self) -> Fault | None:
+        return self.loop._guard.latched
+
+
+@pytest.fixture
+def paper(monkeypatch: pytest.MonkeyPatch) -> Iterator[Paper]:
+    yield Paper(monkeypatch)
+
+
+def test_a_stop_that_is_said_again_and_again_holds_once(paper: Paper) -> None:
+    """A broken wire of the pedal; each hold under load would let a tendon creep."""
+    for _ in range(200):
+        paper.hear(stop=True)
+        paper.now_s += 0.02
+    assert paper.bus.told == ["hold"]
+    assert paper.stopped
+
+
+def test_a_second_press_of_stop_holds_again(paper: Paper) -> None:
+    paper.hear(stop=True)
+    paper.now_s += 0.6
+    paper.hear(stop=True)
+    assert paper.bus.told == ["hold", "hold"]
+
+
+def test_a_stop_after_its_acknowledgement_is_a_new_one(paper: Paper) -> None:
+    paper.hear(stop=True)
+    paper.now_s += 0.1
+    paper.hear(request="acknowledge")
+    assert not paper.stopped
+    paper.now_s += 0.1
+    paper.hear(stop=True)
+    assert paper.stopped
+    assert paper.bus.told == ["hold", "hold"]
+
+
+def test_an_acknowledgement_that_was_asked_for_before_stop_does_not_undo_it(paper: Paper) -> None:
+    paper.hear(stop=True, request="acknowledge")
+    assert paper.stopped
+    assert paper.latched is not None
+    what, error = paper.end.answers[0]
+    assert what == "acknowledge"
+    assert isinstance(error, NotReady)
+    assert "STOP was pressed meanwhile" in str(error)
+    paper.now_s += 0.02
+    paper.hear(request="acknowledge")
+    assert not paper.stopped
+
+
+def test_the_first_cause_stays_when_the_torque_cannot_be_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+    paper.loop._guard.end_motion(Fault(Cause.SERVO_SILENT, "up"))
+    paper.bus.torque_stays = True
+    paper.hear(stop=True)
+    assert paper.latched is not None
+    assert paper.latched.cause is Cause.SERVO_SILENT
+    assert "up" in paper.latched.detail
+    assert "cut the servos' power" in paper.latched.detail
+
+
+def test_a_robot_that_is_closed_while_it_connects_keeps_no_bus_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """F5 while "Servos on" starts a lost bus process again: that one would keep the port from the next rig."""
+    opening, go_on = threading.Event(), threading.Event()
+    alive: list[object] = []
+
+    class PaperLink:
+        failure = None
+
+        def __init__(self, *_: object) -> None:
+            alive.append(self)
+
+        def request(self, what: str, timeout_s: float) -> None:
+            opening.set()
+            assert go_on.wait(10.0)
+
+        def close(self) -> None:
+            alive.remove(self)
+
+    monkeypatch.setattr(servo_robot, "BusLink", PaperLink)
+    robot = ServoRobot(ServosConfig(port="/dev/none"), SafetyConfig())
+    failed: list[NotReady] = []
+
+    def connect() -> None:
+        try:
+            robot.connect()
+        except NotReady as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=connect)
+    thread.start()
+    assert opening.wait(10.0)
+    robot.close()
+    go_on.set()
+    thread.join(10.0)
+    assert alive == []
+    assert "closed meanwhile" in str(failed[0])
+    assert robot.bus_status() is None
