@@ -111,7 +111,10 @@ class OperatorPanels(ScenePanels):
 
     def show_drive(self, view: DriveView | None, bus: BusStatus | None) -> None:
         """Show who drives, and what the servos say; None: there is nothing to drive."""
-        self._blanked = view.blanked if view is not None else ""
+        before, self._blanked = self._blanked, view.blanked if view is not None else ""
+        if self._blanked and not before:  # at once, and not with the next picture: it may be long in coming
+            self.live.drop_ghost()
+            self.advice.show_advice(None, None, self._blanked)
         self.mode.show_view(view)
         self.mode_bar.show_view(view)
         if view is not None:

@@ -79,6 +79,11 @@ class LiveView(QWidget):
     def scene(self) -> Scene | None:
         return self._scene
 
+    @property
+    def ghost(self) -> Points | None:
+        """Where the shown advice leads, in working px; None: nothing is advised."""
+        return self._ghost
+
     def set_scale(self, pixels_per_mm: float) -> None:
         self._pixels_per_mm = pixels_per_mm
 
@@ -103,6 +108,12 @@ class LiveView(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         QTimer.singleShot(0, self, self._show_loupe)  # a picture that stands still has no next frame to put it right
+
+    def drop_ghost(self) -> None:
+        """Where the last advice led is not advised any more."""
+        if self._ghost is not None:
+            self._ghost = None
+            self._draw_over()
 
     def blank_overlays(self) -> None:
         """Take everything away that was understood: it is not true any more. The last picture and the target stay."""
