@@ -122,6 +122,8 @@ class DriveDesk(QObject):
         if pilot is not None:
             pilot.ask(act)
             self._panels.log(EventKind.OPERATOR, act.value)
+        elif act is Act.STOP and self._thread.stop_opening():
+            self._panels.log(EventKind.OPERATOR, tr("stop: the rig that is being opened starts stopped"))
         elif act is Act.STOP:
             self._panels.log(EventKind.OPERATOR, tr("stop: no rig is open, so nothing moves"))
 

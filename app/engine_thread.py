@@ -12,6 +12,7 @@ from typing import Protocol
 from PySide6.QtCore import QObject, QThread, Signal
 
 from core.config import PerceptionConfig
+from core.control.modes import Act
 from core.control.pilot import Pilot
 from core.devices import EndOfStream
 from core.latest import Latest
@@ -77,6 +78,7 @@ class EngineThread(QThread):
         self._lock = threading.Lock()
         self._changed = threading.Event()
         self._stopping = False
+        self._opening = self._stop_next = False
         self._order: OpenEngine | None = None
         self._engine: EngineLike | None = None
 
@@ -89,6 +91,7 @@ class EngineThread(QThread):
         """Close what runs and open this engine instead; of several orders in a row the last one wins."""
         with self._lock:
             self._order = open_engine
+            self._opening = True
             self._changed.set()
         if not self.isRunning():
             self.start()
@@ -110,6 +113,12 @@ class EngineThread(QThread):
         """Why there are no pictures although the rig is open; None when nothing is known to be wrong."""
         engine = self._engine
         return engine.problem if engine is not None else None
+
+    def stop_opening(self) -> bool:
+        """STOP while an engine is being opened: it starts stopped. False when none is being opened."""
+        with self._lock:
+            self._stop_next = self._stop_next or self._opening
+            return self._opening
 
     def bus_status(self) -> BusStatus | None:
         """The newest status of the servo bus; None where there is none."""
@@ -153,10 +162,15 @@ class EngineThread(QThread):
         """Open an engine and turn its loop until there is another order."""
         self.ticks.take()
         self._report(EngineStatus(Phase.STARTING))
-        engine = open_engine()
+        try:
+            engine = open_engine()
+        except BaseException:
+            self._opened(None)
+            raise
         try:
             if not self._changed.is_set():
                 self._engine = engine
+                self._opened(engine)
                 self._report(EngineStatus(Phase.RUNNING))
                 self._turn(engine)
         finally:
@@ -164,6 +178,15 @@ class EngineThread(QThread):
                 engine.close()  # STOP still finds its way meanwhile
             finally:
                 self._engine = None
+
+    def _opened(self, engine: EngineLike | None) -> None:
+        """What was stopped before it was there is stopped now; where it could not be opened the next one is."""
+        with self._lock:
+            self._opening = self._order is not None
+            stop = self._stop_next and engine is not None
+            self._stop_next = self._stop_next and engine is None
+        if stop and engine is not None and engine.pilot is not None:
+            engine.pilot.ask(Act.STOP)
 
     def _turn(self, engine: EngineLike) -> None:
         while not self._changed.is_set():

@@ -57,6 +57,8 @@ class SafetyConfig(BaseModel):
                 raise ValueError(f"{hold} must be below {disarm}")
         if self.frame_loss_warn_share >= self.frame_loss_hold_share:
             raise ValueError("frame_loss_warn_share must be below frame_loss_hold_share")
+        if self.frame_loss_min_frames > 10 * self.frame_loss_window_s:
+            raise ValueError("frame_loss_min_frames must not exceed 10 a second of frame_loss_window_s, or loss is never seen")
         if self.min_confidence + self.confidence_hysteresis > 1.0:
             raise ValueError("min_confidence + confidence_hysteresis must not exceed 1")
         return self

@@ -79,7 +79,7 @@ class ServosConfig(_Section):
     bus_hz: float = Field(50.0, ge=5.0, le=200.0, description="how often the servos are asked and told")
     heartbeat_timeout_s: float = Field(0.5, ge=0.05, le=5.0, description="silence of the application after which the bus holds")
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="the servos' own bus watchdog")
-    max_temperature_c: float = Field(70.0, ge=30.0, le=90.0, description="a hotter servo ends the driving")
+    max_temperature_c: float = Field(70.0, ge=30.0, le=80.0, description="a hotter servo ends the driving")
     min_voltage_v: float = Field(10.5, ge=5.0, le=24.0, description="a lower supply ends the driving")
     tracking_error_mm: float = Field(1.5, gt=0.0, le=50.0, description="distance of goal and measured position that counts as jam")
     torque_off_on_stop: bool = Field(False, description="also switch the torque off at STOP; it releases the tension of the wires")
@@ -100,4 +100,14 @@ class ServosConfig(_Section):
             raise ValueError(f"joints must be these seven in this order: {', '.join(JOINT_NAMES)}")
         if len({joint.id for joint in self.joints}) != len(self.joints):
             raise ValueError("joints: two servos have the same id")
+        for joint in self.joints:
+            rest_mm, what = (self.pretension_mm, "pretension_mm") if joint.name in TENDONS else (0.0, "zero")
+            if not joint.low_mm <= rest_mm <= joint.high_mm:
+                raise ValueError(f"joint {joint.name}: {what} must lie between low_mm and high_mm, or it would be driven at rest")
+        return self
+
+    @model_validator(mode="after")
+    def _check_times(self) -> Self:
+        if self.watchdog_s < 2.0 / self.bus_hz:
+            raise ValueError("watchdog_s must be two cycles of the bus (2 / bus_hz) at least, or it trips by itself")
         return self

@@ -5,25 +5,37 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 from typing import Protocol
 
+from core.control.faults import Cause, Fault
 from core.control.pilot import PERIOD_S
 
+_SLEPT_S = 0.5
 _log = logging.getLogger(__name__)
+
+
+def slept_s() -> float:
+    """Seconds of sleep since the start: the monotonic clock, by which all ages are told, stands still meanwhile."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
 class Turns(Protocol):
     """What is turned."""
 
     def tick(self) -> object: ...
+    def report(self, fault: Fault) -> None: ...
     def close(self) -> None: ...
 
 
 class PilotLoop:
-    """Turns a pilot until it is closed. When a turn fails the loop ends, ``failure`` says why, and the robot holds by itself."""
+    """Turns a pilot until it is closed. When a turn fails the loop ends, ``failure`` says why, and the robot holds by itself.
 
-    def __init__(self, pilot: Turns) -> None:
-        self._pilot = pilot
+    `asleep_s` tells how long the computer has been asleep since it was started.
+    """
+
+    def __init__(self, pilot: Turns, asleep_s: Callable[[], float] = slept_s) -> None:
+        self._pilot, self._asleep_s = pilot, asleep_s
         self._closing = threading.Event()
         self.failure: str | None = None
         self._thread = threading.Thread(target=self._run, name="pilot", daemon=True)
@@ -37,8 +49,12 @@ class PilotLoop:
 
     def _run(self) -> None:
         due_s = time.monotonic()
+        before_s = self._asleep_s()
         try:
             while not self._closing.wait(max(0.0, due_s - time.monotonic())):
+                if (now_s := self._asleep_s()) - before_s > _SLEPT_S:
+                    self._pilot.report(Fault(Cause.CLOCK, f"the computer slept for {now_s - before_s:.0f} s"))
+                before_s = now_s
                 self._pilot.tick()
                 due_s = max(due_s + PERIOD_S, time.monotonic())
         except Exception as error:  # noqa: BLE001 - top of the thread: its silence stops the robot, and this says why

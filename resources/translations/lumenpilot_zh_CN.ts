@@ -2012,6 +2012,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/drive_desk.py"/>
+        <source>stop: the rig that is being opened starts stopped</source>
+        <translation>停止：正在打开的装置将以停止状态启动</translation>
+    </message>
+    <message>
+        <location filename="../../app/drive_desk.py"/>
         <source>stop: no rig is open, so nothing moves</source>
         <translation>停止：没有打开装置，所以没有东西会动</translation>
     </message>

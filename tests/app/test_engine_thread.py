@@ -10,6 +10,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
+from core.control.modes import Act
 from core.devices import DeviceError, EndOfStream
 from tests.app.fakes import FakeBench, FakeEngine
 
@@ -137,6 +138,47 @@ def test_of_several_orders_the_last_one_runs(
     assert slow.closed.is_set(), "opened for nothing, closed at once"
     assert not skipped.closed.is_set(), "never opened"
     assert thread.pilot is last.pilot
+
+
+def test_stop_while_an_engine_is_being_opened_stops_it(
+    qtbot: QtBot, thread: EngineThread, statuses: list[EngineStatus], bench: FakeBench
+) -> None:
+    gate = threading.Event()
+    engine, later = FakeEngine(bench), FakeEngine(bench)
+
+    def open_slow() -> FakeEngine:
+        gate.wait(5)
+        return engine
+
+    assert not thread.stop_opening(), "there is none yet"
+    thread.start_engine(open_slow)
+    assert thread.stop_opening()
+    gate.set()
+    qtbot.waitUntil(lambda: Phase.RUNNING in phases(statuses))
+    assert engine.pilot.acts == [Act.STOP]
+    assert not thread.stop_opening()
+    thread.start_engine(lambda: later)
+    qtbot.waitUntil(lambda: thread.pilot is later.pilot)
+    assert later.pilot.acts == [], "what was stopped before is the rig's own left-over"
+
+
+def test_stop_while_an_engine_cannot_be_opened_stops_the_next(
+    qtbot: QtBot, thread: EngineThread, statuses: list[EngineStatus], bench: FakeBench
+) -> None:
+    gate = threading.Event()
+    engine = FakeEngine(bench)
+
+    def open_slow() -> EngineLike:
+        gate.wait(5)
+        raise DeviceError("nothing there")
+
+    thread.start_engine(open_slow)
+    assert thread.stop_opening()
+    gate.set()
+    qtbot.waitUntil(lambda: Phase.FAULT in phases(statuses))
+    thread.start_engine(lambda: engine)
+    qtbot.waitUntil(lambda: Phase.RUNNING in phases(statuses))
+    assert engine.pilot.acts == [Act.STOP]
 
 
 MOMENTS = ["before the start", "while opening", "while running", "while the camera is silent", "after a fault"]

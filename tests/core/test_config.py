@@ -1,8 +1,11 @@
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel, ValidationError
 
 from core.config import Config, ConfigError, load_config
+from core.safety_config import SafetyConfig
+from core.servo_config import ServosConfig
 
 
 def _write(folder: Path, text: str) -> Path:
@@ -66,3 +69,25 @@ def test_a_binary_file_is_named(tmp_path: Path) -> None:
 def test_the_configuration_cannot_be_changed_in_place() -> None:
     with pytest.raises(ValueError, match="frozen"):
         Config().twin = None  # type: ignore[misc, assignment]
+
+
+def _joints_with(name: str, **changes: float) -> list[dict[str, object]]:
+    joints = [joint.model_dump() for joint in ServosConfig().joints]
+    return [{**joint, **changes} if joint["name"] == name else joint for joint in joints]
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "words"),
+    [
+        (ServosConfig, {"pretension_mm": 5.0}, "joint right: pretension_mm must lie between low_mm and high_mm"),
+        (ServosConfig, {"joints": _joints_with("advance", low_mm=100.0)}, "joint advance: zero must lie between"),
+        (ServosConfig, {"joints": _joints_with("delivery_2", high_mm=-1.0)}, "delivery_2"),
+        (ServosConfig, {"watchdog_s": 0.02}, "watchdog_s must be two cycles of the bus"),
+        (ServosConfig, {"bus_hz": 5.0}, "watchdog_s must be two cycles of the bus"),
+        (ServosConfig, {"max_temperature_c": 85.0}, "80"),
+        (SafetyConfig, {"frame_loss_min_frames": 300}, "loss is never seen"),
+    ],
+)
+def test_limits_that_contradict_each_other_are_refused(section: type[BaseModel], values: dict[str, object], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        section.model_validate(values)
