@@ -133,5 +133,5 @@ def test_an_end_stops_both_tendons_of_a_pair_so_that_no_wire_hangs(
 
 
 def test_a_pretension_outside_the_envelope_leaves_the_decision_to_the_gate() -> None:
-    servos = _with("right", high_mm=0.1).model_copy(update={"pretension_mm": 0.5})
+    servos = _with("right", high_mm=0.4).model_copy(update={"pretension_mm": 0.5})  # the configuration itself refuses it
     assert _settled(Command(bend=0.5), servos).goals_mm[0] == pytest.approx(0.5)

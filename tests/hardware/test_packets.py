@@ -15,21 +15,28 @@ _ANSWER = bytes.fromhex("fffffd00 01 0800 55 00 a6000000 8cc0".replace(" ", ""))
 
 
 class _Line:
-    """What pyserial would give: bytes come at the line's speed, and reading takes the time that they take to come."""
+    """What pyserial would give: bytes come at the line's speed, and a read waits for them for half a millisecond at most.
+
+    Time is counted in bytes of the line, so that nothing is lost in rounding.
+    """
 
     def __init__(self, baud: int, noise: str) -> None:
-        self.now_s, self._per_byte_s, self._noise = 0.0, 10.0 / baud, noise
+        self._noise, self._slice = noise, max(1, round(_SLICE_S * baud / 10))
         self._random = random.Random(1)
-        self._read = 0
+        self._per_byte_s = 10.0 / baud
+        self._now = self._read = 0
+
+    @property
+    def now_s(self) -> float:
+        return self._now * self._per_byte_s
 
     @property
     def in_waiting(self) -> int:
-        return min(4095, int(self.now_s / self._per_byte_s) - self._read)
+        return min(4095, self._now - self._read)
 
     def read(self, length: int) -> bytes:
-        until_s = self.now_s + _SLICE_S
-        self.now_s = min(until_s, max(self.now_s, (self._read + length) * self._per_byte_s))
-        count = min(length, max(self.in_waiting, 0))
+        self._now += min(self._slice, max(0, length - self.in_waiting))
+        count = min(length, self.in_waiting)
         self._read += count
         return bytes(count) if self._noise == "zeros" else self._random.randbytes(count)
 
