@@ -5,7 +5,9 @@ What a command takes stands with its family, in ``cli_*.py``; what it does, in a
 
 from __future__ import annotations
 
+import faulthandler
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -34,6 +36,8 @@ SourceOption = Annotated[Path | None, typer.Option("--source", help="video, pict
 
 def main() -> None:
     """Run the command line. Known errors end as one line on standard error and exit code 2; Ctrl-C as exit code 130."""
+    with suppress(OSError, RuntimeError, ValueError):  # there is not always a standard error
+        faulthandler.enable()  # a memory fault says at least where, and not only that
     share_heaps()
     try:
         app()

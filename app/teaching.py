@@ -76,11 +76,12 @@ class Classroom:
             keep(network, step, whole=whole)
 
         def keep_at_once(network: DualUNet, step: int) -> None:
-            # Hours of learning must not hang on the eight-bit copy, which takes a while, nor on the workers' end.
+            # Hours of learning must not hang on the eight-bit copy, which takes a while; nor either of them on the workers' end.
             if step > _MAY_BE_LOST:
                 keep(network, step, whole=False)
+            look_and_keep(network, step, whole=True)
 
-        network, done = train(
+        _, done = train(
             lesson.network,
             crops,
             plan,
@@ -92,7 +93,6 @@ class Classroom:
             report_every=50 if self.teller is None else _TOLD_EVERY,
             checkpoint_every=1000 if not self.watch.is_on else max(_TOLD_EVERY, plan.steps // _LOOKS),
         )
-        look_and_keep(network, done, whole=True)
         self.steps_before += done
         return done
 

@@ -113,8 +113,8 @@ def train(
     """Train `network` in place; returns the network with averaged weights and the number of steps done.
 
     `crops` (``crops.py``) gives ``plan.steps * plan.batch`` crops with their labels.
-    `should_stop` is asked after every step; what was learnt until then is returned. `on_last` is given it first, while the crops'
-    workers still run: processes have broken down when these ended. Where the device computes in bf16, autocast is used.
+    `should_stop` is asked after every step; what was learnt until then is returned. `on_last` is given it first, on the CPU, while
+    the crops' workers still run: processes have broken down when these ended. Where the device computes in bf16, autocast is used.
     """
     torch.manual_seed(plan.seed)
     if plan.threads:
@@ -158,7 +158,7 @@ def train(
         if done % checkpoint_every == 0 and done < plan.steps:
             on_checkpoint(average, done)
         if should_stop() or done in (plan.steps, plan.stop_after):
-            on_last(average, done)
+            on_last(average.to("cpu"), done)
             break
     return average.to("cpu"), done
 

@@ -49,3 +49,11 @@ def test_a_help_page_waits_for_nothing_slow() -> None:
     code = f"import sys, app.cli; print([name for name in {SLOW} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
     assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_a_memory_fault_says_where() -> None:
+    code = "import ctypes, app.cli as cli\ncli.app = lambda: ctypes.string_at(0)\ncli.main()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode < 0
+    assert "Segmentation fault" in done.stderr
+    assert "string_at" in done.stderr

@@ -10,9 +10,12 @@ import torch
 
 from core.learning.model_file import (
     INFO,
+    MODELS,
     ONNX,
+    ONNX_INT8,
     WEIGHTS,
     ModelError,
+    check_files,
     load_network,
     model_folder,
     read_model_info,
@@ -136,3 +139,12 @@ def test_a_model_is_replaced_whole(model: Path) -> None:
     assert after.training == {"steps": 9}
     assert after.weights_sha256 != before
     assert [p.name for p in model.parent.iterdir()] == [model.name], "no scratch is left behind"
+
+
+@pytest.mark.parametrize("manifest", sorted(MODELS.rglob(INFO)), ids=lambda path: path.parent.name)
+def test_a_shipped_models_files_are_those_of_its_manifest(manifest: Path) -> None:
+    """One that is left over from other weights would never be used, nor its absence be seen."""
+    info = read_model_info(manifest.parent, verify=())
+    there = {path.name for path in manifest.parent.iterdir() if path.is_file()}
+    assert there == {INFO, WEIGHTS, ONNX} | ({ONNX_INT8} if info.onnx_int8_sha256 is not None else set())
+    check_files(info, manifest.parent, sorted(there - {INFO}))
