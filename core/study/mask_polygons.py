@@ -24,7 +24,7 @@ _BRUSH_SIDE_PX = 2048
 def polygons_of(
     mask: Mask, target: MaskTarget, tolerance_px: float = TOLERANCE_PX, offset: tuple[int, int] = (0, 0)
 ) -> tuple[MaskPolygon, ...]:
-    """The outlines of a mask (H, W): outer ones first, each hole after its outer one.
+    """The outlines of a mask (H, W), the largest first and each followed by its holes: what lies in a hole comes after that.
 
     Parameters
     ----------
@@ -40,8 +40,9 @@ def polygons_of(
     for outline, parent in zip(outlines, parents, strict=True):
         if parent >= 0:
             holes.setdefault(parent, []).extend(outline)
-    outer = [(place, outline) for place, outline in enumerate(outlines) if parents[place] < 0 and outline]
-    return tuple(polygon for place, outline in outer for polygon in (*outline, *holes.get(place, [])))
+    outer = [place for place, outline in enumerate(outlines) if parents[place] < 0 and outline]
+    outer.sort(key=lambda place: -cv2.contourArea(contours[place]))
+    return tuple(polygon for place in outer for polygon in (*outlines[place], *holes.get(place, [])))
 
 
 def _outline(contour: Any, target: MaskTarget, tolerance_px: float, is_hole: bool) -> list[MaskPolygon]:
