@@ -30,7 +30,7 @@ class PursuitConfig(_Section):
     preview_px: float = Field(50.0, ge=5.0, le=400.0, description="bends and bifurcations so far ahead slow the robot down")
     brake_px: float = Field(16.0, ge=5.0, le=400.0, description="way left at which it begins to slow down for the target")
     gentle_turn_deg: float = Field(25.0, gt=0.0, le=180.0, description="turn within the preview that still allows full speed")
-    slow_steer_deg: float = Field(8.0, gt=0.0, le=180.0, description="steering error above which the robot goes slow")
+    slow_steer_deg: float = Field(10.0, gt=0.0, le=180.0, description="steering error above which the robot goes slow")
     wall_share: float = Field(0.85, gt=0.1, le=1.5, description="head's distance over the room it has: above, near the wall")
     contact_slow_n: float = Field(0.06, gt=0.0, le=5.0, description="rise of the contact force that slows the robot down")
     lean_mm: float = Field(5.0, gt=0.1, le=100.0, description="way over which a contact force becomes the body's own lean")
@@ -42,7 +42,7 @@ class PursuitConfig(_Section):
     behind_s: float = Field(0.3, ge=0.0, le=5.0, description="the way must have lain behind the head for so long to back off")
     retry_mm: float = Field(9.0, gt=0.0, le=50.0, description="way back from where a missed branch lies beside the head")
     arrive_px: float = Field(8.0, ge=1.0, le=100.0, description="way left at which the target counts as reached")
-    most_misses: int = Field(3, ge=1, le=100, description="after missing a branch so often it gives up and stops")
+    most_misses: int = Field(2, ge=1, le=100, description="after missing a branch so often it gives up and stops")
 
     @model_validator(mode="after")
     def _check_limits(self) -> Self:
@@ -57,8 +57,8 @@ class DriveConfig(_Section):
     """From advice to the tendons' bend and the feed."""
 
     turn_deg: float = Field(94.0, gt=1.0, le=720.0, description="by how much the head turns at a bend of 1")
-    proportional: float = Field(0.2, ge=0.0, le=5.0, description="share of the advised turn that is made at once")
-    integral_s: float = Field(0.4, ge=0.02, le=60.0, description="time in which the advised turn is made, if advice stays the same")
+    proportional: float = Field(0.3, ge=0.0, le=5.0, description="share of the advised turn that is made at once")
+    integral_s: float = Field(0.3, ge=0.02, le=60.0, description="time in which the advised turn is made, if advice stays the same")
     max_bend_rate_per_s: float = Field(1.5, gt=0.0, le=20.0, description="share of the tendons' full pull per second, at most")
     max_acceleration_mm_s2: float = Field(30.0, gt=0.0, le=1000.0, description="of the feed")
     max_gap_s: float = Field(0.1, gt=0.0, le=0.5, description="a longer pause between two commands counts as so much")

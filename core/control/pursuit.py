@@ -117,7 +117,7 @@ class Pursuit:
             share = (config.slow_steer_deg / abs(self._steer_deg)) ** 2
             limits.append((max(words.slowest_mm_s, words.fast_mm_s * share), "the head must turn first"))
         if way.wall > config.wall_share:
-            limits.append((words.slow_mm_s, "the head is near the wall"))
+            limits.append((words.moderate_mm_s, "the head is near the wall"))
         if rises:
             limits.append((words.slow_mm_s, "the robot meets the wall"))
         if way.left_px is not None and way.left_px < config.brake_px:

@@ -72,10 +72,10 @@ def test_the_more_the_head_must_turn_the_slower_and_never_by_a_jump() -> None:
     assert speeds[-1] < WORDS.slow_mm_s
 
 
-def test_near_the_wall_it_goes_slow() -> None:
+def test_near_the_wall_it_goes_slower() -> None:
     advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 111), (380, 100)))  # 11 of 15 - 3.5 px
     assert advice is not None
-    assert advice.advance_mm_s <= WORDS.slow_mm_s
+    assert advice.advance_mm_s <= WORDS.moderate_mm_s
 
 
 def test_the_nearer_the_target_the_slower_and_there_it_stops() -> None:
@@ -151,7 +151,7 @@ def test_a_branch_that_is_missed_again_and_again_is_given_up_with_a_word() -> No
     pursuit = Pursuit(CONFIG, WORDS)
     assert "take over" not in " ".join(_missing(pursuit, CONFIG.most_misses - 1))
     last = _missing(pursuit, 1)[-1]
-    assert last == "missed the branch 3 times: take over, or choose another destination"
+    assert last == f"missed the branch {CONFIG.most_misses} times: take over, or choose another destination"
     assert "take over" not in " ".join(_missing(pursuit, 1, target=(30, 100))), "another destination is another way"
     pursuit.reset()
     assert "take over" not in " ".join(_missing(pursuit, 1)), "taken over, it may try again"
