@@ -15,7 +15,7 @@ from core.errors import UserError
 from core.learning.crops import FirstLook, FrameCrops, NearCrops
 from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.growing import deepened, with_first_look
-from core.learning.model_file import INFO, SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look
+from core.learning.model_file import SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look, second_look_of
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX
 from core.perception.segmentation import Turned, open_second_look, open_segmenter
@@ -57,8 +57,7 @@ class FrameLesson:
             self.network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
             return
         self.network = load_network(model_folder(init))[0]
-        if has_second_look(init):
-            self._second_look = model_folder(init) / SECOND_LOOK
+        self._second_look = second_look_of(model_folder(init))
         if deepen:
             images = [sample.load(WORKING_SIZE_PX)[0] for sample in _some(samples)]
             self.network = deepened(self.network, default_shape().encoder_convolutions, images)
@@ -125,7 +124,7 @@ class SecondLookLesson:
 
 def has_second_look(model: str) -> bool:
     """Whether a model has a network for a second look; raises ModelError when there is no such model."""
-    return (model_folder(model) / SECOND_LOOK / INFO).is_file()
+    return second_look_of(model_folder(model)) is not None
 
 
 def default_shape(*, deep: bool = True) -> UNetShape:

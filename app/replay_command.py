@@ -61,7 +61,7 @@ def run_replay(options: ReplayOptions) -> None:
             _make_folder(options.out)
         pipeline = open_pipeline(config.perception)
         after = _model_of(config) | {"engine": pipeline.engine}
-        notes += _same_model_note(reader.manifest, config, after)
+        notes += model_note(reader.manifest, config, after)
         reader.wait()
         lines = stack.enter_context(_open_lines(options.jsonl)) if options.jsonl is not None else None
         done = replay(reader, pipeline, lines, options.jsonl)
@@ -102,18 +102,22 @@ def replay_config(manifest: Manifest | None, options: ReplayOptions) -> tuple[Co
 
 def _model_of(config: Config) -> dict[str, Any]:
     name = config.perception.segmentation.model
-    return {"name": name, "sha256": read_model_info(model_folder(name), verify=()).weights_sha256}
+    info = read_model_info(model_folder(name), verify=())
+    return {"name": name, "sha256": info.weights_sha256, "second_look_sha256": info.second_look_sha256}
 
 
-def _same_model_note(manifest: Manifest | None, config: Config, after: dict[str, Any]) -> list[str]:
+def model_note(manifest: Manifest | None, config: Config, after: dict[str, Any]) -> list[str]:
     """What must be known to read the figures: the same name may be another model, and the same model never sees the same pixels."""
     if manifest is None:
         return []
     before = manifest.model
-    if before.get("name") == after["name"] and before.get("sha256") != after["sha256"]:
+    # Recordings from before the second look was noted say nothing of it.
+    same_near = "second_look_sha256" not in before or before["second_look_sha256"] == after["second_look_sha256"]
+    same_weights = before.get("sha256") == after["sha256"] and same_near
+    if before.get("name") == after["name"] and not same_weights:
         return [f"model {after['name']} is not the one that was recorded with: its weights differ"]
     same_config = manifest.config.get("perception") == config.perception.model_dump(mode="json")
-    if before.get("sha256") == after["sha256"] and same_config:
+    if same_weights and same_config:
         lossy = "" if manifest.codec == "lossless" else "the video's lossy coding, "
         return [f"same model, same configuration: what differs comes from {lossy}the program and the stream's beginning"]
     return []

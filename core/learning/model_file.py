@@ -41,7 +41,10 @@ class ModelError(UserError):
 
 
 class ModelInfo(BaseModel):
-    """What ``model.json`` says. Image height and width must be multiples of ``stride``; ``figures`` are measured."""
+    """What ``model.json`` says. Image height and width must be multiples of ``stride``; ``figures`` are measured.
+
+    ``second_look_sha256`` is of the weights of its second look; None: it has none, or is older than this entry.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -54,6 +57,7 @@ class ModelInfo(BaseModel):
     weights_sha256: str = Field(pattern="^[0-9a-f]{64}$")
     onnx_sha256: str = Field(pattern="^[0-9a-f]{64}$")
     onnx_int8_sha256: str | None = Field(None, pattern="^[0-9a-f]{64}$")
+    second_look_sha256: str | None = Field(None, pattern="^[0-9a-f]{64}$")
     training: dict[str, Any] = {}
     calibration: Calibration | None = None
     calibration_mirrored: Calibration | None = None
@@ -113,6 +117,19 @@ def check_files(info: ModelInfo, folder: Path, names: Sequence[str]) -> None:
             raise ModelError(f"{file}: SHA-256 differs from {INFO}: the file is cut or damaged; restore the model folder")
 
 
+def second_look_of(folder: Path) -> Path | None:
+    """The folder of a model's second look, None when it has none; ModelError when it is gone or not the one it belongs to."""
+    expected = read_model_info(folder, verify=()).second_look_sha256
+    near = folder / SECOND_LOOK
+    if not (near / INFO).is_file():
+        if expected is not None:
+            raise ModelError(f"{near / INFO}: missing, and the model does not see well without; restore the model folder")
+        return None
+    if expected is not None and read_model_info(near, verify=()).weights_sha256 != expected:
+        raise ModelError(f"{near}: is of another model than {folder / INFO} says; restore the model folder")
+    return near
+
+
 def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
     """The torch network in evaluation mode with its weights; raises ModelError."""
     from safetensors import SafetensorError
@@ -168,6 +185,7 @@ def save_model(
             weights_sha256=sha256_of(scratch / WEIGHTS),
             onnx_sha256=sha256_of(scratch / ONNX),
             onnx_int8_sha256=sha256_of(scratch / ONNX_INT8) if len(examples) else None,
+            second_look_sha256=read_model_info(second_look, verify=()).weights_sha256 if second_look is not None else None,
             training=training,
             figures=figures,
             **_PLANES if network.shape.inputs == 5 else {},
@@ -183,15 +201,18 @@ def save_model(
 
 
 def _put(scratch: Path, folder: Path) -> None:
-    """Move a whole model to its place."""
+    """Move a whole model to its place; where that fails, the one that was there before is there again."""
     aside = scratch.with_name(scratch.name + ".old")
+    # Aside first, deleted last: whenever this is interrupted, one of the two is whole.
+    if folder.exists():
+        os.replace(folder, aside)
     try:
-        if folder.exists():
-            # Aside first, deleted last: whenever this is interrupted, one of the two is whole.
-            os.replace(folder, aside)
         os.replace(scratch, folder)
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
+    except BaseException:
+        if aside.exists():
+            os.replace(aside, folder)
+        raise
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs: Any) -> None:
@@ -210,7 +231,9 @@ def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs:
         save_model(network, scratch / SECOND_LOOK, **kwargs)
         figures = read_model_info(scratch, verify=()).figures
         held_out = figures if figures.get("held_out") else {}
-        _update(scratch, {"name": folder.name, "calibration": None, "calibration_mirrored": None, "figures": held_out})
+        near_sha256 = sha256_of(scratch / SECOND_LOOK / WEIGHTS)
+        changes: dict[str, Any] = {"calibration": None, "calibration_mirrored": None, "figures": held_out}
+        _update(scratch, {"name": folder.name, "second_look_sha256": near_sha256} | changes)
         scratch.chmod(0o755)
         _put(scratch, folder)
     finally:
@@ -246,8 +269,11 @@ def write_calibration(folder: Path, calibration: Calibration, mirrored: Calibrat
 def _update(folder: Path, changes: dict[str, Any]) -> None:
     info = read_model_info(folder).model_copy(update=changes)
     scratch = folder / f".{INFO}.new"
-    scratch.write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    os.replace(scratch, folder / INFO)
+    try:
+        scratch.write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        os.replace(scratch, folder / INFO)
+    except OSError as error:
+        raise ModelError(f"{folder / INFO}: cannot be written ({error.strerror}); copy the model to a folder of your own") from None
 
 
 def _eight_bit(network: DualUNet, examples: Sequence[Image]) -> EightBitUNet:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import SegmentationConfig
-from core.learning.model_file import INFO, ONNX, ONNX_INT8, SECOND_LOOK, ModelError, check_files, model_folder, read_model_info
+from core.learning.model_file import ONNX, ONNX_INT8, ModelError, check_files, model_folder, read_model_info, second_look_of
 from core.types import Image
 
 Probability = NDArray[np.float32]
@@ -190,10 +190,10 @@ def open_segmenter(config: SegmentationConfig) -> OpenVinoSegmenter | TorchSegme
 def open_second_look(config: SegmentationConfig) -> OpenVinoSegmenter | TorchSegmenter | None:
     """The network of the configured model's second look, which takes ``second_look.Planes``; None: it has none, or none is wanted.
 
-    Raises ModelError, as ``open_segmenter`` does.
+    Raises ModelError, as ``open_segmenter`` does, and when the model has lost its second look.
     """
-    folder = model_folder(config.model) / SECOND_LOOK
-    return _open(folder, config) if config.second_look and (folder / INFO).is_file() else None
+    folder = second_look_of(model_folder(config.model)) if config.second_look else None
+    return _open(folder, config) if folder is not None else None
 
 
 def _open(folder: Path, config: SegmentationConfig) -> OpenVinoSegmenter | TorchSegmenter:

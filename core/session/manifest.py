@@ -115,6 +115,7 @@ def about_rig(config: Config, kind: Kind, rig: str, calibration: dict[str, Any] 
     else:
         model["sha256"] = info.weights_sha256
         model["onnx_sha256"], model["onnx_int8_sha256"] = info.onnx_sha256, info.onnx_int8_sha256
+        model["second_look_sha256"] = info.second_look_sha256
     if calibration is None:
         with contextlib.suppress(RigFileError):  # whoever opens the rig is told
             known = calibration_of(config)

@@ -15,13 +15,13 @@ from core.learning.model_file import (
     INFO,
     ONNX,
     ONNX_INT8,
-    SECOND_LOOK,
     WEIGHTS,
     ModelError,
     ModelInfo,
     check_files,
     model_folder,
     read_model_info,
+    second_look_of,
 )
 from core.types import Image, Mask, Scene
 from hardware.checks.check import Check, one_line
@@ -49,8 +49,8 @@ def check_model(name: str) -> Check:
     try:
         folder = model_folder(name)
         info, files = _checked(folder)
-        if (folder / SECOND_LOOK / INFO).is_file():
-            files += [f"{SECOND_LOOK}/{file}" for file in _checked(folder / SECOND_LOOK)[1]]
+        if (near := second_look_of(folder)) is not None:
+            files += [f"{near.name}/{file}" for file in _checked(near)[1]]
     except ModelError as error:
         return Check("model", False, one_line(error), _advice(name))
     return Check("model", True, f"{info.name}: all {len(files)} files are whole (SHA-256)")

@@ -16,7 +16,7 @@ from statistics import median
 
 import pytest
 
-from app.replay_command import ReplayOptions, change_to_json, replay_config, run_replay
+from app.replay_command import ReplayOptions, change_to_json, model_note, replay_config, run_replay
 from app.replay_figure import draw_replay
 from core.config import Config
 from core.errors import UserError
@@ -181,3 +181,13 @@ def test_one_frame_can_be_drawn_and_written() -> None:
     told = change_to_json(change)
     assert (told["change"], told["before"]["head_xy"], told["after"]["reason"]) == ("pose lost", [2.0, 3.0], "image black")
     assert len(draw_replay([change], summarise([change])["states"]["matrix"], "x").axes) == 5
+
+
+def test_another_second_look_is_another_model() -> None:
+    """Its network is trained on while the first one stays as it is."""
+    now = {"name": "default", "sha256": "a" * 64, "second_look_sha256": "b" * 64}
+    manifest = read_manifest(GOLDEN).model_copy(update={"model": now})
+    assert "weights differ" not in " ".join(model_note(manifest, Config(), now))
+    assert "weights differ" in model_note(manifest, Config(), now | {"second_look_sha256": "c" * 64})[0]
+    older = manifest.model_copy(update={"model": {"name": "default", "sha256": "a" * 64}})
+    assert "weights differ" not in " ".join(model_note(older, Config(), now)), "it is not known"

@@ -1,6 +1,7 @@
 """A model folder: written whole, verified by hash, never half loaded."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -148,3 +149,27 @@ def test_a_shipped_models_files_are_those_of_its_manifest(manifest: Path) -> Non
     there = {path.name for path in manifest.parent.iterdir() if path.is_file()}
     assert there == {INFO, WEIGHTS, ONNX} | ({ONNX_INT8} if info.onnx_int8_sha256 is not None else set())
     check_files(info, manifest.parent, sorted(there - {INFO}))
+
+
+def test_where_a_new_model_cannot_take_its_place_the_old_one_stays(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = read_model_info(model)
+    rename = os.replace
+
+    def fails_into_place(source: Path, target: Path) -> None:
+        if Path(target) == model and not Path(source).name.endswith(".old"):
+            raise OSError(28, "No space left on device")
+        rename(source, target)
+
+    monkeypatch.setattr(os, "replace", fails_into_place)
+    torch.manual_seed(2)
+    with pytest.raises(OSError, match="No space"):
+        save_model(DualUNet(TINY).eval(), model, training={}, figures={})
+    monkeypatch.undo()
+    assert read_model_info(model) == before
+    assert [path.name for path in model.parent.iterdir()] == [model.name], "nothing is left lying about"
+
+
+def test_figures_that_cannot_be_stored_are_one_clear_error(model: Path) -> None:
+    (model / f".{INFO}.new").mkdir()
+    with pytest.raises(ModelError, match=r"model\.json: cannot be written .* copy the model"):
+        write_figures(model, {"robot_dice": 0.5})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -298,8 +300,6 @@ def test_it_can_be_left_out_and_need_not_be_there(model: Path) -> None:
 
 
 def test_a_damaged_second_look_is_said(model: Path, tmp_path: Path) -> None:
-    import shutil
-
     copy = shutil.copytree(model, tmp_path / "copy")
     data = bytearray((copy / SECOND_LOOK / "network.onnx").read_bytes())
     data[len(data) // 2] ^= 1
@@ -309,3 +309,28 @@ def test_a_damaged_second_look_is_said(model: Path, tmp_path: Path) -> None:
     (copy / SECOND_LOOK / INFO).write_text("{}")
     with pytest.raises(ModelError, match=r"second_look.*damaged"):
         open_second_look(SegmentationConfig(model=str(copy)))
+
+
+def test_a_model_that_has_lost_its_second_look_is_not_taken_for_whole(model: Path, tmp_path: Path) -> None:
+    """Without it a picture is understood far worse, and what its confidence means was learnt with it."""
+    copy = shutil.copytree(model, tmp_path / "copy")
+    shutil.rmtree(copy / SECOND_LOOK)
+    with pytest.raises(ModelError, match=r"second_look.*missing.*restore"):
+        open_second_look(SegmentationConfig(model=str(copy)))
+    assert open_second_look(SegmentationConfig(model=str(copy), second_look=False)) is None, "nobody asks for it"
+
+
+def test_a_second_look_of_another_model_is_refused(model: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(model, tmp_path / "copy")
+    torch.manual_seed(7)
+    save_model(with_first_look(DualUNet(TINY).eval()), copy / SECOND_LOOK, training={}, figures={})
+    with pytest.raises(ModelError, match=r"second_look.*another model"):
+        open_second_look(SegmentationConfig(model=str(copy)))
+
+
+def test_a_model_from_before_it_was_noted_keeps_its_second_look(model: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(model, tmp_path / "copy")
+    info = json.loads((copy / INFO).read_text())
+    del info["second_look_sha256"]
+    (copy / INFO).write_text(json.dumps(info))
+    assert open_second_look(SegmentationConfig(model=str(copy))) is not None

@@ -19,7 +19,7 @@ import pytest
 from core.config import Config, PerceptionConfig, RigConfig, SegmentationConfig
 from core.devices import DeviceError
 from core.gamepad_config import GamepadConfig
-from core.learning.model_file import INFO, MODELS, ONNX, ONNX_INT8, sha256_of
+from core.learning.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, sha256_of
 from core.pedal_config import PedalConfig
 from core.record_config import RecordConfig
 from core.servo_config import ServosConfig
@@ -175,6 +175,12 @@ def test_a_whole_model_passes_and_a_flipped_bit_is_found(copied: Path) -> None:
     _bad(model.check_model(str(copied)), "SHA-256 differs", "restore the model folder")
     _bad(model.check_self_test(_segmentation(copied)), "not run: .*SHA-256", "restore")
     _bad(model.check_model(str(copied / "gone")), "no model", "restore|set perception")
+
+
+def test_a_model_that_has_lost_its_second_look_does_not_pass(copied: Path) -> None:
+    shutil.rmtree(copied / SECOND_LOOK)
+    _bad(model.check_model(str(copied)), "second_look.*missing", "restore the model folder")
+    _bad(model.check_self_test(_segmentation(copied)), "not run: .*second_look", "restore")
 
 
 def test_an_eight_bit_network_that_a_processor_gets_wrong_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
