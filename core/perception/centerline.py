@@ -156,7 +156,11 @@ def _feet(graph: VesselGraph, head: Point, half_length: float) -> list[tuple[int
 def _walks(
     graph: VesselGraph, incidence: list[list[tuple[int, bool]]], edge: int, position: float, onward: bool, reach: float
 ) -> list[tuple[Points, frozenset[int]]]:
-    """All ways to walk `reach` along the graph from a place on an edge: polylines from that place, and the other edges they use."""
+    """All ways to walk `reach` along the graph from a place on an edge: polylines from that place, and the other edges they use.
+
+    An edge that is a loop is come back to by its other end, and then is one of them; unless it is so short that the ways to both
+    sides would meet on it.
+    """
     first = graph.edges[edge]
     along = polyline.arc_length(first.points)
     total = float(along[-1])
@@ -164,12 +168,14 @@ def _walks(
         line, node = polyline.cut(first.points, position, min(position + reach, total), along), first.end
     else:
         line, node = polyline.cut(first.points, max(position - reach, 0.0), position, along)[::-1], first.start
+    comes_back = total >= 2.0 * reach
     walks = []
     left = reach - (total - position if onward else position)
     pending: list[tuple[Points, int, float, frozenset[int]]] = [(line, node, left, frozenset())]
     while pending:
         line, node, left, used = pending.pop()
-        options = [(i, starts) for i, starts in incidence[node] if i != edge and i not in used] if left > 0 else []
+        open_ends = [(i, starts) for i, starts in incidence[node] if i not in used] if left > 0 else []
+        options = [(i, starts) for i, starts in open_ends if i != edge or (comes_back and starts == onward)]
         if not options:
             walks.append((line, used))
         for index, starts in options:

@@ -141,6 +141,29 @@ def test_a_loop_is_walked_one_way_round() -> None:
     assert piece[1][1] < 90
 
 
+@pytest.mark.parametrize("has_stem", [False, True])
+@pytest.mark.parametrize("radius", [120.0, 14.0])
+def test_a_loops_one_node_is_no_end_of_it(radius: float, has_stem: bool) -> None:
+    """A bare ring has its node anywhere; a small one is still one vessel past the head."""
+    turns = np.linspace(0.0, 2.0 * np.pi, 721)
+    ring = 200.0 + radius * np.column_stack([np.sin(turns), -np.cos(turns)])
+    stem = np.linspace(ring[0], ring[0] - (0.0, 100.0), 81)
+    nodes = np.vstack([ring[0], stem[-1]]) if has_stem else ring[:1]
+    edges = [GraphEdge(0, 0, ring, np.full(721, 15.0)), GraphEdge(0, 1, stem, np.full(81, 15.0))][: 1 + has_stem]
+    graph = VesselGraph(nodes, tuple(edges))
+    for angle_deg in range(-20, 21, 2):
+        angle = np.radians(angle_deg)
+        head = (200.0 + (radius - 1.0) * np.sin(angle), 200.0 - (radius - 1.0) * np.cos(angle))
+        found = centerline_at(graph, head, direction(angle_deg), HALF)
+        assert found is not None
+        length = float(polyline.arc_length(found.piece)[-1])
+        if radius > 20.0:
+            assert length == pytest.approx(2.0 * HALF, abs=0.2)
+            chord = found.piece[-1] - found.piece[0]
+            assert np.degrees(np.arctan2(chord[1], chord[0])) == pytest.approx(angle_deg, abs=1.5)
+        assert length <= 2.0 * HALF + 0.2
+
+
 @settings(max_examples=60)
 @given(
     x=st.floats(20, 180), offset=st.floats(-10, 10), angle=st.floats(-35, 35), turn=st.floats(-180, 180), shift=st.floats(-300, 300)
