@@ -13,10 +13,10 @@ import shutil
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import platformdirs
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from core.config import RESOURCES
 from core.errors import UserError
@@ -63,6 +63,20 @@ class ModelInfo(BaseModel):
     calibration_mirrored: Calibration | None = None
     figures: dict[str, Any] = {}
 
+    @property
+    def planes(self) -> int:
+        """Of its input: 3 of a picture, 5 with a first look's probabilities."""
+        return int(self.shape.get("inputs", 3))
+
+    @model_validator(mode="after")
+    def _check_shape(self) -> Self:
+        fold, inputs = self.shape.get("fold"), self.shape.get("inputs", 3)
+        if type(fold) is not int or self.stride != 16 * fold:
+            raise ValueError(f"stride {self.stride} is not 16 times the shape's fold {fold!r}")
+        if type(inputs) is not int or inputs not in (3, 5):
+            raise ValueError(f"the shape's inputs are 3 or 5, not {inputs!r}")
+        return self
+
 
 def sha256_of(path: Path) -> str:
     """SHA-256 of a file as lower-case hex."""
@@ -97,7 +111,8 @@ def read_model_info(folder: Path, *, verify: tuple[str, ...] = (WEIGHTS, ONNX)) 
     except ValidationError as error:
         first: Any = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise ModelError(f"{path}: damaged ({key + ': ' if key else ''}{first['msg']}); restore the model folder") from None
+        reason = first["msg"].removeprefix("Value error, ")
+        raise ModelError(f"{path}: damaged ({key + ': ' if key else ''}{reason}); restore the model folder") from None
     check_files(info, folder, verify)
     return info
 

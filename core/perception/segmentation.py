@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import SegmentationConfig
-from core.learning.model_file import ONNX, ONNX_INT8, ModelError, check_files, model_folder, read_model_info, second_look_of
+from core.learning.model_file import INFO, ONNX, ONNX_INT8, ModelError, check_files, model_folder, read_model_info, second_look_of
 from core.types import Image
 
 Probability = NDArray[np.float32]
@@ -102,7 +102,7 @@ class OpenVinoSegmenter:
         except RuntimeError as error:
             reason = str(error).strip().splitlines()[-1]
             raise ModelError(f"{folder / name}: cannot be read ({reason}); restore the model folder") from None
-        self._planes = int(self.info.shape.get("inputs", 3))
+        self._file = folder / name
         self._requests: dict[tuple[int, int], openvino.InferRequest] = {}
 
     @property
@@ -127,9 +127,13 @@ class OpenVinoSegmenter:
             if len(self._requests) >= self._MAX_SIZES:
                 self._requests.pop(next(iter(self._requests)))
             model = self._model.clone()
-            model.reshape([1, height, width, self._planes])
             options = {"PERFORMANCE_HINT": "LATENCY", "INFERENCE_NUM_THREADS": self._threads}
-            self._requests[key] = self._core.compile_model(model, "CPU", options).create_infer_request()
+            try:
+                model.reshape([1, height, width, self.info.planes])
+                self._requests[key] = self._core.compile_model(model, "CPU", options).create_infer_request()
+            except RuntimeError as error:
+                reason = str(error).strip().splitlines()[-1]
+                raise ModelError(f"{self._file}: is no network of {INFO}'s shape ({reason}); restore the model folder") from None
         return self._requests[key]
 
 
@@ -193,10 +197,12 @@ def open_second_look(config: SegmentationConfig) -> OpenVinoSegmenter | TorchSeg
     Raises ModelError, as ``open_segmenter`` does, and when the model has lost its second look.
     """
     folder = second_look_of(model_folder(config.model)) if config.second_look else None
-    return _open(folder, config) if folder is not None else None
+    return _open(folder, config, planes=5) if folder is not None else None
 
 
-def _open(folder: Path, config: SegmentationConfig) -> OpenVinoSegmenter | TorchSegmenter:
+def _open(folder: Path, config: SegmentationConfig, planes: int = 3) -> OpenVinoSegmenter | TorchSegmenter:
+    if (found := read_model_info(folder, verify=()).planes) != planes:
+        raise ModelError(f"{folder / INFO}: the network takes {found} planes, not {planes}; restore the model folder")
     if config.device == "torch" or (config.device == "auto" and cuda_present()):
         return TorchSegmenter(folder, config.threads)
     return OpenVinoSegmenter(folder, config.threads, config.precision)

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import torch
 
+from core.config import SegmentationConfig
+from core.learning.growing import with_first_look
 from core.learning.model_file import (
     INFO,
     MODELS,
@@ -21,9 +23,10 @@ from core.learning.model_file import (
     model_folder,
     read_model_info,
     save_model,
+    sha256_of,
     write_figures,
 )
-from core.perception.segmentation import OpenVinoSegmenter, TorchSegmenter, to_working
+from core.perception.segmentation import OpenVinoSegmenter, TorchSegmenter, open_segmenter, to_working
 from core.perception.unet import DualUNet, UNetShape
 
 TINY = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
@@ -173,3 +176,33 @@ def test_figures_that_cannot_be_stored_are_one_clear_error(model: Path) -> None:
     (model / f".{INFO}.new").mkdir()
     with pytest.raises(ModelError, match=r"model\.json: cannot be written .* copy the model"):
         write_figures(model, {"robot_dice": 0.5})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"stride": 7}, "stride 7 is not 16 times the shape's fold 2"),
+        ({"stride": 256}, "stride 256 is not 16 times"),
+        ({"shape": TINY.to_json() | {"fold": "x"}}, "fold 'x'"),
+        ({"shape": TINY.to_json() | {"inputs": "x"}}, "inputs are 3 or 5, not 'x'"),
+        ({"shape": TINY.to_json() | {"inputs": None}}, "inputs are 3 or 5, not None"),
+        ({"shape": TINY.to_json() | {"inputs": 5}}, "takes 5 planes, not 3"),
+    ],
+)
+def test_a_manifest_that_contradicts_itself_is_one_clear_error(model: Path, change: dict[str, object], said: str) -> None:
+    info = json.loads((model / INFO).read_text())
+    (model / INFO).write_text(json.dumps(info | change))
+    with pytest.raises(ModelError, match=said) as raised:
+        open_segmenter(SegmentationConfig(model=str(model)))
+    assert len(str(raised.value).splitlines()) == 1
+
+
+def test_a_network_of_other_planes_under_a_good_hash_is_one_clear_error(model: Path) -> None:
+    torch.manual_seed(3)
+    save_model(with_first_look(DualUNet(TINY).eval()), model.with_name("near"), training={}, figures={})
+    shutil.copyfile(model.with_name("near") / ONNX, model / ONNX)
+    info = json.loads((model / INFO).read_text())
+    (model / INFO).write_text(json.dumps(info | {"onnx_sha256": sha256_of(model / ONNX)}))
+    with pytest.raises(ModelError, match=r"is no network of model\.json's shape") as raised:
+        OpenVinoSegmenter(model, 1)(np.zeros((64, 64, 3), np.uint8))
+    assert len(str(raised.value).splitlines()) == 1
