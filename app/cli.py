@@ -5,7 +5,9 @@ What a command takes stands with its family, in ``cli_*.py``; what it does, in a
 
 from __future__ import annotations
 
+import errno
 import faulthandler
+import os
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -40,13 +42,33 @@ def main() -> None:
         faulthandler.enable()  # a memory fault says at least where, and not only that
     share_heaps()
     try:
-        app()
+        try:
+            app()
+        finally:
+            _finish_output()
     except UserError as error:
         sys.stderr.write(f"error: {error}\n")
+        sys.exit(2)
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        sys.stderr.write(f"error: {error.filename or 'output'}: the disk is full; make room, or write to another one\n")
         sys.exit(2)
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         sys.exit(130)
+
+
+def _finish_output() -> None:
+    """What standard output still holds is written while an error of it can be told; at the interpreter's end nobody could."""
+    if sys.stdout is None:
+        return
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter tries again
+        if error.errno != errno.EPIPE:
+            raise
 
 
 @app.callback(invoke_without_command=True)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import cv2
 import numpy as np
 
+from app.line_output import LineOutput
 from app.overlay_picture import draw_overlay
 from app.scene_json import scene_to_json, unread_to_json
 from app.sources import SourcePicture, expand, pictures
@@ -20,6 +20,9 @@ from core.control.policy import table_policy
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.types import Frame, Mask, Point, Scene
+
+_FARTHEST_PX = 1_000_000
+"""No picture is so large: a destination beyond is a slip of the pen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,7 @@ def run_perceive(
             _make_folder(folder)
     pipeline = open_pipeline(config.perception)
     tally = _Tally()
-    with _open_lines(outputs.jsonl) as lines, progress_bar() as bar:
+    with LineOutput(outputs.jsonl) as lines, progress_bar() as bar:
         task = bar.add_task("pictures", total=None if any(_is_video(f) for f in files) else len(files))
         for picture in pictures(files):
             if picture.image is None:
@@ -67,7 +70,7 @@ def run_perceive(
                 if scene.route_problem:
                     tally.notes.append(f"{picture.name}: no route to the target: {scene.route_problem}")
                 tally.done += 1
-            _write_line(lines, json.dumps(record, allow_nan=False), outputs.jsonl)
+            lines.write(json.dumps(record, allow_nan=False))
             if picture.image is not None:
                 try:
                     _write_pictures(outputs, picture.stem, picture.image, scene, config.advice)
@@ -119,13 +122,6 @@ class _Targets(dict[str, Point]):
         return None
 
 
-def _write_line(lines: IO[str], text: str, path: Path | None) -> None:
-    try:
-        lines.write(text + "\n")
-    except OSError as error:
-        raise UserError(f"{path or 'standard output'}: cannot be written ({error.strerror})") from None
-
-
 def _perceive_one(pipeline: Any, picture: SourcePicture, image: Any, index: int, targets: _Targets) -> Scene:
     if picture.time_s is None:
         return pipeline.perceive_single(Frame(index, 0.0, image), targets.of(picture))  # type: ignore[no-any-return]
@@ -167,23 +163,13 @@ def _make_folder(folder: Path) -> None:
         raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 
 
-def _open_lines(path: Path | None) -> IO[str]:
-    if path is None:
-        return open(sys.stdout.fileno(), "w", encoding="utf-8", buffering=1, closefd=False)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return path.open("w", encoding="utf-8", buffering=1)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror}); choose another file") from None
-
-
 def _read_targets(path: Path | None) -> dict[str, Point]:
     """``{stem: [x, y]}`` in source pixels."""
     if path is None:
         return {}
-    wanted = 'an object {"stem": [x, y], ...} with finite numbers'
+    wanted = f'an object {{"stem": [x, y], ...}} with numbers below {_FARTHEST_PX:,} px'
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror})") from None
     except (ValueError, RecursionError):
@@ -192,8 +178,11 @@ def _read_targets(path: Path | None) -> dict[str, Point]:
         raise UserError(f"{path}: needs {wanted}")
     targets: dict[str, Point] = {}
     for stem, point in data.items():
-        numbers = isinstance(point, list) and len(point) == 2 and all(type(v) in (int, float) and math.isfinite(v) for v in point)
-        if not numbers:
+        if not (isinstance(point, list) and len(point) == 2 and all(_is_place(value) for value in point)):
             raise UserError(f"{path}: {stem}: needs {wanted}")
         targets[stem] = (float(point[0]), float(point[1]))
     return targets
+
+
+def _is_place(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _FARTHEST_PX

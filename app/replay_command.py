@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from app.learning_commands import Interrupt, progress_bar
-from app.perceive_command import _make_folder, _open_lines, _write_line
+from app.line_output import LineOutput
+from app.perceive_command import _make_folder
 from app.scene_json import scene_to_json, unread_to_json
 from core.config import Config, load_config
 from core.errors import UserError
@@ -63,8 +64,8 @@ def run_replay(options: ReplayOptions) -> None:
         after = _model_of(config) | {"engine": pipeline.engine}
         notes += model_note(reader.manifest, config, after)
         reader.wait()
-        lines = stack.enter_context(_open_lines(options.jsonl)) if options.jsonl is not None else None
-        done = replay(reader, pipeline, lines, options.jsonl)
+        lines = stack.enter_context(LineOutput(options.jsonl)) if options.jsonl is not None else None
+        done = replay(reader, pipeline, lines)
         problems = list(reader.problems)
     if not done.changes:
         first = f"; the first: {problems[0]}" if problems else ""
@@ -123,7 +124,7 @@ def model_note(manifest: Manifest | None, config: Config, after: dict[str, Any])
     return []
 
 
-def replay(reader: SessionReader, pipeline: Pipeline, lines: IO[str] | None = None, path: Path | None = None) -> _Replayed:
+def replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None = None) -> _Replayed:
     """All frames once more, as a stream with the recorded targets; Ctrl-C keeps what is done."""
     done = _Replayed()
     targets = RecordedTargets(reader.events)
@@ -153,7 +154,7 @@ def replay(reader: SessionReader, pipeline: Pipeline, lines: IO[str] | None = No
                 record = scene_to_json(name, scene)
             if lines is not None:
                 placed = {"frame": row.index, "captured_s": round(row.captured_s, 6), "time_s": round(row.captured_s - first_s, 6)}
-                _write_line(lines, json.dumps(record | placed, allow_nan=False), path)
+                lines.write(json.dumps(record | placed, allow_nan=False))
     return done
 
 

@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from core import MAX_PIXELS
 from core.errors import UserError
 from core.types import Image
 
-MAX_PIXELS = 120_000_000
-"""8k (33 million pixels) passes easily; far beyond it a file is rather damaged or hostile than a photograph."""
 _AS_SEEN = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR
 """Grey stays grey and 16 bit stay 16 bit; alpha is dropped, and the picture is turned upright as its EXIF orientation says."""
+_TOO_LARGE = f"is larger than {MAX_PIXELS // 1_000_000} million pixels"
 _FULL_SCALES = (1023, 4095, 65535)
 _PNG, _JPEG = b"\x89PNG", b"\xff\xd8"
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
@@ -53,6 +53,8 @@ def read_image(path: Path) -> Image:
         if pixels is None:  # some rare kinds, such as TIFF of floats with alpha, are only read as they are
             pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
+        if "MAX_IMAGE" in error.err:
+            raise ImageError(f"{path}: {_TOO_LARGE}") from None
         raise ImageError(f"{path}: cannot be decoded ({error.err or 'damaged or too large'})") from None
     if pixels is None or pixels.size == 0:
         raise ImageError(f"{path}: not a picture that can be read, or cut short")
@@ -62,7 +64,7 @@ def read_image(path: Path) -> Image:
 
 def _check_size(path: Path, width: int, height: int) -> None:
     if width * height > MAX_PIXELS:
-        raise ImageError(f"{path}: {width}x{height} is larger than {MAX_PIXELS // 1_000_000} million pixels")
+        raise ImageError(f"{path}: {width}x{height} {_TOO_LARGE}")
 
 
 def _is_cut(data: bytes) -> bool:

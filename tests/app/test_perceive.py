@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -150,6 +151,40 @@ def test_a_video_is_perceived_frame_by_frame(picture: Path, tmp_path: Path) -> N
     found = rows(tmp_path / "o.jsonl")
     assert [row["image"].rsplit("#")[-1] for row in found] == ["0", "1", "2"]
     assert all(row["state"] for row in found)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's full device")
+def test_a_full_disk_is_one_clear_error(picture: Path) -> None:
+    done = run("perceive", picture, "--jsonl", "/dev/full")
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (
+        2,
+        "error: /dev/full: cannot be written (No space left on device); choose another file",
+    )
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, str(MAIN), "perceive", str(picture)]
+        to_output = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        assert (to_output.returncode, "Traceback" in to_output.stderr) == (2, False)
+        assert "error: standard output: cannot be written" in to_output.stderr
+        asked = subprocess.run([sys.executable, str(MAIN), "--help"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        assert (asked.returncode, asked.stderr) == (2, "error: output: the disk is full; make room, or write to another one\n")
+
+
+def test_a_small_file_that_says_it_is_huge_is_refused_before_it_is_decoded(tmp_path: Path) -> None:
+    side = 30_000
+    values = {256: side, 257: side, 258: 8, 259: 1, 262: 1, 273: 8, 277: 1, 278: side, 279: 4}  # width, height, bits, ...
+    entries = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in values.items())
+    (tmp_path / "huge.tif").write_bytes(struct.pack("<2sHIIH", b"II", 42, 12, 0, len(values)) + entries + bytes(4))
+    done = run("perceive", tmp_path / "huge.tif")
+    assert done.returncode == 2
+    assert done.stderr.rstrip().endswith("huge.tif: is larger than 120 million pixels")
+
+
+@pytest.mark.parametrize("place", ["1e308", "1" + "0" * 400, "NaN", "true", "null"])
+def test_a_target_in_no_picture_on_earth_is_refused(picture: Path, tmp_path: Path, place: str) -> None:
+    (tmp_path / "t.json").write_text(f'{{"photo": [{place}, 1]}}')
+    done = run("perceive", picture, "--targets", tmp_path / "t.json")
+    assert done.returncode == 2
+    assert "photo: needs an object" in done.stderr.splitlines()[-1]
 
 
 def test_a_target_of_no_picture_is_noted(picture: Path, tmp_path: Path) -> None:
