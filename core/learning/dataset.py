@@ -9,10 +9,11 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import cv2
 import numpy as np
+from pydantic import BaseModel, Field, ValidationError
 
 from core.errors import UserError
 from core.images import ImageError, read_image
@@ -75,19 +76,39 @@ def find_samples(folders: Sequence[Path]) -> list[Sample]:
     return samples
 
 
+_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+
+
+class _TruthRow(BaseModel):
+    """What every row of ``truth.jsonl`` has to be like; it may say much more."""
+
+    stem: Annotated[str, Field(strict=True)]
+    seed: int | str | None = None
+    state: Literal["A", "B", "C", "D"] | None = None
+    theta_deg: _Number | None = None
+    theta_signed_deg: _Number | None = None
+    head_xy: tuple[_Number, _Number] | None = None
+
+
 def read_truth(folder: Path) -> dict[str, dict[str, Any]]:
     """``truth.jsonl`` by stem; raises DatasetError. A cut last line (a killed writer) is left out."""
     path = folder / "truth.jsonl"
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except OSError as error:
         raise DatasetError(f"{path}: cannot be read ({error.strerror}); write the set again with synth") from None
+    except UnicodeDecodeError:
+        raise DatasetError(f"{path}: is not UTF-8 text; write the set again with synth") from None
     truth: dict[str, dict[str, Any]] = {}
     for number, line in enumerate(lines, 1):
         try:
             row = json.loads(line)
-            truth[row["stem"]] = row
-        except (ValueError, KeyError, TypeError):
+            truth[_TruthRow.model_validate(row).stem] = row
+        except ValidationError as error:
+            first = error.errors()[0]
+            key = "".join(f"{part}: " for part in first["loc"][:1])
+            raise DatasetError(f"{path}: line {number}: {key}{first['msg']}; mend it, or write the set again with synth") from None
+        except (ValueError, RecursionError):
             if number < len(lines):
                 raise DatasetError(f"{path}: line {number} is damaged; write the set again with synth") from None
     return truth

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.learning.dataset import Sample
+from core.learning.dataset import DatasetError, Sample
 from core.perception.pipeline import Pipeline
 from core.study.classification import kappa
 from core.types import Frame, Image, Mask, Point, Reason, Scene
@@ -71,11 +71,13 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
     state, theta = truth.get("state"), truth.get("theta_deg")
     head_error = theta_error = None
     if pose is not None and scene.path is not None and state is not None and theta is not None:
-        true_head: Point = (float(truth["head_xy"][0]), float(truth["head_xy"][1]))
-        true_head = scene.to_working(true_head)
+        head_xy, theta_signed = truth.get("head_xy"), truth.get("theta_signed_deg")
+        if head_xy is None or theta_signed is None:
+            raise DatasetError(f"frame {stem}: truth.jsonl has theta_deg of it, but not head_xy and theta_signed_deg; add them")
+        true_head: Point = scene.to_working((float(head_xy[0]), float(head_xy[1])))
         head_error = float(np.hypot(scene.path.head[0] - true_head[0], scene.path.head[1] - true_head[1]))
         # Signed and wrapped: a robot that points left by as much as it should point right is wrong, and would be steered wrongly.
-        theta_error = (pose.theta_signed_deg - float(truth["theta_signed_deg"]) + 180.0) % 360.0 - 180.0
+        theta_error = (pose.theta_signed_deg - float(theta_signed) + 180.0) % 360.0 - 180.0
     return FrameScore(
         stem=stem,
         vessel_dice=dice(found_vessel, vessel),

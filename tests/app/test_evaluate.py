@@ -316,8 +316,8 @@ def test_a_set_with_a_hole_is_one_clear_line(labelled: Path, tmp_path: Path) -> 
     _write_frame(broken, "a", np.zeros((120, 160, 3), np.uint8))
     for text, words in (
         ('{"stem": "b"}\n', "1 of 1 frames lack a truth"),
-        ('{"stem": "a", "theta_deg": "x", "state": "B"}\n', "makes no sense"),
-        ('{"stem": "a", "theta_deg": 3, "state": "E"}\n', "makes no sense"),
+        ('{"stem": "a", "theta_deg": "x", "state": "B"}\n', "line 1: theta_deg: "),
+        ('{"stem": "a", "theta_deg": 3, "state": "E"}\n', "line 1: state: "),
     ):
         (broken / "truth.jsonl").write_text(text)
         with pytest.raises(UserError, match=words):

@@ -63,6 +63,35 @@ def test_truth_skips_a_cut_last_line_and_names_any_other(tmp_path: Path) -> None
         read_truth(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("entry", "named"),
+    [
+        ('"theta_deg": NaN', "theta_deg"),
+        ('"theta_signed_deg": "x"', "theta_signed_deg"),
+        ('"theta_deg": true', "theta_deg"),
+        ('"head_xy": [1]', "head_xy"),
+        ('"head_xy": [1, Infinity]', "head_xy"),
+        ('"state": ["A"]', "state"),
+        ('"state": "Z"', "state"),
+        ('"seed": [1]', "seed"),
+    ],
+)
+def test_a_truth_that_makes_no_sense_is_named_by_line_and_key(tmp_path: Path, entry: str, named: str) -> None:
+    path = tmp_path / "truth.jsonl"
+    path.write_text('{"stem": "a", "seed": 3}\n{"stem": "b", ' + entry + "}\n")
+    with pytest.raises(DatasetError, match=rf"truth.jsonl: line 2: {named}: .*; mend it") as raised:
+        read_truth(tmp_path)
+    assert len(str(raised.value).splitlines()) == 1
+
+
+def test_a_truth_in_another_coding_is_one_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "truth.jsonl").write_bytes(b"\xff\xfe{}")
+    with pytest.raises(DatasetError, match="is not UTF-8 text"):
+        read_truth(tmp_path)
+    (tmp_path / "truth.jsonl").write_bytes(b'\xef\xbb\xbf{"stem": "a"}\n')
+    assert list(read_truth(tmp_path)) == ["a"], "editors of Windows begin with a mark"
+
+
 def test_crops_keep_image_and_labels_together(tmp_path: Path) -> None:
     image, vessel, robot = find_samples([_toy_set(tmp_path / "set", 1)])[0].load()
     rng = np.random.default_rng(3)
