@@ -16,6 +16,7 @@ from rich.console import Console
 from app.ablation_streams import measure_streams
 from app.ablation_tables import difference_table, markdown, stream_table, value_table
 from app.learning_commands import progress_bar
+from app.left_out import LeftOut
 from core.config import PerceptionConfig, load_config
 from core.errors import UserError
 from core.study.ablation import OURS, PAPER, STEPS, TRACKING, SameMasks, Variant, make_variants
@@ -70,8 +71,9 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
     if samples:
         variants = make_variants(paper, ours, [step for step in STEPS if step.name != TRACKING])
         pipelines = [pipeline_of(variant.config) for variant in variants]
-        scores, latency_ms, interrupted = _measure_set(samples, truth, pipelines, masks, ours.working_size_px)
-        groups = [truth[sample.stem].get("seed", sample.stem) for sample in samples[: len(scores[0])]]
+        left_out = LeftOut()
+        scores, latency_ms, interrupted = _measure_set(samples, truth, pipelines, masks, ours.working_size_px, left_out)
+        groups = [truth[score.stem].get("seed", score.stem) for score in scores[0]]
         result |= _described(variants, scores, latency_ms, groups, plan.seed)
         if plan.out is not None:
             _write_frames(plan.out / "ablation_frames.csv", frame_rows(variants, scores))
@@ -136,8 +138,10 @@ def _measure_set(
     pipelines: Sequence[Pipeline],
     masks: SameMasks,
     working_size_px: int,
+    left_out: LeftOut,
 ) -> tuple[list[list[FrameScore]], list[list[float]], bool]:
     """For each pipeline the scores of all frames and the milliseconds after the network, and whether it was interrupted."""
+    from core.learning.dataset import DatasetError
     from core.perception.segmentation import to_working
 
     scores: list[list[FrameScore]] = [[] for _ in pipelines]
@@ -146,7 +150,11 @@ def _measure_set(
     with progress_bar() as bar:
         try:
             for sample in bar.track(samples, description=f"frames x {len(pipelines)} variants"):
-                image, *true = sample.load()
+                try:
+                    image, *true = sample.load()
+                except DatasetError as error:
+                    left_out.add(error)
+                    continue
                 masks.next_frame(true[0], true[1])
                 vessel, robot = (to_working(mask.astype(np.uint8) * 255, working_size_px)[0] > 127 for mask in true)
                 for place, pipeline in enumerate(pipelines):
@@ -156,6 +164,7 @@ def _measure_set(
                     latency_ms[place].append(spent["total"] - spent.get("prepare", 0.0) - spent.get("network", 0.0))
         except KeyboardInterrupt:
             interrupted = True
+    left_out.tell(len(scores[0]))
     count = len(latency_ms[-1])  # an interruption leaves the last frame with some of the pipelines only
     if not any(score.expected for score in scores[-1][:count]):
         raise KeyboardInterrupt

@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.learning_commands import progress_bar
+from app.left_out import LeftOut
 from core.config import Config, TwinConfig, load_config
 from core.types import Frame, Image, Scene
 
@@ -188,20 +189,22 @@ def run_accuracy(
 
     config = _config(model, preset, config_path)
     samples, truth = find_labelled(folder)
-    masks = TrueMasks()
+    masks, left_out = TrueMasks(), LeftOut()
     pipeline = Pipeline(masks, config.perception) if true_masks else open_pipeline(config.perception)
     with progress_bar() as bar:
-        scores = list(bar.track(score_set(samples, truth, pipeline, masks), total=len(samples), description="frames"))
-    figures = summarise(scores) | describe_confidence(scores)
+        found = score_set(samples, truth, pipeline, masks, left_out.add)
+        scores = list(bar.track(found, total=len(samples), description="frames"))
+    left_out.tell(len(scores))
+    figures = summarise(scores) | describe_confidence(scores) | ({"left_out": len(left_out)} if left_out else {})
+    _print(figures, as_json, f"accuracy on {folder}")
     if store and not true_masks:
         described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
         write_figures(model_folder(config.perception.segmentation.model), described | figures)
-    _print(figures, as_json, f"accuracy on {folder}")
 
 
 def _print(result: dict[str, Any], as_json: bool, title: str) -> None:
     if as_json:
-        sys.stdout.write(json.dumps(result) + "\n")
+        sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
         return
     table = Table(title=title, show_header=False)
     for key, value in result.items():
@@ -216,4 +219,6 @@ def _print(result: dict[str, Any], as_json: bool, title: str) -> None:
 def _words(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{key} {_words(inner)}" for key, inner in value.items()) or "-"
+    if value is None:
+        return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

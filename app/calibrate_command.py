@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.learning_commands import progress_bar
+from app.left_out import LeftOut
 from core.config import load_config
 from core.perception.evidence import Calibration
 
@@ -24,7 +25,7 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None
     samples, truth = find_labelled(folder)
     described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
     calibrations: list[Calibration] = []
-    target, tables = model_folder(model), []
+    target, tables, left_out = model_folder(model), [], LeftOut()
     with progress_bar() as bar:
         for mirrored in ("never", "always"):
             # Answers that would be refused for low confidence are the ones to learn from.
@@ -32,13 +33,17 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None
             overrides = {"perception": {"segmentation": segmentation, "quality": {"min_confidence": 0.0}}}
             pipeline = open_pipeline(load_config(config_path, None, overrides).perception)
             title = "frames" if mirrored == "never" else "all orientations"
-            scores = list(bar.track(score_set(samples, truth, pipeline, TrueMasks()), total=len(samples), description=title))
+            found = score_set(samples, truth, pipeline, TrueMasks(), left_out.add)
+            scores = list(bar.track(found, total=len(samples), description=title))
+            if not scores:
+                break
             pairs = [(score.evidence, is_right(score)) for score in scores if score.answered and score.evidence is not None]
             calibrations.append(fit([evidence for evidence, _ in pairs], [right for _, right in pairs], described))
             table = _table(f"{target}, mirrored {mirrored}: {len(pairs)} answers of {folder.name}", calibrations[-1])
             table.add_row("right answers", str(sum(right for _, right in pairs)))
             table.add_row("AUROC before, on this set", f"{describe_confidence(scores)['confidence_auroc']:.3f}")
             tables.append(table)
+    left_out.tell(len(calibrations))
     write_calibration(target, *calibrations)
     Console().print(*tables)
     sys.stderr.write("measure it on another set: main.py benchmark --accuracy SET\n")

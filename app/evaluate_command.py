@@ -6,13 +6,14 @@ import json
 import os
 import sys
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from app.annotate_tables import print_agreement
 from app.evaluation_report import print_tables, render_report
 from app.learning_commands import progress_bar
+from app.left_out import LeftOut
 from app.progress_lines import asked_teller
 from core.config import Config, load_config
 from core.study.annotation_report import write_measures
@@ -36,6 +37,18 @@ class _Study:
     source: dict[str, Any]
     notes: list[str]
     agreement: dict[str, Any] | None = None
+    interrupted: bool = False
+
+
+@dataclass(slots=True)
+class _Perceived:
+    """Rows, how often which reason was given on images with a pose, and where the network ran."""
+
+    engine: str
+    rows: list[Measurement] = field(default_factory=list)
+    reasons: Counter[str] = field(default_factory=Counter)
+    left_out: LeftOut = field(default_factory=LeftOut)
+    interrupted: bool = False
 
 
 def run_evaluate(
@@ -51,7 +64,10 @@ def run_evaluate(
     seed: int,
     study_name: str | None = None,
 ) -> None:
-    """Evaluate a table, a labelled set or images annotated by hand (one study of them) into `out`; raises UserError."""
+    """Evaluate a table, a labelled set or images annotated by hand (one study of them) into `out`; raises UserError.
+
+    An interruption (Ctrl-C) evaluates what was perceived until then.
+    """
     if (folder is None) == (csv is None):
         raise EvaluationError("give either a labelled set (evaluate DIR) or a table (evaluate --csv FILE)")
     if study_name is not None and (csv is not None or like_paper is not None):
@@ -100,6 +116,8 @@ def run_evaluate(
         if study.agreement is not None:
             print_agreement(study.agreement)
         sys.stderr.write(f"report and figures are in {out}\n")
+    if study.interrupted:
+        raise KeyboardInterrupt
 
 
 def _make_folder(out: Path) -> None:
@@ -230,30 +248,43 @@ def _perceive_set(
             f"Built like the paper's test: {len(truth)} images drawn with seed {seed}; each manual angle is the true one with a "
             f"normal error of {like_paper.manual_sd_deg:g}° (SD), the manual state is the true one."
         )
-    rows, reasons, engine = _perceive(truth, measured, config)
-    source |= {"model": config.perception.segmentation.model, "preset": preset, "engine": engine, "refused": reasons}
+    done = _perceive(truth, measured, config)
+    rows, reasons = done.rows, dict(sorted(done.reasons.items()))
+    source |= {"model": config.perception.segmentation.model, "preset": preset, "engine": done.engine, "refused": reasons}
+    if done.interrupted:
+        notes.append(f"Interrupted after {len(rows)} of {len(truth)} images.")
+    if done.left_out:
+        notes.append(f"{len(done.left_out)} images could not be read and are left out.")
     poseless = [row for row in rows if row.state is None]
     if poseless:
         answered = sum(row.algorithm_state is not None for row in poseless)
         notes.append(f"{len(poseless)} images show no pose to measure (the algorithm answered {answered} of them).")
-    return _Study(rows, source, notes)
+    return _Study(rows, source, notes, interrupted=done.interrupted)
 
 
-def _perceive(
-    truth: list[_Truth], measured: dict[str, tuple[float, float | None]], config: Config
-) -> tuple[list[Measurement], dict[str, int], str]:
-    """Rows, how often which reason was given on images with a pose, and where the network ran."""
-    from core.images import read_image
+def _perceive(truth: list[_Truth], measured: dict[str, tuple[float, float | None]], config: Config) -> _Perceived:
+    """Each image by itself; an interruption (Ctrl-C) keeps what was done until then."""
+    from core.images import ImageError, read_image
     from core.perception.pipeline import open_pipeline
 
     pipeline = open_pipeline(config.perception)
-    rows: list[Measurement] = []
-    reasons: Counter[str] = Counter()
+    done = _Perceived(pipeline.engine)
     with progress_bar() as bar:
-        for one in bar.track(truth, description="images"):
-            scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(one.image)))
-            angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
-            rows.append(Measurement(one.stem, *measured.get(one.stem, (None, None)), one.state, angle, state, one.group))
-            if scene.refusal is not None and one.state is not None:
-                reasons[scene.refusal.reason.value] += 1
-    return rows, dict(sorted(reasons.items())), pipeline.engine
+        try:
+            for one in bar.track(truth, description="images"):
+                try:
+                    image = read_image(one.image)
+                except ImageError as error:
+                    done.left_out.add(error)
+                    continue
+                scene = pipeline.perceive_single(Frame(len(done.rows), 0.0, image))
+                angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
+                done.rows.append(Measurement(one.stem, *measured.get(one.stem, (None, None)), one.state, angle, state, one.group))
+                if scene.refusal is not None and one.state is not None:
+                    done.reasons[scene.refusal.reason.value] += 1
+        except KeyboardInterrupt:
+            if not done.rows:
+                raise
+            done.interrupted = True
+    done.left_out.tell(len(done.rows))
+    return done

@@ -13,8 +13,12 @@ import torch
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
+from core.learning.dataset import DatasetError
 from core.learning.optimizer import make_optimizers
 from core.perception.unet import DualUNet
+
+Crop = tuple[Tensor, Tensor]
+"""Planes and labels, as ``crops.py`` cuts them."""
 
 _SMALL_AREA_PX = 50.0
 """Of a crop whose robot is smaller than this, a few pixels more or less do not decide the Dice."""
@@ -94,13 +98,21 @@ def _learning_rate(plan: TrainingPlan, step: int) -> float:
     return plan.learning_rate * max(0.01, 1.0 - share)
 
 
-def _batches(crops: Dataset[tuple[Tensor, Tensor]], plan: TrainingPlan) -> Iterator[tuple[Tensor, Tensor]]:
-    yield from DataLoader(crops, plan.batch, num_workers=plan.workers, prefetch_factor=4 if plan.workers else None)
+def _batches(
+    crops: Dataset[tuple[Tensor, Tensor]], plan: TrainingPlan, failed: list[DatasetError]
+) -> Iterator[tuple[Tensor, Tensor]]:
+    """All of them, or until a frame cannot be read: that goes into `failed`."""
+    try:
+        yield from DataLoader(crops, plan.batch, num_workers=plan.workers, prefetch_factor=4 if plan.workers else None)
+    except DatasetError as error:
+        # A worker's error comes with all of its traceback; the last line is what it says.
+        said = str(error).strip().splitlines()[-1].removeprefix(f"{DatasetError.__module__}.DatasetError: ")
+        failed.append(DatasetError(said))
 
 
 def train(
     network: DualUNet,
-    crops: Dataset[tuple[Tensor, Tensor]],
+    crops: Dataset[Crop],
     plan: TrainingPlan,
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
@@ -115,6 +127,7 @@ def train(
     `crops` (``crops.py``) gives ``plan.steps * plan.batch`` crops with their labels.
     `should_stop` is asked after every step; what was learnt until then is returned. `on_last` is given it first, on the CPU, while
     the crops' workers still run: processes have broken down when these ended. Where the device computes in bf16, autocast is used.
+    Raises DatasetError for a frame that cannot be read, after `on_last` was given what was learnt until then.
     """
     torch.manual_seed(plan.seed)
     if plan.threads:
@@ -131,7 +144,8 @@ def train(
     shares = [[group["lr"] / plan.learning_rate for group in optimizer.param_groups] for optimizer in optimizers]
     smooth_loss, smooth_dice = 0.0, np.zeros(2)
     done, mark, marked = 0, time.monotonic(), 0
-    for image, target in _batches(crops, plan):
+    failed: list[DatasetError] = []
+    for image, target in _batches(crops, plan, failed):
         for optimizer, parts in zip(optimizers, shares, strict=True):
             for group, part in zip(optimizer.param_groups, parts, strict=True):
                 group["lr"] = part * _learning_rate(plan, done)
@@ -160,6 +174,10 @@ def train(
         if should_stop() or done in (plan.steps, plan.stop_after):
             on_last(average.to("cpu"), done)
             break
+    if failed and done:
+        on_last(average.to("cpu"), done)
+    for error in failed:
+        raise error
     return average.to("cpu"), done
 
 

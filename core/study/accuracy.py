@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,11 +97,22 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
 
 
 def score_set(
-    samples: Sequence[Sample], truth: dict[str, dict[str, Any]], pipeline: Pipeline, masks: TrueMasks
+    samples: Sequence[Sample],
+    truth: dict[str, dict[str, Any]],
+    pipeline: Pipeline,
+    masks: TrueMasks,
+    on_unreadable: Callable[[DatasetError], None],
 ) -> Iterator[FrameScore]:
-    """Perceive every frame by itself and score it; `masks` is told the true masks first, for a pipeline that runs on them."""
+    """Perceive every frame by itself and score it; `masks` is told the true masks first, for a pipeline that runs on them.
+
+    Frames that cannot be read are told to `on_unreadable` and left out.
+    """
     for sample in samples:
-        image, vessel, robot = sample.load()
+        try:
+            image, vessel, robot = sample.load()
+        except DatasetError as error:
+            on_unreadable(error)
+            continue
         masks.show(vessel, robot)
         scene = pipeline.perceive_single(Frame(0, 0.0, image))
         size = _working_size(scene)
@@ -128,12 +139,13 @@ def _statistics(values: Sequence[float]) -> dict[str, float] | None:
 
 
 def summarise(scores: Sequence[FrameScore]) -> dict[str, Any]:
-    """Sums over frames. "Expected" frames are those whose truth has a pose; "empty" ones show no robot at all."""
+    """Sums over frames: "expected" are those whose truth has a pose, "empty" those without any robot, "poseless" the rest."""
     expected = [s for s in scores if s.expected]
     pairs = [(s.true_state, s.state) for s in expected if s.true_state is not None and s.state is not None]
     thetas = [(s.true_theta_deg, s.theta_deg) for s in expected if s.theta_deg is not None and s.true_theta_deg is not None]
     robots = [s.robot_dice for s in scores if s.robot_dice is not None]
     empty = [s for s in scores if s.robot_dice is None]
+    poseless = [s for s in scores if s.robot_dice is not None and not s.expected]
     refused: dict[str, int] = {}
     for s in expected:
         if s.reason is not None:
@@ -148,10 +160,21 @@ def summarise(scores: Sequence[FrameScore]) -> dict[str, Any]:
         "robot_dice": float(np.mean(robots)) if robots else None,
         "head_error_px": _statistics([s.head_error_px for s in expected if s.head_error_px is not None]),
         "theta_error_deg": _statistics([s.theta_error_deg for s in expected if s.theta_error_deg is not None]),
-        "theta_pearson": float(np.corrcoef(np.array(thetas).T)[0, 1]) if len(thetas) > 2 else None,
+        "theta_pearson": _pearson(thetas),
         "state_agreement": sum(a == b for a, b in pairs) / len(pairs) if pairs else None,
         "state_kappa": kappa([str(a) for a, _ in pairs], [str(b) for _, b in pairs]),
         "confident_and_wrong_share": len(wrong) / len(pairs) if pairs else None,
         "empty_frames": len(empty),
         "answers_on_empty_frames": sum(s.answered for s in empty),
+        # The robot is seen, but its head is outside the picture or has no vessel beside it: what is answered there is wrong.
+        "poseless_frames": len(poseless),
+        "answers_on_poseless_frames": sum(s.answered for s in poseless),
     }
+
+
+def _pearson(pairs: Sequence[tuple[float, float]]) -> float | None:
+    """Correlation of the pairs; None for fewer than three, and where one side does not vary."""
+    columns = np.array(pairs).T
+    if len(pairs) < 3 or np.ptp(columns, axis=1).min() == 0.0:
+        return None
+    return float(np.corrcoef(columns)[0, 1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -107,6 +108,17 @@ def test_an_interrupted_training_keeps_what_was_learnt(frames: Path, tmp_path: P
     assert process.returncode == 0, errors
     assert "interrupted after" in errors.replace("\n", " ")
     assert 50 <= read_model_info(out).training["steps_done"] < 100_000
+
+
+def test_accuracy_goes_on_after_a_damaged_picture(model: Path, frames: Path, tmp_path: Path) -> None:
+    damaged = Path(shutil.copytree(frames, tmp_path / "set"))
+    cut = min((damaged / "images").iterdir())
+    cut.write_bytes(cut.read_bytes()[:500])
+    done = run("benchmark", "--accuracy", damaged, "--model", model, "--json")
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)
+    assert (figures["frames"], figures["left_out"]) == (5, 1)
+    assert f"note: 1 of 6 frames could not be read and are left out; the first: {cut}" in done.stderr
 
 
 def test_accuracy_is_one_json_object(model: Path, frames: Path) -> None:

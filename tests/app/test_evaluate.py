@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -307,6 +308,46 @@ def test_a_study_like_the_papers(labelled: Path, tmp_path: Path, capsys: pytest.
     assert set(found["against_paper"].values()) <= {"better", "equal", "worse", None}
     assert "of the paper’s 27 figures are bettered" in capsys.readouterr().out
     assert "Against it" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_damaged_picture_does_not_cost_the_others(labelled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    damaged = Path(shutil.copytree(labelled, tmp_path / "set"))
+    cut = damaged / "images" / "000003.png"
+    cut.write_bytes(cut.read_bytes()[:500])
+    found = evaluate(damaged, out=tmp_path / "out")
+    assert [row.image for row in read_measurements(tmp_path / "out" / "measurements.csv")] == [
+        "000000",
+        "000001",
+        "000002",
+        "000004",
+    ]
+    assert "1 images could not be read and are left out." in found["notes"]
+    assert f"note: 1 of 5 frames could not be read and are left out; the first: {cut}" in capsys.readouterr().err
+    for path in (damaged / "images").glob("*.png"):
+        path.write_bytes(b"")
+    with pytest.raises(UserError, match=r"none of 5 frames could be read; the first: .*000000\.png: empty file"):
+        evaluate(damaged, out=tmp_path / "out")
+
+
+def test_an_interrupted_evaluation_keeps_what_was_perceived(
+    labelled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from core import images
+
+    read = images.read_image
+
+    def third_is_interrupted(path: Path) -> np.ndarray:
+        if path.stem == "000002":
+            raise KeyboardInterrupt
+        return read(path)
+
+    monkeypatch.setattr(images, "read_image", third_is_interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(labelled, out=tmp_path / "out")
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    assert "Interrupted after 2 of 5 images." in metrics["notes"]
+    assert [row.image for row in read_measurements(tmp_path / "out" / "measurements.csv")] == ["000000", "000001"]
+    assert (tmp_path / "out" / "report.html").is_file()
 
 
 def test_a_set_with_a_hole_is_one_clear_line(labelled: Path, tmp_path: Path) -> None:

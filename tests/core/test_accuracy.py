@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.learning.dataset import DatasetError
 from core.study.accuracy import FrameScore, dice, kappa, score_frame, summarise
 from core.types import Masks, Pose, PoseState, Reason, Refusal, RobotPath, Scene
 from tests.core.drawing import art
@@ -143,3 +144,20 @@ def test_sums_of_nothing() -> None:
     sums = summarise([])
     assert sums["frames"] == 0
     assert sums["answered_share"] is sums["vessel_dice"] is sums["head_error_px"] is sums["state_kappa"] is None
+
+
+def test_answers_where_there_is_no_pose_are_counted() -> None:
+    """The head is outside the picture: whatever is answered is wrong, but no angle can say by how much."""
+    without = score_frame("b", scene(), VESSEL, ROBOT, {"state": None, "theta_deg": None})
+    sums = summarise([score_frame("a", scene(), VESSEL, ROBOT, TRUTH), without])
+    assert (sums["poseless_frames"], sums["answers_on_poseless_frames"]) == (1, 1)
+    assert (sums["empty_frames"], sums["expected"]) == (0, 1)
+
+
+def test_angles_that_do_not_vary_have_no_correlation() -> None:
+    assert summarise([score_frame(name, scene(), VESSEL, ROBOT, TRUTH) for name in "abc"])["theta_pearson"] is None
+
+
+def test_a_truth_without_a_head_says_what_it_lacks() -> None:
+    with pytest.raises(DatasetError, match=r"frame a: truth\.jsonl has theta_deg of it, but not head_xy"):
+        score_frame("a", scene(), VESSEL, ROBOT, {"state": "C", "theta_deg": 12.0, "theta_signed_deg": 12.0})

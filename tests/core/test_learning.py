@@ -190,6 +190,22 @@ def test_training_repeats_bit_for_bit_and_can_be_stopped(tmp_path: Path) -> None
     assert last == [(stopped, 3)]
 
 
+@pytest.mark.parametrize("workers", [0, 1])
+def test_a_frame_that_cannot_be_read_is_one_line_and_what_was_learnt_is_kept(tmp_path: Path, workers: int) -> None:
+    folder = _toy_set(tmp_path / "set", 30)
+    cut = folder / "images" / "029.png"
+    cut.write_bytes(cut.read_bytes()[:200])
+    plan = TrainingPlan(steps=30, batch=1, crop=(64, 64), workers=workers, threads=1, clutter_share=0.0)
+    last: list[int] = []
+    network = DualUNet(UNetShape((4, 8, 8, 8, 8), (4, 8, 8, 8), 1, 2))
+    with pytest.raises(DatasetError, match=r"029\.png: cut short") as raised:
+        train(network, FrameCrops(find_samples([folder]), plan), plan, on_last=lambda _n, step: last.append(step))
+    assert len(str(raised.value).splitlines()) == 1
+    assert str(raised.value).startswith(str(cut))
+    assert len(last) == 1
+    assert 0 < last[0] < 30
+
+
 def test_orthogonalised_directions_have_singular_values_near_one() -> None:
     import torch
 
