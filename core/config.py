@@ -6,6 +6,7 @@ file. Every setting has a unit in its name and an allowed range here, which the 
 
 from __future__ import annotations
 
+import json
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -248,7 +249,7 @@ class Config(_Section):
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin with a mark
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such configuration file") from None
     except OSError as error:
@@ -257,6 +258,8 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: not a text file in UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: not valid TOML: nested too deeply") from None
 
 
 def merge(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
@@ -288,7 +291,7 @@ def _field_range(location: tuple[Any, ...]) -> str:
         return ""
     bounds = []
     for item in info.metadata:
-        for name, sign in (("ge", ">="), ("gt", ">"), ("le", "<="), ("lt", "<")):
+        for name, sign in (("ge", ">="), ("gt", ">"), ("le", "<="), ("lt", "<"), ("multiple_of", "a multiple of")):
             value = getattr(item, name, None)
             if value is not None:
                 bounds.append(f"{sign} {value:g}" if isinstance(value, float) else f"{sign} {value}")
@@ -338,6 +341,7 @@ def load_config(path: Path | None = None, preset: str | None = None, overrides: 
 
 def _validate(data: dict[str, Any], source: str) -> Config:
     try:
-        return Config.model_validate(data)
+        # As JSON, strictly: true is no number there, nor is "6", and a list is a tuple all the same.
+        return Config.model_validate_json(json.dumps(data, default=str), strict=True)
     except ValidationError as error:
         raise ConfigError(_one_line(source, error)) from None

@@ -91,3 +91,26 @@ def _joints_with(name: str, **changes: float) -> list[dict[str, object]]:
 def test_limits_that_contradict_each_other_are_refused(section: type[BaseModel], values: dict[str, object], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         section.model_validate(values)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[perception.pose]\nd_allow_px = true", "d_allow_px: must be .* got True"),
+        ('[perception.pose]\nd_allow_px = "6"', "d_allow_px: must be .* got '6'"),
+        ("[perception.tracking]\nwindow_px = 33", "window_px: must be .*a multiple of 32, got 33"),
+        ("x = " + "[" * 5000 + "]" * 5000, "not valid TOML: nested too deeply"),
+    ],
+)
+def test_a_wrong_type_and_a_hidden_rule_are_said(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "my.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=said) as raised:
+        load_config(path)
+    assert len(str(raised.value).splitlines()) == 1
+
+
+def test_a_whole_number_is_a_number_and_a_mark_at_the_beginning_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "my.toml"
+    path.write_bytes(b"\xef\xbb\xbf[perception.pose]\nd_allow_px = 7\n")
+    assert load_config(path).perception.pose.d_allow_px == 7.0
