@@ -67,7 +67,7 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
     masks, pipeline_of = _open_masks(ours, plan.true_masks)
     source = "true masks" if plan.true_masks else f"model {ours.segmentation.model}, {masks.engine}"
     result: dict[str, Any] = {"set": str(plan.folder) if plan.folder else None, "masks": source, "seed": plan.seed}
-    interrupted = False
+    interrupted, frames = False, []
     if samples:
         variants = make_variants(paper, ours, [step for step in STEPS if step.name != TRACKING])
         pipelines = [pipeline_of(variant.config) for variant in variants]
@@ -75,8 +75,7 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
         scores, latency_ms, interrupted = _measure_set(samples, truth, pipelines, masks, ours.working_size_px, left_out)
         groups = [truth[score.stem].get("seed", score.stem) for score in scores[0]]
         result |= _described(variants, scores, latency_ms, groups, plan.seed)
-        if plan.out is not None:
-            _write_frames(plan.out / "ablation_frames.csv", frame_rows(variants, scores))
+        frames = frame_rows(variants, scores)
     if plan.sequence and not interrupted:
         named = {variant.name: variant.config for variant in make_variants(paper, ours)}
         chosen = {name: named[name] for name in (PAPER, f"{OURS} without {TRACKING}")} | {OURS: ours}
@@ -85,6 +84,8 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
         )
     result["interrupted"] = interrupted
     _show(result, as_json, plan.out)
+    if plan.out is not None and frames:
+        _write_frames(plan.out / "ablation_frames.csv", frames)
     if interrupted:
         raise KeyboardInterrupt
 
@@ -196,20 +197,21 @@ def _described(
 
 
 def _show(result: dict[str, Any], as_json: bool, out: Path | None) -> None:
+    if as_json:
+        sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
+    else:
+        console = Console() if sys.stdout.isatty() else Console(width=_WIDTH)
+        if "rows" in result:
+            console.print(value_table(result), difference_table(result))
+        if result.get("stream"):
+            console.print(stream_table(result["stream"]))
+    if out is None:
+        return
     try:
-        if out is not None:
-            (out / "ablation.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-            (out / "ablation.md").write_text(markdown(result), encoding="utf-8")
+        (out / "ablation.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        (out / "ablation.md").write_text(markdown(result), encoding="utf-8")
     except OSError as error:
         raise AblationError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
-    if as_json:
-        sys.stdout.write(json.dumps(result) + "\n")
-        return
-    console = Console() if sys.stdout.isatty() else Console(width=_WIDTH)
-    if "rows" in result:
-        console.print(value_table(result), difference_table(result))
-    if result.get("stream"):
-        console.print(stream_table(result["stream"]))
 
 
 def _write_frames(path: Path, rows: list[dict[str, Any]]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 
@@ -16,6 +18,7 @@ from core.types import Advice, Image, Mask, Point, Pose, PoseState, Scene
 
 _INSET_SPAN_PX = 112.0
 _INSET_MAX_COVERED = 0.35
+_BAND_ROWS = 256
 
 
 def draw_overlay(image: Image, scene: Scene, advice: Advice | None = None, *, longer_side_px: int = 1280, stamp: str = "") -> Image:
@@ -63,16 +66,22 @@ def _tinted(image: Image, scene: Scene, zoom: float) -> Image:
 
 
 def _tint(canvas: Image, mask: Mask, name: str, opacity: float) -> Image:
+    """In bands: the numbers in between take ten times the memory of the picture, which may be of 8k."""
     size = (canvas.shape[1], canvas.shape[0])
-    step = size[0] / mask.shape[1]
-    blur = max(0.6, 0.7 * step)
-    soft = cv2.GaussianBlur(cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_LINEAR), (0, 0), blur)
-    # across the edge `soft` climbs from 0 to 1 with a slope of about 1 / (2.5 blur), so this is a line about 2 px wide
-    edge = np.clip(1.4 - np.abs(soft - 0.5) * (2.5 * blur), 0.0, 1.0)
-    share = np.maximum(np.clip(1.5 * soft - 0.25, 0.0, 1.0) * opacity, edge * 0.8)
-    colour = np.empty_like(canvas)
-    colour[:] = palette.rgb(name)
-    return np.asarray(cv2.blendLinear(colour, canvas, share, 1.0 - share), np.uint8)
+    blur = max(0.6, 0.7 * size[0] / mask.shape[1])
+    wide = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    margin = math.ceil(4.0 * blur) + 1  # farther than this the blur does not see
+    tinted = np.empty_like(canvas)
+    for top in range(0, size[1], _BAND_ROWS):
+        bottom, above = min(top + _BAND_ROWS, size[1]), min(top, margin)
+        soft = cv2.GaussianBlur(wide[top - above : bottom + margin], (0, 0), blur)[above : above + bottom - top]
+        # across the edge `soft` climbs from 0 to 1 with a slope of about 1 / (2.5 blur), so this is a line about 2 px wide
+        edge = np.clip(1.4 - np.abs(soft - 0.5) * (2.5 * blur), 0.0, 1.0)
+        share = np.maximum(np.clip(1.5 * soft - 0.25, 0.0, 1.0) * opacity, edge * 0.8)
+        colour = np.empty_like(canvas[top:bottom])
+        colour[:] = palette.rgb(name)
+        tinted[top:bottom] = cv2.blendLinear(colour, canvas[top:bottom], share, 1.0 - share)
+    return tinted
 
 
 def _free_corner(canvas: Image, scene: Scene, zoom: float) -> tuple[int, int, int, int] | None:

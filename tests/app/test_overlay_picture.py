@@ -33,6 +33,13 @@ def test_source_is_left_alone(bench: FakeBench) -> None:
     np.testing.assert_array_equal(image, before)
 
 
+def test_the_bands_that_it_is_tinted_in_leave_no_trace(bench: FakeBench, monkeypatch: pytest.MonkeyPatch) -> None:
+    image, scene = bench.scene_at(0, 6.0)
+    in_bands = draw_overlay(image, scene)
+    monkeypatch.setattr(overlay_picture, "_BAND_ROWS", 100_000)
+    np.testing.assert_array_equal(in_bands, draw_overlay(image, scene))
+
+
 def test_everything_that_was_understood_is_there(bench: FakeBench) -> None:
     image, scene = bench.scene_at(0, 6.0)
     plain = draw_overlay(image, make_scene())
