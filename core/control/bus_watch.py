@@ -94,11 +94,12 @@ def bus_faults(watch: BusWatch, now_s: float, servos: ServosConfig, safety: Safe
     newest = watch.newest
     if not newest.port_open:
         faults.append(Fault(Cause.PORT_LOST))
-    if silent := [n for n, misses in zip(JOINT_NAMES, newest.misses, strict=False) if misses >= safety.missed_answers]:
-        faults.append(Fault(Cause.SERVO_SILENT, ", ".join(silent)))
+    # Before the silence that it makes: what comes first is what the operator is told.
     bad = sum(count for time_s, count in watch.errors if now_s - time_s <= safety.bus_errors_window_s)
     if bad > safety.bus_errors:
         faults.append(Fault(Cause.BUS_NOISE, f"{bad} in {safety.bus_errors_window_s:g} s (at most {safety.bus_errors})"))
+    if silent := [n for n, misses in zip(JOINT_NAMES, newest.misses, strict=False) if misses >= safety.missed_answers]:
+        faults.append(Fault(Cause.SERVO_SILENT, ", ".join(silent)))
     if alerted := [f"{n} {bits:#04x}" for n, bits in zip(JOINT_NAMES, newest.hardware_errors, strict=False) if bits != 0]:
         faults.append(Fault(Cause.SERVO_ALERT, ", ".join(alerted)))
     if watch.astray_since_s is not None and now_s - watch.astray_since_s >= safety.tracking_time_s:

@@ -41,8 +41,8 @@ class Cause(StrEnum):
     TRACKING = "servo does not follow"
     SERVOS_WRONG = "servos are not as configured"
     CLOCK = "clock jumped"
+    BUS_NOISE = "bad packets on the servo bus"  # before the silence that it makes: what is named first is told
     SERVO_SILENT = "servo silent"
-    BUS_NOISE = "bad packets on the servo bus"
     BUS_DEAD = "servo bus lost"
     REBOOTED = "servo restarted"
     WATCHDOG = "bus watchdog tripped"

@@ -274,6 +274,7 @@ def test_silence_of_the_bus(age_s: float, causes: list[Cause]) -> None:
         ({"rebooted": True}, [Cause.REBOOTED]),
         ({"errors": 5}, []),
         ({"errors": 6}, [Cause.BUS_NOISE]),
+        ({"errors": 26, "misses": (3,) * 7}, [Cause.BUS_NOISE, Cause.SERVO_SILENT]),
     ],
 )
 def test_one_report_of_the_bus(change: dict[str, object], causes: list[Cause]) -> None:
@@ -319,8 +320,8 @@ def test_the_details_name_the_joints() -> None:
     bad = BusReport(True, _one(4, 0), 7, _one(0x21, 0), _one(71.0, 66.0), _one(9.9, 10.8), _one(2.0, 0.0))  # type: ignore[arg-type]
     assert bus_faults(_bus((0.0, bad)), 0.2, SERVOS, SAFETY) == [
         Fault(Cause.BUS_SILENT, "for 200 ms"),
-        Fault(Cause.SERVO_SILENT, "up"),
         Fault(Cause.BUS_NOISE, "7 in 1 s (at most 5)"),
+        Fault(Cause.SERVO_SILENT, "up"),
         Fault(Cause.SERVO_ALERT, "up 0x21"),
         Fault(Cause.TRACKING, "up off by 2.00 mm (at most 1.5 mm)"),
         Fault(Cause.HOT, "up 71 °C"),

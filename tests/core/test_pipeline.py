@@ -22,7 +22,7 @@ FRAME_S = 1 / 30
 class DrawnNetwork:
     """Gives what was drawn last, in the size of the image, and counts how often it is asked."""
 
-    info = ModelInfo(name="drawn", shape={}, stride=1, weights_sha256="0" * 64, onnx_sha256="0" * 64)
+    info = ModelInfo(name="drawn", shape={"fold": 1}, stride=16, weights_sha256="0" * 64, onnx_sha256="0" * 64)
     engine = "drawn by hand"
 
     def __init__(self) -> None:
