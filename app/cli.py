@@ -23,6 +23,7 @@ from app.cli_sessions import play, record, replay, session_commands
 from app.cli_study import ablation, annotate, evaluate, perceive
 from app.memory import share_heaps
 from core.errors import UserError
+from core.picture_limit import limit_pictures
 
 app = typer.Typer(
     name="lumenpilot",
@@ -41,6 +42,7 @@ def main() -> None:
     with suppress(OSError, RuntimeError, ValueError):  # there is not always a standard error
         faulthandler.enable()  # a memory fault says at least where, and not only that
     share_heaps()
+    limit_pictures()
     try:
         try:
             app()

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core import MAX_PIXELS
 from core.errors import UserError
+from core.picture_limit import MAX_PIXELS
 from core.types import Image
 
 _AS_SEEN = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR
