@@ -181,14 +181,14 @@ def run_accuracy(
 
     `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network.
     """
-    from core.learning.dataset import find_labelled
+    from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.model_file import model_folder, sha256_of, write_figures
     from core.perception.pipeline import Pipeline, open_pipeline
     from core.study.accuracy import TrueMasks, score_set, summarise
     from core.study.calibration import describe_confidence
 
     config = _config(model, preset, config_path)
-    samples, truth = find_labelled(folder)
+    samples, truth = find_labelled(folder, POSE_KEYS)
     masks, left_out = TrueMasks(), LeftOut()
     pipeline = Pipeline(masks, config.perception) if true_masks else open_pipeline(config.perception)
     with progress_bar() as bar:

@@ -16,13 +16,13 @@ from core.perception.evidence import Calibration
 
 def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None:
     """Perceive every frame of a labelled set, once and in all orientations; store a calibration of each in the model's manifest."""
-    from core.learning.dataset import find_labelled
+    from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.model_file import model_folder, sha256_of, write_calibration
     from core.perception.pipeline import open_pipeline
     from core.study.accuracy import TrueMasks, score_set
     from core.study.calibration import describe_confidence, fit, is_right
 
-    samples, truth = find_labelled(folder)
+    samples, truth = find_labelled(folder, POSE_KEYS)
     described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
     calibrations: list[Calibration] = []
     target, tables, left_out = model_folder(model), [], LeftOut()

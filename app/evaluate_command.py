@@ -221,7 +221,7 @@ def _read_set(folder: Path) -> list[_Truth]:
         row = truth[sample.stem]
         theta, state = row.get("theta_deg"), row.get("state")
         posed = theta is not None and state is not None
-        group = f"phantom {row['seed']}" if "seed" in row else None
+        group = f"phantom {row['seed']}" if row.get("seed") is not None else None
         found.append(_Truth(sample.stem, sample.image, float(theta) if posed else None, state if posed else None, group))
     return found
 

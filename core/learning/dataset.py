@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import cv2
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
 from core.errors import UserError
 from core.images import ImageError, read_image
@@ -84,10 +84,31 @@ class _TruthRow(BaseModel):
 
     stem: Annotated[str, Field(strict=True)]
     seed: int | str | None = None
-    state: Literal["A", "B", "C", "D"] | None = None
     theta_deg: _Number | None = None
+    state: Literal["A", "B", "C", "D"] | None = None
     theta_signed_deg: _Number | None = None
     head_xy: tuple[_Number, _Number] | None = None
+    tail_xy: tuple[_Number, _Number] | None = None
+
+    @field_validator("state")
+    @classmethod
+    def _has_its_angle(cls, state: str | None, before: ValidationInfo) -> str | None:
+        if state is not None and before.data.get("theta_deg", 0.0) is None:
+            raise ValueError("theta_deg is missing")
+        return state
+
+
+_WANTED = {
+    "stem": "must be the frame's name, as text",
+    "seed": "must be a whole number or a text",
+    "state": "must be A, B, C, D or null",
+    "head_xy": "must be two finite numbers, or null",
+    "tail_xy": "must be two finite numbers, or null",
+}
+"""What a row's values have to be; all others are finite numbers, or null."""
+
+POSE_KEYS = ("theta_deg", "theta_signed_deg", "head_xy")
+"""What the accuracy of a frame is measured by, where its truth has a state."""
 
 
 def read_truth(folder: Path) -> dict[str, dict[str, Any]]:
@@ -103,24 +124,37 @@ def read_truth(folder: Path) -> dict[str, dict[str, Any]]:
     for number, line in enumerate(lines, 1):
         try:
             row = json.loads(line)
-            truth[_TruthRow.model_validate(row).stem] = row
-        except ValidationError as error:
-            first = error.errors()[0]
-            key = "".join(f"{part}: " for part in first["loc"][:1])
-            raise DatasetError(f"{path}: line {number}: {key}{first['msg']}; mend it, or write the set again with synth") from None
         except (ValueError, RecursionError):
             if number < len(lines):
                 raise DatasetError(f"{path}: line {number} is damaged; write the set again with synth") from None
+            continue
+        if not isinstance(row, dict):
+            raise DatasetError(f"{path}: line {number} is damaged; write the set again with synth")
+        try:
+            truth[_TruthRow.model_validate(row).stem] = row
+        except ValidationError as error:
+            first = error.errors()[0]
+            key = str(first["loc"][0])
+            wanted = _WANTED.get(key, "must be a finite number, or null")
+            why = "is said, but theta_deg is not" if first["type"] == "value_error" else wanted
+            raise DatasetError(f"{path}: line {number}: {key}: {why}; mend it, or write the set again with synth") from None
     return truth
 
 
-def find_labelled(folder: Path) -> tuple[list[Sample], dict[str, dict[str, Any]]]:
-    """The frames of a set that ``synth`` wrote, and their truth by stem; raises DatasetError when a frame has no truth."""
+def find_labelled(folder: Path, needed: Sequence[str] = ()) -> tuple[list[Sample], dict[str, dict[str, Any]]]:
+    """The frames of a set that ``synth`` wrote, and their truth by stem.
+
+    Raises DatasetError when a frame has no truth, or one with a state lacks a `needed` key.
+    """
     samples, truth = find_samples([folder]), read_truth(folder)
     untold = [sample.stem for sample in samples if sample.stem not in truth]
     if untold:
         share = f"{len(untold)} of {len(samples)} frames lack a truth (the first: {untold[0]})"
         raise DatasetError(f"{folder}: {share}; write the set again with synth")
+    for row in (truth[sample.stem] for sample in samples):
+        missing = [key for key in needed if row.get(key) is None] if row.get("state") is not None else []
+        if missing:
+            raise DatasetError(f"{folder}: truth of frame {row['stem']} lacks {missing[0]}; write the set again with synth")
     return samples, truth
 
 

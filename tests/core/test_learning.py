@@ -1,5 +1,6 @@
 """Data set layout, augmentation and the training loop on a toy task."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from core.images import read_image
 from core.learning.augment import random_clutter, random_crop, random_look, with_strips
 from core.learning.crops import FrameCrops
-from core.learning.dataset import DatasetError, find_samples, read_truth, write_mask, write_png
+from core.learning.dataset import DatasetError, find_labelled, find_samples, read_truth, write_mask, write_png
 from core.learning.optimizer import make_optimizers, orthogonalised
 from core.learning.training import Progress, TrainingPlan, computes_in_bf16, train
 from core.perception.unet import DualUNet, UNetShape
@@ -66,6 +67,9 @@ def test_truth_skips_a_cut_last_line_and_names_any_other(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("entry", "named"),
     [
+        ('"theta_deg": -Infinity', "theta_deg: must be a finite number, or null"),
+        ('"head_xy": [1, 2, 3]', "head_xy: must be two finite numbers, or null"),
+        ('"theta_deg": null, "state": "A"', "state: is said, but theta_deg is not"),
         ('"theta_deg": NaN', "theta_deg"),
         ('"theta_signed_deg": "x"', "theta_signed_deg"),
         ('"theta_deg": true', "theta_deg"),
@@ -74,14 +78,52 @@ def test_truth_skips_a_cut_last_line_and_names_any_other(tmp_path: Path) -> None
         ('"state": ["A"]', "state"),
         ('"state": "Z"', "state"),
         ('"seed": [1]', "seed"),
+        ('"tail_xy": "there"', "tail_xy"),
+        ('"state": "A", "theta_deg": null', "state"),
+        ('"theta_deg": "x", "state": "A"', "theta_deg"),
     ],
 )
 def test_a_truth_that_makes_no_sense_is_named_by_line_and_key(tmp_path: Path, entry: str, named: str) -> None:
     path = tmp_path / "truth.jsonl"
     path.write_text('{"stem": "a", "seed": 3}\n{"stem": "b", ' + entry + "}\n")
-    with pytest.raises(DatasetError, match=rf"truth.jsonl: line 2: {named}: .*; mend it") as raised:
+    with pytest.raises(DatasetError, match=rf"truth.jsonl: line 2: {named}.*; mend it") as raised:
         read_truth(tmp_path)
     assert len(str(raised.value).splitlines()) == 1
+
+
+def test_what_else_a_row_says_and_frames_without_a_pose_are_welcome(tmp_path: Path) -> None:
+    rows = [
+        {
+            "stem": "a",
+            "theta_deg": 3,
+            "theta_signed_deg": -3.0,
+            "head_xy": [1, 2.5],
+            "state": "B",
+            "seed": "x",
+            "family": "backlit",
+        },
+        {"stem": "b", "theta_deg": None, "theta_signed_deg": None, "head_xy": [1, 2], "state": None, "seed": 4, "crossed": None},
+        {"stem": "c", "theta_deg": 3, "state": "A"},
+    ]
+    (tmp_path / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert list(read_truth(tmp_path).values()) == rows
+
+
+def test_a_row_that_is_no_object_is_damaged(tmp_path: Path) -> None:
+    for text, line in (('[]\n{"stem": "a"}\n', 1), ('{"stem": "a"}\n[]\n', 2)):
+        (tmp_path / "truth.jsonl").write_text(text)
+        with pytest.raises(DatasetError, match=f"line {line} is damaged"):
+            read_truth(tmp_path)
+
+
+def test_a_pose_has_what_it_is_to_be_measured_by(tmp_path: Path) -> None:
+    folder = _toy_set(tmp_path / "set", 2)
+    rows = [{"stem": sample.stem, "theta_deg": 3, "state": "A", "head_xy": [1, 2]} for sample in find_samples([folder])]
+    rows[1]["head_xy"] = None
+    (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert len(find_labelled(folder)[0]) == 2
+    with pytest.raises(DatasetError, match=f"truth of frame {rows[1]['stem']} lacks head_xy; write the set again"):
+        find_labelled(folder, ("theta_deg", "head_xy"))
 
 
 def test_a_truth_in_another_coding_is_one_clear_error(tmp_path: Path) -> None:
