@@ -39,7 +39,8 @@ def table_statistics(tables: NDArray[np.int64]) -> dict[str, Floats]:
     Returns
     -------
     dict
-        Name -> shape (R,), NaN where undefined. Classes absent from a table are left out of its macro averages.
+        Name -> shape (R,), NaN where undefined. Classes absent from a table are left out of its macro averages; one that occurs
+        without a hit counts as 0.
     """
     n = tables.sum((1, 2)).astype(np.float64)
     hits = np.diagonal(tables, axis1=1, axis2=2).astype(np.float64)
@@ -47,7 +48,7 @@ def table_statistics(tables: NDArray[np.int64]) -> dict[str, Floats]:
     with np.errstate(divide="ignore", invalid="ignore"):
         chance = (manual * algorithm).sum(1) / n**2
         f1 = 2 * hits / (manual + algorithm)
-        per_class = np.sqrt(hits / manual * (hits / algorithm))
+        per_class = np.where(manual + algorithm > 0, hits / np.sqrt(np.maximum(manual * algorithm, 1.0)), np.nan)
         together = ((tables * (tables - 1)).sum((1, 2))) / np.sqrt(
             (manual * (manual - 1)).sum(1) * (algorithm * (algorithm - 1)).sum(1)
         )
@@ -83,9 +84,10 @@ def state_metrics(
     -------
     dict
         As ``metrics.json`` has it. ``labels`` are those that occur on either side; ``confusion`` has manual rows and algorithm
-        columns. Precision of a class that the algorithm never gave, and recall of one that nobody saw, are None and left out of
-        the averages. ``fowlkes_mallows_pairs`` is the pair-counting index, ``fowlkes_mallows_macro`` the mean over the classes
-        of ``sqrt(precision * recall)``, the formula of the paper's table.
+        columns. Precision of a class that the algorithm never gave is None and counts as 0 in the averages, or never to find a
+        class would be better than to find a part of it; recall of one that nobody saw is None and left out of them.
+        ``fowlkes_mallows_pairs`` is the pair-counting index, ``fowlkes_mallows_macro`` the mean over the classes of
+        ``sqrt(precision * recall)``, the formula of the paper's table, with 0 for a class without a hit.
     """
     n, labels = len(manual), sorted(set(manual) | set(algorithm))
     if n == 0:
@@ -93,7 +95,7 @@ def state_metrics(
     rows_columns = np.array([(labels.index(m), labels.index(a)) for m, a in zip(manual, algorithm, strict=True)]).T
     confusion = np.zeros((len(labels), len(labels)), np.int64)
     np.add.at(confusion, tuple(rows_columns), 1)
-    classes = np.array(_scores(manual, algorithm, labels, None))
+    classes = np.array(_scores(manual, algorithm, labels))
     rows = [{name: _defined(value) for name, value in zip(_AVERAGED, column, strict=True)} for column in classes.T]
     per_class_fm = np.sqrt(classes[0] * classes[1])
     cells = _drawn_tables(confusion, rows_columns, seed, group)
@@ -101,9 +103,9 @@ def state_metrics(
         "accuracy": float(np.trace(confusion) / n),
         "kappa": kappa(manual, algorithm),
         "fowlkes_mallows_pairs": fowlkes_mallows_pairs(manual, algorithm),
-        "fowlkes_mallows_macro": _defined(_mean_of_defined(per_class_fm[None])[0]),
+        "fowlkes_mallows_macro": float(np.nan_to_num(per_class_fm).mean()),
     }
-    averages = {kind: dict(zip(_AVERAGED, map(_defined, _scores(manual, algorithm, labels, kind)), strict=True)) for kind in _KINDS}
+    averages = {"macro": _averages(classes, np.ones(len(labels))), "weighted": _averages(classes, confusion.sum(1))}
     known = point | {f"{kind}_f1": averages[kind]["f1"] for kind in _KINDS}
     intervals = {name: interval_95(values) for name, values in table_statistics(cells).items()} if n > 1 else {}
     per_class = {
@@ -134,9 +136,21 @@ def _drawn_tables(
 _KINDS = ("macro", "weighted")
 
 
-def _scores(manual: Sequence[str], algorithm: Sequence[str], labels: list[str], average: str | None) -> Any:
-    """Precision, recall and F1: of each class, or averaged."""
-    return precision_recall_fscore_support(list(manual), list(algorithm), labels=labels, average=average, zero_division=np.nan)[:3]
+def _scores(manual: Sequence[str], algorithm: Sequence[str], labels: list[str]) -> Any:
+    """Precision, recall and F1 of each class, NaN where undefined."""
+    return precision_recall_fscore_support(list(manual), list(algorithm), labels=labels, zero_division=np.nan)[:3]
+
+
+def _averages(classes: Floats, weights: NDArray[Any]) -> dict[str, float | None]:
+    """Weighted means of precision, recall and F1 (rows) over the classes."""
+    precision, recall, f1 = classes
+    seen = np.isfinite(recall)
+    means = (
+        np.average(np.nan_to_num(precision), weights=weights),
+        np.average(recall[seen], weights=weights[seen]),
+        np.average(f1, weights=weights),
+    )
+    return dict(zip(_AVERAGED, map(float, means), strict=True))
 
 
 def _defined(value: float) -> float | None:

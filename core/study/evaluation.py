@@ -237,7 +237,7 @@ def _state_notes(state: dict[str, Any]) -> list[str]:
         notes.append("No two images share a state on one of the sides: the pair-counting Fowlkes-Mallows index is undefined.")
     for label, row in state["per_class"].items():
         if row["precision"] is None:
-            notes.append(f"The algorithm never gave state {label}: its precision is undefined and left out of the averages.")
+            notes.append(f"The algorithm never gave state {label}: its precision is undefined and counts as 0 in the averages.")
         if row["recall"] is None:
             notes.append(f"No image has the manual state {label}: its recall is undefined and left out of the averages.")
     return notes

@@ -84,11 +84,26 @@ def test_many_tables_at_once_agree_with_one_at_a_time() -> None:
 def test_a_state_that_one_side_never_gives() -> None:
     found = state_metrics(list("BBC"), list("BBB"))
     assert found["per_class"]["C"] == {"precision": None, "recall": 0.0, "f1": 0.0, "fowlkes_mallows": None, "n": 1}
-    assert found["macro"]["precision"] == pytest.approx(2 / 3), "of B alone"
+    assert found["macro"]["precision"] == pytest.approx((2 / 3 + 0) / 2)
+    assert found["weighted"]["precision"] == pytest.approx((2 * 2 / 3 + 1 * 0) / 3)
+    assert found["fowlkes_mallows_macro"] == pytest.approx((np.sqrt(2 / 3) + 0) / 2)
     assert found["macro"]["recall"] == pytest.approx(1 / 2)
     found = state_metrics(list("BB"), list("BA"))
     assert found["per_class"]["A"]["recall"] is None
+    assert found["macro"]["recall"] == pytest.approx(1 / 2), "of B alone"
+    assert found["fowlkes_mallows_macro"] == pytest.approx((np.sqrt(1 / 2) + 0) / 2)
     assert found["labels"] == ["A", "B"]
+
+
+def test_to_find_a_part_of_a_state_is_better_than_to_find_none_of_it() -> None:
+    none, one = ([[13, 0, 0], [0, 26, 0], [0, 5 - found, found]] for found in (0, 1))
+    worse, better = state_metrics(*label_pairs(none)), state_metrics(*label_pairs(one))
+    assert worse["fowlkes_mallows_macro"] == pytest.approx((1 + np.sqrt(26 / 31) + 0) / 3)
+    assert better["fowlkes_mallows_macro"] == pytest.approx((1 + np.sqrt(26 / 30) + np.sqrt(1 / 5)) / 3)
+    assert better["macro"]["precision"] > worse["macro"]["precision"]
+    low, high = worse["ci95"]["fowlkes_mallows_macro"]
+    assert low < worse["fowlkes_mallows_macro"] < high
+    assert high < 0.75, "no class is as good as left out"
 
 
 @pytest.mark.parametrize(("manual", "algorithm"), [("B", "B"), ("B", "C"), ("BB", "BB"), ("BC", "CB"), ("BBC", "DDA"), ("", "")])
