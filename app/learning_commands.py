@@ -142,12 +142,16 @@ def run_train(
     teller, watch = asked_teller(), HeldOutWatch(outputs.held_out, out, asked_teller(), log.write)
     with log, Interrupt() as interrupt, progress_bar() as bar:
         room = Classroom(out, notes, log.write, teller, bar, interrupt, watch, steps_total=plan.steps + (then.steps if then else 0))
-        done = room.teach(lesson, plan)
-        if done is None:
-            _console.print(f"interrupted before the first step; nothing was written to {out}", soft_wrap=True)
-            return
-        if then is not None and done == plan.steps:
-            teach_second_look(room, samples, then)
+        try:
+            done = room.teach(lesson, plan)
+            if done is None:
+                _console.print(f"interrupted before the first step; nothing was written to {out}", soft_wrap=True)
+                return
+            if then is not None and done == plan.steps:
+                teach_second_look(room, samples, then)
+        except DatasetError as error:
+            kept = f"; what was learnt before is kept, go on with --init {out}" if room.has_kept else ""
+            raise DatasetError(f"{error}; mend this frame, or remove it{kept}") from None
     steps, done = room.steps_total, room.steps_before
     if teller is not None:
         teller.tell({"model": str(out), "steps_done": done, "steps": steps})

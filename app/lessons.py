@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -13,7 +15,7 @@ from torch.utils.data import Dataset
 from core.config import SegmentationConfig
 from core.errors import UserError
 from core.learning.crops import FirstLook, FrameCrops, NearCrops
-from core.learning.dataset import WORKING_SIZE_PX, Sample
+from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample
 from core.learning.growing import deepened, with_first_look
 from core.learning.model_file import SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look, second_look_of
 from core.learning.training import TrainingPlan
@@ -21,6 +23,7 @@ from core.perception.second_look import WINDOW_PX
 from core.perception.segmentation import Turned, open_second_look, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 from core.study.difficulty import difficulty
+from core.types import Image
 
 if TYPE_CHECKING:
     from app.learning_commands import Interrupt
@@ -78,7 +81,7 @@ class FrameLesson:
         return FrameCrops(self._samples, plan, np.array(found))
 
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
-        examples = [sample.load(WORKING_SIZE_PX)[0] for sample in _some(self._samples)] if whole else []
+        examples = list(_readable(_some(self._samples))) if whole else []
         save_model(network, out, training=training, figures=figures, examples=examples, second_look=self._second_look)
 
 
@@ -114,11 +117,12 @@ class SecondLookLesson:
         return self._shown
 
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
-        examples = []
+        examples: list[Image] = []
         if whole and self._shown is not None:
             step = max(1, len(self._shown) // (4 * _EXAMPLES))
-            shown = (self._shown[index][0] for index in range(0, len(self._shown), step))
-            examples = [np.ascontiguousarray(planes.numpy().transpose(1, 2, 0)) for planes in shown]
+            for index in range(0, len(self._shown), step):
+                with suppress(DatasetError):  # as in _readable
+                    examples.append(np.ascontiguousarray(self._shown[index][0].numpy().transpose(1, 2, 0)))
         save_with_second_look(self._base, network, out, training=training, figures=figures, examples=examples)
 
 
@@ -135,3 +139,9 @@ def default_shape(*, deep: bool = True) -> UNetShape:
 def _some(samples: list[Sample]) -> list[Sample]:
     """From all over the sets."""
     return samples[:: max(1, len(samples) // _EXAMPLES)]
+
+
+def _readable(samples: list[Sample]) -> Iterator[Image]:
+    for sample in samples:
+        with suppress(DatasetError):  # the training says it, and then wants to keep what was learnt without that frame
+            yield sample.load(WORKING_SIZE_PX)[0]

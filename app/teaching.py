@@ -32,7 +32,8 @@ _SECOND_SHARE, _SECOND_BATCH = 0.3, 24
 
 @dataclass(slots=True)
 class Classroom:
-    """What all lessons of one ``train`` share. ``log`` takes lines; ``steps_before`` and ``steps_total`` are of all lessons."""
+    """What all lessons of one ``train`` share. ``log`` takes lines; ``steps_before`` and ``steps_total`` are of all
+    lessons; ``has_kept``: a model has been written."""
 
     out: Path
     notes: dict[str, Any]
@@ -43,6 +44,7 @@ class Classroom:
     watch: HeldOutWatch
     steps_before: int = 0
     steps_total: int = 0
+    has_kept: bool = False
 
     def teach(self, lesson: Lesson, plan: TrainingPlan) -> int | None:
         """Teach and save; the steps done, None when it was interrupted before the first."""
@@ -69,6 +71,7 @@ class Classroom:
         def keep(network: DualUNet, step: int, *, whole: bool) -> None:
             figures = self.watch.figures if held_out is not None else {}
             lesson.save(network, self.out, self.notes | {"plan": plan.to_json(), "steps_done": step}, figures, whole=whole)
+            self.has_kept = True
 
         def look_and_keep(network: DualUNet, step: int, *, whole: bool = False) -> None:
             if held_out is not None:

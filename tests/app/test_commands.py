@@ -14,6 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from core.learning.crops import _Order
+from core.learning.dataset import find_samples
 from core.learning.model_file import read_model_info
 
 MAIN = Path(__file__).resolve().parents[2] / "main.py"
@@ -108,6 +110,19 @@ def test_an_interrupted_training_keeps_what_was_learnt(frames: Path, tmp_path: P
     assert process.returncode == 0, errors
     assert "interrupted after" in errors.replace("\n", " ")
     assert 50 <= read_model_info(out).training["steps_done"] < 100_000
+
+
+def test_a_damaged_frame_is_one_clear_line_and_the_model_until_then_is_there(frames: Path, tmp_path: Path) -> None:
+    folder, out = tmp_path / "set", tmp_path / "model"
+    shutil.copytree(frames, folder)
+    mask = find_samples([folder])[_Order(0, 6)[5]].robot  # of the frame that is shown last
+    mask.write_bytes(mask.read_bytes()[:60])
+    done = run("train", "--data", folder, "--out", out, "--steps", 60, "--batch", 1, "--crop", 64, "--base", 4, "--threads", 1)
+    assert (done.returncode, done.stdout) == (2, "")
+    told = f"error: {mask}: cut short (the end of the file is missing); mend this frame, or remove it; what was learnt before"
+    assert done.stderr.splitlines()[-1] == f"{told} is kept, go on with --init {out}"
+    assert "Traceback" not in done.stderr
+    assert 5 <= read_model_info(out).training["steps_done"] < 60
 
 
 def test_accuracy_goes_on_after_a_damaged_picture(model: Path, frames: Path, tmp_path: Path) -> None:
