@@ -73,7 +73,7 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
         left_out = LeftOut()
         scores, latency_ms, interrupted = _measure_set(samples, truth, pipelines, masks, ours.working_size_px, left_out)
         groups = [truth[score.stem].get("seed", score.stem) for score in scores[0]]
-        result |= _described(variants, scores, latency_ms, groups, plan.seed)
+        result |= _described(variants, scores, latency_ms, groups, plan.seed) | {"left_out": len(left_out)}
         frames = frame_rows(variants, scores)
     if plan.sequence and not interrupted:
         named = {variant.name: variant.config for variant in make_variants(paper, ours)}
@@ -159,10 +159,13 @@ def _measure_set(
                     latency_ms[place].append(spent["total"] - spent.get("prepare", 0.0) - spent.get("network", 0.0))
         except KeyboardInterrupt:
             interrupted = True
-    left_out.tell(len(scores[0]))
     count = len(latency_ms[-1])  # an interruption leaves the last frame with some of the pipelines only
-    if not any(score.expected for score in scores[-1][:count]):
+    has_pose = any(score.expected for score in scores[-1][:count])
+    if interrupted and not has_pose:
         raise KeyboardInterrupt
+    left_out.tell(count)
+    if not has_pose:
+        raise AblationError("no frame with a pose can be read; nothing can be compared")
     return [row[:count] for row in scores], [row[:count] for row in latency_ms], interrupted
 
 

@@ -80,7 +80,8 @@ def markdown(result: dict[str, Any]) -> str:
 
 
 def _title(result: dict[str, Any]) -> str:
-    return f"{result['set']}: {result['expected']} frames with a pose; the same masks for all rows ({result['masks']})"
+    without = f", {result['left_out']} frames left out that cannot be read" if result.get("left_out") else ""
+    return f"{result['set']}: {result['expected']} frames with a pose{without}; the same masks for all rows ({result['masks']})"
 
 
 def _headings() -> list[str]:

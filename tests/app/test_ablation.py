@@ -106,6 +106,39 @@ def test_an_interruption_shows_what_was_measured_until_then(
     assert "stream" not in result
 
 
+def test_a_damaged_frame_is_left_out_and_said(frames: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, out = tmp_path / "set", tmp_path / "out"
+    shutil.copytree(frames, folder)
+    _cut(folder / "images" / "000002.png")
+    run_ablation(Plan(folder, true_masks=True, out=out), as_json=True)
+    shown = capsys.readouterr()
+    result = json.loads(shown.out)
+    assert (result["frames"], result["left_out"], result["interrupted"]) == (5, 1, False)
+    assert "1 of 6 frames could not be read" in shown.err
+    assert "1 frames left out that cannot be read" in (out / "ablation.md").read_text()
+    with (out / "ablation_frames.csv").open(newline="") as file:
+        assert {row["stem"] for row in csv.DictReader(file)} == {f"{index:06d}" for index in (0, 1, 3, 4, 5)}
+
+
+def test_what_leaves_nothing_to_compare_is_no_interruption(frames: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "set"
+    shutil.copytree(frames, folder)
+    rows = [json.loads(line) for line in (frames / "truth.jsonl").read_text().splitlines()]
+    rows[1:] = [row | {"state": None} for row in rows[1:]]
+    (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    _cut(folder / "images" / f"{rows[0]['stem']}.png")
+    with pytest.raises(UserError, match="no frame with a pose can be read"):
+        run_ablation(Plan(folder, true_masks=True), as_json=True)
+    for image in (folder / "images").iterdir():
+        _cut(image)
+    with pytest.raises(UserError, match="none of 6 frames could be read"):
+        run_ablation(Plan(folder, true_masks=True), as_json=True)
+
+
+def _cut(image: Path) -> None:
+    image.write_bytes(image.read_bytes()[:50])
+
+
 def test_bad_input_is_one_clear_line(frames: Path, tmp_path: Path) -> None:
     untold, poseless, halved = tmp_path / "untold", tmp_path / "poseless", tmp_path / "halved"
     for folder in (untold, poseless, halved):
