@@ -294,12 +294,14 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     else:
         from app.annotate_evaluation import compared_rows
 
-        rows, _, _ = compared_rows(annotations, images, config, options.study.name or None, str(store_path))
+        rows, _, _, missed = compared_rows(annotations, images, config, options.study.name or None, str(store_path))
         try:
             write_measurements(options.out, rows)
         except OSError as error:
             raise AnnotationError(f"{options.out}: cannot be written ({error.strerror}); choose another --out") from None
         sys.stderr.write(f"{len(rows)} images in {options.out}: evaluate --csv {options.out} --out DIR\n")
+        if missed:
+            raise KeyboardInterrupt
     return 0
 
 

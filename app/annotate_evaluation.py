@@ -19,13 +19,14 @@ from core.types import Frame
 
 def compared_rows(
     annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], config: Config, study: str | None, where: str
-) -> tuple[list[Measurement], dict[str, int], str]:
-    """A row for each image that was answered by hand and is here.
+) -> tuple[list[Measurement], dict[str, int], str, int]:
+    """A row for each image that was answered by hand and is here; an interruption (Ctrl-C) keeps what was done until then.
 
     Returns
     -------
     tuple
-        Rows, how often which reason was given on images with a manual state, and where the network ran.
+        Rows, how often which reason was given on images with a manual state, where the network ran, and how many images were not
+        perceived before an interruption.
     """
     from core.images import read_image
     from core.perception.pipeline import open_pipeline
@@ -40,15 +41,19 @@ def compared_rows(
     rows: list[Measurement] = []
     reasons: Counter[str] = Counter()
     with progress_bar() as bar:
-        for row in bar.track(manual, description="images"):
-            image = here[row.image]
-            scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(image.path)))
-            angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
-            group = image.path.parent.name if len(folders) > 1 else None  # pictures of one session are alike
-            rows.append(replace(row, image=image.path.name, algorithm_angle=angle, algorithm_state=state, group=group))
-            if scene.refusal is not None and row.state is not None:
-                reasons[scene.refusal.reason.value] += 1
-    return rows, dict(sorted(reasons.items())), pipeline.engine
+        try:
+            for row in bar.track(manual, description="images"):
+                image = here[row.image]
+                scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(image.path)))
+                angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
+                group = image.path.parent.name if len(folders) > 1 else None  # pictures of one session are alike
+                rows.append(replace(row, image=image.path.name, algorithm_angle=angle, algorithm_state=state, group=group))
+                if scene.refusal is not None and row.state is not None:
+                    reasons[scene.refusal.reason.value] += 1
+        except KeyboardInterrupt:
+            if not rows:
+                raise
+    return rows, dict(sorted(reasons.items())), pipeline.engine, len(manual) - len(rows)
 
 
 def raters_agreement(

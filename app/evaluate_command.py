@@ -169,12 +169,14 @@ def _perceive_annotated(
     if recorded is not None:
         config = recorded
         notes.append("Each picture of the session was perceived by itself, with the settings that it was recorded with.")
-    rows, reasons, engine = compared_rows(answers, images, config, study, str(annotations))
+    rows, reasons, engine, missed = compared_rows(answers, images, config, study, str(annotations))
     source = {"kind": "annotated by hand", "name": annotations.parent.name, "model": config.perception.segmentation.model}
     unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
     notes += [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
+    notes += [f"Interrupted after {len(rows)} of {len(rows) + missed} images."] if missed else []
     agreement = raters_agreement(answers, images, study, str(annotations), seed)
-    return _Study(rows, source | {"preset": preset, "engine": engine, "refused": reasons, "study": study}, notes, agreement)
+    source |= {"preset": preset, "engine": engine, "refused": reasons, "study": study}
+    return _Study(rows, source, notes, agreement, interrupted=missed > 0)
 
 
 def _recorded(folder: Path, config: Config, model: str | None) -> Config | None:

@@ -400,6 +400,31 @@ def test_a_study_is_evaluated_with_its_raters_and_repeats(tmp_path: Path, capsys
     assert len((out / "raters.csv").read_text().splitlines()) == 9
 
 
+def test_an_interrupted_evaluation_of_annotated_images_keeps_what_was_perceived(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from core import images as image_files
+
+    paths = [tmp_path / f"frame_{index}.png" for index in range(3)]
+    for index, path in enumerate(paths):
+        write_png(path, tube(index)[0])
+    measure(tmp_path / "annotations.lumenpilot.sqlite", paths, [0.0, 10.0, 5.0], study="main", rater="al")
+    read, calls = image_files.read_image, []
+
+    def third_is_interrupted(path: Path) -> np.ndarray:
+        calls.append(path)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return read(path)
+
+    monkeypatch.setattr(image_files, "read_image", third_is_interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(tmp_path, out=tmp_path / "out")
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    assert "Interrupted after 2 of 3 images." in metrics["notes"]
+    assert len(read_measurements(tmp_path / "out" / "measurements.csv")) == 2
+
+
 def test_a_study_needs_images_annotated_by_hand(paper_csv: Path, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="--study needs images annotated by hand"):
         evaluate(csv=paper_csv, out=tmp_path / "out", study_name="main")
