@@ -7484,13 +7484,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>servo silent</source>
-        <translation>舵机无应答</translation>
+        <source>bad packets on the servo bus</source>
+        <translation>舵机总线有坏包</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>bad packets on the servo bus</source>
-        <translation>舵机总线有坏包</translation>
+        <source>servo silent</source>
+        <translation>舵机无应答</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
