@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -81,21 +83,36 @@ def _padded(image: Image, stride: int) -> Image:
     return np.asarray(cv2.copyMakeBorder(image, 0, down, 0, right, border), np.uint8)
 
 
+_making_core = threading.Lock()
+
+
+@functools.cache
+def _core() -> Any:
+    """The one OpenVINO of this process, which is never given back; to be asked for with `_making_core` held.
+
+    Each OpenVINO lends its thread a stack for signals (sigaltstack). Where two end in the order in which they began, the second
+    gives back to the thread the stack of the first, which is unmapped by then: the next signal that Python handles (Ctrl-C,
+    SIGTERM, the end of a loader's process) kills this process as a memory fault.
+    """
+    # Importing openvino reports itself over the network; with its telemetry package blocked it takes a silent stub instead.
+    sys.modules["openvino_telemetry"] = None  # type: ignore[assignment]
+    import openvino
+
+    return openvino.Core()
+
+
 class OpenVinoSegmenter:
     """The ONNX network on the CPU through OpenVINO, in int8 where the model has it; compiled once per image size."""
 
     _MAX_SIZES = 4
 
     def __init__(self, folder: Path, threads: int = 0, precision: str = "auto") -> None:
-        # Importing openvino reports itself over the network; with its telemetry package blocked it takes a silent stub instead.
-        sys.modules["openvino_telemetry"] = None  # type: ignore[assignment]
-        import openvino
-
         self.info = read_model_info(folder, verify=())
         self._int8 = precision == "int8" or (precision == "auto" and self.info.onnx_int8_sha256 is not None)
         name = ONNX_INT8 if self._int8 else ONNX
         check_files(self.info, folder, (name,))
-        self._core = openvino.Core()
+        with _making_core:
+            self._core = _core()
         self._threads = threads or cores()
         try:
             self._model = self._core.read_model(folder / name)
@@ -103,7 +120,7 @@ class OpenVinoSegmenter:
             reason = str(error).strip().splitlines()[-1]
             raise ModelError(f"{folder / name}: cannot be read ({reason}); restore the model folder") from None
         self._file = folder / name
-        self._requests: dict[tuple[int, int], openvino.InferRequest] = {}
+        self._requests: dict[tuple[int, int], Any] = {}
 
     @property
     def is_eight_bit(self) -> bool:
@@ -121,7 +138,7 @@ class OpenVinoSegmenter:
         output = request.infer({0: np.ascontiguousarray(padded)[None]}, share_inputs=True, share_outputs=True)[0]
         return output[0, 0, :height, :width].copy(), output[0, 1, :height, :width].copy()
 
-    def _request(self, height: int, width: int):  # type: ignore[no-untyped-def]
+    def _request(self, height: int, width: int) -> Any:
         key = (height, width)
         if key not in self._requests:
             if len(self._requests) >= self._MAX_SIZES:
