@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := help
-.PHONY: help run test damage lint translations setup install uninstall clean
+.PHONY: help run test damage mutation lint translations setup install uninstall clean
 
 # Tools are started as modules, so that a checkout that was moved still works (the scripts in .venv/bin name their old place).
 PY := .venv/bin/python
@@ -29,6 +29,9 @@ damage: setup  ## 50 kills of a recording, 100 of saves, 2600 damaged files: wha
 	$(PY) -m pytest --timeout 3600 tests/core -k "$$only"
 	LUMENPILOT_KILLS=50 $(PY) -m pytest --timeout 3600 tests/core/test_session_recovery.py -k is_killed
 	LUMENPILOT_KILLS=100 $(PY) -m pytest --timeout 3600 tests/core/test_annotation_store.py -k kill_9
+
+mutation: setup  ## does a test fail for every small change of gate and supervisor? (a quarter of an hour)
+	@$(PY) scripts/mutation.py $(ARGS)
 
 lint: setup  ## ruff and mypy only
 	@failed=

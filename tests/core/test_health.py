@@ -12,7 +12,7 @@ from core.control.bus_watch import BusReport, BusWatch, bus_faults, see_bus
 from core.control.faults import Cause, Fault, Reaction, worst
 from core.control.frame_watch import FrameReport, FrameWatch, RouteState, frame_faults, see_arrival, see_frame
 from core.control.gate import RejectReason
-from core.control.health import Beat, GateReport, Health, Part, faults_now, take
+from core.control.health import Beat, GateReport, Health, Part, ServosChecked, faults_now, take
 from core.safety_config import SafetyConfig
 from core.types import Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, TICK_S
@@ -378,6 +378,26 @@ def test_only_a_command_that_goes_through_ends_the_row_of_broken_ones() -> None:
     assert Cause.COMMAND_REJECTED in _host_faults(_take(Health(), broken, broken, GateReport(None), broken), 0.0)
     ended = _host_faults(_take(Health(), broken, GateReport(None)), 0.0)
     assert Cause.COMMAND_REJECTED not in ended
+
+
+def _bus_goes_quiet(health: Health, ended: Fault | None) -> Health:
+    """As many reports of a bus process that is not armed as make it sure."""
+    report = replace(GOOD_BUS, armed=False, ended=ended)
+    for number in range(SAFETY.missed_answers):
+        health = take(health, report, armed=True, now_s=number * TICK_S, servos=SERVOS, safety=SAFETY)
+    return health
+
+
+def test_servos_that_the_bus_process_has_disarmed_are_off_for_its_reason_or_for_none() -> None:
+    on = take(Health(), ServosChecked(()), armed=True, now_s=0.0, servos=SERVOS, safety=SAFETY)
+    quiet = _bus_goes_quiet(on, None)
+    assert (quiet.servos_ready, quiet.reported) == (False, (Fault(Cause.SERVOS_WRONG, "the servo process is not armed"),))
+    hot = Fault(Cause.HOT, "advance: 71 C")
+    assert _bus_goes_quiet(on, hot).reported == (hot,)
+
+
+def test_servos_that_were_never_on_have_not_gone_off() -> None:
+    assert _bus_goes_quiet(Health(), None).reported == ()
 
 
 def test_what_the_gate_says_while_nothing_is_armed_counts_for_nothing() -> None:
