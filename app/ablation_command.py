@@ -197,7 +197,7 @@ def _show(result: dict[str, Any], as_json: bool, out: Path | None) -> None:
     if as_json:
         sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
     else:
-        console = Console() if sys.stdout.isatty() else Console(width=_WIDTH)
+        console = Console(markup=False) if sys.stdout.isatty() else Console(width=_WIDTH, markup=False)
         if "rows" in result:
             console.print(value_table(result), difference_table(result))
         if result.get("stream"):

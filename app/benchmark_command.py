@@ -30,7 +30,7 @@ _WARM_UP = 3
 
 
 def _config(model: str | None, preset: str | None, config_path: Path | None) -> Config:
-    return load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model else None)
+    return load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model is not None else None)
 
 
 def _as_in_a_stream(config: Config) -> Config:
@@ -213,7 +213,7 @@ def _print(result: dict[str, Any], as_json: bool, title: str) -> None:
                 table.add_row(f"{key}.{inner_key}", _words(inner))
         else:
             table.add_row(key, _words(value))
-    Console().print(table)
+    Console(markup=False).print(table)
 
 
 def _words(value: Any) -> str:

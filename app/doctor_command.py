@@ -38,7 +38,7 @@ def _with_progress(checks: Iterator[Check]) -> Iterator[Check]:
 
 
 def _print(checks: list[Check]) -> None:
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, expand=False)
     table.add_column("", no_wrap=True)
     table.add_column("check", no_wrap=True, min_width=_NAME_COLUMNS)

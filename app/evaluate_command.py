@@ -86,7 +86,7 @@ def run_evaluate(
             raise EvaluationError(f"{folder}: has no annotation file; begin the study with: annotate {folder} --study {study_name}")
         truth = _read_set(folder) if annotations is None else []
         _make_folder(out)
-        config = load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model else None)
+        config = load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model is not None else None)
         if annotations is not None:
             as_recorded = config_path is None and preset is None
             study = _perceive_annotated(annotations, config, preset, model, study_name, seed, as_recorded=as_recorded)

@@ -23,14 +23,14 @@ from rich.progress import (
 
 from app.progress_lines import ProgressLines, Teller, asked_teller
 
-_console = Console(stderr=True)
+_console = Console(stderr=True, markup=False)
 
 
 def progress_bar() -> Progress:
     """The bar that all long commands show, on standard error; as lines where another program asked for them."""
     if (teller := asked_teller()) is not None:
         return ProgressLines(teller)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TaskProgressColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TaskProgressColumn())
     return Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=_console)
 
 

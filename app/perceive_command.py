@@ -47,7 +47,7 @@ def run_perceive(
     from app.learning_commands import progress_bar
     from core.perception.pipeline import open_pipeline
 
-    overrides: dict[str, Any] = {"perception": {"segmentation": {"model": model}}} if model else {}
+    overrides: dict[str, Any] = {"perception": {"segmentation": {"model": model}}} if model is not None else {}
     config = load_config(config_path, preset, overrides)
     targets = _Targets(_read_targets(targets_path))
     files = expand(paths)

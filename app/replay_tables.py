@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from app.wording import signed_degrees
 from core.study.replay import STATES, Change, Seen, changed_most, runs
@@ -17,7 +18,7 @@ _DASH = "\N{EN DASH}"
 
 def print_replay(result: dict[str, Any], changes: Sequence[Change], *, with_diff: bool, count: int) -> None:
     """On standard output."""
-    console = Console()
+    console = Console(markup=False)
     console.print(_sums(result))
     console.print(_states(result["states"]["matrix"]))
     if with_diff:
@@ -60,7 +61,7 @@ def _states(matrix: list[list[int]]) -> Table:
     for label in STATES:
         table.add_column(label, justify="right")
     for k, label in enumerate(STATES):
-        cells = (f"[bold]{count}[/bold]" if place == k else str(count) for place, count in enumerate(matrix[k]))
+        cells = (Text(str(count), style="bold" if place == k else "") for place, count in enumerate(matrix[k]))
         table.add_row(label, *cells)
     return table
 

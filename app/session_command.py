@@ -35,7 +35,7 @@ def run_info(folder: Path, *, as_json: bool) -> None:
     table = Table(title=str(folder), show_header=False)
     for key, value in result.items():
         table.add_row(key, escape(_words(value)))
-    Console().print(table)
+    Console(markup=False).print(table)
     if result["ended"] == "cut":
         sys.stderr.write(f"note: it did not end properly; repair it with: session recover {folder}\n")
 

@@ -33,12 +33,17 @@ def expand(paths: Sequence[Path]) -> list[Path]:
     for path in paths:
         try:
             if path.is_dir():
-                files += sorted(p for p in path.iterdir() if p.suffix.lower() in IMAGE_ENDINGS + VIDEO_ENDINGS and p.is_file())
+                files += sorted(p for p in path.iterdir() if p.suffix.lower() in IMAGE_ENDINGS + VIDEO_ENDINGS and _is_file(p))
                 continue
         except OSError as error:
             raise UserError(f"{path}: cannot be read ({error.strerror})") from None
         files.append(path)
     return files
+
+
+def _is_file(path: Path) -> bool:
+    """Links that lead nowhere count: who put one there shall hear of it."""
+    return path.is_file() or (path.is_symlink() and not path.exists())
 
 
 def pictures(files: Sequence[Path]) -> Iterator[SourcePicture]:

@@ -144,6 +144,20 @@ def test_accuracy_is_one_json_object(model: Path, frames: Path) -> None:
     assert 0 <= result["vessel_dice"] <= 1
 
 
+def test_a_folders_name_is_shown_as_it_is(tmp_path: Path) -> None:
+    out = tmp_path / "q[" / "red]x"  # what the terminal's library takes for a change of colour
+    done = run("synth", "--out", out, "--count", 1, "--width", 160, "--height", 120)
+    assert done.returncode == 0, done.stderr
+    assert "q[/red]x" in done.stderr.replace("\n", "")
+
+
+@pytest.mark.parametrize("command", [("perceive", "no.png"), ("benchmark", "--frames", "3")])
+def test_an_empty_name_is_no_model(command: tuple[str, ...]) -> None:
+    done = run(*command, "--model", "")
+    assert done.returncode == 2
+    assert "segmentation.model" in done.stderr
+
+
 def test_an_unknown_look_is_named(tmp_path: Path) -> None:
     done = run("synth", "--out", tmp_path / "x", "--count", 1, "--family", "velvet")
     assert done.returncode == 2

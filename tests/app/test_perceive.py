@@ -90,16 +90,18 @@ def test_bad_files_are_objects_with_a_reason_and_the_rest_goes_on(picture: Path,
     (folder / "notes.txt").write_text("other files are left alone")
     grey16 = cv2.imread(str(picture), cv2.IMREAD_GRAYSCALE).astype(np.uint16) * 257
     cv2.imwrite(str(folder / "d_grey16.png"), grey16)
+    (folder / "e_gone.png").symlink_to(tmp_path / "moved away.png")
     done = run("perceive", folder, "--jsonl", tmp_path / "o.jsonl")
     assert done.returncode == 0, done.stderr
-    cut, empty, good, grey = rows(tmp_path / "o.jsonl")
+    cut, empty, good, grey, gone = rows(tmp_path / "o.jsonl")
     assert "cut short" in cut["reason"]
     assert cut["state"] is None
     assert cut["confidence"] == 0
     assert "empty file" in empty["reason"]
     assert good["state"] is not None
     assert grey["state"] is not None
-    assert "2 pictures could not be read" in done.stderr
+    assert "No such file" in gone["reason"]
+    assert "3 pictures could not be read" in done.stderr
 
 
 def test_pictures_of_nothing_have_no_pose_and_a_named_reason(tmp_path: Path) -> None:
