@@ -130,7 +130,8 @@ def stale(request: GoalRequest | None, newest_s: float | None, now_s: float, saf
 
 
 def _age(age_s: float, limit_s: float) -> str:
-    return f"{1000 * age_s:.0f} ms (at most {1000 * limit_s:.0f} ms)"
+    age, limit = (f"{1000 * seconds:.0f} ms" for seconds in (age_s, limit_s))
+    return f"{age} (at most {limit})"
 
 
 def mistrust(measurement: Measurement | None, now_s: float, servos: ServosConfig, safety: SafetyConfig) -> Rejection | None:

@@ -275,6 +275,7 @@ def test_a_rejection_says_what_was_measured_against_what() -> None:
 
     assert detail(_step(_running(issued_s=0.0), _ask(age_s=0.25))) == "250 ms (at most 100 ms)"
     assert detail(_step(request=_ask(frame_age_s=0.25))) == "250 ms (at most 150 ms)"
+    assert detail(_step(request=_ask(frame_age_s=2.0))) == "2000 ms (at most 150 ms)"
     assert detail(_step(request=_ask(frame_age_s=None))) == "no frame behind the command"
     assert detail(_step(measurement=_at(age_s=0.25))) == "250 ms (at most 100 ms)"
     assert detail(_step(request=_ask(age_s=-0.5, frame_age_s=0.1))) == "command, by 0.500 s"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -12,7 +13,18 @@ from core.control.bus_watch import BusReport, BusWatch, bus_faults, see_bus
 from core.control.faults import Cause, Fault, Reaction, worst
 from core.control.frame_watch import FrameReport, FrameWatch, RouteState, frame_faults, see_arrival, see_frame
 from core.control.gate import RejectReason
-from core.control.health import Beat, GateReport, Health, Part, ServosChecked, faults_now, take
+from core.control.health import (
+    Beat,
+    DeadmanReport,
+    GateReport,
+    Health,
+    Part,
+    ServosBusy,
+    ServosChecked,
+    disarmed,
+    faults_now,
+    take,
+)
 from core.safety_config import SafetyConfig
 from core.types import Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, TICK_S
@@ -344,11 +356,11 @@ def _host_faults(health: Health, now_s: float) -> dict[Cause, str]:
 
 
 def test_signs_of_life_are_told_apart() -> None:
-    health = _take(Health(), Beat(Part.WINDOW))
-    assert Cause.WINDOW_HUNG not in _host_faults(health, 0.5)
-    assert _host_faults(health, 0.6)[Cause.WINDOW_HUNG] == "silent for 600 ms"
-    assert _host_faults(health, 0.1)[Cause.WORKER_DEAD] == "no sign of life yet"
-    assert Cause.WORKER_DEAD not in _host_faults(_take(health, Beat(Part.WORKER)), 0.5)
+    health = _take(Health(), Beat(Part.WINDOW), now_s=1.0)
+    assert Cause.WINDOW_HUNG not in _host_faults(health, 1.5)
+    assert _host_faults(health, 1.6)[Cause.WINDOW_HUNG] == "silent for 600 ms"
+    assert _host_faults(health, 1.1)[Cause.WORKER_DEAD] == "no sign of life yet"
+    assert Cause.WORKER_DEAD not in _host_faults(_take(health, Beat(Part.WORKER), now_s=1.0), 1.5)
 
 
 BROKEN = (
@@ -378,6 +390,37 @@ def test_only_a_command_that_goes_through_ends_the_row_of_broken_ones() -> None:
     assert Cause.COMMAND_REJECTED in _host_faults(_take(Health(), broken, broken, GateReport(None), broken), 0.0)
     ended = _host_faults(_take(Health(), broken, GateReport(None)), 0.0)
     assert Cause.COMMAND_REJECTED not in ended
+
+
+@pytest.mark.parametrize("ends", [lambda health: _take(health, GateReport(None)), disarmed])
+def test_a_row_of_broken_commands_begins_with_none(ends: Callable[[Health], Health]) -> None:
+    broken = [GateReport(RejectReason.OVER_RATE)] * (SAFETY.broken_results - 1)
+    again = _take(ends(_take(Health(), *broken)), *broken)
+    assert Cause.COMMANDS_REJECTED not in _host_faults(again, 0.0)
+    assert Cause.COMMANDS_REJECTED in _host_faults(_take(again, broken[0]), 0.0)
+
+
+@pytest.mark.parametrize(("silence_s", "counts"), [(SAFETY.hold_clear_s, True), (SAFETY.hold_clear_s + 0.0078125, False)])
+def test_the_longest_silence_after_which_a_held_deadman_still_counts(silence_s: float, counts: bool) -> None:
+    health = Health()
+    for pressed, now_s in ((False, 1.0), (True, 1.0), (True, 1.0 + silence_s)):
+        health = take(health, DeadmanReport(pressed), armed=True, now_s=now_s, servos=SERVOS, safety=SAFETY)
+    assert health.deadman.counts is counts
+
+
+def test_only_servos_that_are_as_configured_are_no_longer_restarted() -> None:
+    restarted = take(Health(), replace(GOOD_BUS, rebooted=True), armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
+    for problems, is_over in ((("advance has another model",), False), ((), True)):
+        health = take(restarted, ServosChecked(problems), armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
+        assert (Cause.REBOOTED not in _host_faults(health, 0.0)) is is_over
+
+
+def test_the_bus_may_be_silent_over_a_request_only_while_the_servos_are_off() -> None:
+    heard = take(Health(), GOOD_BUS, armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
+    on = take(heard, ServosChecked(()), armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
+    for health, is_excused in ((heard, True), (on, False)):
+        busy = take(health, ServosBusy(), armed=False, now_s=5.0, servos=SERVOS, safety=SAFETY)
+        assert (Cause.BUS_DEAD not in _host_faults(busy, 5.0)) is is_excused
 
 
 def _bus_goes_quiet(health: Health, ended: Fault | None) -> Health:
