@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from PySide6.QtCore import QUrl, Signal, Slot
+from PySide6.QtCore import QTimer, QUrl, Signal, Slot
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QAbstractItemView, QAbstractSpinBox, QComboBox, QLineEdit
 
@@ -37,6 +37,8 @@ OpenEngineFor = Callable[[Config], EngineLike]
 STALE_AFTER_S = 0.5
 PLAYBACK_STALE_AFTER_S = 3.0
 _STOP_WITHIN_MS = 20_000
+_PAINTED_AFTER_MS = 60
+"""By then the window has painted itself. Opening a rig imports for seconds, and whoever imports holds up who paints."""
 
 _log = logging.getLogger(__name__)
 
@@ -71,6 +73,7 @@ class OperatorWindow(WindowFrame):
         self._target: Point | None = None
         self._place_asked: Callable[[Point], object] | None = None
         self._thread = EngineThread(self)
+        self._first_rig = QTimer(self, singleShot=True, interval=_PAINTED_AFTER_MS)
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
         self._pace = TickPace(self)
         self._panels = OperatorPanels(config, kind, phantoms)
@@ -196,7 +199,7 @@ class OperatorWindow(WindowFrame):
     def lend(self, why: str) -> None:
         """Close the rig, so that somebody else can have camera and servos; it stands as FAULT with `why` until ``use_config``."""
         self._desk.reset()
-        self._thread.start_engine(partial(_lent, why))
+        self._start_engine(partial(_lent, why))
 
     def take_settings(self, config: Config) -> None:
         """What acts without opening the rig anew: thresholds of perception, folders. What is recorded from here on says so."""
@@ -243,16 +246,29 @@ class OperatorWindow(WindowFrame):
         self._panels.live.setFocus()
         self._pace.start()
         self._desk.start()
-        self._start_rig()
+        self._prepare_rig()
+        self._first_rig.timeout.connect(self._open_rig)
+        self._first_rig.start()
 
     def _start_rig(self) -> None:
+        self._prepare_rig()
+        self._open_rig()
+
+    def _prepare_rig(self) -> None:
         self._config = self.amend_config(self._config)
         self._panels.set_config(self._config)
         self._desk.reset()
         self.clear_target()
         self._recorder.open_rig(self._as_calibrated(self._config), self._kind)
         self._show_phase(Phase.STARTING)
-        self._thread.start_engine(partial(self._open_engine, self._config))
+
+    @Slot()
+    def _open_rig(self) -> None:
+        self._start_engine(partial(self._open_engine, self._config))
+
+    def _start_engine(self, open_engine: Callable[[], EngineLike]) -> None:
+        self._first_rig.stop()
+        self._thread.start_engine(open_engine)
 
     @Slot()
     def restart(self) -> None:
@@ -394,6 +410,7 @@ class OperatorWindow(WindowFrame):
         self._desk.halt()
         self._desk.detach()
         self._pace.stop()
+        self._first_rig.stop()
         self._panels.notice.clear()
 
     def _finish(self) -> Sequence[str]:
