@@ -49,6 +49,54 @@ def test_window_is_there_at_once_and_says_what_it_waits_for(make_window: MakeWin
     assert not window.panels.notice.isVisible()
 
 
+def test_a_rig_that_is_lent_before_it_was_opened_stays_lent(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    opened: list[Config] = []
+
+    def open_engine(config: Config) -> FakeEngine:
+        opened.append(config)
+        return FakeEngine(bench)
+
+    window = make_window(open_engine)
+    window.start()
+    window.lend("the rig is being set up")
+    until(qtbot, lambda: "being set up" in window.panels.notice.text)
+    qtbot.wait(200)  # longer than the window takes to paint itself
+    assert opened == []
+    window.use_config(window.config)
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert len(opened) == 1
+
+
+def test_a_rig_that_is_changed_before_it_was_opened_is_opened_once(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    opened: list[str] = []
+
+    def open_engine(config: Config) -> FakeEngine:
+        opened.append(config.twin.phantom)
+        return FakeEngine(bench)
+
+    window = make_window(open_engine)
+    window.start()
+    twin = window.config.twin.model_copy(update={"phantom": "y_branch"})
+    window.use_config(window.config.model_copy(update={"twin": twin}))
+    until(qtbot, lambda: window.shown_tick is not None)
+    qtbot.wait(200)  # longer than the window takes to paint itself
+    assert opened == ["y_branch"]
+
+
+def test_a_window_that_is_closed_before_its_rig_was_opened_opens_none(make_window: MakeWindow, qtbot: QtBot) -> None:
+    opened: list[Config] = []
+
+    def open_engine(config: Config) -> FakeEngine:
+        opened.append(config)
+        raise DeviceError("nobody is there any more")
+
+    window = make_window(open_engine)
+    window.start()
+    window.close()
+    qtbot.wait(200)  # longer than the window takes to paint itself
+    assert opened == []
+
+
 def test_millimetres_are_those_of_the_calibrated_rig(make_window: MakeWindow, bench: FakeBench, tmp_path: Path) -> None:
     scale = ScaleConfig(mm_per_px=0.2, size_px=(1280, 720), method="board", uncertainty_share=0.001)
     known = CalibrationConfig(made_utc=datetime(2025, 3, 4, tzinfo=UTC), scale=scale)
