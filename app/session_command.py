@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from app.learning_commands import progress_bar
@@ -34,7 +33,7 @@ def run_info(folder: Path, *, as_json: bool) -> None:
         return
     table = Table(title=str(folder), show_header=False)
     for key, value in result.items():
-        table.add_row(key, escape(_words(value)))
+        table.add_row(key, _words(value))
     Console(markup=False).print(table)
     if result["ended"] == "cut":
         sys.stderr.write(f"note: it did not end properly; repair it with: session recover {folder}\n")
