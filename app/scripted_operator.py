@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 from PySide6.QtCore import QObject, QTimer
@@ -67,7 +68,7 @@ class ScriptedOperator(QObject):
             desk.hold_deadman(False)
             desk.take(Step.ARM)
         elif mode in {Mode.ARMED, Mode.HOLD}:
-            if tick is not None and (target := _far_ahead(tick.scene)) is not None and mode is Mode.ARMED:
+            if tick is not None and mode is Mode.ARMED and (target := _far_ahead(tick.scene)) is not None:
                 self._window.choose_target(*target)
             desk.hold_deadman(True)
             desk.take(Step.HAND_OVER)
@@ -77,11 +78,15 @@ def _far_ahead(scene: Scene) -> Point | None:
     """The end of the vessel with the longest way that begins ahead of the head, in source pixels; None when no way is long."""
     if scene.path is None or scene.vessel_graph is None:
         return None
-    best_px, best = _LEAST_WAY_PX, None
-    for x, y in scene.vessel_graph.nodes.tolist():
-        route = plan_route(scene.vessel_graph, scene.path.head, (x, y))
-        if route is not None and route.length_px > best_px:
-            way = look_ahead(replace(scene, route=route), _LOOK_AHEAD.look_ahead_px, _LOOK_AHEAD)
-            if way is not None and not way.behind:
-                best_px, best = route.length_px, scene.to_source((x, y))
-    return best
+    graph, head = scene.vessel_graph, scene.path.head
+    times = Counter(node for edge in graph.edges for node in (edge.start, edge.end))
+    ends = [graph.nodes[node].tolist() for node, count in times.items() if count == 1]
+    routes = [(route, end) for end in ends if (route := plan_route(graph, head, (end[0], end[1]))) is not None]
+    # Here in the window's thread each look ahead counts: the longest way first, and mostly it is the only one.
+    for route, (x, y) in sorted(routes, key=lambda found: -found[0].length_px):
+        if route.length_px <= _LEAST_WAY_PX:
+            break
+        way = look_ahead(replace(scene, route=route), _LOOK_AHEAD.look_ahead_px, _LOOK_AHEAD)
+        if way is not None and not way.behind:
+            return scene.to_source((x, y))
+    return None
