@@ -60,6 +60,18 @@ def test_brightness_is_the_sorted_values_percentile() -> None:
     assert quality._level(np.full((1, 1), 255, np.uint8), 0.99) == 255.0
 
 
+@pytest.mark.parametrize("size", [1, 2, 16, 17, 300, 76_800])
+def test_the_steepest_steps_are_found_without_sorting_all(size: int) -> None:
+    rng = np.random.default_rng(size)
+    kinds = rng.gamma(0.5, 20.0, size), np.zeros(size), rng.integers(0, 3, size), np.sort(rng.gamma(0.3, 50.0, size))
+    at_the_far_end = np.zeros(size)
+    at_the_far_end[1::16] = 9.0  # where the sample does not look
+    for values in (*kinds, at_the_far_end):
+        steps = values.astype(np.float32)
+        place = int(0.995 * (size - 1))
+        assert quality._of_the_largest(steps, size - place) == np.sort(steps)[place]
+
+
 def test_sharpness_is_only_asked_where_a_limit_is_set() -> None:
     assert quality.check_image(picture("blurred"), QualityConfig(min_sharpness=0.0)) is None
 
