@@ -50,6 +50,9 @@ def train(
     focus: Annotated[
         float, typer.Option(min=0, max=0.9, help="share of the crops that show what the --init model finds hard")
     ] = 0.0,
+    end_weight: Annotated[
+        float, typer.Option(min=0, max=20, help="how much more than elsewhere a pixel counts near the robot's ends")
+    ] = 0.0,
     base: Annotated[
         int | None, typer.Option(min=4, max=128, help="plain U-Net of this base width instead of the folded one")
     ] = None,
@@ -75,6 +78,7 @@ def train(
         look_share=look_share,
         strip_share=strips,
         focus_share=focus,
+        end_weight=end_weight,
         keeps_statistics=remember > 0,
         stop_after=stop_after,
         seed=seed,

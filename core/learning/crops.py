@@ -19,6 +19,8 @@ from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX, look_again, places_to_look
 from core.perception.segmentation import Segmenter
+from core.perception.skeleton import end_pixels
+from core.perception.thinning import thin_parts
 from core.perception.windows import window_around
 from core.types import Image, Mask, Point
 
@@ -31,9 +33,13 @@ _EDGE_PX = 4
 """What is wrong farther than this from the robot's outline is no blur of it: a piece was missed or invented."""
 _WRONG_PLACES = 32
 _WRONG_JITTER_PX = 30.0
+_END_REACH_PX = 15.0
+"""Standard deviation of what counts as near to a robot's end: of the 40 px that its vector is fitted to the first 25 weigh most."""
+_BORDER_PX = 8.0
 
 Crop = tuple[Tensor, Tensor]
-"""uint8 (planes, h, w) and its labels uint8 (2, h, w): vessel, robot."""
+"""uint8 (planes, h, w) and its labels uint8 (2 or 3, h, w): vessel, robot (0, 1), and where the plan weighs the robot's ends, how
+near they are (0..255)."""
 
 
 class _Frames:
@@ -107,7 +113,7 @@ class FrameCrops(Dataset[Crop]):
                 image = with_strips(image, vessel, robot, rng)
         if rng.random() < self._plan.look_share:
             image = random_look(image, rng)
-        return _tensors(image, vessel, robot)
+        return _tensors(image, vessel, robot, self._plan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +176,7 @@ class NearCrops(Dataset[Crop]):
         cut = np.ascontiguousarray(cut)
         if rng.random() < self._plan.look_share:
             cut[:, :, :3] = random_look(cut[:, :, :3], rng)
-        return _tensors(cut[:, :, :5], cut[:, :, 5] > 0, cut[:, :, 6] > 0)
+        return _tensors(cut[:, :, :5], cut[:, :, 5] > 0, cut[:, :, 6] > 0, self._plan)
 
 
 def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...], rng: Generator) -> Point:
@@ -206,6 +212,30 @@ def _filled(cut: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.pad(cut, ((0, down), (0, right), (0, 0)), mode="edge") if down or right else cut
 
 
-def _tensors(image: NDArray[np.uint8], vessel: Mask, robot: Mask) -> Crop:
-    target = np.stack([vessel, robot]).astype(np.uint8)
-    return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(target)
+def _tensors(image: NDArray[np.uint8], vessel: Mask, robot: Mask, plan: TrainingPlan) -> Crop:
+    labels = [vessel.astype(np.uint8), robot.astype(np.uint8)]
+    if plan.end_weight > 0:
+        labels.append(_nearness(robot))
+    return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(np.stack(labels))
+
+
+def _nearness(robot: Mask) -> NDArray[np.uint8]:
+    """How near each pixel is to an end of the true robot, 255 there; where the cut-out's border cuts it off it does not end."""
+    rows, columns = np.ogrid[: robot.shape[0], : robot.shape[1]]
+    nearest = np.full(robot.shape, np.inf, np.float32)
+    for x, y in _true_ends(robot):
+        np.minimum(nearest, (rows - y) ** 2 + (columns - x) ** 2, out=nearest)
+    return np.asarray(np.rint(255 * np.exp(-0.5 * nearest / np.float32(_END_REACH_PX**2))), np.uint8)
+
+
+def _true_ends(robot: Mask) -> list[tuple[int, int]]:
+    """Ends (x, y) of a true mask's skeleton inside the cut-out: farther from its border than thinning draws back an end."""
+    left, top, across, down = cv2.boundingRect(robot.view(np.uint8))
+    if not across:
+        return []
+    box = np.ascontiguousarray(robot[top : top + down, left : left + across])
+    half_width = float(cv2.distanceTransform(np.pad(box, 1).view(np.uint8), cv2.DIST_L2, 3).max())
+    margin = max(_BORDER_PX, half_width + 3.0)
+    height, width = robot.shape
+    ends = ((x + left, y + top) for x, y in end_pixels(thin_parts(box)))
+    return [(x, y) for x, y in ends if min(x, y, width - 1 - x, height - 1 - y) >= margin]

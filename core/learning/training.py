@@ -29,8 +29,9 @@ class TrainingPlan:
     """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours,
     ``look_share`` of them are changed in exposure, colour, sharpness and noise, and in ``strip_share`` of the first look's ones
     clips lie over the robot. ``stop_after`` ends before the learning rate has come down: for a run that another one goes on from.
-    ``focus_share`` of the samples are drawn by difficulty. With ``keeps_statistics`` the normalisation stays as it was learnt:
-    that of a few frames alike would ruin it for all others."""
+    ``focus_share`` of the samples are drawn by difficulty. Around the robot's true ends a pixel counts ``1 + end_weight`` times:
+    theta and state are measured there. With ``keeps_statistics`` the normalisation stays as it was learnt: that of a few frames
+    alike would ruin it for all others."""
 
     steps: int = 6000
     batch: int = 12
@@ -44,6 +45,7 @@ class TrainingPlan:
     look_share: float = 1.0
     strip_share: float = 0.0
     focus_share: float = 0.0
+    end_weight: float = 0.0
     keeps_statistics: bool = False
     stop_after: int | None = None
     seed: int = 0
@@ -66,21 +68,31 @@ class Progress:
     images_per_s: float
 
 
-def loss_of(logits: Tensor, target: Tensor, robot_weight: float) -> tuple[Tensor, Tensor]:
-    """Cross entropy + Dice of both tasks, and the soft Dice (2,) of vessel and robot over the batch.
+def loss_of(logits: Tensor, target: Tensor, robot_weight: float, end_weight: float = 0.0) -> tuple[Tensor, Tensor]:
+    """Cross entropy + Dice of both tasks, and the plain soft Dice (2,) of vessel and robot over the batch.
+
+    ``target`` (N, 2 or 3, H, W) are vessel, robot, and how near a pixel is to an end of the robot (0..1): in the loss it counts
+    ``1 + end_weight`` times there, so that losses of different weights do not compare.
 
     Half of the Dice is taken over the batch, half over every crop by itself: over the batch alone, a crop whose robot is short or
     faint weighs next to nothing, and those are the crops in which a tip gets lost.
     """
     weights = logits.new_tensor([1.0, robot_weight])
-    entropy = torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction="none").mean(dim=(0, 2, 3))
+    counts = 1 + end_weight * target[:, 2:3] if target.shape[1] > 2 else None
+    target = target[:, :2]
+    entropies = torch.nn.functional.binary_cross_entropy_with_logits(logits, target, weight=counts, reduction="none")
+    entropy = entropies.mean(dim=(0, 2, 3))
     probability = torch.sigmoid(logits)
-    overlap, size = (probability * target).sum(dim=(2, 3)), (probability + target).sum(dim=(2, 3))
+    both, either = probability * target, probability + target
+    plain = (2 * both.sum(dim=(0, 2, 3)) + 1) / (either.sum(dim=(0, 2, 3)) + 1)
+    if counts is not None:
+        both, either = both * counts, either * counts
+    overlap, size = both.sum(dim=(2, 3)), either.sum(dim=(2, 3))
     dice = (2 * overlap.sum(dim=0) + 1) / (size.sum(dim=0) + 1)
     each = ((2 * overlap + _SMALL_AREA_PX) / (size + _SMALL_AREA_PX)).mean(dim=0)
     # The robot is some 2 % of the pixels: unweighted, its entropy would drown in the background's.
     entropy = entropy * logits.new_tensor([1.0, 5.0])
-    return ((entropy + 1 - 0.5 * (dice + each)) * weights).sum(), dice.detach()
+    return ((entropy + 1 - 0.5 * (dice + each)) * weights).sum(), plain.detach()
 
 
 def computes_in_bf16(device: torch.device) -> bool:
@@ -152,7 +164,10 @@ def train(
         batch = (image.to(device).float() / 255).contiguous(memory_format=torch.channels_last)
         with torch.autocast(device.type, torch.bfloat16, enabled=in_bf16):
             logits = network(batch)
-        loss, dice = loss_of(logits.float(), target.to(device).float(), plan.robot_weight)
+        labels = target.to(device).float()
+        if labels.shape[1] > 2:
+            labels[:, 2] /= 255
+        loss, dice = loss_of(logits.float(), labels, plan.robot_weight, plan.end_weight)
         for optimizer in optimizers:
             optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]

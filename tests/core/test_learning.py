@@ -1,6 +1,7 @@
 """Data set layout, augmentation and the training loop on a toy task."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,10 @@ import pytest
 
 from core.images import read_image
 from core.learning.augment import random_clutter, random_crop, random_look, with_strips
-from core.learning.crops import FrameCrops
+from core.learning.crops import FrameCrops, _nearness
 from core.learning.dataset import DatasetError, find_labelled, find_samples, read_truth, write_mask, write_png
 from core.learning.optimizer import make_optimizers, orthogonalised
-from core.learning.training import Progress, TrainingPlan, computes_in_bf16, train
+from core.learning.training import Progress, TrainingPlan, computes_in_bf16, loss_of, train
 from core.perception.unet import DualUNet, UNetShape
 
 
@@ -156,13 +157,21 @@ def test_looks_and_clutter_are_pictures() -> None:
         assert picture.dtype == np.uint8
 
 
-def _toy_training(folder: Path, steps: int, **kwargs: object) -> tuple[DualUNet, int]:
+def _toy_training(folder: Path, steps: int, *, end_weight: float = 0.0, **kwargs: object) -> tuple[DualUNet, int]:
     import torch
 
     torch.manual_seed(0)
     network = DualUNet(UNetShape((4, 8, 8, 8, 8), (4, 8, 8, 8), 1, 2))
     plan = TrainingPlan(
-        steps=steps, batch=4, learning_rate=4e-2, warmup_steps=5, crop=(64, 64), workers=0, average_decay=0.9, threads=1
+        steps=steps,
+        batch=4,
+        learning_rate=4e-2,
+        warmup_steps=5,
+        crop=(64, 64),
+        workers=0,
+        average_decay=0.9,
+        threads=1,
+        end_weight=end_weight,
     )
     return train(network, FrameCrops(find_samples([folder]), plan), plan, **kwargs)  # type: ignore[arg-type]
 
@@ -246,6 +255,65 @@ def test_a_frame_that_cannot_be_read_is_one_line_and_what_was_learnt_is_kept(tmp
     assert str(raised.value).startswith(str(cut))
     assert len(last) == 1
     assert 0 < last[0] < 30
+
+
+def test_the_robots_ends_are_told_where_they_count_for_more(tmp_path: Path) -> None:
+    samples = find_samples([_toy_set(tmp_path / "set", 1)])
+    plan = TrainingPlan(steps=20, batch=1, crop=(320, 320), clutter_share=0.0, look_share=0.0, end_weight=4.0)
+    crops, plain = FrameCrops(samples, plan), FrameCrops(samples, replace(plan, end_weight=0.0))
+    seen = 0
+    for index in range(20):
+        labels = crops[index][1].numpy()
+        assert plain[index][1].numpy().tolist() == labels[:2].tolist()
+        if labels[2].any():
+            seen += 1
+            rows, columns = np.nonzero(labels[2] == labels[2].max())
+            robot = np.argwhere(labels[1])
+            assert np.hypot(*(robot - (rows[0], columns[0])).T).min() <= 2.0, "it is on the robot"
+            assert labels[2].mean() < 25, "and nowhere else"
+    assert seen > 10
+
+
+@pytest.mark.parametrize("width", [1, 4, 10, 24, 40])
+def test_a_robot_does_not_end_where_it_is_cut_off(width: int) -> None:
+    robot = np.zeros((160, 160), bool)
+    robot[60 : 60 + width, :100] = True
+    peak = np.argwhere(_nearness(robot) == 255)
+    assert len(peak) == 1, "one end, the right one"
+    assert 99 - width <= peak[0][1] <= 99
+    robot[60 : 60 + width] = True
+    assert not _nearness(robot).any()
+    robot[:] = False
+    robot[60:76, 0] = True
+    assert not _nearness(robot).any(), "a sliver at the border"
+    assert not _nearness(np.zeros((160, 160), bool)).any()
+
+
+def test_what_is_wrong_near_an_end_costs_more() -> None:
+    import torch
+
+    target = torch.zeros(1, 3, 64, 64)
+    target[0, 1, 28:36, 8:40] = 1
+    target[0, 2, 20:44, 28:52] = 1
+    right = torch.where(target[:, :2] > 0, 6.0, -6.0)
+    at_the_end, elsewhere = right.clone(), right.clone()
+    at_the_end[0, 1, 28:36, 36:40] *= -1
+    elsewhere[0, 1, 28:36, 8:12] *= -1
+    plain = [float(loss_of(wrong, target[:, :2], 1.5)[0]) for wrong in (right, at_the_end, elsewhere)]
+    unweighted = [float(loss_of(wrong, target, 1.5)[0]) for wrong in (right, at_the_end, elsewhere)]
+    weighted = [float(loss_of(wrong, target, 1.5, 4.0)[0]) for wrong in (right, at_the_end, elsewhere)]
+    assert unweighted == pytest.approx(plain)
+    assert plain[1] == pytest.approx(plain[2])
+    assert weighted[1] - weighted[0] > 2 * (weighted[2] - weighted[0])
+    for wrong in (right, at_the_end, elsewhere):
+        assert loss_of(wrong, target, 1.5, 4.0)[1].equal(loss_of(wrong, target, 1.5)[1]), "what is told is the plain Dice"
+
+
+def test_training_weighs_the_ends_when_it_is_asked_to(tmp_path: Path) -> None:
+    folder = _toy_set(tmp_path / "set", 4)
+    plain, _ = _toy_training(folder, 4)
+    weighted, _ = _toy_training(folder, 4, end_weight=4.0)
+    assert not all(a.equal(b) for a, b in zip(plain.state_dict().values(), weighted.state_dict().values(), strict=True))
 
 
 def test_orthogonalised_directions_have_singular_values_near_one() -> None:
