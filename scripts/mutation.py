@@ -2,7 +2,8 @@
 
 Each mutant of gate and supervisor differs from the code in one place: a comparison, an operator, a condition, a number, a returned
 value. Its own unit tests are run against it, then the long ones (state machines, pilot). A mutant that they all pass is a survivor:
-either a test is missing, or the change changes nothing, which ``EXPLAINED`` has to say. Ends with 1 when a survivor is unexplained.
+either a test is missing, or the change changes nothing, which ``EXPLAINED`` has to say. Ends with 1 when a survivor is unexplained,
+and with 2 when the tests do not pass without any mutant: then they would find everything.
 
 Works on copies in a temporary folder; takes a quarter of an hour on two cores. `python scripts/mutation.py NAME ...` does only the
 modules of these names.
@@ -16,9 +17,11 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from queue import Queue
 
@@ -35,7 +38,7 @@ TESTS = {
 }
 """Module -> the tests that should find its mutants."""
 LONG_TESTS = ("test_safety_machine.py", "test_pilot.py", "test_pilot_machine.py")
-JOBS = len(os.sched_getaffinity(0))
+JOBS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 TIMEOUT_S = 300.0
 
 MISTRUST = "without a measurement to believe there is an objection already; it stands there for the type checker"
@@ -68,15 +71,15 @@ EXPLAINED = {
     (
         "joint_limits",
         "faster_mm_s = max(0.0, speed_mm_s * direction) + joint.max_acceleration_mm_s2 * passed_s",
-        "Mult -> Div",
+        "Mult -> Div of speed_mm_s * direction",
     ): "a direction is 1 or -1",
     ("joint_limits", "return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit", "Gt -> GtE"): TIE,
-    ("health", "reported_s: float = 0.0", "0.0 -> 1.0"): "nobody reads it before the first report",
+    ("health", "reported_s: float = 0.0", "0.0 -> 1.0"): "before the first report nothing is pressed, whenever that was",
     ("health", "counts: bool = False", "False -> True"): "what is not pressed does not count",
     (
         "health",
         "counts = pressed and ((before is True and deadman.counts) or (before is False and armed))",
-        "without term 1",
+        "without term 1 of pressed and (before is True and deadman.counts or (before is False and armed))",
     ): TWICE,
     (
         "health",
@@ -105,7 +108,10 @@ HARMLESS = {"strict", "frozen", "slots"}
 
 @dataclass(frozen=True)
 class Mutant:
-    """A module with one change. ``line`` is the changed line's old text, ``change`` says what was done to it."""
+    """A module with one change.
+
+    ``line`` is the changed line's old text, ``change`` says what was done to it, and to which part where the line has several.
+    """
 
     module: str
     number: int
@@ -118,15 +124,21 @@ def mutants(module: str, source: str) -> Iterator[Mutant]:
     """All mutants of a module's source. Each parses; none is the source."""
     tree = ast.parse(source)
     lines = source.splitlines()
+    found = [(node, change, new, lines[getattr(node, "lineno", 0) - 1].strip()) for node, change, new in _changes_in(tree)]
+    alike = Counter((line, change) for _, change, _, line in found)
+    for node, change, new, line in found:
+        part = f" of {ast.unparse(node).splitlines()[0]}" if alike[line, change] > 1 else ""
+        changed = ast.unparse(_Swap(node, new).visit(tree))
+        _Swap(new, node).visit(tree)
+        yield Mutant(module, getattr(node, "lineno", 0), line, change + part, changed)
+
+
+def _changes_in(tree: ast.Module) -> Iterator[tuple[ast.AST, str, ast.AST]]:
     harmless = {id(word.value) for word in ast.walk(tree) if isinstance(word, ast.keyword) and word.arg in HARMLESS}
-    for node in list(ast.walk(tree)):
-        if id(node) in harmless:
-            continue
-        for change, replacement in _changes(node):
-            changed = ast.unparse(_Swap(node, replacement).visit(tree))
-            _Swap(replacement, node).visit(tree)
-            number = getattr(node, "lineno", 0)
-            yield Mutant(module, number, lines[number - 1].strip(), change, changed)
+    for node in ast.walk(tree):
+        if id(node) not in harmless:
+            for change, new in _changes(node):
+                yield node, change, new
 
 
 class _Swap(ast.NodeTransformer):
@@ -171,17 +183,27 @@ def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
         yield "returns None", ast.Return(ast.Constant(None))
 
 
-def survives(mutant: Mutant, tree: Path) -> bool:
-    """Whether all tests pass in `tree`, a copy of the project, with the mutant in it."""
+class Fate(Enum):
+    """What became of a mutant. A test that stands still or is killed has found it, too, but told nobody why."""
+
+    FOUND = "found"
+    HANGS = "hangs"
+    SURVIVES = "survives"
+
+
+def fate_of(mutant: Mutant, tree: Path) -> Fate:
+    """What the tests say in `tree`, a copy of the project, with the mutant in it."""
     path = tree / FOLDER / f"{mutant.module}.py"
     path.write_text(mutant.source, encoding="utf-8")
     try:
-        return all(_passes(tree, tests) for tests in (TESTS[mutant.module], LONG_TESTS))
+        fates = (run_tests(tree, tests) for tests in (TESTS[mutant.module], LONG_TESTS))
+        return next((fate for fate in fates if fate is not Fate.SURVIVES), Fate.SURVIVES)
     finally:
         path.write_bytes((ROOT / FOLDER / path.name).read_bytes())
 
 
-def _passes(tree: Path, tests: tuple[str, ...]) -> bool:
+def run_tests(tree: Path, tests: tuple[str, ...]) -> Fate:
+    """SURVIVES: they all pass."""
     command = [
         sys.executable,
         "-B",
@@ -194,19 +216,28 @@ def _passes(tree: Path, tests: tuple[str, ...]) -> bool:
         *(f"tests/core/{name}" for name in tests),
     ]
     try:
-        return subprocess.run(command, cwd=tree, capture_output=True, timeout=TIMEOUT_S, check=False).returncode == 0
+        code = subprocess.run(command, cwd=tree, capture_output=True, timeout=TIMEOUT_S, check=False).returncode
     except subprocess.TimeoutExpired:
-        return False
+        return Fate.HANGS
+    return Fate.SURVIVES if code == 0 else Fate.FOUND if code > 0 else Fate.HANGS
+
+
+def broken_tests(modules: list[str], tree: Path) -> list[str]:
+    """Of the tests that are to find mutants of the modules those that do not pass on the code as it is."""
+    asked = {name for module in modules for name in TESTS[module]} | set(LONG_TESTS)
+    return [name for name in sorted(asked) if run_tests(tree, (name,)) is not Fate.SURVIVES]
 
 
 def copy_project(folder: Path) -> Path:
-    """A copy of what is tracked, as it lies here."""
-    files = subprocess.run(["git", "ls-files", "-z", "--", "core", "hardware", "tests", "resources", "*.toml"], cwd=ROOT,
-                           capture_output=True, check=True).stdout.decode().split("\0")  # fmt: skip
+    """A copy of the project as it lies here, with what is new and without what is ignored."""
+    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--"]
+    parts = ["core", "hardware", "tests", "resources", "*.toml"]
+    files = subprocess.run([*listed, *parts], cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0")
     for name in filter(None, files):
-        target = folder / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes((ROOT / name).read_bytes())
+        if (ROOT / name).is_file():  # not one that was just deleted
+            target = folder / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes((ROOT / name).read_bytes())
     return folder
 
 
@@ -215,38 +246,47 @@ def main(modules: list[str]) -> int:
     if unknown := set(modules) - TESTS.keys():
         sys.stderr.write(f"unknown: {', '.join(sorted(unknown))}; known are {', '.join(TESTS)}\n")
         return 2
+    modules = modules or list(TESTS)
     todo = [
-        mutant
-        for module in modules or TESTS
-        for mutant in mutants(module, (ROOT / FOLDER / f"{module}.py").read_text(encoding="utf-8"))
+        mutant for module in modules for mutant in mutants(module, (ROOT / FOLDER / f"{module}.py").read_text(encoding="utf-8"))
     ]
     with tempfile.TemporaryDirectory() as folder, Progress() as bar, ThreadPoolExecutor(JOBS) as pool:
+        copies = [copy_project(Path(folder) / str(job)) for job in range(JOBS)]
+        if broken := broken_tests(modules, copies[0]):
+            sys.stderr.write(f"{', '.join(broken)}: does not pass as it is; mend it first, or every change seems to be found\n")
+            return 2
         trees: Queue[Path] = Queue()
-        for job in range(JOBS):
-            trees.put(copy_project(Path(folder) / str(job)))
+        for tree in copies:
+            trees.put(tree)
         task = bar.add_task("mutants", total=len(todo))
 
-        def judge(mutant: Mutant) -> bool:
+        def judge(mutant: Mutant) -> Fate:
             tree = trees.get()
             try:
-                return survives(mutant, tree)
+                return fate_of(mutant, tree)
             finally:
                 trees.put(tree)
                 bar.advance(task)
 
-        survivors = [mutant for mutant, survived in zip(todo, pool.map(judge, todo), strict=True) if survived]
-    return _report(todo, survivors)
+        fates = list(zip(todo, pool.map(judge, todo), strict=True))
+    return report(fates)
 
 
-def _report(todo: list[Mutant], survivors: list[Mutant]) -> int:
+def report(fates: list[tuple[Mutant, Fate]]) -> int:
+    """Tell what survives, and why it may; returns the exit code."""
+    counts = Counter(fate for _, fate in fates)
     unexplained = 0
-    for mutant in survivors:
-        why = EXPLAINED.get((mutant.module, mutant.line, mutant.change))
+    for mutant, fate in fates:
+        if fate is Fate.FOUND:
+            continue
+        why = EXPLAINED.get((mutant.module, mutant.line, mutant.change)) if fate is Fate.SURVIVES else "the tests stood still"
         unexplained += why is None
         place = f"{FOLDER}/{mutant.module}.py:{mutant.number}"
         sys.stdout.write(f"{place}: {mutant.change}\n    {mutant.line}\n    {why or 'NOT EXPLAINED'}\n")
-    found = len(todo) - len(survivors)
-    sys.stdout.write(f"{len(todo)} mutants, {found} found by tests, {len(survivors)} survive, {unexplained} of them unexplained\n")
+    sys.stdout.write(
+        f"{len(fates)} mutants, {counts[Fate.FOUND]} found by tests, {counts[Fate.HANGS]} by tests that stand still, "
+        f"{counts[Fate.SURVIVES]} survive, {unexplained} of them unexplained\n"
+    )
     return 1 if unexplained else 0
 
 

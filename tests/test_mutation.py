@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib.util
 import sys
+from collections import Counter
 from pathlib import Path
 from types import ModuleType
 
@@ -40,15 +41,54 @@ def test_a_small_module_has_all_its_mutants(mutation: ModuleType) -> None:
 
 
 def test_every_explained_survivor_is_a_change_of_todays_code(mutation: ModuleType) -> None:
-    known = set()
+    known: Counter[tuple[str, str, str]] = Counter()
     for module, tests in mutation.TESTS.items():
         source = (ROOT / mutation.FOLDER / f"{module}.py").read_text(encoding="utf-8")
         same = ast.unparse(ast.parse(source))
         for mutant in mutation.mutants(module, source):
             assert mutant.source != same, f"{module}:{mutant.number}: {mutant.change}"
-            known.add((module, mutant.line, mutant.change))
+            known[module, mutant.line, mutant.change] += 1
         assert all((ROOT / "tests" / "core" / name).exists() for name in (*tests, *mutation.LONG_TESTS))
-    assert mutation.EXPLAINED.keys() <= known
+    assert {key: known[key] for key in mutation.EXPLAINED} == dict.fromkeys(mutation.EXPLAINED, 1), "one change each"
+
+
+def test_changes_that_read_alike_say_what_they_change(mutation: ModuleType) -> None:
+    source = "def f(a, b, c):\n    return a and (b and c or a)\n"
+    changes = {mutant.change for mutant in mutation.mutants("gate", source)}
+    assert {
+        "without term 1 of a and (b and c or a)",
+        "without term 1 of b and c or a",
+        "without term 1 of b and c",
+        "Or -> And",
+    } <= changes
+    assert "without term 1" not in changes
+
+
+def test_a_test_that_fails_as_it_is_finds_nothing(
+    mutation: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "tests" / "core").mkdir(parents=True)
+    (tmp_path / "tests" / "core" / "test_red.py").write_text("def test_red():\n    assert False\n")
+    (tmp_path / "tests" / "core" / "test_green.py").write_text("def test_green():\n    pass\n")
+    monkeypatch.setattr(mutation, "LONG_TESTS", ("test_green.py",))
+    monkeypatch.setattr(mutation, "TESTS", {"gate": ("test_red.py", "test_missing.py")})
+    monkeypatch.setattr(mutation, "copy_project", lambda _folder: tmp_path)
+    assert mutation.main(["gate"]) == 2
+    said = capsys.readouterr().err
+    assert said == "test_missing.py, test_red.py: does not pass as it is; mend it first, or every change seems to be found\n"
+    monkeypatch.setattr(mutation, "TESTS", {"gate": ("test_green.py",)})
+    assert mutation.broken_tests(["gate"], tmp_path) == []
+
+
+def test_a_survivor_without_an_explanation_is_a_failure(mutation: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
+    key = next(iter(mutation.EXPLAINED))
+    explained = mutation.Mutant(key[0], 3, key[1], key[2], "")
+    new = mutation.Mutant("gate", 7, "if a > b:", "Gt -> GtE", "")
+    fate = mutation.Fate
+    assert mutation.report([(explained, fate.SURVIVES), (new, fate.FOUND), (new, fate.HANGS)]) == 0
+    assert "3 mutants, 1 found by tests, 1 by tests that stand still, 1 survive, 0 of them unexplained" in capsys.readouterr().out
+    assert mutation.report([(explained, fate.SURVIVES), (new, fate.SURVIVES)]) == 1
+    assert "core/control/gate.py:7: Gt -> GtE\n    if a > b:\n    NOT EXPLAINED" in capsys.readouterr().out
 
 
 def test_an_unknown_module_is_one_line(mutation: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
