@@ -119,11 +119,14 @@ class DriveDesk(QObject):
     def ask(self, act: Act) -> None:
         """A request of the operator; refusals come back as alerts."""
         pilot = self._thread.pilot
+        if pilot is None and act is Act.STOP:
+            if self._thread.stop_opening():
+                self._panels.log(EventKind.OPERATOR, tr("stop: the rig that is being opened starts stopped"))
+                return
+            pilot = self._thread.pilot  # it may have been opened between the two questions
         if pilot is not None:
             pilot.ask(act)
             self._panels.log(EventKind.OPERATOR, act.value)
-        elif act is Act.STOP and self._thread.stop_opening():
-            self._panels.log(EventKind.OPERATOR, tr("stop: the rig that is being opened starts stopped"))
         elif act is Act.STOP:
             self._panels.log(EventKind.OPERATOR, tr("stop: no rig is open, so nothing moves"))
 

@@ -87,6 +87,11 @@ class EngineThread(QThread):
         with self._lock:
             self._changed.set()
 
+    def announce_engine(self) -> None:
+        """One will be started soon: a STOP until then is kept for it."""
+        with self._lock:
+            self._opening = True
+
     def start_engine(self, open_engine: OpenEngine) -> None:
         """Close what runs and open this engine instead; of several orders in a row the last one wins."""
         with self._lock:
@@ -115,7 +120,7 @@ class EngineThread(QThread):
         return engine.problem if engine is not None else None
 
     def stop_opening(self) -> bool:
-        """STOP while an engine is being opened: it starts stopped. False when none is being opened."""
+        """STOP while an engine is announced or being opened: it starts stopped. False when there is none. From any thread."""
         with self._lock:
             self._stop_next = self._stop_next or self._opening
             return self._opening

@@ -52,16 +52,21 @@ class OperatorDevices(QObject):
             self._pedal.close()
 
     def _on_gamepad(self, state: GamepadState) -> None:
-        pilot = self._pilot()
+        pilot = self._pilot() or self._pilot_after(state.stop)
         if pilot is None:
-            if state.stop:
-                self._stop()
             return
         pilot.jog("gamepad", Jog(state.bend_rate, state.pitch_rate, state.advance, state.delivery))
         if state.deadman is not None:
             pilot.deadman("gamepad", state.deadman)
         if state.stop:
             pilot.ask(Act.STOP)
+
+    def _pilot_after(self, stop: bool) -> Pilot | None:
+        """Without a pilot STOP goes to whoever else has the servos; a rig may have been opened in that moment."""
+        if not stop:
+            return None
+        self._stop()
+        return self._pilot()
 
     def _on_gamepad_device(self, name: str | None, problem: GamepadError | None) -> None:
         before, self._gamepad_name = self._gamepad_name, name
@@ -73,10 +78,8 @@ class OperatorDevices(QObject):
             self.said.emit(tr("Gamepad lost: {name}", name=before), True)
 
     def _on_pedal(self, report: PedalReport) -> None:
-        pilot = self._pilot()
+        pilot = self._pilot() or self._pilot_after(report.stop)
         if pilot is None:
-            if report.stop:
-                self._stop()
             return
         pilot.deadman("pedal", report.deadman)
         if report.stop:

@@ -38,7 +38,8 @@ STALE_AFTER_S = 0.5
 PLAYBACK_STALE_AFTER_S = 3.0
 _STOP_WITHIN_MS = 20_000
 _PAINTED_AFTER_MS = 60
-"""By then the window has painted itself. Opening a rig imports for seconds, and whoever imports holds up who paints."""
+"""By then the window has painted itself, on a screen of this machine. Opening a rig imports for seconds, and whoever imports holds
+up who paints: where painting begins later, it takes longer."""
 
 _log = logging.getLogger(__name__)
 
@@ -115,6 +116,10 @@ class OperatorWindow(WindowFrame):
     def pilot(self) -> Pilot | None:
         """The running rig's pilot; from any thread."""
         return self._thread.pilot
+
+    def stop_opening(self) -> bool:
+        """STOP while a rig is being opened: it starts stopped. False when none is. From any thread."""
+        return self._thread.stop_opening()
 
     @Slot(str, bool)
     def say(self, message: str, is_fault: bool = False) -> None:
@@ -247,6 +252,7 @@ class OperatorWindow(WindowFrame):
         self._pace.start()
         self._desk.start()
         self._prepare_rig()
+        self._thread.announce_engine()
         self._first_rig.timeout.connect(self._open_rig)
         self._first_rig.start()
 

@@ -110,7 +110,12 @@ def run_window(
         switches = overlay_switches(panels.overlay_bar)
         LayoutKeeper(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
     rigs = RigDesk(window)
-    devices = OperatorDevices(config, lambda: window.pilot, window, rigs.stop)
+
+    def stop() -> None:  # whoever has the servos, or is about to
+        window.stop_opening()
+        rigs.stop()
+
+    devices = OperatorDevices(config, lambda: window.pilot, window, stop)
     devices.said.connect(window.say)
     application.aboutToQuit.connect(settings.close)
     application.aboutToQuit.connect(rigs.close)

@@ -162,6 +162,17 @@ def test_stop_while_an_engine_is_being_opened_stops_it(
     assert later.pilot.acts == [], "what was stopped before is the rig's own left-over"
 
 
+def test_stop_before_an_announced_engine_is_opened_stops_it(
+    qtbot: QtBot, thread: EngineThread, statuses: list[EngineStatus], bench: FakeBench
+) -> None:
+    engine = FakeEngine(bench)
+    thread.announce_engine()
+    assert thread.stop_opening()
+    thread.start_engine(lambda: engine)
+    qtbot.waitUntil(lambda: Phase.RUNNING in phases(statuses))
+    assert engine.pilot.acts == [Act.STOP]
+
+
 def test_stop_while_an_engine_cannot_be_opened_stops_the_next(
     qtbot: QtBot, thread: EngineThread, statuses: list[EngineStatus], bench: FakeBench
 ) -> None:

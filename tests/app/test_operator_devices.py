@@ -22,6 +22,17 @@ def pedal() -> Iterator[SoftPedal]:
         yield made
 
 
+def test_a_rig_that_is_opened_while_stop_is_on_its_way_is_stopped(qtbot: QtBot) -> None:
+    there: list[FakePilot] = []
+    config = Config.model_validate({"gamepad": {"enabled": False}})
+    devices = OperatorDevices(config, lambda: there[0] if there else None, stop=lambda: there.append(FakePilot()))  # type: ignore[arg-type,return-value]
+    devices._on_gamepad(GamepadState(0.0, 0.0, 0.0, 0.0, None, False, 1.0))
+    assert there == []
+    devices._on_gamepad(GamepadState(0.0, 0.0, 0.0, 0.0, None, True, 1.0))
+    assert [pilot.acts for pilot in there] == [[Act.STOP]]
+    devices.close()
+
+
 def test_a_gamepads_state_is_a_jog_a_deadman_and_a_stop(qtbot: QtBot) -> None:
     pilot = FakePilot()
     devices = OperatorDevices(Config.model_validate({"gamepad": {"enabled": False}}), lambda: pilot)  # type: ignore[arg-type,return-value]

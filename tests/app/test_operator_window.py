@@ -11,11 +11,12 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.engine_thread import Phase
+from app.engine_thread import EngineThread, Phase
 from app.operator_window import OperatorWindow
 from core.calibration_config import CalibrationConfig, ScaleConfig
 from core.config import Config
 from core.control.hand import AT_REST
+from core.control.modes import Act
 from core.devices import DeviceError, EndOfStream
 from core.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.types import Reason, Refusal
@@ -47,6 +48,25 @@ def test_window_is_there_at_once_and_says_what_it_waits_for(make_window: MakeWin
     until(qtbot, lambda: window.shown_tick is not None)
     assert opened == [True]
     assert not window.panels.notice.isVisible()
+
+
+def test_stop_before_the_first_rig_is_opened_is_kept_for_it(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    engine = FakeEngine(bench)
+    window = make_window(lambda _config: engine)
+    window.start()
+    window.desk.stop()
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert engine.pilot.acts[0] is Act.STOP
+
+
+def test_stop_in_the_moment_in_which_a_rig_is_opened_is_not_lost(
+    running: OperatorWindow, engine: FakeEngine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = iter([None, engine.pilot])
+    monkeypatch.setattr(EngineThread, "pilot", property(lambda _self: next(found)))
+    running.desk.ask(Act.STOP)
+    monkeypatch.undo()
+    assert engine.pilot.acts == [Act.STOP]
 
 
 def test_a_rig_that_is_lent_before_it_was_opened_stays_lent(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
