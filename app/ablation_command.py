@@ -17,7 +17,7 @@ from app.ablation_streams import measure_streams
 from app.ablation_tables import difference_table, markdown, stream_table, value_table
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
-from core.config import PerceptionConfig, load_config
+from core.config import PerceptionConfig, choose_model, load_config
 from core.errors import UserError
 from core.study.ablation import OURS, PAPER, STEPS, TRACKING, SameMasks, Variant, make_variants
 from core.study.ablation_figures import draws_groups, figures, frame_rows, refusals
@@ -57,7 +57,7 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
     """Run it and print the tables; raises UserError. An interruption (Ctrl-C) prints what was measured until then."""
     if plan.folder is None and not plan.sequence:
         raise AblationError("nothing to measure on: give a labelled set (as synth writes it), --sequence N, or both")
-    overrides = {"perception": {"segmentation": {"model": plan.model}}} if plan.model else None
+    overrides = choose_model(plan.model)
     ours = load_config(plan.config_path, None, overrides).perception
     paper = load_config(plan.config_path, "paper", overrides).perception
     samples, truth = _labelled(plan.folder) if plan.folder is not None else ([], {})
@@ -197,7 +197,7 @@ def _show(result: dict[str, Any], as_json: bool, out: Path | None) -> None:
     if as_json:
         sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
     else:
-        console = Console(markup=False) if sys.stdout.isatty() else Console(width=_WIDTH, markup=False)
+        console = Console(markup=False, emoji=False) if sys.stdout.isatty() else Console(width=_WIDTH, markup=False, emoji=False)
         if "rows" in result:
             console.print(value_table(result), difference_table(result))
         if result.get("stream"):

@@ -15,7 +15,7 @@ from typing import Any
 from app.annotate_sources import default_store, image_files
 from app.language import tr
 from app.learning_commands import progress_bar
-from core.config import Config, load_config
+from core.config import Config, choose_model, load_config
 from core.profiles import own_config
 from core.study.annotation_images import FoundImage, find_images
 from core.study.annotation_records import ItemKey, StoredAnnotation
@@ -84,8 +84,7 @@ def run_annotate(options: AnnotateOptions) -> int:
 
 
 def _config(options: AnnotateOptions) -> Config:
-    overrides = {"perception": {"segmentation": {"model": options.model}}} if options.model else None
-    return load_config(options.config_path, overrides=overrides)
+    return load_config(options.config_path, overrides=choose_model(options.model))
 
 
 def _store_of(paths: Sequence[Path]) -> Path:

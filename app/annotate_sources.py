@@ -32,14 +32,19 @@ def image_files(paths: Sequence[Path], frames: int) -> list[Path]:
     for path in paths:
         if not path.exists():
             raise AnnotationError(f"{path}: no such file or folder")
-        found = expand([path])
+        found = _whole(path)
         if path.is_dir() and not found and (path / "images").is_dir():  # a labelled set
-            found = expand([path / "images"])
+            found = _whole(path / "images")
         for file in found:
             files += _frames_of(file, frames) if file.suffix.lower() in VIDEO_ENDINGS else [file]
     if not files:
         raise AnnotationError(f"{paths[0]}: no picture or video in it")
     return files
+
+
+def _whole(path: Path) -> list[Path]:
+    """What can be annotated in it: a link that leads nowhere cannot, and keeps nobody from the rest."""
+    return [file for file in expand([path]) if file.exists()]
 
 
 def _frames_of(video: Path, count: int) -> list[Path]:

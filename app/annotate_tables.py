@@ -15,7 +15,7 @@ _COLUMNS = 5
 
 def print_agreement(report: Mapping[str, Any]) -> None:
     """Tables on standard output: first against second measure, then rater against rater, then all together."""
-    console = Console(markup=False)
+    console = Console(markup=False, emoji=False)
     name = f"Study {report['study']}" if report["study"] else "Annotations outside studies"
     console.print(f"{name}: {report['annotations']} answers on {report['images']} images", "", sep="\n", highlight=False)
     for title, columns in agreement_tables(report).items():

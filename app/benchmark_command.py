@@ -18,7 +18,7 @@ from rich.table import Table
 
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
-from core.config import Config, TwinConfig, load_config
+from core.config import Config, TwinConfig, choose_model, load_config
 from core.types import Frame, Image, Scene
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ _WARM_UP = 3
 
 
 def _config(model: str | None, preset: str | None, config_path: Path | None) -> Config:
-    return load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model is not None else None)
+    return load_config(config_path, preset, choose_model(model))
 
 
 def _as_in_a_stream(config: Config) -> Config:
@@ -213,7 +213,7 @@ def _print(result: dict[str, Any], as_json: bool, title: str) -> None:
                 table.add_row(f"{key}.{inner_key}", _words(inner))
         else:
             table.add_row(key, _words(value))
-    Console(markup=False).print(table)
+    Console(markup=False, emoji=False).print(table)
 
 
 def _words(value: Any) -> str:

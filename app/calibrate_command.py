@@ -45,7 +45,7 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None
             tables.append(table)
     left_out.tell(len(calibrations))
     write_calibration(target, *calibrations)
-    Console(markup=False).print(*tables)
+    Console(markup=False, emoji=False).print(*tables)
     sys.stderr.write("measure it on another set: main.py benchmark --accuracy SET\n")
 
 

@@ -31,14 +31,14 @@ def run_doctor(rig: str | None, config_path: Path | None, *, as_json: bool) -> i
 
 def _with_progress(checks: Iterator[Check]) -> Iterator[Check]:
     """The slowest take seconds: say on standard error that something happens."""
-    with Console(stderr=True).status("checking ...") as status:
+    with Console(stderr=True, emoji=False).status("checking ...") as status:
         for check in checks:
-            status.update(f"checking ... {check.name}: {'ok' if check.ok else 'not ok'}")
+            status.update(Text(f"checking ... {check.name}: {'ok' if check.ok else 'not ok'}"))
             yield check
 
 
 def _print(checks: list[Check]) -> None:
-    console = Console(highlight=False, markup=False)
+    console = Console(highlight=False, markup=False, emoji=False)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, expand=False)
     table.add_column("", no_wrap=True)
     table.add_column("check", no_wrap=True, min_width=_NAME_COLUMNS)

@@ -15,7 +15,7 @@ from app.evaluation_report import print_tables, render_report
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
 from app.progress_lines import asked_teller
-from core.config import Config, load_config
+from core.config import Config, choose_model, load_config
 from core.study.annotation_report import write_measures
 from core.study.evaluation import EvaluationError, Measurement, angle_pairs, evaluate, read_measurements, write_measurements
 from core.study.paper_study import PAPER, against_paper, choose_images, measure_twice, wanted_images
@@ -86,7 +86,7 @@ def run_evaluate(
             raise EvaluationError(f"{folder}: has no annotation file; begin the study with: annotate {folder} --study {study_name}")
         truth = _read_set(folder) if annotations is None else []
         _make_folder(out)
-        config = load_config(config_path, preset, {"perception": {"segmentation": {"model": model}}} if model is not None else None)
+        config = load_config(config_path, preset, choose_model(model))
         if annotations is not None:
             as_recorded = config_path is None and preset is None
             study = _perceive_annotated(annotations, config, preset, model, study_name, seed, as_recorded=as_recorded)

@@ -80,7 +80,7 @@ def class_rows(state: Mapping[str, Any]) -> list[ClassRow]:
 
 def print_tables(metrics: Mapping[str, Any]) -> None:
     """All figures on standard output, the paper's beside ours, then the notes."""
-    console, judged = Console(markup=False), "against_paper" in metrics
+    console, judged = Console(markup=False, emoji=False), "against_paper" in metrics
     for title, figures, n in (("Angle", ANGLE_FIGURES, metrics["angle"]["n"]), ("State", STATE_FIGURES, metrics["state"]["n"])):
         table = _table(f"{title} (n = {n})", "here", "95 % interval", "paper", *(["verdict"] if judged else []))
         for row in comparison_rows(metrics, figures):

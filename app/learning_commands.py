@@ -23,7 +23,7 @@ from rich.progress import (
 
 from app.progress_lines import ProgressLines, Teller, asked_teller
 
-_console = Console(stderr=True, markup=False)
+_console = Console(stderr=True, markup=False, emoji=False)
 
 
 def progress_bar() -> Progress:

@@ -15,7 +15,7 @@ from app.line_output import LineOutput
 from app.overlay_picture import draw_overlay
 from app.scene_json import scene_to_json, unread_to_json
 from app.sources import SourcePicture, expand, pictures
-from core.config import load_config
+from core.config import choose_model, load_config
 from core.control.policy import table_policy
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
@@ -47,8 +47,7 @@ def run_perceive(
     from app.learning_commands import progress_bar
     from core.perception.pipeline import open_pipeline
 
-    overrides: dict[str, Any] = {"perception": {"segmentation": {"model": model}}} if model is not None else {}
-    config = load_config(config_path, preset, overrides)
+    config = load_config(config_path, preset, choose_model(model))
     targets = _Targets(_read_targets(targets_path))
     files = expand(paths)
     if not files:

@@ -16,7 +16,7 @@ from app.learning_commands import Interrupt, progress_bar
 from app.line_output import LineOutput
 from app.perceive_command import _make_folder
 from app.scene_json import scene_to_json, unread_to_json
-from core.config import Config, load_config
+from core.config import Config, choose_model, load_config, merge
 from core.errors import UserError
 from core.learning.model_file import model_folder, read_model_info
 from core.session.manifest import Manifest, SessionError
@@ -82,22 +82,18 @@ def replay_config(manifest: Manifest | None, options: ReplayOptions) -> tuple[Co
 
     `--model` wins over both. Raises ConfigError.
     """
-    overrides: dict[str, Any] = {"perception": {"segmentation": {"model": options.model}}} if options.model else {}
+    overrides = choose_model(options.model)
     recorded = manifest.config.get("perception") if manifest is not None else None
     if options.config_path is not None or options.preset is not None:
         return load_config(options.config_path, options.preset, overrides), []
     if not isinstance(recorded, dict):
         return load_config(overrides=overrides), ["the recorded configuration is lost; the default one is taken"]
     try:
-        config = Config.model_validate({"perception": recorded})
+        config = Config.model_validate(merge({"perception": recorded}, overrides))
     except ValidationError as error:
         key = ".".join(str(part) for part in error.errors()[0]["loc"])
         note = f"the recorded configuration is not one of this version ({key}); the default one is taken"
         return load_config(overrides=overrides), [note]
-    if options.model:
-        perception = config.perception
-        segmentation = perception.segmentation.model_copy(update={"model": options.model})
-        config = config.model_copy(update={"perception": perception.model_copy(update={"segmentation": segmentation})})
     return config, []
 
 

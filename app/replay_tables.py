@@ -18,7 +18,7 @@ _DASH = "\N{EN DASH}"
 
 def print_replay(result: dict[str, Any], changes: Sequence[Change], *, with_diff: bool, count: int) -> None:
     """On standard output."""
-    console = Console(markup=False)
+    console = Console(markup=False, emoji=False)
     console.print(_sums(result))
     console.print(_states(result["states"]["matrix"]))
     if with_diff:

@@ -34,7 +34,7 @@ def run_info(folder: Path, *, as_json: bool) -> None:
     table = Table(title=str(folder), show_header=False)
     for key, value in result.items():
         table.add_row(key, _words(value))
-    Console(markup=False).print(table)
+    Console(markup=False, emoji=False).print(table)
     if result["ended"] == "cut":
         sys.stderr.write(f"note: it did not end properly; repair it with: session recover {folder}\n")
 

@@ -22,13 +22,13 @@ from rich.console import Console
 
 from app.learning_commands import progress_bar
 from app.trial_store import Job, KeptTrials, TrialError
-from core.config import load_config
+from core.config import choose_model, load_config
 from core.control.policies import POLICY_NAMES
 from core.policy_config import PolicyName
 from core.study.trial import Row, summarise
 from hardware.twin.trial import Look, TrialPlan
 
-_console = Console(stderr=True, markup=False)
+_console = Console(stderr=True, markup=False, emoji=False)
 _MAX_SEEDS = 100_000
 
 
@@ -91,7 +91,7 @@ def run_trials(
     as_json: bool,
 ) -> None:
     """Run a campaign and tell its results; raises TrialError, ConfigError, ModelError, and KeyboardInterrupt once all is kept."""
-    overrides: dict[str, Any] = {"perception": {"segmentation": {"model": model}}} if model is not None else {}
+    overrides = choose_model(model)
     config = load_config(config_path, None, overrides)
     chosen = parse_policies(policies or [config.policy.name])
     if workers > 1 or scheduler is not None:  # one thread each: workers must not fight for the cores

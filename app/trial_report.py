@@ -109,7 +109,7 @@ def _or_dash(value: float | None) -> str:
 
 def print_tables(rows: Rows, sums: Mapping[str, Mapping[str, Any]]) -> None:
     """Every trial, then the sums, on standard output."""
-    console = Console(markup=False)
+    console = Console(markup=False, emoji=False)
     trials = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for heading in HEADINGS:
         trials.add_column(heading, no_wrap=True)

@@ -271,6 +271,11 @@ def merge(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
+def choose_model(model: str | None) -> dict[str, Any]:
+    """Overrides for ``load_config`` that choose a model; None leaves it as it is. An empty name is refused like any wrong value."""
+    return {} if model is None else {"perception": {"segmentation": {"model": model}}}
+
+
 def _allowed(error: dict[str, Any]) -> str:
     context = error.get("ctx", {})
     limits = [f"{name} {context[key]}" for key, name in (("ge", ">="), ("gt", ">"), ("le", "<="), ("lt", "<")) if key in context]

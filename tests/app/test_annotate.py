@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,7 +13,7 @@ import av
 import numpy as np
 import pytest
 
-from app.annotate_command import AnnotateOptions, StudyOptions, _queue, run_annotate
+from app.annotate_command import AnnotateOptions, StudyOptions, _config, _queue, run_annotate
 from app.annotate_sources import default_store, image_files
 from app.evaluate_command import run_evaluate
 from core.config import Config, TwinConfig
@@ -165,6 +166,25 @@ def test_a_damaged_file_is_salvaged_into_a_new_one(folder: Path, capsys: pytest.
     assert path.read_bytes() == data[: len(data) // 2]
     with pytest.raises(UserError, match="is there already; choose another --out"):
         run(folder, salvage=True)
+
+
+def test_a_link_that_leads_nowhere_keeps_nobody_from_the_rest(pictures: Path, tmp_path: Path) -> None:
+    some, labelled = tmp_path / "some", tmp_path / "labelled"
+    some.mkdir()
+    shutil.copy(sorted(pictures.glob("*.png"))[0], some / "a.png")
+    for name in ("clip.mp4", "b.png"):
+        (some / name).symlink_to(tmp_path / "gone")
+    assert image_files([some], 4) == [some / "a.png"]
+    shutil.copytree(some, labelled / "images", symlinks=True)
+    (labelled / "c.png").symlink_to(tmp_path / "gone")
+    assert image_files([labelled], 4) == [labelled / "images" / "a.png"]
+    with pytest.raises(UserError, match="no such file or folder"):
+        image_files([some / "b.png"], 4)
+
+
+def test_an_empty_name_is_no_model() -> None:
+    with pytest.raises(UserError, match=r"segmentation\.model"):
+        _config(AnnotateOptions(paths=(), model=""))
 
 
 def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:

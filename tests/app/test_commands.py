@@ -17,6 +17,7 @@ import pytest
 from core.learning.crops import _Order
 from core.learning.dataset import find_samples
 from core.learning.model_file import read_model_info
+from tests.app.golden_session import GOLDEN
 
 MAIN = Path(__file__).resolve().parents[2] / "main.py"
 
@@ -151,9 +152,19 @@ def test_a_folders_name_is_shown_as_it_is(tmp_path: Path) -> None:
     assert "q[/red]x" in done.stderr.replace("\n", "")
 
 
-@pytest.mark.parametrize("command", [("perceive", "no.png"), ("benchmark", "--frames", "3")])
-def test_an_empty_name_is_no_model(command: tuple[str, ...]) -> None:
-    done = run(*command, "--model", "")
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("perceive", "no.png"),
+        ("benchmark", "--frames", "3"),
+        ("ablation", "--sequence", "3"),
+        ("trial", "--seeds", "0:1"),
+        ("replay", GOLDEN),
+    ],
+)
+def test_an_empty_name_is_no_model(command: tuple[object, ...], tmp_path: Path) -> None:
+    out = ("--out", tmp_path / "out") if command[0] in ("trial", "ablation") else ()
+    done = run(*command, *out, "--model", "")
     assert done.returncode == 2
     assert "segmentation.model" in done.stderr
 
