@@ -65,6 +65,8 @@ class Hooks:
     read_s: float = 0.0
     perceive_s: float = 0.0
     window_lives: bool = True
+    recorder_keeps_up: bool = True
+    """Lock-step waits for the recorder, which goes by the wall's clock, so that only a case that wants it sees dropped frames."""
 
 
 class BenchCamera:
@@ -209,6 +211,8 @@ class FaultBench:
             self.ticks.append(replace(tick, frame=corner, scene=replace(tick.scene, masks=None, skeletons=None)))
             status = self.robot.bus_status() if isinstance(self.robot, ServoRobot) else None
             self.writer.put(tick, self.view, status)
+            if not self.live and self.hooks.recorder_keeps_up:
+                self.wait_for(lambda: self.writer.pictures_waiting == 0)
         return self._beat()
 
     def pass_time(self, seconds: float) -> None:
@@ -238,7 +242,7 @@ class FaultBench:
             if self.live:
                 self.turn()
             else:
-                time.sleep(0.01)
+                time.sleep(_WALL_S)
         return wanted()
 
     def _wait(self) -> None:

@@ -87,9 +87,11 @@ def slow_encoder(kit: Kit) -> Seen:
     with open_bench(kit, live=False, record={"max_queue": 3}) as bench:
         start = mark(bench.hand_over())
         with patch.object(FrameEncoder, "encode", slow):
+            bench.hooks.recorder_keeps_up = False
             bench.run(0.5)
             go_on.set()
-            bench.wait_for(lambda: bench.writer._pictures_waiting == 0)
+            bench.wait_for(lambda: bench.writer.pictures_waiting == 0)
+            bench.hooks.recorder_keeps_up = True
         bench.run(1.1)  # the next picture tells how many were dropped before it
         dropped = bench.writer.status().dropped
         problems = [] if dropped > 0 else ["nothing was counted as dropped"]

@@ -123,6 +123,11 @@ class SessionWriter:
             self._changed.notify()
         return True
 
+    @property
+    def pictures_waiting(self) -> int:
+        """Handed over and not yet taken up."""
+        return self._pictures_waiting
+
     def status(self) -> RecordStatus:
         """How it is going, now."""
         status = self._board.status

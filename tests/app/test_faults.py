@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from app.faults.registry import COUNT, CampaignError, Kit, Seen, all_cases, fault, run_case
 from app.faults.report import page_of, to_json
 from app.faults_command import run_faults
+from core.session.recording import Recording
 
 CASES = {case.number: case for case in all_cases()}
 HERE = (1, 3, 8, 9, 11, 12, 13, 15, 16, 30, 34, 38)
@@ -27,6 +30,20 @@ def test_it_goes_as_listed(number: int) -> None:
     assert CASES[number].quick
     result = run_case(CASES[number], live=False)
     assert result.seen.problems == ()
+
+
+def test_on_a_slow_disk_the_encoder_too_slow_goes_as_listed_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def slow(name: str, act: Callable[..., object]) -> None:
+        def later(self: Recording, *given: object) -> object:
+            done = act(self, *given)
+            time.sleep(0.3)
+            return done
+
+        monkeypatch.setattr(Recording, name, later)
+
+    slow("begin", Recording.begin)
+    slow("take_picture", Recording.take_picture)
+    assert run_case(CASES[38], live=False).seen.problems == ()
 
 
 def test_the_command_tells_one_fault_per_line(capsys: pytest.CaptureFixture[str]) -> None:
