@@ -182,9 +182,9 @@ def run_accuracy(
     `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network.
     """
     from core.learning.dataset import POSE_KEYS, find_labelled
-    from core.learning.model_file import model_folder, sha256_of, write_figures
+    from core.learning.model_file import model_folder, sha256_of, trained_without, write_figures
     from core.perception.pipeline import Pipeline, open_pipeline
-    from core.study.accuracy import TrueMasks, score_set, summarise
+    from core.study.accuracy import TrueMasks, score_set, summarise, summarise_looks
     from core.study.calibration import describe_confidence
 
     config = _config(model, preset, config_path)
@@ -196,6 +196,10 @@ def run_accuracy(
         scores = list(bar.track(found, total=len(samples), description="frames"))
     left_out.tell(len(scores))
     figures = summarise(scores) | describe_confidence(scores) | ({"left_out": len(left_out)} if left_out else {})
+    looks = {stem: str(row["family"]) for stem, row in truth.items() if row.get("family") is not None}
+    if scores and all(score.stem in looks for score in scores):
+        without = [] if true_masks else trained_without(model_folder(config.perception.segmentation.model))
+        figures |= summarise_looks(scores, looks, without)
     _print(figures, as_json, f"accuracy on {folder}")
     if store and not true_masks:
         described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}

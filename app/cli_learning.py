@@ -37,6 +37,10 @@ def train(
     ] = 0,
     shallow: Annotated[bool, typer.Option("--shallow", help="a new network of two convolutions on every level")] = False,
     deepen: Annotated[bool, typer.Option("--deepen", help="give the --init network the default's depth before training")] = False,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(help="leave out frames of this family of looks, to be tested on; may be repeated"),
+    ] = None,
     second_look: Annotated[
         bool, typer.Option("--second-look", help="train the network of the --init model's second look, near the robot's ends")
     ] = False,
@@ -64,7 +68,7 @@ def train(
     progress_json: ProgressOption = False,
 ) -> None:
     """Train or fine-tune the network; Ctrl-C keeps what was learnt."""
-    from app.learning_commands import TrainOutputs, run_train
+    from app.learning_commands import TrainInputs, TrainOutputs, run_train
     from core.learning.training import TrainingPlan
 
     if remember and (synthetic or not data or init is None):
@@ -87,8 +91,7 @@ def train(
     tell_asked_progress(progress_json)
     run_train(
         TrainOutputs(out, held_out),
-        data or [],
-        synthetic or remember,
+        TrainInputs(data or (), synthetic or remember, without or ()),
         init,
         base,
         plan,

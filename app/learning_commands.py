@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
@@ -84,10 +84,32 @@ class TrainOutputs:
     held_out: Path | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class TrainInputs:
+    """Labelled folders, how many frames to make besides, and the families of looks that are left out of both."""
+
+    data: Sequence[Path] = ()
+    synthetic: int = 0
+    without: Sequence[str] = ()
+
+    def looks_to_make(self) -> tuple[str, ...] | None:
+        """Families of the frames made now; None: all. Raises DatasetError when `without` names an unknown one, or leaves none."""
+        from core.learning.dataset import DatasetError
+        from hardware.twin.look_families import LOOK_FAMILIES
+        from hardware.twin.synth import LOOKS
+
+        unknown = next((look for look in self.without if look not in LOOKS), None)
+        if unknown is not None:
+            raise DatasetError(f"unknown look family {unknown!r} in --without; known: {', '.join(LOOKS)}")
+        looks = tuple(look for look in LOOK_FAMILIES if look not in self.without)
+        if self.synthetic and not looks:
+            raise DatasetError("--without leaves no family of looks to make frames of; name fewer")
+        return looks if self.without else None
+
+
 def run_train(
     outputs: TrainOutputs,
-    data: list[Path],
-    synthetic: int,
+    inputs: TrainInputs,
     init: str | None,
     base: int | None,
     plan: Any,
@@ -102,6 +124,8 @@ def run_train(
     new network has two convolutions on every level. With `second_look`, it is the network of the second look of `init` that learns,
     and `out` is `init` with it. Where the plan keeps the normalisation, `data` is shown as often as the frames made now.
     """
+    looks = inputs.looks_to_make()
+
     import torch
 
     from app.lessons import FrameLesson, Lesson, SecondLookLesson
@@ -111,7 +135,7 @@ def run_train(
 
     if second_look and outputs.held_out is not None:
         raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
-    if not data and not synthetic:
+    if not inputs.data and not inputs.synthetic:
         raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
     if init is not None:
         model_folder(init)  # what is not there is said before half a minute of frames is made
@@ -121,14 +145,14 @@ def run_train(
         log = out.with_name(out.name + ".log").open("a", encoding="utf-8", buffering=1)
     except OSError as error:
         raise DatasetError(f"{out.parent}: cannot be written ({error.strerror}); choose another --out") from None
-    folders = list(data)
-    samples = find_samples(folders)
-    if synthetic:
+    folders = list(inputs.data)
+    samples = [sample for folder in folders for sample in _samples_of(folder, inputs.without)]
+    if inputs.synthetic:
         folder = out.with_name(out.name + "_frames")
-        run_synth(folder, synthetic, 1_000_000 + plan.seed * 100_000, (640, 480), None, None, 1)
+        run_synth(folder, inputs.synthetic, 1_000_000 + plan.seed * 100_000, (640, 480), looks, None, 1)
         folders.append(folder)
         if plan.keeps_statistics:  # few frames of a new look, shown as often as all that is to be remembered
-            samples *= max(1, round(synthetic / len(samples)))
+            samples *= max(1, round(inputs.synthetic / len(samples)))
         samples += find_samples([folder])
     torch.manual_seed(plan.seed)
     lesson: Lesson
@@ -139,6 +163,8 @@ def run_train(
     plan = replace(plan, crop=lesson.sides(plan.crop))
     then = None if second_look else second_plan(plan, init)
     notes = {"init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
+    if inputs.without:
+        notes |= {"without": list(inputs.without)}
     teller, watch = asked_teller(), HeldOutWatch(outputs.held_out, out, asked_teller(), log.write)
     with log, Interrupt() as interrupt, progress_bar() as bar:
         room = Classroom(out, notes, log.write, teller, bar, interrupt, watch, steps_total=plan.steps + (then.steps if then else 0))
@@ -157,6 +183,13 @@ def run_train(
         teller.tell({"model": str(out), "steps_done": done, "steps": steps})
     ending = "" if done == steps else f" (interrupted after {done} of {steps} steps; go on with --init {out})"
     _console.print(f"model written to {out}{ending}", soft_wrap=True)
+
+
+def _samples_of(folder: Path, without: Sequence[str]) -> list[Any]:
+    from core.learning.dataset import find_samples, leave_out_looks
+
+    found = find_samples([folder])
+    return leave_out_looks(folder, found, without) if without else found
 
 
 class HeldOutWatch:

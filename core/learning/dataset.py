@@ -84,6 +84,7 @@ class _TruthRow(BaseModel):
 
     stem: Annotated[str, Field(strict=True)]
     seed: int | str | None = None
+    family: Annotated[str, Field(strict=True)] | None = None
     theta_deg: _Number | None = None
     state: Literal["A", "B", "C", "D"] | None = None
     theta_signed_deg: _Number | None = None
@@ -101,6 +102,7 @@ class _TruthRow(BaseModel):
 _WANTED = {
     "stem": "must be the frame's name, as text",
     "seed": "must be a whole number or a text",
+    "family": "must be the name of a family of looks, as text",
     "state": "must be A, B, C, D or null",
     "head_xy": "must be two finite numbers, or null",
     "tail_xy": "must be two finite numbers, or null",
@@ -156,6 +158,21 @@ def find_labelled(folder: Path, needed: Sequence[str] = ()) -> tuple[list[Sample
         if missing:
             raise DatasetError(f"{folder}: truth of frame {row['stem']} lacks {missing[0]}; write the set again with synth")
     return samples, truth
+
+
+def leave_out_looks(folder: Path, samples: Sequence[Sample], looks: Sequence[str]) -> list[Sample]:
+    """The samples of a folder whose truth names none of these families of looks.
+
+    Raises DatasetError when nothing is left, or when a frame's truth does not say which look it has.
+    """
+    truth = read_truth(folder)
+    untold = next((sample.stem for sample in samples if truth.get(sample.stem, {}).get("family") is None), None)
+    if untold is not None:
+        raise DatasetError(f"{folder}: truth.jsonl names no family of looks for frame {untold}; leave --without out")
+    kept = [sample for sample in samples if truth[sample.stem]["family"] not in looks]
+    if not kept:
+        raise DatasetError(f"{folder}: every frame is of a look that is left out ({', '.join(looks)}); name fewer with --without")
+    return kept
 
 
 def write_mask(path: Path, mask: Mask) -> None:

@@ -132,6 +132,12 @@ def check_files(info: ModelInfo, folder: Path, names: Sequence[str]) -> None:
             raise ModelError(f"{file}: SHA-256 differs from {INFO}: the file is cut or damaged; restore the model folder")
 
 
+def trained_without(folder: Path) -> tuple[str, ...]:
+    """The families of looks that its training left out, as ``model.json`` says. Raises ModelError."""
+    told = read_model_info(folder, verify=()).training.get("without")
+    return tuple(str(look) for look in told) if isinstance(told, list) else ()
+
+
 def second_look_of(folder: Path) -> Path | None:
     """The folder of a model's second look, None when it has none; ModelError when it is gone or not the one it belongs to."""
     expected = read_model_info(folder, verify=()).second_look_sha256

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -170,6 +170,50 @@ def summarise(scores: Sequence[FrameScore]) -> dict[str, Any]:
         "poseless_frames": len(poseless),
         "answers_on_poseless_frames": sum(s.answered for s in poseless),
     }
+
+
+_PER_LOOK = (
+    "frames",
+    "answered_share",
+    "vessel_dice",
+    "robot_dice",
+    "head_error_px",
+    "theta_error_deg",
+    "state_agreement",
+    "confident_and_wrong_share",
+)
+
+
+def summarise_looks(scores: Sequence[FrameScore], looks: Mapping[str, str], unseen: Collection[str] = ()) -> dict[str, Any]:
+    """The main figures of every family of looks, errors as medians, and their means over the looks.
+
+    Parameters
+    ----------
+    scores : of the frames.
+    looks : family of every frame, by its stem.
+    unseen : families that training has left out; their mean is given by itself.
+
+    Returns
+    -------
+    dict
+        ``looks``: figures by family; ``mean_over_looks`` and, where some were left out, ``mean_over_looks_left_out``.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    for look in sorted({looks[score.stem] for score in scores}):
+        sums = summarise([score for score in scores if looks[score.stem] == look])
+        rows[look] = {key: sums[key]["median"] if isinstance(sums[key], dict) else sums[key] for key in _PER_LOOK}
+    left_out = [row for look, row in rows.items() if look in unseen]
+    trained = [row for look, row in rows.items() if look not in unseen]
+    means = {"mean_over_looks": _means(trained)} if trained else {}
+    return {"looks": rows} | means | ({"mean_over_looks_left_out": _means(left_out)} if left_out else {})
+
+
+def _means(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    means: dict[str, Any] = {"looks": len(rows), "frames": sum(row["frames"] for row in rows)}
+    for key in _PER_LOOK[1:]:
+        told = [row[key] for row in rows if row[key] is not None]
+        means[key] = float(np.mean(told)) if told else None
+    return means
 
 
 def _pearson(pairs: Sequence[tuple[float, float]]) -> float | None:

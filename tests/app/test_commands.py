@@ -9,13 +9,14 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from core.learning.crops import _Order
-from core.learning.dataset import find_samples
+from core.learning.dataset import find_samples, read_truth
 from core.learning.model_file import read_model_info
 from tests.app.golden_session import GOLDEN
 
@@ -99,6 +100,17 @@ def test_a_few_frames_of_a_new_look_are_learnt_beside_what_is_to_be_remembered(n
     assert (done.returncode, "--remember N is for" in done.stderr) == (2, True)
 
 
+def test_looks_can_be_left_out_of_training(frames: Path, tmp_path: Path) -> None:
+    looks = [row["family"] for row in read_truth(frames).values()]
+    out, few = tmp_path / "without", ("--steps", 1, "--batch", 1, "--crop", 64, "--base", 4, "--threads", 1)
+    done = run("train", "--data", frames, "--out", out, "--without", looks[0], *few)
+    assert done.returncode == 0, done.stderr
+    info = read_model_info(out)
+    assert (info.training["without"], info.training["frames"]) == ([looks[0]], sum(look != looks[0] for look in looks))
+    done = run("train", "--data", frames, "--out", tmp_path / "none", "--without", "purple", *few)
+    assert (done.returncode, "unknown look family 'purple' in --without; known: silicone_white" in done.stderr) == (2, True)
+
+
 def test_an_interrupted_training_keeps_what_was_learnt(frames: Path, tmp_path: Path) -> None:
     out = tmp_path / "long"
     command = ["train", "--data", frames, "--out", out, "--steps", 100_000, "--batch", 1, "--crop", 64, "--base", 4, "--threads", 1]
@@ -137,12 +149,19 @@ def test_accuracy_goes_on_after_a_damaged_picture(model: Path, frames: Path, tmp
     assert f"note: 1 of 6 frames could not be read and are left out; the first: {cut}" in done.stderr
 
 
-def test_accuracy_is_one_json_object(model: Path, frames: Path) -> None:
-    done = run("benchmark", "--accuracy", frames, "--model", model, "--json")
+def test_accuracy_is_one_json_object_and_tells_by_look(model: Path, frames: Path, tmp_path: Path) -> None:
+    looks = [row["family"] for row in read_truth(frames).values()]
+    without = Path(shutil.copytree(model, tmp_path / "without"))
+    info = json.loads((without / "model.json").read_text())
+    info["training"]["without"] = [looks[0]]
+    (without / "model.json").write_text(json.dumps(info))
+    done = run("benchmark", "--accuracy", frames, "--model", without, "--json")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert result["frames"] == 6
     assert 0 <= result["vessel_dice"] <= 1
+    assert {look: row["frames"] for look, row in result["looks"].items()} == Counter(looks)
+    assert result["mean_over_looks_left_out"]["frames"] == looks.count(looks[0])
 
 
 def test_a_folders_name_is_shown_as_it_is(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.learning.dataset import DatasetError
-from core.study.accuracy import FrameScore, dice, kappa, score_frame, summarise
+from core.study.accuracy import FrameScore, dice, kappa, score_frame, summarise, summarise_looks
 from core.types import Masks, Pose, PoseState, Reason, Refusal, RobotPath, Scene
 from tests.core.drawing import art
 
@@ -161,3 +161,33 @@ def test_angles_that_do_not_vary_have_no_correlation() -> None:
 def test_a_truth_without_a_head_says_what_it_lacks() -> None:
     with pytest.raises(DatasetError, match=r"frame a: truth\.jsonl has theta_deg of it, but not head_xy"):
         score_frame("a", scene(), VESSEL, ROBOT, {"state": "C", "theta_deg": 12.0, "theta_signed_deg": 12.0})
+
+
+def test_looks_that_training_left_out_have_a_mean_of_their_own() -> None:
+    scores = [
+        score(stem="a", vessel_dice=0.9),
+        score(stem="b", vessel_dice=0.7, state="B"),
+        score(stem="c", vessel_dice=0.5),
+        score(stem="d", vessel_dice=0.1, robot_dice=0.2),
+        score(**REFUSED, stem="e", reason=Reason.NO_ROBOT, vessel_dice=0.3, robot_dice=0.4),
+    ]
+    sums = summarise_looks(scores, {"a": "red", "b": "red", "c": "blue", "d": "x-ray", "e": "x-ray"}, ["x-ray", "never met"])
+    assert list(sums["looks"]) == ["blue", "red", "x-ray"]
+    assert sums["looks"]["red"] == {
+        "frames": 2,
+        "answered_share": 1.0,
+        "vessel_dice": pytest.approx(0.8),
+        "robot_dice": pytest.approx(0.8),
+        "head_error_px": 2.0,
+        "theta_error_deg": 1.0,
+        "state_agreement": 0.5,
+        "confident_and_wrong_share": 0.0,
+    }
+    # every look counts alike, however many frames it has
+    assert sums["mean_over_looks"]["vessel_dice"] == pytest.approx((0.8 + 0.5) / 2)
+    assert (sums["mean_over_looks"]["looks"], sums["mean_over_looks"]["frames"]) == (2, 3)
+    left_out = sums["mean_over_looks_left_out"]
+    assert (left_out["looks"], left_out["frames"], left_out["answered_share"]) == (1, 2, 0.5)
+    assert left_out["robot_dice"] == pytest.approx(0.3)
+    assert "mean_over_looks_left_out" not in summarise_looks(scores[:3], {"a": "red", "b": "red", "c": "blue"})
+    assert "mean_over_looks" not in summarise_looks(scores[:1], {"a": "red"}, ["red"])

@@ -10,7 +10,7 @@ import pytest
 from core.images import read_image
 from core.learning.augment import random_clutter, random_crop, random_look, with_strips
 from core.learning.crops import FrameCrops, _nearness
-from core.learning.dataset import DatasetError, find_labelled, find_samples, read_truth, write_mask, write_png
+from core.learning.dataset import DatasetError, find_labelled, find_samples, leave_out_looks, read_truth, write_mask, write_png
 from core.learning.optimizer import make_optimizers, orthogonalised
 from core.learning.training import Progress, TrainingPlan, computes_in_bf16, loss_of, train
 from core.perception.unet import DualUNet, UNetShape
@@ -79,6 +79,7 @@ def test_truth_skips_a_cut_last_line_and_names_any_other(tmp_path: Path) -> None
         ('"state": ["A"]', "state"),
         ('"state": "Z"', "state"),
         ('"seed": [1]', "seed"),
+        ('"family": 3', "family"),
         ('"tail_xy": "there"', "tail_xy"),
         ('"state": "A", "theta_deg": null', "state"),
         ('"theta_deg": "x", "state": "A"', "theta_deg"),
@@ -108,6 +109,19 @@ def test_what_else_a_row_says_and_frames_without_a_pose_are_welcome(tmp_path: Pa
     ]
     (tmp_path / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     assert list(read_truth(tmp_path).values()) == rows
+
+
+def test_looks_are_left_out_by_what_the_truth_says(tmp_path: Path) -> None:
+    folder = _toy_set(tmp_path / "set", 3)
+    samples = find_samples([folder])
+    rows = [{"stem": sample.stem, "family": look} for sample, look in zip(samples, ("red", "x-ray", "red"), strict=True)]
+    (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert leave_out_looks(folder, samples, ["x-ray"]) == [samples[0], samples[2]]
+    with pytest.raises(DatasetError, match="every frame is of a look that is left out"):
+        leave_out_looks(folder, samples, ["x-ray", "red"])
+    (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows[:2]))
+    with pytest.raises(DatasetError, match=f"names no family of looks for frame {samples[2].stem}"):
+        leave_out_looks(folder, samples, ["x-ray"])
 
 
 def test_a_row_that_is_no_object_is_damaged(tmp_path: Path) -> None:
