@@ -110,7 +110,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
 
         from app.annotation_desk import AnnotationDesk
         from app.annotator_window import AnnotatorWindow
-        from app.layout_keeper import LayoutKeeper, Parts, Switch
+        from app.layout_keeper import LayoutKeeper, Parts, Switch, toggling
 
         desk = AnnotationDesk(store, items, config.perception, blind=bool(options.study.name))
         _tell(store.problems)
@@ -121,7 +121,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         )
         window = AnnotatorWindow(desk, who)
         bar = window.panels.bar
-        switches = {name: Switch(partial(bar.is_on, key), lambda _on, which=key: bar.toggle(which)) for name, key in _KEPT}
+        switches = {name: Switch(partial(bar.is_on, key), toggling(partial(bar.toggle, key))) for name, key in _KEPT}
         LayoutKeeper(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
         return run_until_closed(application, window, window.say)
 
@@ -208,8 +208,8 @@ def _study(store: AnnotationStore, images: Sequence[FoundImage], options: StudyO
         or (options.order is not None and _order(options.order, settings.order) is not settings.order)
     )
     if differs:
-        views = ", ".join(view.value for view in settings.views)
-        was = f"shown {settings.repeats} times ({views}), order {settings.order.value}, seed {settings.seed}"
+        shown = ", ".join(view.value for view in settings.views)
+        was = f"shown {settings.repeats} times ({shown}), order {settings.order.value}, seed {settings.seed}"
         raise AnnotationError(f"study {options.name!r} was begun otherwise: {was}; leave these options out, or choose another name")
     return settings
 

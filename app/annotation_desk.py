@@ -99,10 +99,10 @@ class AnnotationDesk(QObject):
         self._retry = QTimer(self)
         self._retry.setSingleShot(True)
         self._retry.setInterval(_RETRY_MS)
-        self._retry.timeout.connect(lambda: self._saving.submit("edit", self._write_all))
         self._is_shut = False
         self._last_sign_s = self._counted_s = time.monotonic()
         self._loading, self._saving, self._perceiving = (WorkThread(name, self) for name in ("loading", "saving", "perceiving"))
+        self._retry.timeout.connect(lambda: self._saving.submit("edit", self._write_all))
         self._loading.done.connect(self._on_loaded)
         self._loading.failed.connect(self._on_load_failed)
         self._saving.done.connect(self._on_saved)

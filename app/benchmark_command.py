@@ -72,8 +72,8 @@ def run_speed(frames: int, *, model: str | None, preset: str | None, config_path
             bar.advance(task)
     stages = sorted({stage for scene in scenes for stage in scene.latency_ms} - {"total"})
     totals = [scene.latency_ms["total"] for scene in scenes]
-    before = [scene.latency_ms.get("prepare", 0.0) + scene.latency_ms.get("network", 0.0) for scene in scenes]
-    after = [total - network for total, network in zip(totals, before, strict=True)]
+    until_seen = [scene.latency_ms.get("prepare", 0.0) + scene.latency_ms.get("network", 0.0) for scene in scenes]
+    after = [total - network for total, network in zip(totals, until_seen, strict=True)]
     result = {
         "total_ms": quantiles(totals),
         "after_network_ms": quantiles(after),

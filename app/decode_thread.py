@@ -7,6 +7,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QObject, QThread, Signal
@@ -15,12 +16,12 @@ from core.latest import Latest
 from core.session.reader import SessionReader
 from core.session.recorded import RecordedRow
 from core.session.rows import light_tick
-from core.types import Masks, Scene, Skeletons, Tick
+from core.types import Masks, Point, Points, Scene, Skeletons, Tick
 
 _KEPT = 24
 _AHEAD = 6
 _FAR_PX, _FAR_SCALE, _FAST_MM_S = 1e5, 1e3, 1e3
-_GEOMETRY = ("path", "vessel_graph", "route", "centerline", "robot_vector", "vessel_vector")
+_NO_GEOMETRY: dict[str, Any] = dict.fromkeys(("path", "vessel_graph", "route", "centerline", "robot_vector", "vessel_vector"))
 
 _log = logging.getLogger(__name__)
 
@@ -136,7 +137,7 @@ def drawable(tick: Tick) -> Tick:
 
 def _drawable(scene: Scene) -> Scene:
     if not _is_in_reach(scene):
-        return replace(scene, scale=1.0, scale_xy=None, masks=None, skeletons=None, **dict.fromkeys(_GEOMETRY))
+        return replace(scene, scale=1.0, scale_xy=None, masks=None, skeletons=None, **_NO_GEOMETRY)
     skeletons, masks = scene.skeletons, scene.masks
     if skeletons is None or masks is None:
         return scene
@@ -149,16 +150,19 @@ def _is_in_reach(scene: Scene) -> bool:
     across, down = scene.scale_xy or (scene.scale, scene.scale)
     if not all(1 / _FAR_SCALE <= scale <= _FAR_SCALE for scale in (across, down, scene.scale)):
         return False
-    lines = [scene.path and scene.path.points, scene.route and scene.route.points, scene.centerline and scene.centerline.piece]
-    if any(line is not None and not len(line) for line in lines):
+    lines: list[Points] = [] if scene.path is None else [scene.path.points]
+    lines += [] if scene.route is None else [scene.route.points]
+    lines += [] if scene.centerline is None else [scene.centerline.piece]
+    if not all(len(line) for line in lines):
         return False
     graph = scene.vessel_graph
     lines += [edge.points for edge in graph.edges] if graph is not None else []
-    points = [scene.route and scene.route.target, scene.centerline and scene.centerline.nearest]
+    points: list[Point] = [] if scene.route is None else [scene.route.target]
+    points += [] if scene.centerline is None else [scene.centerline.nearest]
     for vector in (scene.robot_vector, scene.vessel_vector):
         points += [vector.start, vector.center, vector.end] if vector is not None else []
     points += [end for bridge in scene.skeletons.bridges for end in bridge] if scene.skeletons is not None else []
-    everything = [np.ravel(line) for line in (*lines, *points) if line is not None]
+    everything = [*(np.ravel(line) for line in lines), *(np.ravel(point) for point in points)]
     return not everything or float(np.abs(np.concatenate(everything)).max(initial=0.0)) < _FAR_PX
 
 

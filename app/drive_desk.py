@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QWidget
 from app.alert_sounds import AlertSounds
 from app.deadman_key import DeadmanKey
 from app.engine_thread import EngineThread
+from app.event_model import EventKind
 from app.jog_keys import JogKeys, Motion
 from app.language import tr, tr_text
 from app.next_step import Step
 from app.recorder import Recorder
-from app.widgets.event_log import EventKind
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.hand import Jog

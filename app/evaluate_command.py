@@ -92,7 +92,7 @@ def run_evaluate(
             study = _perceive_annotated(annotations, config, preset, model, study_name, seed, as_recorded=as_recorded)
         else:
             study = _perceive_set(folder, truth, config, preset, like_paper, seed)
-    metrics = {"source": study.source, "seed": seed} | evaluate(study.rows, seed)
+    metrics: dict[str, Any] = {"source": study.source, "seed": seed} | evaluate(study.rows, seed)
     if csv is not None and not metrics["angle"]["n"] and not metrics["state"]["n"]:
         raise EvaluationError(f"{csv}: no row has both a manual and an algorithmic measure; nothing to compare")
     metrics["notes"] = study.notes + metrics["notes"]
@@ -170,7 +170,11 @@ def _perceive_annotated(
         config = recorded
         notes.append("Each picture of the session was perceived by itself, with the settings that it was recorded with.")
     rows, reasons, engine, missed = compared_rows(answers, images, config, study, str(annotations))
-    source = {"kind": "annotated by hand", "name": annotations.parent.name, "model": config.perception.segmentation.model}
+    source: dict[str, Any] = {
+        "kind": "annotated by hand",
+        "name": annotations.parent.name,
+        "model": config.perception.segmentation.model,
+    }
     unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
     notes += [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
     notes += [f"Interrupted after {len(rows)} of {len(rows) + missed} images."] if missed else []
@@ -222,9 +226,9 @@ def _read_set(folder: Path) -> list[_Truth]:
     for sample in samples:
         row = truth[sample.stem]
         theta, state = row.get("theta_deg"), row.get("state")
-        posed = theta is not None and state is not None
+        angle, state = (float(theta), str(state)) if theta is not None and state is not None else (None, None)
         group = f"phantom {row['seed']}" if row.get("seed") is not None else None
-        found.append(_Truth(sample.stem, sample.image, float(theta) if posed else None, state if posed else None, group))
+        found.append(_Truth(sample.stem, sample.image, angle, state, group))
     return found
 
 
@@ -281,7 +285,8 @@ def _perceive(truth: list[_Truth], measured: dict[str, tuple[float, float | None
                     continue
                 scene = pipeline.perceive_single(Frame(len(done.rows), 0.0, image))
                 angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
-                done.rows.append(Measurement(one.stem, *measured.get(one.stem, (None, None)), one.state, angle, state, one.group))
+                first, second = measured.get(one.stem, (None, None))
+                done.rows.append(Measurement(one.stem, first, second, one.state, angle, state, one.group))
                 if scene.refusal is not None and one.state is not None:
                     done.reasons[scene.refusal.reason.value] += 1
         except KeyboardInterrupt:

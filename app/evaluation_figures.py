@@ -7,6 +7,7 @@ green and dashed, as in the paper.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -15,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from app.figure_style import BLUE, GREY, INK, PALE, styled
 from app.palette import ON_PICTURE
@@ -36,7 +38,7 @@ def draw_figures(pairs: AnglePairs, metrics: dict[str, Any]) -> dict[str, Figure
     with styled():
         if len(pairs.manual_deg):
             for name, draw in (("error_distribution", error_distribution), ("bland_altman", bland_altman), ("scatter", scatter)):
-                figures[name] = _on_axes(lambda axes, draw=draw: draw(axes, pairs, metrics["angle"]))
+                figures[name] = _on_axes(partial(draw, pairs=pairs, angle=metrics["angle"]))
         if metrics["state"]["n"]:
             figures["confusion"] = _on_axes(lambda axes: confusion(axes, metrics["state"]), (2.75, 2.65))
     return figures
@@ -70,7 +72,8 @@ def error_distribution(axes: Axes, pairs: AnglePairs, angle: dict[str, Any]) -> 
     last = int(np.ceil(reach / width))
     for edge, shade in ((0.08, "#F3F5F7"), (0.04, PALE)):
         axes.axvspan(-edge * RANGE_DEG, edge * RANGE_DEG, color=shade, lw=0, zorder=0)
-    counts, _, _ = axes.hist(error, bins=np.arange(-last, last + 1) * width, color=BLUE, edgecolor="white", linewidth=0.6, zorder=2)
+    bins = (np.arange(-last, last + 1) * width).tolist()
+    counts, _, _ = axes.hist(error, bins=bins, color=BLUE, edgecolor="white", linewidth=0.6, zorder=2)
     axes.axvline(angle["mean_error_deg"], color=_MEAN, lw=1.2, zorder=3, label=f"mean {_degrees(angle['mean_error_deg'])}")
     median = f"median {_degrees(angle['median_deg'])}"
     axes.axvline(angle["median_deg"], color=INK, lw=1.0, ls=(0, (1.5, 1.5)), zorder=3, label=median)
@@ -80,7 +83,7 @@ def error_distribution(axes: Axes, pairs: AnglePairs, angle: dict[str, Any]) -> 
         if edge * RANGE_DEG < last * width:
             words = f"{100 * edge:.0f} % "
             axes.text(edge * RANGE_DEG, axes.get_ylim()[1] * 0.985, words, color=GREY, size=6.5, ha="right", va="top")
-    axes.yaxis.get_major_locator().set_params(integer=True)
+    axes.yaxis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=True))
     axes.set_xlabel("Error, algorithm − manual (°)")
     axes.set_ylabel("Images")
     axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=2, fontsize=6.5, handlelength=1.6, borderaxespad=0.2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib import font_manager
@@ -10,7 +11,7 @@ from matplotlib import font_manager
 from core.config import RESOURCES
 
 INK, GREY, PALE, BLUE = "#1A1D21", "#6B727C", "#E4E7EB", "#0B5C94"
-_STYLE = {
+_STYLE: Any = {
     "font.family": ["Inter", "DejaVu Sans"],
     "font.size": 7.5,
     "axes.labelsize": 7.5,

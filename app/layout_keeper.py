@@ -146,7 +146,12 @@ def _as_bool(value: object) -> bool | None:
 def overlay_switches(bar: OverlayBar, without: tuple[Layer, ...] = ()) -> dict[str, Switch]:
     """The switches of the overlays, but for those that are not the user's choice."""
     return {
-        layer.name.lower(): Switch(partial(bar.is_on, layer), lambda _on, which=layer: bar.toggle(which))
+        layer.name.lower(): Switch(partial(bar.is_on, layer), toggling(partial(bar.toggle, layer)))
         for layer in Layer
         if layer not in without
     }
+
+
+def toggling(toggle: Callable[[], object]) -> Callable[[bool], object]:
+    """Turning something is toggling it: it is only asked for where it is not as wanted."""
+    return lambda _on: toggle()

@@ -162,7 +162,7 @@ def run_train(
         lesson = FrameLesson(samples, init, base, deepen=deepen, shallow=shallow)
     plan = replace(plan, crop=lesson.sides(plan.crop))
     then = None if second_look else second_plan(plan, init)
-    notes = {"init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
+    notes: dict[str, Any] = {"init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
     if inputs.without:
         notes |= {"without": list(inputs.without)}
     teller, watch = asked_teller(), HeldOutWatch(outputs.held_out, out, asked_teller(), log.write)

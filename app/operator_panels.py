@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
 from app import palette
 from app.engine_thread import Phase
+from app.event_model import EventKind
 from app.language import tr, tr_text
 from app.pace import Pace
 from app.panel_layout import card_note, column, holder, row
@@ -17,7 +18,7 @@ from app.scene_panels import ScenePanels
 from app.widgets.alert_strip import AlertStrip
 from app.widgets.card import Card
 from app.widgets.command_panel import CommandPanel
-from app.widgets.event_log import EventKind, EventLog
+from app.widgets.event_log import EventLog
 from app.widgets.help_overlay import operator_help
 from app.widgets.jog_panel import JogPanel
 from app.widgets.mode_bar import ModeBar

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QAbstractItemView, QAbstractSpinBox, QComboBox, QL
 
 from app.drive_desk import DriveDesk
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
+from app.event_model import EventKind
 from app.language import tr
 from app.next_step import Step
 from app.operator_menus import add_operator_menus
@@ -21,7 +22,6 @@ from app.recorder import Recorder
 from app.snapshot import Origin, SnapshotWriter, pictures_folder
 from app.tick_pace import TickPace
 from app.tour_stops import operator_stops
-from app.widgets.event_log import EventKind
 from app.widgets.tour_overlay import TourOverlay
 from app.window_frame import WindowFrame
 from core.config import Config, PerceptionConfig

@@ -100,8 +100,13 @@ ON_PICTURE = DARK
 
 STATE_INK = "#0B0D10"
 """A state's letter on its colour, in both schemes: a state's ground never changes."""
-_STATES = {PoseState.A: "#009E73", PoseState.B: "#56B4E9", PoseState.C: "#D55E00", PoseState.D: "#F0E442"}
-STATE_COLOUR: dict[PoseState | None, str] = {**_STATES, None: DARK.TEXT_FAINT}
+STATE_COLOUR: dict[PoseState | None, str] = {
+    PoseState.A: "#009E73",
+    PoseState.B: "#56B4E9",
+    PoseState.C: "#D55E00",
+    PoseState.D: "#F0E442",
+    None: DARK.TEXT_FAINT,
+}
 
 # The scheme in use; ``use`` changes them all.
 WINDOW = DARK.WINDOW

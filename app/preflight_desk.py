@@ -85,7 +85,7 @@ def live_findings(view: DriveView | None) -> tuple[Finding, ...]:
     for area, name in ((Area.CAMERA, tr("camera's pictures")), (Area.SERVOS, tr("servos' answers"))):
         faults = [fault for fault in view.active if AREA[fault.cause] is area]
         held = [fault for fault in faults if REACTION[fault.cause] >= Reaction.HOLD]
-        worst = (held or faults or [None])[0]
+        worst = next(iter(held or faults), None)
         if worst is None:
             found.append(Finding(name, Level.GOOD, tr("no fault")))
             continue

@@ -40,7 +40,7 @@ class ProgressLines(Progress):
         self._teller = teller
         self._told_s = -_EVERY_S
 
-    def update(self, task_id: TaskID, **changes: Any) -> None:  # type: ignore[override]
+    def update(self, task_id: TaskID, **changes: Any) -> None:
         super().update(task_id, **changes)
         self._tell(task_id)
 

@@ -200,8 +200,8 @@ class RigWizard(QDialog):
         if page.main is not None:
             mark_main(page.main, not page.is_done)
         if busy:
-            busy = tr_text(self.desk.busy)
-            self._say(f"{busy[0].upper()}{busy[1:]} ...")
+            work = tr_text(self.desk.busy)
+            self._say(f"{work[0].upper()}{work[1:]} ...")
         elif self.message.endswith(" ..."):
             self._say("")
         self._look(anew=True)

@@ -91,7 +91,7 @@ class TrueSight:
                 self._kept.pop(old, None)
             return picture
 
-        world._renderer.render = render  # type: ignore[method-assign]
+        world._renderer.render = render  # type: ignore[method-assign, assignment]
 
     def __call__(self, frame: Frame, target: Point | None = None) -> Scene:
         masks = self._kept.get(frame.index)
@@ -142,6 +142,7 @@ class SoakRig:
             self.bus.zeroed()
             camera = SoakCamera(world, self.mischief)
             rig = Rig("soak", RigKind.SIM, camera, self.robot, world)
+            perceive: Perceive
             if true_masks:
                 perceive, model = TrueSight(world, config.perception), ModelReport(True)
             else:

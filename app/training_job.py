@@ -197,7 +197,7 @@ class TrainingJob(QObject):
         state = self.state
         try:
             if "loss" in record:
-                point = (int(record["step"]), *(float(record[name]) for name in ("loss", "vessel_dice", "robot_dice")))
+                point = int(record["step"]), float(record["loss"]), float(record["vessel_dice"]), float(record["robot_dice"])
                 steps = int(record.get("steps", state.steps))  # more than asked for where a second look learns, too
                 state = replace(state, curve=(*state.curve, point), steps=steps, left_s=record.get("left_s"))
             elif "held_out_step" in record:

@@ -229,7 +229,7 @@ def _over_dask(campaign: Campaign, jobs: list[Job], address: str) -> Iterator[Ro
 
 
 def _tell(campaign: Campaign, rows: list[Row], as_json: bool) -> None:
-    by_policy = {policy: [row for row in rows if row["policy"] == policy] for policy in campaign.policies}
+    by_policy: dict[str, list[Row]] = {policy: [row for row in rows if row["policy"] == policy] for policy in campaign.policies}
     sums = {policy: summarise(own) for policy, own in by_policy.items()}
     if campaign.out is not None:
         from app.trial_report import write_report

@@ -101,7 +101,7 @@ def _draw_way(figure: Figure, axes: Axes, row: Mapping[str, Any]) -> None:
     track = row["track"]
     points = np.column_stack([track["x_mm"], track["y_mm"]])
     if len(points) > 1:
-        lines = LineCollection(np.stack([points[:-1], points[1:]], axis=1), cmap=_FORCE, linewidths=1.3, zorder=4)
+        lines = LineCollection(list(np.stack([points[:-1], points[1:]], axis=1)), cmap=_FORCE, linewidths=1.3, zorder=4)
         lines.set_array(np.asarray(track["wall_contact_n"][1:]))
         lines.set_clim(0.0, _MOST_N)
         axes.add_collection(lines)

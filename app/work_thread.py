@@ -6,6 +6,7 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Hashable
+from functools import partial
 
 from PySide6.QtCore import QObject, QThread, Signal
 
@@ -82,9 +83,9 @@ class WorkThread(QThread):
                 if type(error).__module__.partition(".")[0] not in {"core", "hardware"}:
                     _log.error("a job of %s failed", self.objectName(), exc_info=error)
                     line = f"unexpected {type(error).__name__}: {line}"
-                self._finished(lambda k=key, text=line: self.failed.emit(k, text))
+                self._finished(partial(self.failed.emit, key, line))
             else:
-                self._finished(lambda k=key, given=result: self.done.emit(k, given))
+                self._finished(partial(self.done.emit, key, result))
 
     def _finished(self, report: Callable[[], None]) -> None:
         """Report after the job no longer counts as pending, so that "all saved" is true when it is heard."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -123,7 +125,7 @@ def wrong_format(kit: Kit) -> Seen:
         part.folder.mkdir()
         with open_bench(part) as bench:
             start = mark(bench.hand_over())
-            bench.hooks.frame = lambda frame, change=change: replace(frame, image=change(frame.image))
+            bench.hooks.frame = partial(_changed, change=change)
             shown = len(bench.ticks)
             bench.run(0.3)
             odd = [tick for tick in bench.ticks[shown:] if tick.frame.image.dtype != np.uint8 or tick.frame.image.ndim != 3]
@@ -176,7 +178,7 @@ def blurred(kit: Kit) -> Seen:
         with open_bench(part, live=False, network=True) as bench:
             start = mark(bench.hand_over())
             place = _head(bench)
-            bench.hooks.frame = lambda frame, name=name, place=place: _spoilt(frame, name, place)
+            bench.hooks.frame = partial(_spoilt, how=name, place=place)
             bench.run(0.4)
             views = bench.views[start.views :]
             causes = {fault.cause for view in views for fault in view.active} & {
@@ -201,10 +203,14 @@ def _head(bench: FaultBench) -> tuple[int, int]:
     return round(x), round(y)
 
 
+def _changed(frame: Frame, change: Callable[[Image], Image]) -> Frame:
+    return replace(frame, image=change(frame.image))
+
+
 def _spoilt(frame: Frame, how: str, place: tuple[int, int]) -> Frame:
     image = frame.image.copy()
     if how == "blur":
-        image = cv2.GaussianBlur(image, (0, 0), 25.0)
+        image = np.asarray(cv2.GaussianBlur(image, (0, 0), 25.0), np.uint8)
         image[0, 0] = frame.index % 251
     else:
         cv2.circle(image, place, 70, (255, 255, 250) if how == "glare" else (120, 110, 100), -1)
@@ -222,11 +228,12 @@ def moved(kit: Kit) -> Seen:
         bench.hand_over()
         bench.run(0.5)
         start = mark(bench)
-        shift = np.float32([[1, 0, 12], [0, 1, 7]])
+        shift = np.array([[1, 0, 12], [0, 1, 7]], np.float32)
 
         def push(frame: Frame) -> Frame:
             size = frame.image.shape[1], frame.image.shape[0]
-            return replace(frame, image=cv2.warpAffine(frame.image, shift, size, borderMode=cv2.BORDER_REPLICATE))
+            shifted = cv2.warpAffine(frame.image, shift, size, borderMode=cv2.BORDER_REPLICATE)
+            return replace(frame, image=np.asarray(shifted, np.uint8))
 
         def push_masks(*masks: np.ndarray) -> tuple[np.ndarray, ...]:
             return tuple(cv2.warpAffine(mask, shift, (mask.shape[1], mask.shape[0])) for mask in masks)

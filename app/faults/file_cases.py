@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import shutil
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,7 +18,6 @@ from app.faults.registry import Kit, Seen, fault
 from core.config import load_config
 from core.control.faults import Cause
 from core.errors import UserError
-from core.session import record_status
 from core.session.manifest import EVENTS, FRAMES, MANIFEST
 from core.session.reader import SessionReader
 from core.session.recovery import recover
@@ -42,7 +42,7 @@ def disk_full(kit: Kit) -> Seen:
         return total, total - free, free
 
     with (
-        patch.object(record_status.shutil, "disk_usage", usage),
+        patch.object(shutil, "disk_usage", usage),
         open_bench(kit, live=False, record={"warn_free_share": 0.07, "stop_free_mb": 40.0}) as bench,
     ):
         start = mark(bench.hand_over())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from app.faults.bench import FaultBench, open_bench
@@ -15,7 +16,7 @@ from hardware.servos.bus_messages import BusPhase, BusStatus
 from hardware.servos.errors import WrongServo
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servo_bus import SoftServoBus
-from hardware.twin.servo_device import OVERLOAD_BIT
+from hardware.twin.servo_device import OVERLOAD_BIT, SoftServo
 
 _DISARM, _STOP, _HELD = (Mode.ADVISORY,), (Mode.STOPPED,), (Mode.HOLD, Mode.ADVISORY)
 _ADVANCE = 5
@@ -82,7 +83,9 @@ def noise(kit: Kit) -> Seen:
     with open_bench(kit, live=True) as bench:
         start = mark(bench.hand_over())
         faults = _line(bench).faults
-        for spoil in (lambda: faults.crc(1), lambda: faults.garbage(24), lambda: faults.short(3), lambda: faults.truncate(2)):
+        spoils: tuple[Callable[[], object], ...]
+        spoils = (partial(faults.crc, 1), partial(faults.garbage, 24), partial(faults.short, 3), partial(faults.truncate, 2))
+        for spoil in spoils:
             spoil()
             bench.run(0.45)
         single = bench.mode
@@ -120,6 +123,9 @@ def overload(kit: Kit) -> Seen:
     quick=False,
 )
 def supply(kit: Kit) -> Seen:
+    def drop(servo: SoftServo, volts: float) -> None:
+        servo.supply_v = volts
+
     def heat(bench: FaultBench) -> None:
         _line(bench).stir(2, lambda servo: servo.heat(67.0))
         _expect(bench, Cause.WARM)
@@ -128,7 +134,7 @@ def supply(kit: Kit) -> Seen:
     def sag(bench: FaultBench) -> None:
         for supply_v in (10.8, 10.3):
             for joint in bench.config.servos.joints:
-                _line(bench).stir(joint.id, lambda servo, v=supply_v: setattr(servo, "supply_v", v))
+                _line(bench).stir(joint.id, partial(drop, volts=supply_v))
             if supply_v > 10.5:
                 _expect(bench, Cause.VOLTAGE_SAGS)
 

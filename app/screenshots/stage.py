@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from core.config import Config, PerceptionConfig
 from core.control.drive_view import DriveView
@@ -215,7 +216,7 @@ class Stage:
         frame = self.world.frame(self._now_s)
         if self.blur_px <= 0.0:
             return frame
-        return replace(frame, image=cv2.GaussianBlur(frame.image, (0, 0), self.blur_px))
+        return replace(frame, image=np.asarray(cv2.GaussianBlur(frame.image, (0, 0), self.blur_px), np.uint8))
 
 
 class _StageServos(LockStepServos):

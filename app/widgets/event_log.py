@@ -161,9 +161,9 @@ class _EventPainter(QStyledItemDelegate):
             return
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        room = QRectF(option.rect).adjusted(6, 0, -6, 0)
-        if option.state & QStyle.StateFlag.State_MouseOver:
-            painter.fillRect(option.rect, QColor(palette.RAISED))
+        room = QRectF(option.rect).adjusted(6, 0, -6, 0)  # type: ignore[attr-defined]
+        if option.state & QStyle.StateFlag.State_MouseOver:  # type: ignore[attr-defined]
+            painter.fillRect(option.rect, QColor(palette.RAISED))  # type: ignore[attr-defined]
         small, look = theme.font(theme.Size.LABEL), event.kind.value
         centre = Qt.AlignmentFlag.AlignVCenter
         painter.setFont(small)

@@ -215,7 +215,7 @@ class LiveView(QWidget):
             self.clicked.emit(x, y)
 
 
-class _SmoothImage(pg.ImageItem):
+class _SmoothImage(pg.ImageItem):  # type: ignore[misc]
     """Interpolated when enlarged: whole pixels would hide where a thin robot is.
 
     It paints from the screen's own pixel formats. Qt would convert others in its thread pool and wait for it: measured with both
@@ -243,7 +243,7 @@ class _SmoothImage(pg.ImageItem):
         super().paint(painter, *args)
 
 
-class _PictureBox(pg.ViewBox):
+class _PictureBox(pg.ViewBox):  # type: ignore[misc]
     """A view box whose left click means a place and whose drag moves a zoomed picture."""
 
     left_clicked = Signal(QPointF)

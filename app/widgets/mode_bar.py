@@ -219,7 +219,7 @@ class _Line(QWidget):
         spare = self.height() - self._document.size().height()
         painter.translate(2, max(0.0, spare / 2))
         context = QAbstractTextDocumentLayout.PaintContext()
-        context.palette.setColor(QPalette.ColorRole.Text, QColor(palette.TEXT_DIM))
+        context.palette.setColor(QPalette.ColorRole.Text, QColor(palette.TEXT_DIM))  # type: ignore[attr-defined]
         self._document.documentLayout().draw(painter, context)
         painter.end()
 

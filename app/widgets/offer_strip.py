@@ -28,7 +28,7 @@ class Answer:
     """A button: its word, what it does, and a tool tip."""
 
     name: str
-    action: Callable[[], None]
+    action: Callable[[], object]
     meaning: str = ""
 
 
@@ -196,9 +196,9 @@ class OfferStrip(QFrame):
     def _place(self) -> None:
         room = self._parent.rect()
         width = min(_WIDEST_PX, room.width() - 2 * _MARGIN_PX)
-        self.layout().activate()
-        height = max(
-            48, self.layout().totalHeightForWidth(width) if self.layout().hasHeightForWidth() else self.sizeHint().height()
-        )
+        layout = self.layout()
+        assert layout is not None
+        layout.activate()
+        height = max(48, layout.totalHeightForWidth(width) if layout.hasHeightForWidth() else self.sizeHint().height())
         self.setGeometry((room.width() - width) // 2, room.height() - height - _MARGIN_PX, width, height)
         self.lifted.emit(height + _MARGIN_PX)

@@ -148,11 +148,11 @@ class PlayerBar(QWidget):
         after = self._button("\N{RIGHTWARDS ARROW}", tr("One frame on  (\N{RIGHTWARDS ARROW})"), lambda: self.step_asked.emit(1))
         previous = self._button("P", tr("Previous of the kind beside  (P)"), lambda: self.jump_asked.emit(-1))
         following = self._button("N", tr("Next of the kind beside  (N)"), lambda: self.jump_asked.emit(1))
-        for widget in (before, self.play, after):
-            row.addWidget(widget)
+        for step in (before, self.play, after):
+            row.addWidget(step)
         row.addSpacing(6)
-        for widget in (previous, self.kind, following):
-            row.addWidget(widget)
+        for jump in (previous, self.kind, following):
+            row.addWidget(jump)
         row.addSpacing(6)
         row.addWidget(self.speed)
         row.addStretch(1)

@@ -145,8 +145,8 @@ class PreflightList(QDialog):
         self.arm_asked.emit()
 
     def _fill(self) -> None:
-        while (item := self._rows.takeAt(0)) is not None:
-            if (widget := item.widget()) is not None:
+        while self._rows.count():
+            if (widget := self._rows.takeAt(0).widget()) is not None:
                 widget.hide()
                 widget.deleteLater()
         for row in range(self._rows.rowCount()):

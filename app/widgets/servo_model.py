@@ -126,7 +126,7 @@ class ServoDelegate(QStyledItemDelegate):
         if not isinstance(cell, Cell):
             return
         column = _COLUMNS[index.column()]
-        box = QRectF(option.rect)
+        box = QRectF(option.rect)  # type: ignore[attr-defined]
         painter.save()
         if index.row() % 2:
             painter.fillRect(box, theme.colour(palette.RAISED, 0.45))

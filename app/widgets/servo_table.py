@@ -38,6 +38,10 @@ _SILENT_AFTER_S = 1.0
 _LINE_ROLE = {**TONE_ROLE, Tone.PLAIN: "TEXT_DIM"}
 
 
+Entry = tuple[str, Callable[[], object]]
+"""Of a menu: its text, and what it does."""
+
+
 class ServoTable(QWidget):
     """Renewed five times a second at most, and there only the cells that changed.
 
@@ -197,14 +201,16 @@ class ServoTable(QWidget):
         self.menu_for(self._servos.joints[place] if place >= 0 else None).popup(self._table.viewport().mapToGlobal(at))
 
     def _open_restart_menu(self) -> None:
-        joints = [(f"{joint.id}  {_plain(joint.name)}", partial(self._ask_restart, joint)) for joint in self._servos.joints]
+        joints: list[Entry] = [
+            (f"{joint.id}  {_plain(joint.name)}", partial(self._ask_restart, joint)) for joint in self._servos.joints
+        ]
         self._open_menu(self._restart_button, joints)
 
     def _open_zero_menu(self) -> None:
-        joints = [(_plain(joint.name), partial(self._ask_zero, joint.name)) for joint in self._servos.joints]
+        joints: list[Entry] = [(_plain(joint.name), partial(self._ask_zero, joint.name)) for joint in self._servos.joints]
         self._open_menu(self._zero_button, [(tr("All joints"), partial(self._ask_zero, None)), *joints])
 
-    def _open_menu(self, button: QPushButton, entries: list[tuple[str, Callable[[], None]]]) -> None:
+    def _open_menu(self, button: QPushButton, entries: list[Entry]) -> None:
         menu = QMenu(self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for text, slot in entries:

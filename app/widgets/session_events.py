@@ -97,10 +97,10 @@ class _Painter(QStyledItemDelegate):
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
         model, event = index.model(), index.data(Qt.ItemDataRole.UserRole)
         assert isinstance(model, _Model)
-        room = QRectF(option.rect)
+        room = QRectF(option.rect)  # type: ignore[attr-defined]
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        if option.state & QStyle.StateFlag.State_Selected:
+        if option.state & QStyle.StateFlag.State_Selected:  # type: ignore[attr-defined]
             painter.fillRect(room, QColor(palette.RAISED))
         painter.setFont(theme.font(12))
         painter.setPen(QColor(palette.TEXT_FAINT))

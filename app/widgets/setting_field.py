@@ -164,7 +164,7 @@ class SettingField(QFrame):
         assert bounds.low is not None
         assert bounds.high is not None
         share = max(0.0, min(1.0, (value - bounds.low) / (bounds.high - bounds.low)))
-        return round(_SLIDER_STEPS * share ** (1.0 / self._power()))
+        return round(_SLIDER_STEPS * float(share ** (1.0 / self._power())))
 
     # ---- places
 

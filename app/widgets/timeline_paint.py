@@ -24,7 +24,7 @@ def paint_band(painter: QPainter, lane: QRectF, values: NDArray[np.int64], colou
 def curves(xs: NDArray[np.float64], ys: NDArray[np.float64], gap: NDArray[np.bool_]) -> list[list[QPointF]]:
     """Lines through what is known."""
     known = np.isfinite(ys)
-    breaks = np.flatnonzero(np.diff(known.astype(np.int8)) | gap[1:]) + 1
+    breaks = np.flatnonzero((known[1:] != known[:-1]) | gap[1:]) + 1
     parts = (part for part in np.split(np.arange(len(xs)), breaks) if len(part) and known[part[0]])
     return [[QPointF(x, y) for x, y in zip(xs[part].tolist(), ys[part].tolist(), strict=True)] for part in parts]
 

@@ -120,10 +120,9 @@ class CameraPage(WizardPage):
             field.setEnabled(is_real)
 
     def _open(self) -> None:
-        item = self.cameras.currentItem()
-        if item is None:
+        if self.cameras.currentRow() < 0:
             return
-        camera = item.data(Qt.ItemDataRole.UserRole)
+        camera = self.cameras.currentItem().data(Qt.ItemDataRole.UserRole)
         config = self.desk.config
         if not _is_of(camera, config):
             config = with_camera(config, camera)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import cast
 
 from PySide6.QtWidgets import QDoubleSpinBox, QFileDialog, QHBoxLayout, QLabel
 
@@ -132,7 +133,7 @@ class ScalePage(WizardPage):
         self.desk.run(tr("looking for the board"), draft.take_board, self._on_taken)
 
     def _on_taken(self, given: object) -> None:
-        image, view = given  # type: ignore[misc]
+        image, view = cast(tuple[Image, BoardView], given)
         self._show_board(image, view)
 
     def _show_board(self, image: Image, view: BoardView) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from core.perception import polyline
 from core.study.annotations import Annotation, Line, MaskPolygon, MaskTarget
 from core.study.mask_polygons import polygons_of
-from core.types import Mask, Points, Pose, Scene
+from core.types import Mask, Points, Pose, Refusal, Scene
 
 _LINE_PX = 60.0
 """Length of the proposed robot line: the 40 px that count, and some to see where it comes from. Working pixels."""
@@ -24,7 +24,7 @@ class Proposal:
     annotation: Annotation
     pose: Pose | None
     confidence: float
-    refusal: str = ""
+    refusal: Refusal | None = None
 
 
 def proposal_of(scene: Scene) -> Proposal:
@@ -46,7 +46,7 @@ def proposal_of(scene: Scene) -> Proposal:
         )
     state = scene.pose.state if scene.pose is not None else None
     confidence = scene.pose.confidence if scene.pose is not None else 0.0
-    return Proposal(Annotation(robot, vessel, state, masks=masks), scene.pose, confidence, str(scene.refusal or ""))
+    return Proposal(Annotation(robot, vessel, state, masks=masks), scene.pose, confidence, scene.refusal)
 
 
 def _line(scene: Scene, points: Points) -> Line:

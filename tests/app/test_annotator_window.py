@@ -18,12 +18,14 @@ from app.annotation_tool import Tool
 from app.annotator_window import AnnotatorWindow
 from core.config import PerceptionConfig
 from core.learning.dataset import write_png
+from core.perception.pipeline import Pipeline
+from core.study.accuracy import TrueMasks
 from core.study.annotation_images import find_images
-from core.study.annotation_proposal import Proposal
+from core.study.annotation_proposal import Proposal, proposal_of
 from core.study.annotation_records import ItemKey, StoredAnnotation
 from core.study.annotation_store import AnnotationStore
 from core.study.annotations import Annotation, AnnotationError, MaskPolygon, MaskTarget, View, measure_lines
-from core.types import Point, PoseState
+from core.types import Frame, Point, PoseState
 
 Key = Qt.Key
 SIZE = (640, 480)
@@ -273,6 +275,15 @@ def test_the_algorithms_answer_is_shown_and_taken_over_on_demand(rater: Rater) -
     assert (drawn(rater).robot, drawn(rater).vessel, drawn(rater).state, drawn(rater).masks) == (ROBOT, VESSEL, None, ())
     rater.press(Key.Key_4, Key.Key_G)
     assert drawn(rater).masks == (box,)
+
+
+def test_without_an_answer_of_the_algorithm_it_says_why(rater: Rater) -> None:
+    item = rater.desk.item
+    assert item is not None
+    blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+    rater.desk._proposals[item.image.sha256] = proposal_of(Pipeline(TrueMasks(), PerceptionConfig()).perceive_single(blank))
+    rater.press(Key.Key_H)
+    assert rater.window.panels.toast.text().startswith("The algorithm gives no pose: image black: 99 % of it")
 
 
 def test_brush_and_outline(rater: Rater) -> None:
