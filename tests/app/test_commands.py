@@ -10,11 +10,14 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from ctypes.util import find_library
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from app.application import check_display
+from core.errors import UserError
 from core.learning.crops import _Order
 from core.learning.dataset import find_samples, read_truth
 from core.learning.model_file import read_model_info
@@ -224,3 +227,14 @@ def test_without_a_display_the_window_says_so() -> None:
     done = subprocess.run([sys.executable, str(MAIN)], capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 2
     assert done.stderr.startswith("error: no display")
+
+
+@pytest.mark.skipif(find_library("xcb") is None, reason="no X libraries here: Qt has its own say")
+def test_a_display_that_has_gone_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("DISPLAY", ":4711")
+    with pytest.raises(UserError, match=r"the display :4711 \(DISPLAY\) does not answer"):
+        check_display()
+    monkeypatch.setenv("QT_QPA_PLATFORM", "offscreen")  # which needs no display
+    check_display()
