@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -33,7 +34,10 @@ from core.study.annotations import (
 )
 from core.types import Frame, Image, Scene
 
+_log = logging.getLogger(__name__)
+
 _SAVE_WITHIN_MS = 20_000
+_SETTLE_S = 1.0
 _RETRY_MS = 3000
 _KEPT_IMAGES = 4
 _IDLE_S = 60.0
@@ -339,10 +343,18 @@ class AnnotationDesk(QObject):
 
     # ---- the end
 
-    def shut_down(self) -> bool:
-        """Finish writing and end the threads; False when the disk did not take everything in time."""
+    def settle(self) -> None:
+        """Give the disk a moment to take what waits: ``unsaved`` then tells what it does not take."""
+        if self._to_write and not self._is_shut:
+            self._saving.submit("edit", self._write_all, once=True)
+        until_s = time.monotonic() + _SETTLE_S
+        while self._saving.pending and time.monotonic() < until_s:
+            time.sleep(0.005)
+
+    def shut_down(self) -> tuple[str, ...]:
+        """Finish writing and end the threads; a line for each that did not end in its time. What the disk refused is logged."""
         if self._is_shut:
-            return True
+            return ()
         self._keep_time()
         self._is_shut = True
         self._retry.stop()
@@ -351,7 +363,9 @@ class AnnotationDesk(QObject):
         self._saving.stop(finish=True)
         for thread in (self._loading, self._perceiving):
             thread.stop(finish=False)
-        ended = [thread.wait(_SAVE_WITHIN_MS) for thread in (self._saving, self._loading, self._perceiving)]
-        if all(ended):
+        running = [thread for thread in (self._saving, self._loading, self._perceiving) if not thread.wait(_SAVE_WITHIN_MS)]
+        if not running:
             self._store.close()
-        return all(ended) and not self._to_write
+        if self._to_write:
+            _log.error("%d edits could not be written to %s", len(self._to_write), self.store_path)
+        return tuple(f"{thread.objectName()} did not end in {_SAVE_WITHIN_MS / 1000:g} s" for thread in running)

@@ -126,6 +126,7 @@ class AnnotatorWindow(WindowFrame):
 
     def _on_opened(self) -> None:
         annotation = self._desk.annotation
+        self.panels.note.setText(annotation.note)  # also while it is being written in: what stood there was the last picture's
         self.panels.canvas.show_image(self._desk.levels, annotation, self._desk.measure)
         self.panels.canvas.set_brush(False)
         tool = Tool.VESSEL if len(annotation.robot) > 1 and len(annotation.vessel) < 2 else Tool.ROBOT
@@ -359,8 +360,8 @@ class AnnotatorWindow(WindowFrame):
     def _may_close(self) -> bool:
         """Edits that cannot be written are asked about."""
         self._keep_note()
-        is_told = self.panels.header.saved_text.startswith("\N{WARNING SIGN}")
-        return not (self._desk.unsaved and is_told) or self._may_lose()
+        self._desk.settle()
+        return not self._desk.unsaved or self._may_lose()
 
     def _may_lose(self) -> bool:
         box = QMessageBox(
@@ -383,5 +384,4 @@ class AnnotatorWindow(WindowFrame):
 
     def _finish(self) -> Sequence[str]:
         """What is still to be written or perceived."""
-        self._desk.shut_down()
-        return ()
+        return self._desk.shut_down()

@@ -70,8 +70,9 @@ class ChildProcess(QObject):
 
     def start(self) -> None:
         """Start it; what hinders that comes by ``ended``."""
-        errors = tempfile.TemporaryFile()
+        errors: IO[bytes] | None = None
         try:
+            errors = tempfile.TemporaryFile()  # which a full disk or a read-only one refuses
             self._process = subprocess.Popen(
                 self._command,
                 cwd=None if self._command[1:2] != ["-m"] else ROOT,
@@ -81,8 +82,9 @@ class ChildProcess(QObject):
                 start_new_session=True,  # a Ctrl-C in the window's terminal is for the window, which tells this one
             )
         except OSError as error:
-            errors.close()
-            self._over.emit(127, f"cannot be started ({error.strerror})")
+            if errors is not None:
+                errors.close()
+            self._over.emit(127, f"cannot be started ({error.strerror or error})")
             return
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, self._process.pid, os.getpriority(os.PRIO_PROCESS, 0) + self._priority)

@@ -201,6 +201,11 @@ class OperatorWindow(WindowFrame):
         self._panels.show_kind(self._kind, has_servos=self._config.rig.robot != "none")
         self.setWindowTitle(f"LumenPilot \N{EM DASH} {tr(self._kind.value)}")
 
+    @property
+    def phase_message(self) -> str:
+        """The line that says why the rig has ended, or stands in FAULT."""
+        return self._phase_message
+
     def lend(self, why: str) -> None:
         """Close the rig, so that somebody else can have camera and servos; it stands as FAULT with `why` until ``use_config``."""
         self._desk.reset()

@@ -26,6 +26,8 @@ from core.types import Point
 from hardware.rig import RigKind, kind_of
 from hardware.rig_search import FoundCamera, search, with_camera
 
+_LEAVING = mark("Waiting for the wizard to give camera and servos back; where a driver hangs, start the program again")
+_SLOW_MS = 3000
 _LENT = mark("the rig wizard has camera and servos; the rig is opened again when it is closed")
 
 
@@ -65,6 +67,7 @@ class RigDesk(QObject):
         self._wish: _Wish | None = None
         self._saved = ""
         self.wizard: RigWizard | None = None
+        self._leaving: RigWizard | None = None
         new = add_menu(
             window,
             tr("Ri&g"),
@@ -95,17 +98,19 @@ class RigDesk(QObject):
     @Slot()
     def stop(self) -> None:
         """STOP while the wizard has the servos; from any thread."""
-        wizard = self.wizard
+        wizard = self.wizard or self._leaving
         if wizard is not None:
             wizard.desk.stop()
 
     @Slot()
     def close(self) -> None:
         """The program ends: the wizard gives back what it has, and opens no rig again."""
-        wizard, self.wizard = self.wizard, None
+        wizard, self.wizard, self._leaving = self.wizard or self._leaving, None, None
         if wizard is not None:
             wizard.finished.disconnect(self._on_finished)
+            wizard.desk.closed.disconnect(self._on_closed)
             wizard.reject()
+            wizard.desk.wait_closed()
 
     # ---- the menu
 
@@ -238,6 +243,9 @@ class RigDesk(QObject):
     def _begin(self, name: str, config: Config, known: CalibrationConfig | None) -> None:
         if self.wizard is not None or self._wish is not None:
             return
+        if self._leaving is not None:
+            self._refuse(tr(_LEAVING))
+            return
         why = self.hindrance()
         if kind_of(config.rig) is RigKind.PLAYBACK:
             why = tr("a recording is played: start with a camera or the twin")
@@ -249,15 +257,20 @@ class RigDesk(QObject):
 
     @Slot(object)
     def _on_phase(self, phase: Phase) -> None:
-        if phase is Phase.FAULT and self._wish is not None and self.wizard is None:
-            wish, self._wish = self._wish, None
+        if phase is Phase.STARTING or self._wish is None:
+            return
+        wish, self._wish = self._wish, None
+        if phase is Phase.FAULT and self._window.phase_message == _LENT:
             QTimer.singleShot(0, partial(self._show, wish))
+        else:  # another order came in between: F5, a phantom, a model
+            self._window.say(tr("The rig was opened anew meanwhile; ask for the wizard again"), is_fault=True)
 
     def _show(self, wish: _Wish) -> None:
         desk = WizardDesk(wish.config, wish.known, self._open_bench, self._make_sight)
         wizard = RigWizard(desk, wish.name, self._window)
         wizard.saved.connect(self._on_saved)
         wizard.finished.connect(self._on_finished)
+        desk.closed.connect(self._on_closed)
         self.wizard = wizard
         wizard.show()
 
@@ -267,7 +280,18 @@ class RigDesk(QObject):
 
     @Slot(int)
     def _on_finished(self, _result: int) -> None:
-        wizard, self.wizard = self.wizard, None
+        self._leaving, self.wizard = self.wizard, None
+        QTimer.singleShot(_SLOW_MS, self._tell_slow)
+
+    @Slot()
+    def _tell_slow(self) -> None:
+        if self._leaving is not None:
+            self._window.say(tr(_LEAVING), is_fault=True)
+
+    @Slot()
+    def _on_closed(self) -> None:
+        """Camera and servos are free: the rig is opened again."""
+        wizard, self._leaving = self._leaving, None
         if wizard is not None:
             wizard.deleteLater()
         saved, self._saved = self._saved, ""

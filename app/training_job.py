@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -125,6 +126,7 @@ class TrainingJob(QObject):
         self.state = TrainingState()
         self._wish = Wish("")
         self._child: ChildProcess | None = None
+        self._is_closed = threading.Event()
         self._told = _Told()
         self._work = WorkThread("preparing a training", self)
         self._work.done.connect(self._on_prepared)
@@ -139,7 +141,7 @@ class TrainingJob(QObject):
             return
         self._wish, self._told = wish, _Told()
         self._show(TrainingState(Phase.PREPARING, tr("Collecting the masks"), wish.name, wish.steps))
-        collect = self._collect
+        collect, closed = self._collect, self._is_closed
         out = self._folder / f"{wish.name}_{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
 
         def prepare() -> OwnFrames:
@@ -148,8 +150,9 @@ class TrainingJob(QObject):
             annotations, images = collect()
             with ExitStack() as undo:
                 undo.callback(shutil.rmtree, out, ignore_errors=True)  # half a set is none
-                frames = split_own_frames(annotations, images, out)
-                undo.pop_all()
+                frames = split_own_frames(annotations, images, out, lambda: not closed.is_set())
+                if not closed.is_set():
+                    undo.pop_all()
             return frames
 
         self._work.submit("prepare", prepare)
@@ -166,6 +169,7 @@ class TrainingJob(QObject):
         if self._child is not None:
             self._child.leave()
             self._child.ask_to_end()
+        self._is_closed.set()
         self._work.stop(finish=False)
         self._work.wait(_END_WITHIN_MS)
 
@@ -177,6 +181,8 @@ class TrainingJob(QObject):
         self._show(TrainingState(Phase.FAILED, tr("Not started: {why}", why=tr_text(line)), self._wish.name, self._wish.steps))
 
     def _on_prepared(self, _key: object, frames: OwnFrames) -> None:
+        if self._is_closed.is_set():
+            return
         wish, out = self._wish, own_models() / self._wish.name
         plan = ["--steps", wish.steps, "--batch", _BATCH, "--rate", _RATE, "--crop", _CROP, "--look-share", _LOOK_SHARE]
         plan += ["--remember", wish.remember]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 
 from PySide6.QtCore import QObject, Signal, Slot
 
@@ -23,7 +24,8 @@ _END_MS = 30_000
 class WizardDesk(QObject):
     """Jobs run one after the other in a thread of their own; STOP does not wait for them.
 
-    Signals: ``said`` a line of progress; ``failed`` a line of what went wrong; ``changed`` when a job began or ended.
+    Signals: ``said`` a line of progress; ``failed`` a line of what went wrong; ``changed`` when a job began or ended; ``closed``
+    when camera and port are free after ``close``.
 
     Parameters
     ----------
@@ -35,6 +37,7 @@ class WizardDesk(QObject):
     said = Signal(str)
     failed = Signal(str)
     changed = Signal()
+    closed = Signal()
 
     def __init__(
         self,
@@ -56,6 +59,7 @@ class WizardDesk(QObject):
         self._thread = WorkThread("rig wizard", self)
         self._thread.done.connect(self._on_done)
         self._thread.failed.connect(self._on_failed)
+        self._thread.ended.connect(self.closed)
 
     @property
     def is_busy(self) -> bool:
@@ -85,8 +89,11 @@ class WizardDesk(QObject):
             if self._see is None:
                 self._see = self._make_sight(config)
             self._bench = self._open_bench(config, self._see)
-            self._bench.warm_up()
-            self.draft = RigDraft(self._bench, config, self._known, self.said.emit)
+            with ExitStack() as undo:
+                undo.callback(self._close_bench)  # a camera that gives no picture is none
+                self._bench.warm_up()
+                self.draft = RigDraft(self._bench, config, self._known, self.said.emit)
+                undo.pop_all()
 
         self.run(tr("opening the camera"), job, then)
 
@@ -101,11 +108,14 @@ class WizardDesk(QObject):
         return str(write_rig(rig))
 
     def close(self) -> None:
-        """Stop, and give camera and port back; waits for a job that is still running."""
+        """Stop, and give camera and port back after the job that is still running; ``closed`` tells when."""
         self.stop()
         self._thread.submit("closing", self._close_bench)
         self._thread.stop(finish=True)
-        self._thread.wait(_END_MS)
+
+    def wait_closed(self) -> bool:
+        """At the program's end: until all is given back; False where a driver hangs."""
+        return self._thread.wait(_END_MS)
 
     def _close_bench(self) -> None:
         bench, self._bench, self.draft = self._bench, None, None

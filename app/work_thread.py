@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Hashable
 from functools import partial
 
-from PySide6.QtCore import QObject, QThread, Signal
+from PySide6.QtCore import QObject, Signal
 
 _log = logging.getLogger(__name__)
 
 
-class WorkThread(QThread):
+class WorkThread(QObject):
     """Jobs in the order in which they come, urgent ones first. ``stop`` lets those be finished that must not be lost.
 
-    ``done`` carries a job's key and what it gave, ``failed`` its key and one line.
+    ``done`` carries a job's key and what it gave, ``failed`` its key and one line; ``ended`` comes after the last job once it is
+    stopped. It is no QThread: Qt aborts the program where one is destroyed that still runs, and a driver or a disk that hangs
+    cannot be ended.
     """
 
     done = Signal(object, object)
     failed = Signal(object, str)
+    ended = Signal()
 
     def __init__(self, name: str, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -29,6 +33,7 @@ class WorkThread(QThread):
         self._jobs: deque[tuple[Hashable, Callable[[], object]]] = deque()
         self._stopping = False
         self._busy: Hashable | None = None
+        self._thread: threading.Thread | None = None
 
     @property
     def pending(self) -> int:
@@ -50,8 +55,9 @@ class WorkThread(QThread):
             else:
                 self._jobs.append((key, job))
             self._changed.notify()
-        if not self.isRunning():
-            self.start()
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._run, name=self.objectName(), daemon=True)
+                self._thread.start()
 
     def forget(self) -> None:
         """Take back what has not begun."""
@@ -65,8 +71,24 @@ class WorkThread(QThread):
             if not finish:
                 self._jobs.clear()
             self._changed.notify()
+            is_over = self._thread is None
+        if is_over:
+            self.ended.emit()
 
-    def run(self) -> None:
+    def wait(self, within_ms: float | None = None) -> bool:
+        """Until it has ended, once it is stopped; False when it did not in time. None: for as long as it takes."""
+        thread = self._thread
+        if thread is not None:
+            thread.join(None if within_ms is None else within_ms / 1000)
+        return thread is None or not thread.is_alive()
+
+    def _run(self) -> None:
+        """The thread."""
+        self._work()
+        with contextlib.suppress(RuntimeError):  # whoever asked has gone, and this object with it
+            self.ended.emit()
+
+    def _work(self) -> None:
         while True:
             with self._changed:
                 self._busy = None
@@ -91,4 +113,5 @@ class WorkThread(QThread):
         """Report after the job no longer counts as pending, so that "all saved" is true when it is heard."""
         with self._changed:
             self._busy = None
-        report()
+        with contextlib.suppress(RuntimeError):  # as above
+            report()

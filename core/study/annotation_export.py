@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,12 @@ def mask_source(annotations: Iterable[StoredAnnotation]) -> dict[str, StoredAnno
     return newest
 
 
-def export_training_set(annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], out: Path) -> tuple[int, list[str]]:
+def export_training_set(
+    annotations: Sequence[StoredAnnotation],
+    images: Sequence[FoundImage],
+    out: Path,
+    go_on: Callable[[], bool] = lambda: True,
+) -> tuple[int, list[str]]:
     """Write ``images/``, ``masks/`` and ``truth.jsonl`` as ``train --data`` and ``evaluate`` read them.
 
     Returns
@@ -43,7 +48,7 @@ def export_training_set(annotations: Sequence[StoredAnnotation], images: Sequenc
     Raises
     ------
     AnnotationError
-        The folder is not empty or cannot be written, or there is nothing to write.
+        The folder is not empty or cannot be written, or there is nothing to write; or `go_on`, asked before each image, is False.
     """
     sources = mask_source(annotations)
     here = {image.sha256: image for image in images}
@@ -64,6 +69,8 @@ def export_training_set(annotations: Sequence[StoredAnnotation], images: Sequenc
         for name in ("images", "masks"):
             (out / name).mkdir(parents=True, exist_ok=True)
         for sha256, one in complete.items():
+            if not go_on():
+                raise AnnotationError(f"{out}: given up half-way; it is no whole set")
             image, stem = here[sha256], stems[sha256]
             shutil.copyfile(image.path, out / "images" / f"{stem}{image.path.suffix.lower()}")
             for target in MaskTarget:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,13 +33,18 @@ def count_complete(annotations: Sequence[StoredAnnotation]) -> int:
     return len(_complete(annotations))
 
 
-def split_own_frames(annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], out: Path) -> OwnFrames:
+def split_own_frames(
+    annotations: Sequence[StoredAnnotation],
+    images: Sequence[FoundImage],
+    out: Path,
+    go_on: Callable[[], bool] = lambda: True,
+) -> OwnFrames:
     """Write both sets below `out`: every fifth image, two at least, is held out, spread evenly in the order of the images' names.
 
     Raises
     ------
     AnnotationError
-        Too few images with both masks are here, `out` is not empty, or cannot be written.
+        Too few images with both masks are here, `out` is not empty, or cannot be written; or `go_on` has become False.
     """
     here = {image.sha256: image for image in images}
     complete = sorted((sha256 for sha256 in _complete(annotations) if sha256 in here), key=lambda one: str(here[one].path))
@@ -54,7 +59,7 @@ def split_own_frames(annotations: Sequence[StoredAnnotation], images: Sequence[F
     for name in ("train", "held_out"):
         wanted = held_out if name == "held_out" else {image.sha256 for image in images} - held_out
         chosen = [one for one in annotations if one.key.sha256 in wanted]
-        counts[name], found = export_training_set(chosen, [image for image in images if image.sha256 in wanted], out / name)
+        counts[name], found = export_training_set(chosen, [image for image in images if image.sha256 in wanted], out / name, go_on)
         problems += found
     return OwnFrames(out / "train", out / "held_out", counts["train"], counts["held_out"], tuple(problems))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -347,6 +348,40 @@ def test_an_edit_that_cannot_be_written_is_shouted_and_written_later(rater: Rate
     assert one.content.cannot_tell
     with AnnotationStore(rater.store_path, read_only=True) as kept:
         assert len(kept.history(one.key)._contents) == 5, "no edit was skipped"
+
+
+@pytest.mark.parametrize("last", ["note", "state", "only one"])
+def test_closing_asks_about_edits_that_the_disk_did_not_take(
+    rater: Rater, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, last: str
+) -> None:
+    monkeypatch.setattr(rater.desk._store, "save", lambda *_: (_ for _ in ()).throw(AnnotationError("the disk is full")))
+    asked: list[int] = []
+    answer = False
+    monkeypatch.setattr(rater.window, "_may_lose", lambda: asked.append(rater.desk.unsaved) or answer)
+    if last != "only one":
+        rater.press(Key.Key_A)
+        rater.qtbot.waitUntil(lambda: "NOT SAVED: 1 edit" in rater.window.panels.header.saved_text)
+    if last == "note":
+        rater.press(Key.Key_F2)
+        QTest.keyClicks(rater.window.panels.note, "glare")
+    else:
+        rater.press(Key.Key_B)
+    assert not rater.window.close()
+    assert asked == [1 if last == "only one" else 2]
+    answer = True
+    with caplog.at_level(logging.ERROR):
+        assert rater.window.close()
+    assert f"{asked[0]} edits could not be written to {rater.store_path}" in caplog.text
+
+
+def test_a_note_stays_with_its_picture(rater: Rater) -> None:
+    rater.press(Key.Key_F2)
+    QTest.keyClicks(rater.window.panels.note, "blurred")
+    rater.press(Key.Key_PageDown)
+    rater.qtbot.waitUntil(lambda: rater.desk.index == 1 and rater.desk.is_open)
+    assert rater.window.panels.note.text() == ""
+    rater.press(Key.Key_Return)
+    assert [(one.key.sha256, one.content.note) for one in rater.kept()] == [(rater.desk.items[0].key.sha256, "blurred")]
 
 
 def test_an_image_that_vanished_is_named_and_the_others_go_on(rater: Rater) -> None:

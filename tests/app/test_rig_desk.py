@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,6 +19,7 @@ from core.config import Config, load_config
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.modes import Mode
+from core.devices import DeviceError
 from core.rig_file import make_rig, read_rig, rig_path, with_rig, write_rig
 from core.session.manifest import read_manifest
 from hardware.calibration_bench import CalibrationBench
@@ -209,6 +211,42 @@ def test_the_wizard_gets_a_rig_that_is_closed_and_gives_it_back(window: Operator
     assert desk.wizard is None
     until(qtbot, lambda: len(opened) == 2)
     until(qtbot, lambda: window.shown_tick is not None)
+
+
+def test_an_order_in_between_gives_up_the_wizard_and_says_so(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
+    desk = _desk(window)
+    desk.new()
+    window.restart()  # F5, before the rig is closed
+    until(qtbot, lambda: len(opened) == 2 and window.shown_tick is not None)
+    assert desk.wizard is None
+    assert "ask for the wizard again" in window.panels.toast.text()
+    desk.new()
+    until(qtbot, lambda: desk.wizard is not None)
+    assert desk.wizard is not None
+    desk.wizard.reject()
+    until(qtbot, lambda: len(opened) == 3)
+
+
+def test_a_rig_that_the_wizard_still_holds_is_waited_for(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
+    go_on = threading.Event()
+
+    def hang(_config: Config, _see: object) -> CalibrationBench:
+        go_on.wait(20.0)
+        raise DeviceError("the camera does not answer: check its cable")
+
+    desk = RigDesk(window, hang, lambda _config: lambda frame: make_scene())
+    desk.new()
+    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.desk.is_busy)
+    assert desk.wizard is not None
+    desk.wizard.camera_page.name_edit.setText("bench 7")
+    desk.wizard.camera_page.open_button.click()
+    desk.wizard.reject()
+    desk.new()
+    assert desk.wizard is None
+    assert "Waiting for the wizard to give camera and servos back" in window.panels.toast.text()
+    assert len(opened) == 1
+    go_on.set()
+    until(qtbot, lambda: len(opened) == 2)
 
 
 def test_a_saved_rig_is_opened(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,6 +22,7 @@ from core.devices import DeviceError
 from core.rig_file import find_rig, list_rigs
 from core.servo_config import JOINT_NAMES
 from core.types import Frame
+from hardware import calibration_bench
 from hardware.calibration_bench import CalibrationBench
 from hardware.servos.search import FoundServo, FoundServos
 from tests.app.fakes import make_scene, until
@@ -327,6 +329,7 @@ def test_saved_rigs_hold_what_was_found(opened: RigWizard, qtbot: QtBot) -> None
     assert rig.calibration is not None
     assert rig.calibration.scale is not None
     assert rig.calibration.scale.mm_per_px == 0.3
+    assert opened.desk.wait_closed()
     assert opened.desk.bench is None  # the camera is free again
 
 
@@ -344,4 +347,44 @@ def test_a_step_that_is_left_out_keeps_what_was_known(make_wizard: MakeWizard, q
 def test_cancel_saves_nothing_and_gives_the_camera_back(opened: RigWizard) -> None:
     opened.cancel_button.click()
     assert list_rigs() == ()
+    assert opened.desk.wait_closed()
     assert opened.desk.bench is None
+
+
+def test_a_camera_without_pictures_is_none(make_wizard: MakeWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Blind(StillCamera):
+        def read(self, timeout_s: float) -> Frame | None:
+            time.sleep(0.01)
+            return None
+
+    monkeypatch.setattr(calibration_bench, "_LOOK_WITHIN_S", 0.1)
+    wizard = make_wizard(
+        "bench 1", opener=lambda config, see: CalibrationBench(config, Blind(), None, lambda frame: make_scene(), lambda: None)
+    )
+    qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
+    _idle(wizard, qtbot)
+    assert "gives no pictures" in wizard.message
+    assert wizard.desk.bench is None
+    assert not wizard.camera_page.is_done
+    wizard.next()
+    assert wizard.page is wizard.camera_page
+
+
+def test_a_driver_that_hangs_does_not_hold_the_window_up(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    go_on = threading.Event()
+
+    def hang(config: Config, see: object) -> CalibrationBench:
+        go_on.wait(20.0)
+        return _open(config, see)
+
+    wizard = make_wizard("bench 1", opener=hang)
+    closed: list[bool] = []
+    wizard.desk.closed.connect(lambda: closed.append(True))
+    qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
+    wizard.cancel_button.click()  # comes back although the driver does not
+    assert not wizard.isVisible()
+    qtbot.wait(50)
+    assert closed == []
+    go_on.set()
+    until(qtbot, lambda: closed == [True])
+    assert wizard.desk.bench is None

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import shutil
-from collections.abc import Iterator
+import tempfile
+import threading
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -21,6 +25,8 @@ from app.training_source import collect_from_file
 from core.control.drive_view import DriveView
 from core.control.modes import Mode
 from core.learning.model_file import MODELS, model_folder, own_models, read_model_info
+from core.study.annotation_images import FoundImage
+from core.study.annotation_records import StoredAnnotation
 from core.study.own_frames import FEWEST
 from tests.app.annotated import annotate_masks
 from tests.app.fakes import FakeEngine, until
@@ -103,6 +109,38 @@ def test_a_training_whose_window_has_gone_ends_and_keeps_what_it_learnt(small_mo
     job.close()
     qtbot.waitUntil(lambda: not child.is_running, timeout=LONG_MS)
     assert read_model_info(model_folder("own_1")).training["steps_done"] < 5000
+
+
+def test_masks_that_are_still_being_collected_are_left_when_the_window_goes(qtbot: QtBot, tmp_path: Path) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+    store = annotate_masks(tmp_path / "images", FEWEST)
+
+    def collect() -> tuple[Sequence[StoredAnnotation], Sequence[FoundImage]]:
+        begun.set()
+        go_on.wait(20.0)
+        return collect_from_file(store)
+
+    job = TrainingJob(collect, folder=tmp_path / "training")
+    job.start(Wish("own_1"))
+    assert begun.wait(5.0)
+    threading.Timer(0.2, go_on.set).start()
+    job.close()
+    qtbot.wait(50)  # what the thread gave is heard here, if it is heard
+    assert job._child is None
+    assert not list((tmp_path / "training").glob("*"))
+
+
+def test_a_process_that_cannot_be_started_is_said(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full() -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", full)
+    job = job_on(annotate_masks(tmp_path / "images", FEWEST), tmp_path)
+    job.start(Wish("own_1"))
+    ended(job, qtbot)
+    assert job.state.phase is Phase.FAILED
+    assert "cannot be started (No space left on device)" in job.state.line
+    job.close()
 
 
 def test_too_few_masks_are_one_clear_line(qtbot: QtBot, tmp_path: Path) -> None:
