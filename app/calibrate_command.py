@@ -43,7 +43,7 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None
             table.add_row("right answers", str(sum(right for _, right in pairs)))
             table.add_row("AUROC before, on this set", f"{describe_confidence(scores)['confidence_auroc']:.3f}")
             tables.append(table)
-    left_out.tell(len(calibrations))
+    left_out.tell(len(scores))
     write_calibration(target, *calibrations)
     Console(markup=False, emoji=False).print(*tables)
     sys.stderr.write("measure it on another set: main.py benchmark --accuracy SET\n")

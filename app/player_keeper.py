@@ -24,13 +24,15 @@ class PlayerKeeper(QObject):
     """Also reads the events, which are a file of their own.
 
     ``said`` carries a line to show and whether it is a fault; ``events_read`` the events and whether the session is still being
-    recorded; ``replayed_read`` a replay's results; ``noted`` a note that is kept; ``progressed`` the share of the clip that is
+    recorded; ``replayed_read`` a replay's results; ``noted`` a note that is kept, ``note_refused`` one that the disk did
+    not take; ``progressed`` the share of the clip that is
     written, None when none is.
     """
 
     said = Signal(str, bool)
     events_read = Signal(object, bool)
     noted = Signal(object)
+    note_refused = Signal(object)
     replayed_read = Signal(object)
     progressed = Signal(object)
 
@@ -44,7 +46,7 @@ class PlayerKeeper(QObject):
         self._clip: ClipExporter | None = None
         self._work = WorkThread("player work", self)
         self._work.done.connect(self._on_done)
-        self._work.failed.connect(lambda _key, line: self.said.emit(line, True))
+        self._work.failed.connect(self._on_failed)
         self._snapshots = SnapshotWriter(folder, self)
         self._snapshots.saved.connect(lambda line: self.said.emit(line, False))
         self._snapshots.failed.connect(lambda line: self.said.emit(line, True))
@@ -63,7 +65,7 @@ class PlayerKeeper(QObject):
 
     def add_note(self, event: Event) -> None:
         """Into the session's own file."""
-        self._work.submit("note", partial(_add, self._reader.folder, event))
+        self._work.submit(event, partial(_add, self._reader.folder, event))
 
     def take_snapshot(self, tick: Tick) -> None:
         """Plain, with overlays, and its values."""
@@ -104,6 +106,12 @@ class PlayerKeeper(QObject):
             self.replayed_read.emit(result)
         else:
             self.noted.emit(result)
+
+    @Slot(object, str)
+    def _on_failed(self, key: object, line: str) -> None:
+        self.said.emit(line, True)
+        if isinstance(key, Event):
+            self.note_refused.emit(key)
 
     def shut_down(self) -> bool:
         """Finish notes and snapshots, give a clip up; False when the disk does not answer."""

@@ -115,6 +115,7 @@ class PlayerWindow(WindowFrame):
         self._keeper.said.connect(self.say)
         self._keeper.events_read.connect(self._known.take_events)
         self._keeper.noted.connect(self._known.take_note)
+        self._keeper.note_refused.connect(self._write_again)
         self._keeper.replayed_read.connect(self._on_replayed)
         self._keeper.progressed.connect(bar.show_progress)
         known = self._known
@@ -363,6 +364,14 @@ class PlayerWindow(WindowFrame):
         if text and len(self._course):
             event = Event(self._course.first_s + self._clock.position_s, EventKind.NOTE, text)
             self._keeper.add_note(event)
+
+    @Slot(object)
+    def _write_again(self, event: Event) -> None:
+        """A note that the disk did not take, at its time; what is being written meanwhile comes first."""
+        if not self.panels.note.isVisible():
+            self.begin_note()
+            self.seek(event.time_s - self._course.first_s)
+            self.panels.note.setText(event.text)
 
     # ---- the window
 

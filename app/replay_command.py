@@ -146,7 +146,7 @@ def replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None =
                 record = unread_to_json(name, "the picture is lost")
             else:
                 scene: Scene = pipeline(Frame(row.index, row.captured_s, frame.image), target)
-                done.changes.append(Change(place, row.index, row.captured_s - first_s, seen(row.scene), seen(scene)))
+                done.changes.append(Change(row.row, row.index, row.captured_s - first_s, seen(row.scene), seen(scene)))
                 record = scene_to_json(name, scene)
             if lines is not None:
                 placed = {"frame": row.index, "captured_s": round(row.captured_s, 6), "time_s": round(row.captured_s - first_s, 6)}
@@ -166,7 +166,7 @@ def change_to_json(change: Change) -> dict[str, Any]:
     """One frame before and after, as plain JSON values."""
     both = {"before": change.before, "after": change.after}
     return {
-        "row": change.place,
+        "row": change.row,
         "frame": change.index,
         "time_s": round(change.time_s, 6),
         "change": change.kind,

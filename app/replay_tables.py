@@ -83,7 +83,7 @@ def _frames(worst: Sequence[Change], count: int) -> Table:
     for change in worst:
         told_by = change.before if change.before.reason is not None else change.after
         table.add_row(
-            str(change.place),
+            str(change.row),
             f"{change.time_s:.3f}",
             _theta(change.before),
             _theta(change.after),

@@ -193,7 +193,8 @@ class SettingsDesk(QObject):
     def _keep(self, config: Config) -> str | None:
         """Write the file; a note about the old one, None when it could not be written."""
         try:
-            note = write_settings(self._file.path, config, self._file.text)
+            # None would mean that nobody has looked: what somebody else wrote since then would go without a copy.
+            note = write_settings(self._file.path, config, self._file.text or "")
         except ConfigError as error:
             if self.dialog is not None:
                 self.dialog.show_notice(str(error), is_fault=True)

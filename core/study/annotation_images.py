@@ -55,7 +55,8 @@ def _identified(path: Path, store: AnnotationStore) -> FoundImage:
         state = path.stat()
     except OSError as error:
         raise ImageError(f"{path}: cannot be read ({error.strerror})") from None
-    name = os.path.relpath(path.resolve(), store.path.parent.resolve())
+    # A name that is no UTF-8, as old archives have them, is kept in a form that a file can hold.
+    name = os.fsencode(os.path.relpath(path.resolve(), store.path.parent.resolve())).decode("utf-8", "backslashreplace")
     record = store.image_as_last_seen(name, state.st_size, state.st_mtime_ns)
     if record is None:
         sha256 = image_sha256(path)

@@ -295,11 +295,13 @@ class AnnotationStore:
     def _named_errors(self) -> Iterator[None]:
         try:
             yield
-        except (sqlite3.Error, UnicodeDecodeError) as error:  # damage can reach SQLite's own messages
+        except (sqlite3.Error, UnicodeError) as error:  # damage can reach SQLite's own messages
             raise AnnotationError(f"{self.path}: {_advice(error)}") from None
 
 
 def _advice(error: Exception) -> str:
+    if isinstance(error, UnicodeEncodeError):
+        return "cannot hold a name that is no UTF-8; give names of raters and studies in plain letters"
     text = str(error) if isinstance(error, sqlite3.Error) else "malformed"
     if "locked" in text:
         return "is open in another window; close that one, or give another --store FILE"

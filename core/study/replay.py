@@ -34,9 +34,9 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One frame before and after. ``place`` counts the session's rows, ``index`` is the camera's, ``time_s`` from the first row."""
+    """One frame before and after. ``row`` counts in the session, ``index`` is the camera's, ``time_s`` from the first row."""
 
-    place: int
+    row: int
     index: int
     time_s: float
     before: Seen
@@ -179,12 +179,12 @@ def _median(values: Iterable[float]) -> float | None:
 def changed_most(changes: Sequence[Change], count: int) -> list[Change]:
     """The frames that changed most, largest first; equal ones in their order. Frames that say the same are left out."""
     differing = [c for c in changes if c.kind not in ("same state", "same reason") or c.size_deg > 0.0 or (c.head_px or 0.0) > 0.0]
-    return sorted(differing, key=lambda c: (-c.size_deg, -(c.head_px or 0.0), c.place))[:count]
+    return sorted(differing, key=lambda c: (-c.size_deg, -(c.head_px or 0.0), c.row))[:count]
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Frames in a row, first to last place, whose pose was lost or gained for one reason."""
+    """Frames in a row, first to last row, whose pose was lost or gained for one reason."""
 
     kind: str
     reason: str
@@ -205,8 +205,8 @@ def runs(changes: Sequence[Change]) -> list[Run]:
         told_by = change.after if change.kind == "pose lost" else change.before
         reason = told_by.reason.value if told_by.reason is not None else ""
         last = found[-1] if found else None
-        if last is not None and (last.kind, last.reason, last.last) == (change.kind, reason, change.place - 1):
-            found[-1] = Run(last.kind, reason, last.first, change.place)
+        if last is not None and (last.kind, last.reason, last.last) == (change.kind, reason, change.row - 1):
+            found[-1] = Run(last.kind, reason, last.first, change.row)
         else:
-            found.append(Run(change.kind, reason, change.place, change.place))
+            found.append(Run(change.kind, reason, change.row, change.row))
     return found

@@ -3392,6 +3392,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/rig_desk.py"/>
+        <source>Waiting for the wizard to give camera and servos back; where a driver hangs, start the program again</source>
+        <translation>正在等待向导归还相机和舵机；如果驱动程序卡住，请重新启动程序</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_desk.py"/>
         <source>the rig wizard has camera and servos; the rig is opened again when it is closed</source>
         <translation>装置向导正在使用相机和舵机；向导关闭后装置会重新打开</translation>
     </message>
@@ -3454,6 +3459,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/rig_desk.py"/>
         <source>Click where the robot is inserted; Esc leaves it as it is</source>
         <translation>请单击机器人的插入处；按 Esc 保持不变</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_desk.py"/>
+        <source>The rig was opened anew meanwhile; ask for the wizard again</source>
+        <translation>期间装置已重新打开；请再次打开向导</translation>
     </message>
     <message>
         <location filename="../../app/rig_desk.py"/>

@@ -17,6 +17,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from app import player_keeper
 from app.decode_thread import drawable
 from app.player_window import PlayerWindow
 from app.replayed import scene_from_json
@@ -318,6 +319,28 @@ def test_a_note_is_kept_in_the_session(open_player: Open, tmp_path: Path, qtbot:
     press(window, Key.Key_Escape)
     assert not window.panels.note.isVisible()
     assert not any("never" in event.text for event in window.events)
+
+
+def test_a_note_that_the_disk_does_not_take_is_not_lost(
+    open_player: Open, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(folder: Path, _event: Event) -> None:
+        raise SessionError(f"{folder}: read-only")
+
+    window = open_player(make_session(tmp_path))
+    until(qtbot, lambda: window.place == 0 and window.rows == COUNT)
+    with monkeypatch.context() as patch:
+        patch.setattr(player_keeper, "add_event", refuse)
+        window.go(22)
+        press(window, Key.Key_M)
+        QTest.keyClicks(window.panels.note, "a long careful remark")
+        press(window, Key.Key_Return)
+        window.go(3)
+        until(qtbot, window.panels.note.isVisible)
+    assert "read-only" in window.panels.toast.text()
+    assert (window.panels.note.text(), window.place) == ("a long careful remark", 22)
+    press(window, Key.Key_Return)  # there is room again
+    until(qtbot, lambda: any(event.text == "a long careful remark" for event in window.events))
 
 
 def test_a_note_into_a_session_that_is_being_recorded_is_refused(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:

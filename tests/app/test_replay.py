@@ -144,9 +144,12 @@ def test_lost_pictures_are_counted_and_the_rest_goes_on(tmp_path: Path, capsys: 
     session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(3)])
     lines = (session / "frames.jsonl").read_text().splitlines()
     (session / "frames.jsonl").write_text("\n".join([lines[0], '{"row": 1, "nonsense', lines[2]]) + "\n")
-    run_replay(options(session, as_json=True))
+    out = tmp_path / "out"
+    run_replay(options(session, as_json=True, out=out))
     told = json.loads(capsys.readouterr().out)
     assert told["frames"] == 2
+    frames = [json.loads(line) for line in (out / "frames.jsonl").read_text().splitlines()]
+    assert [frame["row"] for frame in frames] == [0, 2], "as in the session, so that other tables of it can be joined"
     assert any("line 2" in problem for problem in told["problems"])
 
 

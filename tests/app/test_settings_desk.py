@@ -118,6 +118,20 @@ def test_settings_of_the_rig_are_not_tried_out(at: Bench) -> None:
     assert not at.desk.is_trying
 
 
+def test_what_somebody_else_wrote_first_is_kept_beside(at: Bench) -> None:
+    """There was no file when the window opened; another window has saved one meanwhile."""
+    at.path.write_text("[window]\npictures_folder = 'mine'\n", encoding="utf-8")
+    at.edit(D_ALLOW, "9")
+    assert at.desk.dialog is not None
+    at.desk.dialog.save.click()
+    assert "was changed meanwhile" in at.window.panels.toast.text()
+    (aside,) = (path for path in at.path.parent.glob("settings*") if path != at.path)
+    assert "pictures_folder = 'mine'" in aside.read_text(encoding="utf-8")
+    at.edit(D_ALLOW, "6")
+    at.desk.dialog.save.click()
+    assert "meanwhile" not in at.window.panels.toast.text()
+
+
 def test_what_is_saved_stays_and_is_written(at: Bench) -> None:
     at.edit(D_ALLOW, "9")
     assert at.desk.dialog is not None

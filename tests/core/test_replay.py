@@ -94,8 +94,8 @@ def test_most_changed_first_and_a_lost_pose_before_any_angle() -> None:
         change(3, posed(0.0), refused()),
         change(4, refused(), refused()),
     ]
-    assert [c.place for c in changed_most(changes, 10)] == [3, 2, 1]
-    assert [c.place for c in changed_most(changes, 1)] == [3]
+    assert [c.row for c in changed_most(changes, 10)] == [3, 2, 1]
+    assert [c.row for c in changed_most(changes, 1)] == [3]
 
 
 def test_lost_poses_are_told_as_runs() -> None:
