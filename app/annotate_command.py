@@ -68,6 +68,8 @@ def run_annotate(options: AnnotateOptions) -> int:
         raise AnnotationError("--report, --export, --import and --salvage are different things: give one of them")
     if options.export is not None and options.out is None:
         raise AnnotationError("--export needs --out: a folder for dataset, a file for csv and coco")
+    if options.as_json and not options.report:
+        raise AnnotationError("--json is for --report; leave it out")
     config = _config(options)
     given = options.paths or (Path(),)
     store_path = options.store or _store_of(given)
@@ -247,6 +249,7 @@ def _report(store_path: Path, options: AnnotateOptions) -> int:
 
     with AnnotationStore(store_path, read_only=True) as store:
         annotations = choose_study(store.annotations(), options.study.name or None, str(store_path))
+        annotations = _of_rater(annotations, options.study.rater)
         names = {sha256: image.name for sha256, image in store.images().items()}
         _tell(store.problems)
     study = annotations[0].key.study
@@ -283,6 +286,7 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     annotations, images = read_annotated(store_path, paths, options.frames)
     if options.study.name:
         annotations = [one for one in annotations if one.key.study == options.study.name]
+    annotations = _of_rater(annotations, options.study.rater)
     if options.export == "dataset":
         count, problems = export_training_set(annotations, images, options.out)
         _tell(problems)
@@ -293,6 +297,8 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     else:
         from app.annotate_evaluation import compared_rows
 
+        if options.out.exists():
+            raise AnnotationError(f"{options.out}: is there already; choose another --out")
         rows, _, _, missed = compared_rows(annotations, images, config, options.study.name or None, str(store_path))
         try:
             write_measurements(options.out, rows)
@@ -302,6 +308,17 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         if missed:
             raise KeyboardInterrupt
     return 0
+
+
+def _of_rater(annotations: list[StoredAnnotation], rater: str | None) -> list[StoredAnnotation]:
+    """Those of one rater; None: of all. Raises AnnotationError where there are none."""
+    if rater is None:
+        return annotations
+    own = [one for one in annotations if one.key.rater == rater]
+    if not own:
+        known = ", ".join(sorted({one.key.rater for one in annotations})) or "nobody"
+        raise AnnotationError(f"--rater {rater}: has annotated nothing here; who has: {known}")
+    return own
 
 
 def read_annotated(store_path: Path, paths: Sequence[Path], frames: int = 48) -> tuple[list[StoredAnnotation], list[FoundImage]]:

@@ -179,7 +179,7 @@ def run_accuracy(
 ) -> None:
     """Perceive every frame of a synth set as a single image and compare with its truth.
 
-    `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network.
+    `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network: not both.
     """
     from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.model_file import model_folder, sha256_of, trained_without, write_figures
@@ -201,7 +201,7 @@ def run_accuracy(
         without = [] if true_masks else trained_without(model_folder(config.perception.segmentation.model))
         figures |= summarise_looks(scores, looks, without)
     _print(figures, as_json, f"accuracy on {folder}")
-    if store and not true_masks:
+    if store:
         described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
         write_figures(model_folder(config.perception.segmentation.model), described | figures)
 

@@ -43,20 +43,33 @@ def main() -> None:
         faulthandler.enable()  # a memory fault says at least where, and not only that
     share_heaps()
     limit_pictures()
+    if sys.stdout is None:  # started with a closed one: what is told there is told to nobody
+        sys.stdout = open(os.devnull, "w")
     try:
         try:
-            app()
+            app(prog_name="main.py", standalone_mode=False)
         finally:
             _finish_output()
     except UserError as error:
         sys.stderr.write(f"error: {error}\n")
         sys.exit(2)
-    except OSError as error:
-        if error.errno != errno.ENOSPC:
-            raise
-        sys.stderr.write(f"error: {error.filename or 'output'}: the disk is full; make room, or write to another one\n")
+    except typer.TyperException as error:  # a command line that makes no sense
+        if error.format_message().startswith("Usage:"):  # a group by itself: its help is the answer
+            sys.stderr.write(f"{error.format_message()}\n")
+            sys.exit(2)
+        context = getattr(error, "ctx", None)
+        told = " ".join(error.format_message().split()).rstrip(".")
+        sys.stderr.write(f"error: {told}; see {context.command_path + ' ' if context is not None else ''}--help\n")
         sys.exit(2)
-    except KeyboardInterrupt:
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            sys.stderr.write(f"error: {error.filename or 'output'}: the disk is full; make room, or write to another one\n")
+        elif error.filename is not None and error.strerror:
+            sys.stderr.write(f"error: {error.filename}: {error.strerror}\n")
+        else:
+            raise
+        sys.exit(2)
+    except (KeyboardInterrupt, typer.Abort):
         sys.stderr.write("interrupted\n")
         sys.exit(130)
 
@@ -78,6 +91,10 @@ def _window(context: typer.Context, rig: RigOption = None, config: ConfigOption 
     """Without a command: the operator window."""
     if context.invoked_subcommand is None:
         _open_window(rig, config, source)
+    given = [name for name, value in (("--rig", rig), ("--config", config), ("--source", source)) if value is not None]
+    if given:
+        command = context.invoked_subcommand
+        raise UserError(f"{given[0]} before {command} is for the window alone; write it behind, where {command} takes it")
 
 
 def gui(

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from app.cli_options import ConfigOption, JsonOption, ModelOption, PresetOption
+from core.errors import UserError
 
 
 def trial(
@@ -63,6 +64,16 @@ def benchmark(
     """Latency per stage, throughput, memory and start-up, against the paper-literal baseline in the same run; or accuracy."""
     from app.benchmark_command import run_accuracy, run_player, run_recording, run_speed, run_window_pace
 
+    asked = {"--window": window is not None, "--player": player is not None, "--recording": recording}
+    asked["--accuracy"] = accuracy is not None
+    if sum(asked.values()) > 1:
+        raise UserError(f"{', '.join(name for name, given in asked.items() if given)} are different things: give one of them")
+    if accuracy is None and (store or true_masks):
+        raise UserError(f"{'--store' if store else '--true-masks'} is for --accuracy SET")
+    if store and (true_masks or preset is not None or config is not None):
+        raise UserError("--store keeps figures of the model as it is shipped: leave --true-masks, --preset and --config out")
+    if window is not None and (model is not None or preset is not None):
+        raise UserError("--window runs with the settings of --config: leave --model and --preset out")
     if window is not None:
         run_window_pace(window, config_path=config, as_json=json)
     elif player is not None:

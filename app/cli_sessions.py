@@ -65,7 +65,7 @@ def session_info(session: SessionArgument, json: JsonOption = False) -> None:
 @session_commands.command("recover")
 def session_recover(
     session: SessionArgument,
-    into: Annotated[Path | None, typer.Option(help="folder of the copy; default: beside the session")] = None,
+    into: Annotated[Path | None, typer.Option(help="folder in which the copy is made; default: beside the session")] = None,
     only_look: Annotated[bool, typer.Option("--only-look", help="write nothing; say what would be lost")] = False,
     json: JsonOption = False,
     progress_json: ProgressOption = False,

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from app.cli_options import ConfigOption, JsonOption, ModelOption, PresetOption, ProgressOption, tell_asked_progress
+from core.errors import UserError
 
 
 def perceive(
@@ -80,7 +81,9 @@ def evaluate(
     like_paper: Annotated[
         bool, typer.Option("--like-paper", help="draw a test like the paper's: 48 images, measured twice with an error")
     ] = False,
-    manual_sd: Annotated[float, typer.Option(min=0, max=30, help="SD of one such manual measure, degrees")] = 1.5,
+    manual_sd: Annotated[
+        float | None, typer.Option(min=0, max=30, help="SD of one such manual measure, degrees; default: 1.5")
+    ] = None,
     study: Annotated[str | None, typer.Option(help="this study of images annotated by hand, its raters and repeats too")] = None,
     seed: Annotated[int, typer.Option(min=0, help="of the drawn images, their manual errors and the bootstrap")] = 0,
     model: ModelOption = None,
@@ -91,6 +94,10 @@ def evaluate(
     """The algorithm against manual measures, with the statistics of the paper beside its own figures."""
     from app.evaluate_command import LikePaper, run_evaluate
 
+    if manual_sd is not None and not like_paper:
+        raise UserError("--manual-sd is for --like-paper")
+    if json and progress_json:
+        raise UserError("--json and --progress-json both write to standard output: give one of them")
     tell_asked_progress(progress_json)
     run_evaluate(
         labelled,
@@ -100,7 +107,7 @@ def evaluate(
         model=model,
         preset=preset,
         config_path=config,
-        like_paper=LikePaper(manual_sd) if like_paper else None,
+        like_paper=LikePaper(1.5 if manual_sd is None else manual_sd) if like_paper else None,
         seed=seed,
         study_name=study,
     )

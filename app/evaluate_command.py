@@ -14,6 +14,7 @@ from app.annotate_tables import print_agreement
 from app.evaluation_report import print_tables, render_report
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
+from app.outputs import check_no_input
 from app.progress_lines import asked_teller
 from core.config import Config, choose_model, load_config
 from core.study.annotation_report import write_measures
@@ -75,6 +76,7 @@ def run_evaluate(
     if csv is not None:
         if like_paper is not None or model is not None or preset is not None or config_path is not None:
             raise EvaluationError("--like-paper, --model, --preset and --config need a labelled set (evaluate DIR), not --csv")
+        check_no_input(out / "measurements.csv", [csv], "--out")
         study = _Study(read_measurements(csv), {"kind": "table of measures", "name": csv.name}, [])
         _make_folder(out)
     else:

@@ -23,6 +23,11 @@ def run_faults(only: list[int], out: Path | None, *, quick: bool, as_json: bool)
     cases = _chosen(only, quick=quick)
     if out is not None and len(cases) < COUNT:
         raise CampaignError("--out writes the whole list: leave --only and --quick out")
+    if out is not None:
+        try:
+            out.touch()  # now, and not after the whole campaign
+        except OSError as error:
+            raise CampaignError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
     os.environ["QT_QPA_PLATFORM"] = "offscreen"  # windows are opened and closed; nobody shall see them
     logging.disable(logging.CRITICAL)  # what is logged of injected faults is what is looked for anyway
     try:
@@ -40,7 +45,11 @@ def _chosen(only: list[int], *, quick: bool) -> list[FaultCase]:
     cases = list(all_cases())
     if unknown := [number for number in only if not 1 <= number <= COUNT]:
         raise CampaignError(f"there is no fault {unknown[0]}: they are numbered 1 to {COUNT}")
-    return [case for case in cases if (not only or case.number in only) and (case.quick or not quick)]
+    chosen = [case for case in cases if (not only or case.number in only) and (case.quick or not quick)]
+    if not chosen:
+        numbers = ", ".join(str(number) for number in only)
+        raise CampaignError(f"fault {numbers} needs a line, a process or a window: leave --quick out")
+    return chosen
 
 
 def _with_progress(cases: list[FaultCase], *, live: bool, as_json: bool) -> Iterator[Result]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from app.outputs import is_same
 from app.progress_lines import ProgressLines, Teller, asked_teller
 
 _console = Console(stderr=True, markup=False, emoji=False)
@@ -131,20 +133,20 @@ def run_train(
     from app.lessons import FrameLesson, Lesson, SecondLookLesson
     from app.teaching import Classroom, second_plan, teach_second_look
     from core.learning.dataset import DatasetError, find_samples
-    from core.learning.model_file import check_can_write, model_folder
+    from core.learning.model_file import INFO, check_can_write, model_folder
 
     if second_look and outputs.held_out is not None:
         raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
+    _check_choices(init, base, plan, deepen=deepen, shallow=shallow, second_look=second_look)
+    if outputs.held_out is not None and any(is_same(outputs.held_out, folder) for folder in inputs.data):
+        raise DatasetError(f"{outputs.held_out}: is trained on, so that it cannot judge; give --held-out another folder")
     if not inputs.data and not inputs.synthetic:
         raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
-    if init is not None:
-        model_folder(init)  # what is not there is said before half a minute of frames is made
-    check_can_write(outputs.out)
     out = outputs.out.resolve()
-    try:
-        log = out.with_name(out.name + ".log").open("a", encoding="utf-8", buffering=1)
-    except OSError as error:
-        raise DatasetError(f"{out.parent}: cannot be written ({error.strerror}); choose another --out") from None
+    began_with = model_folder(init) if init is not None else None  # said before half a minute of frames is made
+    if (out / INFO).is_file() and (began_with is None or began_with.resolve() != out):
+        raise DatasetError(f"{out}: is a model already; choose another --out, or give --init {outputs.out} to go on with it")
+    check_can_write(out)
     folders = list(inputs.data)
     samples = [sample for folder in folders for sample in _samples_of(folder, inputs.without)]
     if inputs.synthetic:
@@ -163,8 +165,13 @@ def run_train(
     plan = replace(plan, crop=lesson.sides(plan.crop))
     then = None if second_look else second_plan(plan, init)
     notes: dict[str, Any] = {"init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
-    if inputs.without:
-        notes |= {"without": list(inputs.without)}
+    without = _never_seen(inputs.without, began_with)
+    if without:
+        notes |= {"without": without}
+    try:
+        log = out.with_name(out.name + ".log").open("a", encoding="utf-8", buffering=1)
+    except OSError as error:
+        raise DatasetError(f"{out.parent}: cannot be written ({error.strerror}); choose another --out") from None
     teller, watch = asked_teller(), HeldOutWatch(outputs.held_out, out, asked_teller(), log.write)
     with log, Interrupt() as interrupt, progress_bar() as bar:
         room = Classroom(out, notes, log.write, teller, bar, interrupt, watch, steps_total=plan.steps + (then.steps if then else 0))
@@ -183,6 +190,35 @@ def run_train(
         teller.tell({"model": str(out), "steps_done": done, "steps": steps})
     ending = "" if done == steps else f" (interrupted after {done} of {steps} steps; go on with --init {out})"
     _console.print(f"model written to {out}{ending}", soft_wrap=True)
+
+
+def _check_choices(init: str | None, base: int | None, plan: Any, *, deepen: bool, shallow: bool, second_look: bool) -> None:
+    """Raise DatasetError for options that could have no effect beside the others."""
+    from core.learning.dataset import DatasetError
+
+    told = {"--base": base is not None, "--shallow": shallow, "--deepen": deepen}
+    shapes = [name for name, given in told.items() if given]
+    if len(shapes) > 1:
+        raise DatasetError(f"{' and '.join(shapes)} contradict each other; give one of them")
+    if second_look and shapes:
+        raise DatasetError(f"{shapes[0]} is for the first look; with --second-look leave it out")
+    if init is not None and (base is not None or shallow):
+        raise DatasetError(f"{shapes[0]} shapes a new network; the one of --init {init} has its shape: leave one of them out")
+    if init is None and deepen:
+        raise DatasetError("--deepen needs --init MODEL, which is to be made deeper")
+    if init is None and plan.focus_share > 0:
+        raise DatasetError("--focus needs --init MODEL, which tells what is hard")
+
+
+def _never_seen(without: Sequence[str], init: Path | None) -> list[str]:
+    """Looks that neither this training sees nor the one that it begins with has seen; the others are said."""
+    from core.learning.model_file import trained_without
+
+    unseen = [look for look in without if init is None or look in trained_without(init)]
+    known = [look for look in without if look not in unseen]
+    if known:
+        sys.stderr.write(f"note: {', '.join(known)} are left out now, but {init} may have been trained with them\n")
+    return unseen
 
 
 def _samples_of(folder: Path, without: Sequence[str]) -> list[Any]:

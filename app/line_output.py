@@ -24,7 +24,7 @@ class LineOutput:
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
             return path.open("w", encoding="utf-8", buffering=1)
-        if sys.stdout is None:  # started with a closed one
+        if sys.__stdout__ is None:  # started with a closed one
             raise UserError("standard output is closed; name a file with --jsonl")
         return open(sys.stdout.fileno(), "w", encoding="utf-8", buffering=1, closefd=False)
 

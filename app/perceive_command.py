@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import cv2
 import numpy as np
 
 from app.line_output import LineOutput
+from app.outputs import check_no_input, is_same
 from app.overlay_picture import draw_overlay
 from app.scene_json import scene_to_json, unread_to_json
 from app.sources import SourcePicture, expand, pictures
@@ -52,8 +54,14 @@ def run_perceive(
     files = expand(paths)
     if not files:
         raise UserError(f"{', '.join(map(str, paths))}: no pictures or videos there")
-    for folder in (outputs.masks, outputs.overlay):
+    if outputs.jsonl is not None:
+        check_no_input(outputs.jsonl, files if targets_path is None else [*files, targets_path], "--jsonl")
+    for folder, option, endings in (
+        (outputs.masks, "--masks", ("_vessel.png", "_robot.png")),
+        (outputs.overlay, "--overlay", ("_overlay.png",)),
+    ):
         if folder is not None:
+            _check_keeps_inputs(folder, files, option, endings)
             _make_folder(folder)
     pipeline = open_pipeline(config.perception)
     tally = _Tally()
@@ -150,6 +158,16 @@ def _source_sized(mask: Mask, size: tuple[int, int]) -> Mask:
     if mask.shape == (size[1], size[0]):
         return mask
     return np.asarray(cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_LINEAR) > 127)
+
+
+def _check_keeps_inputs(folder: Path, files: Sequence[Path], option: str, endings: Sequence[str]) -> None:
+    """Refuse a folder in which what is written would have the name of an input, or of the masks that belong to one."""
+    written = {f"{file.stem}{ending}" for file in files for ending in endings}
+    for file in files:
+        if file.name in written and is_same(folder, file.parent):
+            raise UserError(f"{file}: is an input, which {option} {folder} would overwrite; choose another folder")
+        if file.parent.name == "images" and is_same(folder, file.parent.parent / "masks"):
+            raise UserError(f"{folder}: holds the masks that were drawn, which {option} would overwrite; choose another folder")
 
 
 def _make_folder(folder: Path) -> None:

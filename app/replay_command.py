@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from app.learning_commands import Interrupt, progress_bar
 from app.line_output import LineOutput
+from app.outputs import check_no_input, check_no_session
 from app.perceive_command import _make_folder
 from app.scene_json import scene_to_json, unread_to_json
 from core.config import Config, choose_model, load_config, merge
@@ -59,7 +60,10 @@ def run_replay(options: ReplayOptions) -> None:
     with SessionReader(options.session) as reader, ExitStack() as stack:
         config, notes = replay_config(reader.manifest, options)
         if options.out is not None:
+            check_no_session(options.out, "--out")
             _make_folder(options.out)
+        if options.jsonl is not None:
+            check_no_input(options.jsonl, options.session.iterdir(), "--jsonl")
         pipeline = open_pipeline(config.perception)
         after = _model_of(config) | {"engine": pipeline.engine}
         notes += model_note(reader.manifest, config, after)

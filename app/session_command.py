@@ -13,6 +13,7 @@ from rich.table import Table
 
 from app.learning_commands import progress_bar
 from core.control.modes import Mode
+from core.session.completeness import losses, rows_cut_off
 from core.session.export import export_csv, export_mp4
 from core.session.files import is_being_written
 from core.session.manifest import SessionError
@@ -65,7 +66,7 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "recovered": f"{loss.seconds} s, {loss.rows} rows and {loss.pictures} pictures lost" if loss else None,
         "seconds": round(reader.duration_s, 3),
         "rows": len(reader),
-        "missing_rows": reader.missing_rows,
+        "missing_rows": reader.missing_rows + rows_cut_off(reader),
         "dropped": counts.dropped if counts else None,
         "states": {state.value: int((line.state == place).sum()) for place, state in enumerate(PoseState)},
         "without_pose": int((line.state < 0).sum()),
@@ -76,7 +77,7 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "codec": manifest.codec if manifest else None,
         "model": manifest.model.get("name") if manifest else None,
         "bytes": sum(path.stat().st_size for path in reader.folder.iterdir() if path.is_file()),
-        "problems": list(reader.problems),
+        "problems": [*reader.problems, *losses(reader)],
     }
 
 
@@ -115,7 +116,7 @@ def run_export(folder: Path, outs: list[Path], *, plain: bool, as_json: bool) ->
             for out in outs:
                 task = bar.add_task(out.name, total=len(reader))
                 written[str(out)] = _export(reader, out, plain, lambda task=task: bar.advance(task))
-        problems = list(reader.problems)
+        problems = [*reader.problems, *losses(reader)]
     if as_json:
         sys.stdout.write(json.dumps({"written": written, "problems": problems}) + "\n")
         return

@@ -59,7 +59,10 @@ def read_image(path: Path) -> Image:
     if pixels is None or pixels.size == 0:
         raise ImageError(f"{path}: not a picture that can be read, or cut short")
     _check_size(path, pixels.shape[1], pixels.shape[0])
-    return to_rgb8(pixels, blue_first=True)
+    try:
+        return to_rgb8(pixels, blue_first=True)
+    except ImageError as error:
+        raise ImageError(f"{path}: {error}") from None
 
 
 def _check_size(path: Path, width: int, height: int) -> None:

@@ -119,6 +119,8 @@ def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
             if rig.rig is None:
                 raise RigFileError(rig.problem)
             return rig.path, rig.rig
+    if name.strip().casefold() in RESERVED:
+        raise RigFileError(f"{name}: is built in and has no file; rigs with one: {', '.join(rig.name for rig in listed) or 'none'}")
     known = ", ".join((*RESERVED, *(rig.name for rig in listed)))
     raise RigFileError(f"unknown rig {name!r}; known: {known}")
 

@@ -165,7 +165,10 @@ def leave_out_looks(folder: Path, samples: Sequence[Sample], looks: Sequence[str
 
     Raises DatasetError when nothing is left, or when a frame's truth does not say which look it has.
     """
-    truth = read_truth(folder)
+    try:
+        truth = read_truth(folder)
+    except DatasetError as error:
+        raise DatasetError(f"{error} (--without needs the looks that it names)") from None
     untold = next((sample.stem for sample in samples if truth.get(sample.stem, {}).get("family") is None), None)
     if untold is not None:
         raise DatasetError(f"{folder}: truth.jsonl names no family of looks for frame {untold}; leave --without out")

@@ -195,6 +195,7 @@ def save_model(
     try:
         state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
         save_file(state, scratch / WEIGHTS)
+        (scratch / WEIGHTS).chmod(0o644)  # others at the same machine may use it, too; by itself it is the writer's alone
         export_onnx(network, network.shape.stride, scratch / ONNX)
         if len(examples):
             export_onnx(_eight_bit(network, examples), network.shape.stride, scratch / ONNX_INT8)

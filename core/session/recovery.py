@@ -138,7 +138,9 @@ def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda 
     except VideoError as error:
         raise SessionError(f"{error}; make room or choose another folder") from None
     except OSError as error:
-        raise SessionError(f"{error.filename or work}: {error.strerror or error}; make room or choose another folder") from None
+        is_source = error.filename is not None and Path(error.filename).parent == session
+        what_to_do = "let it be read, and try again" if is_source else "make room or choose another folder"
+        raise SessionError(f"{error.filename or work}: {error.strerror or error}; {what_to_do}") from None
     finally:
         shutil.rmtree(work, ignore_errors=True)
     return recovery

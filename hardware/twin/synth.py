@@ -217,6 +217,8 @@ def _prepare(plan: SynthPlan) -> None:
     }
     path = plan.out / "plan.json"
     try:
+        if not path.is_file() and plan.out.is_dir() and any(plan.out.iterdir()):
+            raise SynthError(f"{plan.out}: holds something that synth did not write; choose another folder")
         for name in ("images", "masks", "episodes"):
             (plan.out / name).mkdir(parents=True, exist_ok=True)
         if (plan.out / "images" / f"{plan.count:06d}.png").exists():

@@ -111,6 +111,23 @@ def test_annotations_become_a_training_set_a_coco_file_and_come_back(folder: Pat
         run(folder, imports=(tmp_path / "coco.json",), store=other, study=StudyOptions(rater="eve"))
 
 
+def test_one_rater_alone_is_exported_and_reported(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    annotate(folder)
+    for name in ("ann", "bob"):
+        run(folder, export="csv", out=tmp_path / f"{name}.csv", study=StudyOptions(rater=name))
+    first, second = (read_measurements(tmp_path / f"{name}.csv") for name in ("ann", "bob"))
+    assert len(first) == len(second) == 3
+    assert [row.angle_1 for row in first] != [row.angle_1 for row in second]
+    capsys.readouterr()
+    run(folder, report=True, as_json=True, study=StudyOptions(rater="bob"))
+    assert "ann" not in json.loads(capsys.readouterr().out)["raters"]
+    for what in ({"export": "csv", "out": tmp_path / "eve.csv"}, {"report": True}):
+        with pytest.raises(UserError, match="--rater eve: has annotated nothing here; who has: ann, bob"):
+            run(folder, study=StudyOptions(rater="eve"), **what)
+    with pytest.raises(UserError, match=r"bob\.csv: is there already"):
+        run(folder, export="csv", out=tmp_path / "bob.csv")
+
+
 def test_an_annotated_folder_is_evaluated_as_its_table_is(folder: Path, tmp_path: Path) -> None:
     annotate(folder)
     run(folder, export="csv", out=tmp_path / "table.csv")

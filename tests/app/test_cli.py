@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +11,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from app.cli import app
+from app.cli import app, main
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (
@@ -51,8 +53,35 @@ def test_a_help_page_waits_for_nothing_slow() -> None:
     assert done.stdout.strip() == "[]", done.stderr
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("perceive",), "error: Missing argument 'images'; see main.py perceive --help\n"),
+        (("perceiv",), "error: No such command 'perceiv'. Did you mean 'perceive'?; see main.py --help\n"),
+        (("session", "info", "{denied}"), "error: {denied}: cannot be read (Permission denied)\n"),
+        (("session", "info", "{long}"), "error: {long}: cannot be read (File name too long)\n"),
+        (("evaluate", "{long}", "--out", "x"), "error: {long}/annotations.lumenpilot.sqlite: File name too long\n"),
+    ],
+)
+def test_a_command_line_that_makes_no_sense_is_one_line(
+    arguments: tuple[str, ...], told: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    names = {"denied": str(tmp_path / "denied"), "long": "n" * 300}
+
+    def deny(self: Path) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(self))
+
+    monkeypatch.setattr(sys, "argv", ["main.py", *(one.format(**names) for one in arguments)])
+    with monkeypatch.context() as patch, pytest.raises(SystemExit) as left:
+        if "{denied}" in arguments:  # the tests may be run by one who is denied nothing
+            patch.setattr(Path, "iterdir", deny)
+        main()
+    assert left.value.code == 2
+    assert capsys.readouterr().err == told.format(**names)
+
+
 def test_a_memory_fault_says_where() -> None:
-    code = "import ctypes, app.cli as cli\ncli.app = lambda: ctypes.string_at(0)\ncli.main()"
+    code = "import ctypes, app.cli as cli\ncli.app = lambda **_: ctypes.string_at(0)\ncli.main()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
     assert done.returncode < 0
     assert "Segmentation fault" in done.stderr

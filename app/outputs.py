@@ -1,0 +1,29 @@
+"""Where a command writes: never over what it reads, nor over what somebody may still need."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from core.errors import UserError
+from core.session.manifest import EVENTS, FRAMES, MANIFEST
+
+
+def is_same(first: Path, second: Path) -> bool:
+    """Whether both names lead to one file or folder, be it there already or not."""
+    try:
+        return first.samefile(second)
+    except OSError:
+        return first.resolve() == second.resolve()
+
+
+def check_no_input(output: Path, inputs: Iterable[Path], option: str) -> None:
+    """Raise UserError when `output`, given by `option`, is one of the `inputs`."""
+    if any(is_same(output, path) for path in inputs):
+        raise UserError(f"{output}: is an input, which {option} would overwrite; choose another one")
+
+
+def check_no_session(folder: Path, option: str) -> None:
+    """Raise UserError when `folder`, given by `option`, is a recorded session, whose files must stay as they are."""
+    if any((folder / name).is_file() for name in (MANIFEST, FRAMES, EVENTS)) or any(folder.glob("video_*.mkv")):
+        raise UserError(f"{folder}: is a recorded session, which {option} would damage; choose another folder")

@@ -1,0 +1,152 @@
+"""No command writes over what it reads, over somebody's work, or takes an option that could have no effect."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli import app
+from app.learning_commands import TrainInputs, TrainOutputs, run_train
+from app.perceive_command import Outputs, run_perceive
+from app.session_command import run_info
+from core.errors import UserError
+from core.learning.dataset import write_mask, write_png
+from core.learning.training import TrainingPlan
+from core.session.manifest import EVENTS, FRAMES
+from hardware.twin.synth import SynthError, SynthPlan, write_set
+from tests.app.golden_session import GOLDEN
+from tests.core.session_data import record, tick_of
+
+
+def call(*arguments: object) -> None:
+    app([str(one) for one in arguments], standalone_mode=False)
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture
+def labelled(tmp_path: Path) -> Path:
+    folder = tmp_path / "set"
+    for name in ("images", "masks"):
+        (folder / name).mkdir(parents=True)
+    for stem in ("a", "a_overlay"):
+        write_png(folder / "images" / f"{stem}.png", np.full((48, 64, 3), 90, np.uint8))
+        for target in ("vessel", "robot"):
+            write_mask(folder / "masks" / f"{stem}_{target}.png", np.zeros((48, 64), bool))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("outputs", "why"),
+    [
+        (Outputs(Path("images/a.png"), None, None), "is an input, which --jsonl would overwrite"),
+        (Outputs(None, Path("masks"), None), "holds the masks that were drawn, which --masks would overwrite"),
+        (Outputs(None, None, Path("images")), "a_overlay.png: is an input, which --overlay"),
+    ],
+)
+def test_perceive_does_not_write_over_its_pictures(
+    labelled: Path, outputs: Outputs, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(labelled)
+    before = contents(labelled)
+    with pytest.raises(UserError, match=why):
+        run_perceive([Path("images")], outputs, targets_path=None, model=None, preset=None, config_path=None)
+    assert contents(labelled) == before
+
+
+def test_a_session_is_not_replayed_into_itself(tmp_path: Path) -> None:
+    session = Path(shutil.copytree(GOLDEN, tmp_path / "session"))
+    before = contents(session)
+    with pytest.raises(UserError, match="is a recorded session, which --out would damage"):
+        call("replay", session, "--out", session)
+    with pytest.raises(UserError, match=f"{FRAMES}: is an input, which --jsonl would overwrite"):
+        call("replay", session, "--jsonl", session / FRAMES)
+    assert contents(session) == before
+
+
+def test_a_table_is_not_evaluated_into_itself(tmp_path: Path) -> None:
+    table = tmp_path / "measurements.csv"
+    table.write_text("image,angle_1,angle_2,state,algorithm_angle,algorithm_state,mine\na,1,,A,2,A,x\n")
+    with pytest.raises(UserError, match=r"measurements.csv: is an input, which --out would overwrite"):
+        call("evaluate", "--csv", table, "--out", tmp_path)
+    assert table.read_text().endswith(",x\n")
+
+
+def test_frames_are_not_made_into_somebody_elses_folder(labelled: Path) -> None:
+    before = contents(labelled)
+    with pytest.raises(SynthError, match="holds something that synth did not write"):
+        write_set(SynthPlan(labelled, 4, 0))
+    assert contents(labelled) == before
+
+
+def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> None:
+    (tmp_path / "model").mkdir()
+    (tmp_path / "model" / "model.json").write_text("{}")
+    with pytest.raises(UserError, match="is a model already; choose another --out"):
+        run_train(TrainOutputs(tmp_path / "model"), TrainInputs([labelled]), None, 4, TrainingPlan(steps=1))
+    assert (tmp_path / "model" / "model.json").read_text() == "{}"
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (("--base", "8", "--shallow"), "--base and --shallow contradict each other"),
+        (("--init", "default", "--shallow"), "--shallow shapes a new network; the one of --init default has its shape"),
+        (("--init", "default", "--second-look", "--deepen"), "--deepen is for the first look"),
+        (("--deepen",), "--deepen needs --init MODEL"),
+        (("--focus", "0.5"), "--focus needs --init MODEL"),
+        (("--held-out", "{set}"), "is trained on, so that it cannot judge"),
+    ],
+)
+def test_training_refuses_what_could_have_no_effect(labelled: Path, tmp_path: Path, options: tuple[str, ...], why: str) -> None:
+    with pytest.raises(UserError, match=why):
+        call("train", "--data", labelled, "--out", tmp_path / "m", *(one.format(set=labelled) for one in options))
+    assert not (tmp_path / "m.log").exists(), "what was refused leaves nothing behind"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (("benchmark", "--window", "5", "--accuracy", "set"), "--window, --accuracy are different things"),
+        (("benchmark", "--store"), "--store is for --accuracy"),
+        (("benchmark", "--accuracy", "set", "--store", "--true-masks"), "--store keeps figures of the model as it is shipped"),
+        (("benchmark", "--accuracy", "set", "--store", "--preset", "paper"), "--store keeps figures of the model as it is shipped"),
+        (("benchmark", "--window", "5", "--model", "x"), "leave --model and --preset out"),
+        (("evaluate", "set", "--out", "out", "--manual-sd", "3"), "--manual-sd is for --like-paper"),
+        (("evaluate", "set", "--out", "out", "--json", "--progress-json"), "both write to standard output"),
+        (("faults", "--only", "40", "--quick"), "fault 40 needs a line, a process or a window"),
+        (("faults", "--out", "/nowhere/at/all.md"), "/nowhere/at/all.md: cannot be written"),
+        (("annotate", "set", "--export", "csv", "--out", "o.csv", "--json"), "--json is for --report"),
+        (("--rig", "twin", "record", "--out", "x"), "--rig before record is for the window alone"),
+        (("rig", "show", "twin"), "twin: is built in and has no file"),
+    ],
+)
+def test_options_that_contradict_each_other_are_refused(arguments: tuple[str, ...], why: str) -> None:
+    with pytest.raises(UserError, match=why):
+        call(*arguments)
+
+
+def test_what_a_closed_session_has_lost_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(6)])
+
+    def info() -> dict[str, object]:
+        run_info(session, as_json=True)
+        return json.loads(capsys.readouterr().out)
+
+    assert (info()["problems"], info()["missing_rows"]) == ([], 0)
+    lines = (session / FRAMES).read_bytes().splitlines(keepends=True)
+    (session / FRAMES).write_bytes(b"".join(lines[:4]))
+    assert (info()["problems"], info()["missing_rows"]) == ([f"{FRAMES}: the last 2 of 6 rows are lost"], 2)
+    (session / FRAMES).write_bytes(b"".join(lines))
+    events = (session / EVENTS).read_bytes().splitlines(keepends=True)
+    (session / EVENTS).write_bytes(b"".join(events[1:]))
+    assert info()["problems"] == [f"{EVENTS}: 1 of {len(events)} events are lost"]
+    (session / EVENTS).write_bytes(b"".join(events))
+    (session / "video_0000.mkv").unlink()
+    assert "1 of 1 videos are lost" in info()["problems"]  # type: ignore[operator]
