@@ -37,6 +37,9 @@ app = typer.Typer(
 SourceOption = Annotated[Path | None, typer.Option("--source", help="video, picture or folder to look at instead of a camera")]
 
 
+_INTERRUPTED = 130
+
+
 def main() -> None:
     """Run the command line. Known errors end as one line on standard error and exit code 2; Ctrl-C as exit code 130."""
     with suppress(OSError, RuntimeError, ValueError):  # there is not always a standard error
@@ -47,7 +50,7 @@ def main() -> None:
         sys.stdout = open(os.devnull, "w")
     try:
         try:
-            app(prog_name="main.py", standalone_mode=False)
+            code = app(prog_name="main.py", standalone_mode=False)
         finally:
             _finish_output()
     except UserError as error:
@@ -70,8 +73,11 @@ def main() -> None:
             raise
         sys.exit(2)
     except (KeyboardInterrupt, typer.Abort):
+        code = _INTERRUPTED
+    if code == _INTERRUPTED:  # Typer gives it back instead of raising
         sys.stderr.write("interrupted\n")
-        sys.exit(130)
+    if isinstance(code, int) and code:
+        sys.exit(code)
 
 
 def _finish_output() -> None:

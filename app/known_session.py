@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject, QTimer, Signal, Slot
 from app.language import tr
 from app.replayed import Replayed
 from app.session_marks import Course, course_of
+from core.session.completeness import losses
 from core.session.events import Event
 from core.session.reader import SessionReader
 
@@ -34,6 +35,7 @@ class KnownSession(QObject):
         self._reader = reader
         self._course = course_of(reader.timeline())
         self._events: tuple[Event, ...] = ()
+        self._has_events = False
         self._replayed: Replayed | None = None
         self._problem_count = -1
         self._is_empty = False
@@ -62,7 +64,7 @@ class KnownSession(QObject):
     @Slot(object, bool)
     def take_events(self, events: tuple[Event, ...], is_written: bool) -> None:
         """The session's events, and whether it is still being recorded."""
-        self._events = events
+        self._events, self._has_events = events, True
         if is_written:
             self.said.emit(tr("This session is still being recorded: what came later is not shown"), False)
         self.changed.emit()
@@ -103,10 +105,12 @@ class KnownSession(QObject):
             loose = tr("there are pictures, but no rows: repair it with: session recover")
             self.emptied.emit(loose if self._reader.videos else tr("it is empty"))
         self.looked.emit()
-        self._tell_problems()
+        self._tell_problems(is_all=is_all)
 
-    def _tell_problems(self) -> None:
+    def _tell_problems(self, *, is_all: bool) -> None:
         problems = list(self._reader.problems)
+        if is_all and self._has_events:
+            problems += losses(self._reader, len(self._events))
         missing = self._reader.missing_rows
         if missing:
             problems.append(tr("{count} rows are missing between those that are there", count=missing))

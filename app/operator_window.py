@@ -64,6 +64,7 @@ class OperatorWindow(WindowFrame):
         self._kind = kind
         self._phase = Phase.IDLE
         self._phase_message = ""
+        self._orders = 0
         self.may_take: Callable[[Step], bool] = lambda _step: True
         """Asked before a step of the operator goes to the pilot; whoever says no tells why."""
         self.amend_config: Callable[[Config], Config] = lambda config: config
@@ -202,6 +203,11 @@ class OperatorWindow(WindowFrame):
         self.setWindowTitle(f"LumenPilot \N{EM DASH} {tr(self._kind.value)}")
 
     @property
+    def phase(self) -> Phase:
+        """Where the rig is, as the window shows it."""
+        return self._phase
+
+    @property
     def phase_message(self) -> str:
         """The line that says why the rig has ended, or stands in FAULT."""
         return self._phase_message
@@ -277,7 +283,13 @@ class OperatorWindow(WindowFrame):
     def _open_rig(self) -> None:
         self._start_engine(partial(self._open_engine, self._config))
 
+    @property
+    def orders(self) -> int:
+        """How often a rig was to be opened or lent: tells whether somebody has asked for another one since."""
+        return self._orders
+
     def _start_engine(self, open_engine: Callable[[], EngineLike]) -> None:
+        self._orders += 1
         self._first_rig.stop()
         self._thread.start_engine(open_engine)
 

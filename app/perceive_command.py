@@ -167,7 +167,9 @@ def _check_keeps_inputs(folder: Path, files: Sequence[Path], option: str, ending
         if file.name in written and is_same(folder, file.parent):
             raise UserError(f"{file}: is an input, which {option} {folder} would overwrite; choose another folder")
         if file.parent.name == "images" and is_same(folder, file.parent.parent / "masks"):
-            raise UserError(f"{folder}: holds the masks that were drawn, which {option} would overwrite; choose another folder")
+            drawn = next((name for name in (f"{file.stem}{ending}" for ending in endings) if (folder / name).exists()), None)
+            if drawn is not None:
+                raise UserError(f"{folder / drawn}: is a mask of the set, which {option} would overwrite; choose another folder")
 
 
 def _make_folder(folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from functools import partial
 from pathlib import Path
 
@@ -14,19 +15,21 @@ from app.snapshot import Origin, SnapshotWriter
 from app.work_thread import WorkThread
 from core.session.events import Event
 from core.session.files import add_event, is_being_written
+from core.session.manifest import SessionError
 from core.session.reader import SessionReader
 from core.types import Tick
 
 _STOP_WITHIN_MS = 10_000
+
+_log = logging.getLogger(__name__)
 
 
 class PlayerKeeper(QObject):
     """Also reads the events, which are a file of their own.
 
     ``said`` carries a line to show and whether it is a fault; ``events_read`` the events and whether the session is still being
-    recorded; ``replayed_read`` a replay's results; ``noted`` a note that is kept, ``note_refused`` one that the disk did
-    not take; ``progressed`` the share of the clip that is
-    written, None when none is.
+    recorded; ``replayed_read`` a replay's results; ``noted`` a note that is kept, ``note_refused`` one that the disk did not take;
+    ``progressed`` the share of the clip that is written, None when none is.
     """
 
     said = Signal(str, bool)
@@ -124,5 +127,9 @@ class PlayerKeeper(QObject):
 
 
 def _add(folder: Path, event: Event) -> Event:
-    add_event(folder, event)
+    try:
+        add_event(folder, event)
+    except SessionError:
+        _log.warning("a note was not kept: %s", event.text)  # whoever wrote it may have left by now
+        raise
     return event

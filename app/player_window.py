@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -51,6 +52,7 @@ class PlayerWindow(WindowFrame):
         self._asked_s = 0.0
         self._shown: Decoded | None = None
         self.seek_ms = 0.0
+        self._refused: deque[Event] = deque()
         self._decode = DecodeThread(reader, self)
         self._keeper = PlayerKeeper(reader, pictures_folder(config.window.pictures_folder), self)
         self._known = KnownSession(reader, self)
@@ -357,6 +359,7 @@ class PlayerWindow(WindowFrame):
     def _end_note(self) -> None:
         self.panels.note.hide()
         self.panels.live.setFocus()
+        QTimer.singleShot(0, self._offer_refused)
 
     def _keep_note(self) -> None:
         text = self.panels.note.kept_text
@@ -368,7 +371,12 @@ class PlayerWindow(WindowFrame):
     @Slot(object)
     def _write_again(self, event: Event) -> None:
         """A note that the disk did not take, at its time; what is being written meanwhile comes first."""
-        if not self.panels.note.isVisible():
+        self._refused.append(event)
+        self._offer_refused()
+
+    def _offer_refused(self) -> None:
+        if self._refused and not self.panels.note.isVisible() and not self._is_shut:
+            event = self._refused.popleft()
             self.begin_note()
             self.seek(event.time_s - self._course.first_s)
             self.panels.note.setText(event.text)

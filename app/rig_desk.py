@@ -38,6 +38,7 @@ class _Wish:
     name: str
     config: Config
     known: CalibrationConfig | None
+    order: int = 0
 
 
 def _open_bench(config: Config, see: Callable) -> object:  # type: ignore[type-arg]
@@ -172,6 +173,8 @@ class RigDesk(QObject):
             return tr("wait: {what}", what=tr_text(view.busy))
         if self._window.recorder.status.recording:
             return tr("a session is being recorded: end it first")
+        if self._leaving is not None:
+            return tr(_LEAVING)
         return ""
 
     def _refuse(self, why: str) -> None:
@@ -243,27 +246,29 @@ class RigDesk(QObject):
     def _begin(self, name: str, config: Config, known: CalibrationConfig | None) -> None:
         if self.wizard is not None or self._wish is not None:
             return
-        if self._leaving is not None:
-            self._refuse(tr(_LEAVING))
-            return
         why = self.hindrance()
         if kind_of(config.rig) is RigKind.PLAYBACK:
             why = tr("a recording is played: start with a camera or the twin")
         if why:
             self._refuse(why)
             return
-        self._wish = _Wish(name, config, known)
         self._window.lend(_LENT)
+        self._wish = _Wish(name, config, known, self._window.orders)
 
     @Slot(object)
     def _on_phase(self, phase: Phase) -> None:
-        if phase is Phase.STARTING or self._wish is None:
+        wish = self._wish
+        if wish is None or phase is Phase.STARTING:
             return
-        wish, self._wish = self._wish, None
-        if phase is Phase.FAULT and self._window.phase_message == _LENT:
-            QTimer.singleShot(0, partial(self._show, wish))
-        else:  # another order came in between: F5, a phantom, a model
+        if self._window.orders != wish.order:  # another order came in between: F5, a phantom, a model
+            self._wish = None
             self._window.say(tr("The rig was opened anew meanwhile; ask for the wizard again"), is_fault=True)
+        elif self._is_lent(phase):  # and not what became of the rig before
+            self._wish = None
+            QTimer.singleShot(0, partial(self._show, wish))
+
+    def _is_lent(self, phase: Phase) -> bool:
+        return phase is Phase.FAULT and self._window.phase_message == _LENT
 
     def _show(self, wish: _Wish) -> None:
         desk = WizardDesk(wish.config, wish.known, self._open_bench, self._make_sight)
@@ -297,6 +302,9 @@ class RigDesk(QObject):
         saved, self._saved = self._saved, ""
         if saved:
             self._window.say(tr("Rig {name} saved", name=saved))
+        if not self._is_lent(self._window.phase):
+            pass  # somebody has opened a rig meanwhile, and may be recording or driving
+        elif saved:
             self.choose(saved)
         else:
             self._window.use_config(self._window.config)

@@ -11,11 +11,16 @@ def rows_cut_off(reader: SessionReader) -> int:
     manifest = reader.manifest
     if manifest is None or not manifest.closed:
         return 0
-    return max(0, manifest.counts.frames - len(reader) - reader.missing_rows)
+    # The gaps that a recovered copy was made with are not among its own rows.
+    gaps = reader.missing_rows if manifest.recovered is None else 0
+    return max(0, manifest.counts.frames - len(reader) - gaps)
 
 
-def losses(reader: SessionReader) -> list[str]:
-    """A line for each kind of loss; of a session that is still open or was cut, none: its counts were never written."""
+def losses(reader: SessionReader, events: int) -> list[str]:
+    """A line for each kind of loss; of a session that is still open or was cut, none: its counts were never written.
+
+    `events` is how many events are there. Notes that were written later hide as many that were lost.
+    """
     manifest = reader.manifest
     if manifest is None or not manifest.closed:
         return []
@@ -25,6 +30,6 @@ def losses(reader: SessionReader) -> list[str]:
     if (videos := len(reader.videos)) < counts.videos:
         found.append(f"{counts.videos - videos} of {counts.videos} videos are lost")
     found += [f"{path.name}: empty, its pictures are lost" for path in reader.videos if path.stat().st_size == 0]
-    if (events := len(reader.events)) < counts.events:  # notes that were written later make them more
+    if events < counts.events:
         found.append(f"{EVENTS}: {counts.events - events} of {counts.events} events are lost")
     return found

@@ -219,15 +219,16 @@ def _prepare(plan: SynthPlan) -> None:
     try:
         if not path.is_file() and plan.out.is_dir() and any(plan.out.iterdir()):
             raise SynthError(f"{plan.out}: holds something that synth did not write; choose another folder")
-        for name in ("images", "masks", "episodes"):
-            (plan.out / name).mkdir(parents=True, exist_ok=True)
+        plan.out.mkdir(parents=True, exist_ok=True)
         if (plan.out / "images" / f"{plan.count:06d}.png").exists():
             raise SynthError(f"{plan.out}: holds more than {plan.count} frames; ask for as many, or choose another folder")
         if path.is_file():
             if json.loads(path.read_text(encoding="utf-8")) != described:
                 raise SynthError(f"{plan.out}: holds a set with other settings ({path.name}); choose another folder")
         else:
-            path.write_text(json.dumps(described) + "\n", encoding="utf-8")
+            path.write_text(json.dumps(described) + "\n", encoding="utf-8")  # first: it says whose folder this is
+        for name in ("images", "masks", "episodes"):
+            (plan.out / name).mkdir(exist_ok=True)
     except OSError as error:
         raise SynthError(f"{plan.out}: cannot be written ({error.strerror}); choose another folder") from None
     except ValueError:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from app import learning_commands
 from app.cli import app, main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -78,6 +79,18 @@ def test_a_command_line_that_makes_no_sense_is_one_line(
         main()
     assert left.value.code == 2
     assert capsys.readouterr().err == told.format(**names)
+
+
+def test_an_interrupted_command_ends_with_130(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(learning_commands, "run_synth", interrupted)
+    monkeypatch.setattr(sys, "argv", ["main.py", "synth", "--out", "x", "--count", "4"])
+    with pytest.raises(SystemExit) as left:
+        main()
+    assert left.value.code == 130
+    assert capsys.readouterr().err == "interrupted\n"
 
 
 def test_a_memory_fault_says_where() -> None:

@@ -11,12 +11,15 @@ import pytest
 
 from app.cli import app
 from app.learning_commands import TrainInputs, TrainOutputs, run_train
-from app.perceive_command import Outputs, run_perceive
-from app.session_command import run_info
+from app.perceive_command import Outputs, _check_keeps_inputs, run_perceive
+from app.session_command import run_export, run_info
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.learning.training import TrainingPlan
+from core.session.completeness import rows_cut_off
 from core.session.manifest import EVENTS, FRAMES
+from core.session.reader import SessionReader
+from core.session.recovery import recover
 from hardware.twin.synth import SynthError, SynthPlan, write_set
 from tests.app.golden_session import GOLDEN
 from tests.core.session_data import record, tick_of
@@ -46,7 +49,7 @@ def labelled(tmp_path: Path) -> Path:
     ("outputs", "why"),
     [
         (Outputs(Path("images/a.png"), None, None), "is an input, which --jsonl would overwrite"),
-        (Outputs(None, Path("masks"), None), "holds the masks that were drawn, which --masks would overwrite"),
+        (Outputs(None, Path("masks"), None), "is a mask of the set, which --masks would overwrite"),
         (Outputs(None, None, Path("images")), "a_overlay.png: is an input, which --overlay"),
     ],
 )
@@ -58,6 +61,11 @@ def test_perceive_does_not_write_over_its_pictures(
     with pytest.raises(UserError, match=why):
         run_perceive([Path("images")], outputs, targets_path=None, model=None, preset=None, config_path=None)
     assert contents(labelled) == before
+
+
+def test_first_masks_may_lie_beside_their_pictures(labelled: Path) -> None:
+    shutil.rmtree(labelled / "masks")
+    _check_keeps_inputs(labelled / "masks", [labelled / "images" / "a.png"], "--masks", ("_vessel.png", "_robot.png"))
 
 
 def test_a_session_is_not_replayed_into_itself(tmp_path: Path) -> None:
@@ -132,6 +140,21 @@ def test_options_that_contradict_each_other_are_refused(arguments: tuple[str, ..
         call(*arguments)
 
 
+def test_what_a_recovered_copy_loses_later_is_told_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(12)])
+    lines = (session / FRAMES).read_bytes().splitlines(keepends=True)
+    (session / FRAMES).write_bytes(b"".join([*lines[:3], *lines[8:]]))
+    copy = recover(session, tmp_path / "copies").folder
+    with SessionReader(copy) as reader:
+        reader.wait()
+        assert (rows_cut_off(reader), len(reader)) == (0, 7)
+    lines = (copy / FRAMES).read_bytes().splitlines(keepends=True)
+    (copy / FRAMES).write_bytes(b"".join(lines[:-2]))
+    with SessionReader(copy) as reader:
+        reader.wait()
+        assert rows_cut_off(reader) == 2
+
+
 def test_what_a_closed_session_has_lost_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(6)])
 
@@ -147,6 +170,9 @@ def test_what_a_closed_session_has_lost_is_told(tmp_path: Path, capsys: pytest.C
     events = (session / EVENTS).read_bytes().splitlines(keepends=True)
     (session / EVENTS).write_bytes(b"".join(events[1:]))
     assert info()["problems"] == [f"{EVENTS}: 1 of {len(events)} events are lost"]
+    (session / EVENTS).write_bytes(b"")
+    run_export(session, [tmp_path / "table.csv"], plain=False, as_json=True)
+    assert f"{EVENTS}: {len(events)} of {len(events)} events are lost" in json.loads(capsys.readouterr().out)["problems"]
     (session / EVENTS).write_bytes(b"".join(events))
     (session / "video_0000.mkv").unlink()
     assert "1 of 1 videos are lost" in info()["problems"]  # type: ignore[operator]

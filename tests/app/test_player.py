@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -321,26 +322,41 @@ def test_a_note_is_kept_in_the_session(open_player: Open, tmp_path: Path, qtbot:
     assert not any("never" in event.text for event in window.events)
 
 
-def test_a_note_that_the_disk_does_not_take_is_not_lost(
+def test_notes_that_the_disk_does_not_take_are_not_lost(
     open_player: Open, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    written = threading.Event()
+
     def refuse(folder: Path, _event: Event) -> None:
+        written.wait(20.0)
         raise SessionError(f"{folder}: read-only")
 
     window = open_player(make_session(tmp_path))
     until(qtbot, lambda: window.place == 0 and window.rows == COUNT)
     with monkeypatch.context() as patch:
         patch.setattr(player_keeper, "add_event", refuse)
-        window.go(22)
-        press(window, Key.Key_M)
-        QTest.keyClicks(window.panels.note, "a long careful remark")
-        press(window, Key.Key_Return)
-        window.go(3)
-        until(qtbot, window.panels.note.isVisible)
+        for place, text in ((22, "a long careful remark"), (30, "another")):
+            window.go(place)
+            press(window, Key.Key_M)
+            QTest.keyClicks(window.panels.note, text)
+            press(window, Key.Key_Return)
+        written.set()
+        until(qtbot, lambda: window.panels.note.isVisible() and len(window._refused) == 1)
     assert "read-only" in window.panels.toast.text()
-    assert (window.panels.note.text(), window.place) == ("a long careful remark", 22)
+    until(qtbot, lambda: window.place == 22)
+    assert window.panels.note.text() == "a long careful remark"
     press(window, Key.Key_Return)  # there is room again
-    until(qtbot, lambda: any(event.text == "a long careful remark" for event in window.events))
+    until(qtbot, lambda: window.panels.note.text() == "another")
+    press(window, Key.Key_Return)
+    until(qtbot, lambda: {"a long careful remark", "another"} <= {event.text for event in window.events})
+
+
+def test_rows_that_went_from_a_closed_session_are_told(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    lines = (folder / "frames.jsonl").read_bytes().splitlines(keepends=True)
+    (folder / "frames.jsonl").write_bytes(b"".join(lines[:-5]))
+    window = open_player(folder)
+    until(qtbot, lambda: f"the last 5 of {COUNT} rows are lost" in window.panels.problems.toPlainText())
 
 
 def test_a_note_into_a_session_that_is_being_recorded_is_refused(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:

@@ -11,6 +11,7 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
+from app.engine_thread import Phase
 from app.operator_devices import OperatorDevices
 from app.operator_window import OperatorWindow
 from app.rig_desk import RigDesk
@@ -225,6 +226,50 @@ def test_an_order_in_between_gives_up_the_wizard_and_says_so(window: OperatorWin
     assert desk.wizard is not None
     desk.wizard.reject()
     until(qtbot, lambda: len(opened) == 3)
+
+
+def test_a_rig_that_cannot_be_opened_leaves_the_wizard_its_turn(
+    make_window: Callable[..., OperatorWindow], qtbot: QtBot, tmp_path: Path
+) -> None:
+    """Asked for while the rig is being opened, by the one whose camera is missing."""
+    go_on = threading.Event()
+
+    def fail(_config: Config) -> FakeEngine:
+        go_on.wait(20.0)
+        raise DeviceError("no camera")
+
+    window = make_window(fail, load_config(overrides={"record": {"ring_s": 0, "folder": str(tmp_path / "sessions")}}))
+    window.start()
+    until(qtbot, lambda: window.phase is Phase.STARTING)
+    desk = _desk(window)
+    desk.new()
+    go_on.set()
+    until(qtbot, lambda: desk.wizard is not None)
+    assert desk.wizard is not None
+    desk.wizard.reject()
+
+
+def test_what_was_opened_while_the_wizard_was_leaving_stays(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
+    go_on = threading.Event()
+
+    def hang(_config: Config, _see: object) -> CalibrationBench:
+        go_on.wait(20.0)
+        raise DeviceError("the camera does not answer: check its cable")
+
+    desk = RigDesk(window, hang, lambda _config: lambda frame: make_scene())
+    desk.new()
+    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.desk.is_busy)
+    assert desk.wizard is not None
+    desk.wizard.camera_page.name_edit.setText("bench 7")
+    desk.wizard.camera_page.open_button.click()
+    desk.wizard.reject()
+    assert "Waiting for the wizard" in desk.hindrance()
+    window.restart()  # F5
+    until(qtbot, lambda: len(opened) == 2 and window.shown_tick is not None)
+    go_on.set()
+    until(qtbot, lambda: desk.hindrance() == "")
+    qtbot.wait(100)
+    assert len(opened) == 2
 
 
 def test_a_rig_that_the_wizard_still_holds_is_waited_for(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
