@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # How well does a network do on looks that it has never seen? Trains one from nothing without three of the ten families of looks, one
 # of each kind of rig (tubes on a board, channels, X-ray), and measures it on all ten: seven that it knows, three that it does not.
-# Some ten minutes of data and an hour and a half of training on two cores.
+# Some ten minutes of data and three quarters of an hour of training on two cores.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-out/leave_looks_out}
