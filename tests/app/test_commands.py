@@ -89,7 +89,8 @@ def test_a_few_frames_of_a_new_look_are_learnt_beside_what_is_to_be_remembered(n
     from safetensors.numpy import load_file
 
     few = ("--data", frames, "--steps", 2, "--batch", 2, "--crop", 64, "--threads", 1)
-    done = run("train", "--init", near, "--out", tmp_path / "tuned", "--remember", 14, "--held-out", frames, *few)
+    held_out = Path(shutil.copytree(frames, tmp_path / "held_out"))
+    done = run("train", "--init", near, "--out", tmp_path / "tuned", "--remember", 14, "--held-out", held_out, *few)
     assert done.returncode == 0, done.stderr
     info = read_model_info(tmp_path / "tuned")
     assert info.training["frames"] == 2 * 6 + 14
