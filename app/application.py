@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
 from collections.abc import Callable
@@ -52,27 +51,15 @@ def check_display() -> None:
     if not display and not os.environ.get("WAYLAND_DISPLAY") and not asked:
         raise UserError("no display: start it in a desktop session, or give it a virtual one (xvfb-run -a make run)")
     is_on_x = asked.startswith("xcb") or (not asked and not os.environ.get("WAYLAND_DISPLAY"))
-    if display and is_on_x and not _answers(display):
+    if not (display and is_on_x):
+        return
+    from hardware.checks.program import x_server_answers  # asks as Qt does; without libxcb Qt has its own say
+
+    if not x_server_answers(display):
         raise UserError(
             f"the display {display} (DISPLAY) does not answer: it has gone, or this user may not use it (over ssh: ssh -X); "
             "start it in a desktop session, or give it a virtual one (xvfb-run -a make run)"
         )
-
-
-def _answers(display: str) -> bool:
-    """Whether the X server lets us in; asked as Qt asks it, through libxcb. Without that library Qt has its own say."""
-    try:
-        xcb = ctypes.CDLL("libxcb.so.1")
-    except OSError:
-        return True
-    xcb.xcb_connect.restype = ctypes.c_void_p
-    xcb.xcb_connect.argtypes = [ctypes.c_char_p, ctypes.c_void_p]
-    xcb.xcb_connection_has_error.argtypes = xcb.xcb_disconnect.argtypes = [ctypes.c_void_p]
-    connection = xcb.xcb_connect(os.fsencode(display), None)
-    try:
-        return int(xcb.xcb_connection_has_error(connection)) == 0
-    finally:
-        xcb.xcb_disconnect(connection)
 
 
 def quit_on_signal(application: QApplication) -> QTimer:

@@ -67,6 +67,24 @@ def _desk(window: OperatorWindow) -> RigDesk:
     return RigDesk(window, bench, lambda _config: lambda frame: make_scene())
 
 
+def _left_with_a_driver_that_hangs(window: OperatorWindow, qtbot: QtBot) -> tuple[RigDesk, threading.Event]:
+    """A desk whose wizard was cancelled while it opened a camera; the driver comes back when the event is set."""
+    go_on = threading.Event()
+
+    def hang(_config: Config, _see: object) -> CalibrationBench:
+        go_on.wait(20.0)
+        raise DeviceError("the camera does not answer: check its cable")
+
+    desk = RigDesk(window, hang, lambda _config: lambda frame: make_scene())
+    desk.new()
+    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.desk.is_busy)
+    assert desk.wizard is not None
+    desk.wizard.camera_page.name_edit.setText("bench 7")
+    desk.wizard.camera_page.open_button.click()
+    desk.wizard.reject()
+    return desk, go_on
+
+
 def test_rigs_are_listed_and_broken_ones_cannot_be_chosen(window: OperatorWindow) -> None:
     write_rig(make_rig(load_config(), "bench 1", KNOWN))
     rig_path("broken").write_text("format = ")
@@ -250,19 +268,7 @@ def test_a_rig_that_cannot_be_opened_leaves_the_wizard_its_turn(
 
 
 def test_what_was_opened_while_the_wizard_was_leaving_stays(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
-    go_on = threading.Event()
-
-    def hang(_config: Config, _see: object) -> CalibrationBench:
-        go_on.wait(20.0)
-        raise DeviceError("the camera does not answer: check its cable")
-
-    desk = RigDesk(window, hang, lambda _config: lambda frame: make_scene())
-    desk.new()
-    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.desk.is_busy)
-    assert desk.wizard is not None
-    desk.wizard.camera_page.name_edit.setText("bench 7")
-    desk.wizard.camera_page.open_button.click()
-    desk.wizard.reject()
+    desk, go_on = _left_with_a_driver_that_hangs(window, qtbot)
     assert "Waiting for the wizard" in desk.hindrance()
     window.restart()  # F5
     until(qtbot, lambda: len(opened) == 2 and window.shown_tick is not None)
@@ -273,19 +279,7 @@ def test_what_was_opened_while_the_wizard_was_leaving_stays(window: OperatorWind
 
 
 def test_a_rig_that_the_wizard_still_holds_is_waited_for(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
-    go_on = threading.Event()
-
-    def hang(_config: Config, _see: object) -> CalibrationBench:
-        go_on.wait(20.0)
-        raise DeviceError("the camera does not answer: check its cable")
-
-    desk = RigDesk(window, hang, lambda _config: lambda frame: make_scene())
-    desk.new()
-    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.desk.is_busy)
-    assert desk.wizard is not None
-    desk.wizard.camera_page.name_edit.setText("bench 7")
-    desk.wizard.camera_page.open_button.click()
-    desk.wizard.reject()
+    desk, go_on = _left_with_a_driver_that_hangs(window, qtbot)
     desk.new()
     assert desk.wizard is None
     assert "Waiting for the wizard to give camera and servos back" in window.panels.toast.text()
