@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, QTimer, Signal
 
 from app.picture_view import halvings
 from app.work_thread import WorkThread
@@ -348,8 +348,9 @@ class AnnotationDesk(QObject):
         if self._to_write and not self._is_shut:
             self._saving.submit("edit", self._write_all, once=True)
         until_s = time.monotonic() + _SETTLE_S
-        while self._saving.pending and time.monotonic() < until_s:
-            time.sleep(0.005)
+        while self._saving.pending and time.monotonic() < until_s:  # the window goes on painting, and takes no further edit
+            QCoreApplication.processEvents(QEventLoop.ProcessEventsFlag.ExcludeUserInputEvents, 5)
+            time.sleep(0.002)
 
     def shut_down(self) -> tuple[str, ...]:
         """Finish writing and end the threads; a line for each that did not end in its time. What the disk refused is logged."""

@@ -36,6 +36,7 @@ class KnownSession(QObject):
         self._course = course_of(reader.timeline())
         self._events: tuple[Event, ...] = ()
         self._has_events = False
+        self._losses: list[str] | None = None
         self._replayed: Replayed | None = None
         self._problem_count = -1
         self._is_empty = False
@@ -109,8 +110,9 @@ class KnownSession(QObject):
 
     def _tell_problems(self, *, is_all: bool) -> None:
         problems = list(self._reader.problems)
-        if is_all and self._has_events:
-            problems += losses(self._reader, len(self._events))
+        if is_all and self._has_events and self._losses is None:
+            self._losses = losses(self._reader, len(self._events))  # once: it asks the disk, and a closed session loses no more
+        problems += self._losses or []
         missing = self._reader.missing_rows
         if missing:
             problems.append(tr("{count} rows are missing between those that are there", count=missing))

@@ -302,10 +302,9 @@ class RigDesk(QObject):
         saved, self._saved = self._saved, ""
         if saved:
             self._window.say(tr("Rig {name} saved", name=saved))
-        if not self._is_lent(self._window.phase):
-            pass  # somebody has opened a rig meanwhile, and may be recording or driving
-        elif saved:
-            self.choose(saved)
-        else:
-            self._window.use_config(self._window.config)
+        if self._is_lent(self._window.phase):  # or somebody has opened a rig meanwhile, and may be recording or driving
+            if saved:
+                self.choose(saved)
+            else:
+                self._window.use_config(self._window.config)
         self.renew()

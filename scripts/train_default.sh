@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some 95 minutes of data and fifteen
-# and a quarter hours of training on two cores. The data can be interrupted and gone on with by the same call.
+# and a half hours of training on two cores. The data can be interrupted and gone on with by the same call.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-out/default_model}
