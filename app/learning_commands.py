@@ -122,7 +122,7 @@ def run_train(
 ) -> None:
     """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log.
 
-    With `deepen`, the network of `init` first gets the convolutions that today's default shape has more than it; with `shallow`, a
+    With `deepen`, the network that learns first gets the convolutions that today's default shape has more; with `shallow`, a
     new network has two convolutions on every level. With `second_look`, it is the network of the second look of `init` that learns,
     and `out` is `init` with it. Where the plan keeps the normalisation, `data` is shown as often as the frames made now.
     """
@@ -159,7 +159,7 @@ def run_train(
     torch.manual_seed(plan.seed)
     lesson: Lesson
     if second_look:
-        lesson = SecondLookLesson(samples, init)
+        lesson = SecondLookLesson(samples, init, deepen=deepen)
     else:
         lesson = FrameLesson(samples, init, base, deepen=deepen, shallow=shallow)
     plan = replace(plan, crop=lesson.sides(plan.crop))
@@ -200,7 +200,7 @@ def _check_choices(init: str | None, base: int | None, plan: Any, *, deepen: boo
     shapes = [name for name, given in told.items() if given]
     if len(shapes) > 1:
         raise DatasetError(f"{' and '.join(shapes)} contradict each other; give one of them")
-    if second_look and shapes:
+    if second_look and shapes and not deepen:
         raise DatasetError(f"{shapes[0]} is for the first look; with --second-look leave it out")
     if init is not None and (base is not None or shallow):
         raise DatasetError(f"{shapes[0]} shapes a new network; the one of --init {init} has its shape: leave one of them out")

@@ -19,7 +19,7 @@ from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample
 from core.learning.growing import deepened, with_first_look
 from core.learning.model_file import SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look, second_look_of
 from core.learning.training import TrainingPlan
-from core.perception.second_look import WINDOW_PX
+from core.perception.second_look import WINDOW_PX, Planes
 from core.perception.segmentation import Turned, open_second_look, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 from core.study.difficulty import difficulty
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 _EXAMPLES = 40
 """Training frames from which an eight-bit network learns its ranges."""
+_SECOND_LOOK_CONVOLUTIONS = ((3, 3, 3, 4, 4), 2)
+"""Of each encoder level, and of every decoder level: a faint tip is decided on the fine ones."""
 
 
 class Lesson(Protocol):
@@ -88,10 +90,10 @@ class FrameLesson:
 class SecondLookLesson:
     """The network of a model's second look, from the one that it has, or else from its network for whole pictures."""
 
-    def __init__(self, samples: list[Sample], init: str | None) -> None:
+    def __init__(self, samples: list[Sample], init: str | None, *, deepen: bool) -> None:
         if init is None:
             raise UserError("--second-look needs --init MODEL, whose first look it looks again after")
-        self._samples, self._init = samples, init
+        self._samples, self._init, self._deepen = samples, init, deepen
         self._base = model_folder(init)
         self._has_one = has_second_look(init)
         self.network = load_network(self._base / SECOND_LOOK)[0] if self._has_one else with_first_look(load_network(self._base)[0])
@@ -114,16 +116,24 @@ class SecondLookLesson:
             if sample.image not in looks:
                 looks[sample.image] = FirstLook.at(sample, ways[index % 2], near)
         self._shown = NearCrops(self._samples, [looks[sample.image] for sample in self._samples], plan)
+        if self._deepen:
+            depths = _SECOND_LOOK_CONVOLUTIONS
+            self.network = deepened(self.network, depths[0], self._examples(), decoder_convolutions=depths[1])
         return self._shown
 
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
-        examples: list[Image] = []
-        if whole and self._shown is not None:
+        examples = self._examples() if whole else []
+        save_with_second_look(self._base, network, out, training=training, figures=figures, examples=examples)
+
+    def _examples(self) -> list[Planes]:
+        """Windows from all over the training."""
+        examples: list[Planes] = []
+        if self._shown is not None:
             step = max(1, len(self._shown) // (4 * _EXAMPLES))
             for index in range(0, len(self._shown), step):
                 with suppress(DatasetError):  # as in _readable
                     examples.append(np.ascontiguousarray(self._shown[index][0].numpy().transpose(1, 2, 0)))
-        save_with_second_look(self._base, network, out, training=training, figures=figures, examples=examples)
+        return examples
 
 
 def has_second_look(model: str) -> bool:

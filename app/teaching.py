@@ -110,5 +110,5 @@ def second_plan(plan: TrainingPlan, init: str | None) -> TrainingPlan | None:
 
 def teach_second_look(room: Classroom, samples: list[Sample], plan: TrainingPlan) -> int | None:
     """After a lesson of whole frames: the second look of the model that came of it."""
-    lesson = SecondLookLesson(samples, str(room.out))
+    lesson = SecondLookLesson(samples, str(room.out), deepen=False)
     return room.teach(lesson, replace(plan, crop=lesson.sides(plan.crop)))

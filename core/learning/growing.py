@@ -11,21 +11,28 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from core.perception.unet import DualUNet, UNetShape
-from core.types import Image
+from core.perception.unet import DualUNet
 
 
-def deepened(network: DualUNet, encoder_convolutions: tuple[int, int, int, int, int], images: Iterable[Image]) -> DualUNet:
-    """A copy of `network` with this many convolutions per encoder level, which in evaluation mode computes the same.
+def deepened(
+    network: DualUNet,
+    encoder_convolutions: tuple[int, int, int, int, int],
+    images: Iterable[NDArray[np.uint8]],
+    *,
+    decoder_convolutions: int | None = None,
+) -> DualUNet:
+    """A copy of `network` with this many convolutions per level, which in evaluation mode computes the same.
 
     Parameters
     ----------
     network : the trained network.
-    encoder_convolutions : counts per level; none may be smaller than the network's.
-    images : typical RGB images (h, w, 3) uint8. The normalisation of a new convolution is set to the mean and variance of what it
-        meets on them, so that it is an identity in training, too.
+    encoder_convolutions : counts per encoder level; none may be smaller than the network's.
+    images : typical inputs (h, w, ``network.shape.inputs``) uint8. The normalisation of a new convolution is set to the mean and
+        variance of what it meets on them, so that it is an identity in training, too.
+    decoder_convolutions : of every decoder level; None leaves them as they are.
 
     Raises
     ------
@@ -35,11 +42,14 @@ def deepened(network: DualUNet, encoder_convolutions: tuple[int, int, int, int, 
     old = network.shape.encoder_convolutions
     if any(new < before for new, before in zip(encoder_convolutions, old, strict=True)):
         raise ValueError(f"the network has {old} convolutions per level and cannot be cut down to {encoder_convolutions}")
-    shape: UNetShape = replace(network.shape, encoder_convolutions=encoder_convolutions)
-    deeper = DualUNet(shape).eval()
+    before = network.shape.decoder_convolutions
+    after = before if decoder_convolutions is None else decoder_convolutions
+    if after < before:
+        raise ValueError(f"the decoders have {before} convolutions per level and cannot be cut down to {after}")
+    deeper = DualUNet(replace(network.shape, encoder_convolutions=encoder_convolutions, decoder_convolutions=after)).eval()
     deeper.load_state_dict(network.state_dict(), strict=False)
-    for block, before, met in zip(deeper.encoder, old, _level_statistics(network, images), strict=True):
-        layers: list[nn.Module] = list(block.children())[3 * before :]
+    for old_block, new_block, met in zip(_levels(network), _levels(deeper), _level_statistics(network, images), strict=True):
+        layers = list(new_block.children())[len(old_block) :]
         for conv, norm in zip(layers[0::3], layers[1::3], strict=True):
             assert isinstance(conv, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d)
             _make_identity(conv, norm, *met)
@@ -60,12 +70,19 @@ def with_first_look(network: DualUNet) -> DualUNet:
     return wider
 
 
-def _level_statistics(network: DualUNet, images: Iterable[Image]) -> list[tuple[Tensor, Tensor]]:
-    """Mean and variance per channel of what leaves each encoder level."""
-    kept: list[list[Tensor]] = [[] for _ in network.encoder]
+def _levels(network: DualUNet) -> list[nn.Sequential]:
+    """The levels of the encoder and of both decoders, all of which end in a rectifier."""
+    levels = [*network.encoder, *network.vessel.blocks, *network.robot.blocks]
+    return [level for level in levels if isinstance(level, nn.Sequential)]
+
+
+def _level_statistics(network: DualUNet, images: Iterable[NDArray[np.uint8]]) -> list[tuple[Tensor, Tensor]]:
+    """Mean and variance per channel of what leaves each level."""
+    levels = _levels(network)
+    kept: list[list[Tensor]] = [[] for _ in levels]
     hooks = [
-        block.register_forward_hook(lambda _module, _inputs, output, at=at: kept[at].append(output.transpose(0, 1).flatten(1)))
-        for at, block in enumerate(network.encoder)
+        level.register_forward_hook(lambda _module, _inputs, output, at=at: kept[at].append(output.transpose(0, 1).flatten(1)))
+        for at, level in enumerate(levels)
     ]
     stride = network.shape.stride
     try:

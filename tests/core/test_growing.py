@@ -11,15 +11,17 @@ SMALL = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
 IMAGES = [np.random.default_rng(seed).integers(0, 256, (70, 96, 3)).astype(np.uint8) for seed in range(3)]
 
 
-def test_the_deeper_network_says_the_same() -> None:
+@pytest.mark.parametrize("decoders", [None, 2])
+def test_the_deeper_network_says_the_same(decoders: int | None) -> None:
     torch.manual_seed(1)
     network = DualUNet(SMALL)
     batch = torch.stack([torch.from_numpy(image[:64, :96].transpose(2, 0, 1).copy()) for image in IMAGES]).float() / 255
-    for _ in range(40):  # until the normalisation knows what it meets, as a trained network's does
+    for _ in range(100):  # until the normalisation knows what it meets, as a trained network's does
         network.train()(batch)
     network.eval()
-    deeper = deepened(network, (2, 2, 3, 4, 2), IMAGES)
+    deeper = deepened(network, (2, 2, 3, 4, 2), IMAGES, decoder_convolutions=decoders)
     assert [len(block) // 3 for block in deeper.encoder] == [2, 2, 3, 4, 2]
+    assert {len(block) // 3 for block in (*deeper.vessel.blocks, *deeper.robot.blocks)} == {decoders or 1}
     picture = torch.rand(1, 3, 64, 64)
     with torch.no_grad():
         torch.testing.assert_close(deeper(picture), network(picture), rtol=1e-4, atol=1e-4)
@@ -39,5 +41,7 @@ def test_what_is_added_can_learn() -> None:
 def test_nothing_is_cut_away() -> None:
     with pytest.raises(ValueError, match="cut down"):
         deepened(DualUNet(SMALL), (1, 2, 2, 2, 2), IMAGES)
+    with pytest.raises(ValueError, match="decoders have 1 convolutions per level"):
+        deepened(DualUNet(SMALL), (2, 2, 2, 2, 2), IMAGES, decoder_convolutions=0)
     with pytest.raises(ValueError, match="without an image"):
         deepened(DualUNet(SMALL), (2, 2, 3, 2, 2), [])
