@@ -111,7 +111,7 @@ class KnownSession(QObject):
     def _tell_problems(self, *, is_all: bool) -> None:
         problems = list(self._reader.problems)
         if is_all and self._has_events and self._losses is None:
-            self._losses = losses(self._reader, len(self._events))  # once: it asks the disk, and a closed session loses no more
+            self._losses = losses(self._reader, self._events)  # once: it asks the disk, and a closed session loses no more
         problems += self._losses or []
         missing = self._reader.missing_rows
         if missing:

@@ -128,8 +128,7 @@ class PlayerKeeper(QObject):
 
 def _add(folder: Path, event: Event) -> Event:
     try:
-        add_event(folder, event)
+        return add_event(folder, event)
     except SessionError:
         _log.warning("a note was not kept: %s", event.text)  # whoever wrote it may have left by now
         raise
-    return event

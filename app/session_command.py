@@ -77,7 +77,7 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "codec": manifest.codec if manifest else None,
         "model": manifest.model.get("name") if manifest else None,
         "bytes": sum(path.stat().st_size for path in reader.folder.iterdir() if path.is_file()),
-        "problems": [*reader.problems, *losses(reader, len(events))],
+        "problems": [*reader.problems, *losses(reader, events)],
     }
 
 
@@ -116,7 +116,7 @@ def run_export(folder: Path, outs: list[Path], *, plain: bool, as_json: bool) ->
             for out in outs:
                 task = bar.add_task(out.name, total=len(reader))
                 written[str(out)] = _export(reader, out, plain, lambda task=task: bar.advance(task))
-        lost = losses(reader, len(reader.events))  # what is wrong with the events is found here
+        lost = losses(reader, reader.events)  # what is wrong with the events is found here
         problems = [*reader.problems, *lost]
     if as_json:
         sys.stdout.write(json.dumps({"written": written, "problems": problems}) + "\n")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from core.session.events import Event, was_added_later
 from core.session.manifest import EVENTS, FRAMES
 from core.session.reader import SessionReader
 
@@ -16,10 +19,10 @@ def rows_cut_off(reader: SessionReader) -> int:
     return max(0, manifest.counts.frames - len(reader) - gaps)
 
 
-def losses(reader: SessionReader, events: int) -> list[str]:
+def losses(reader: SessionReader, events: Sequence[Event]) -> list[str]:
     """A line for each kind of loss; of a session that is still open or was cut, none: its counts were never written.
 
-    `events` is how many events are there. Notes that were written later hide as many that were lost.
+    `events` are those that are there; notes that were added later were never counted.
     """
     manifest = reader.manifest
     if manifest is None or not manifest.closed:
@@ -30,6 +33,7 @@ def losses(reader: SessionReader, events: int) -> list[str]:
     if (videos := len(reader.videos)) < counts.videos:
         found.append(f"{counts.videos - videos} of {counts.videos} videos are lost")
     found += [f"{path.name}: empty, its pictures are lost" for path in reader.videos if path.stat().st_size == 0]
-    if events < counts.events:
-        found.append(f"{EVENTS}: {counts.events - events} of {counts.events} events are lost")
+    kept = len(events) - sum(map(was_added_later, events))
+    if kept < counts.events:
+        found.append(f"{EVENTS}: {counts.events - kept} of {counts.events} events are lost")
     return found

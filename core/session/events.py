@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
@@ -89,6 +89,18 @@ def event_of_target(point: Point | None, time_s: float) -> Event:
     if point is None:
         return Event(time_s, EventKind.TARGET, "cleared")
     return Event(time_s, EventKind.TARGET, f"{point[0]:.0f}, {point[1]:.0f}", {"xy": [round(point[0], 2), round(point[1], 2)]})
+
+
+_ADDED_LATER = "added_later"
+
+
+def as_added_later(event: Event) -> Event:
+    """The event as it is kept when it is added to a session that has ended: the session's own counts know nothing of it."""
+    return replace(event, data=event.data | {_ADDED_LATER: True})
+
+
+def was_added_later(event: Event) -> bool:
+    return event.data.get(_ADDED_LATER) is True
 
 
 def event_to_json(event: Event) -> dict[str, Any]:

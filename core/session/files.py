@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from core.record_config import RecordConfig
-from core.session.events import Event, EventKind, event_to_json
+from core.session.events import Event, EventKind, as_added_later, event_to_json
 from core.session.lines import sealed
 from core.session.manifest import EVENTS, FRAMES, PREFIX, About, Counts, Manifest, SessionError, new_manifest, write_manifest
 from core.session.ring import EncodedFrame
@@ -62,9 +62,13 @@ def is_being_written(folder: Path) -> bool:
         return False
 
 
-def add_event(session: Path, event: Event) -> None:
-    """Add an event (a note made while it is played) to a session that has ended. Raises SessionError; nothing else is changed."""
+def add_event(session: Path, event: Event) -> Event:
+    """Add an event (a note made while it is played) to a session that has ended; gives it as it is kept, marked as added later.
+
+    Raises SessionError; nothing else is changed.
+    """
     path = session / EVENTS
+    event = as_added_later(event)
     line = sealed(json.dumps(event_to_json(event), allow_nan=False)) + "\n"
     if is_being_written(session):
         raise SessionError(f"{session}: is being recorded; stop the recording first")
@@ -81,6 +85,7 @@ def add_event(session: Path, event: Event) -> None:
             os.fsync(file.fileno())
     except OSError as error:
         raise SessionError(f"{path}: cannot be written ({error.strerror}); the note was not kept") from None
+    return event
 
 
 def check_parent(folder: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from core.session.checked import Damaged
-from core.session.events import event_from_json
+from core.session.events import event_from_json, was_added_later
 from core.session.files import is_being_written
 from core.session.lines import Line, lines_of, parse_line
 from core.session.manifest import (
@@ -240,6 +240,8 @@ def _take_row(line: Line, found: _Salvage) -> None:
 
 def _take_event(line: Line, found: _Salvage) -> None:
     event = event_from_json(parse_line(line))
+    if was_added_later(event):
+        return  # kept, but neither counted nor a sign of how long was recorded
     found.events += 1
     found.last_event_s = event.time_s
 

@@ -17,6 +17,8 @@ from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.learning.training import TrainingPlan
 from core.session.completeness import rows_cut_off
+from core.session.events import Event, EventKind
+from core.session.files import add_event
 from core.session.manifest import EVENTS, FRAMES
 from core.session.reader import SessionReader
 from core.session.recovery import recover
@@ -169,7 +171,16 @@ def test_what_a_closed_session_has_lost_is_told(tmp_path: Path, capsys: pytest.C
     (session / FRAMES).write_bytes(b"".join(lines))
     events = (session / EVENTS).read_bytes().splitlines(keepends=True)
     (session / EVENTS).write_bytes(b"".join(events[1:]))
-    assert info()["problems"] == [f"{EVENTS}: 1 of {len(events)} events are lost"]
+    lost_one = [f"{EVENTS}: 1 of {len(events)} events are lost"]
+    assert info()["problems"] == lost_one
+    add_event(session, Event(1000.2, EventKind.NOTE, "written while it is played"))
+    assert info()["problems"] == lost_one, "a note that was added later does not stand for one that is lost"
+    note = (session / EVENTS).read_bytes().splitlines(keepends=True)[-1]
+    (session / EVENTS).write_bytes(b"".join([*events, note]))
+    assert info()["problems"] == []
+    copy = recover(session, tmp_path / "recovered").folder
+    run_info(copy, as_json=True)
+    assert "events" not in str(json.loads(capsys.readouterr().out)["problems"])
     (session / EVENTS).write_bytes(b"")
     run_export(session, [tmp_path / "table.csv"], plain=False, as_json=True)
     assert f"{EVENTS}: {len(events)} of {len(events)} events are lost" in json.loads(capsys.readouterr().out)["problems"]
