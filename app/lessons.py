@@ -14,7 +14,7 @@ from torch.utils.data import Dataset
 
 from core.config import SegmentationConfig
 from core.errors import UserError
-from core.learning.crops import FirstLook, FrameCrops, NearCrops
+from core.learning.crops import FrameCrops, Looks, NearCrops
 from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample
 from core.learning.growing import deepened, with_first_look
 from core.learning.model_file import SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look, second_look_of
@@ -107,14 +107,15 @@ class SecondLookLesson:
         # Streams look once at the whole, single pictures eight times: the second look has to get on with both. Two stand for
         # eight here, where thousands of frames are looked at.
         ways = (plain, Turned(plain, turns=(0,)))
-        # What the second look still gets wrong is worth more of its time than what only the first one did.
-        near = open_second_look(SegmentationConfig(model=self._init)) if self._has_one and plan.focus_share > 0 else None
-        looks: dict[Path, FirstLook] = {}  # a sample that is shown more often is looked at once
+        # What the second look still gets wrong is worth more of its time than what only the first one did, and what it has seen it
+        # may look at once more.
+        near = open_second_look(SegmentationConfig(model=self._init)) if self._has_one else None
+        looks: dict[Path, Looks] = {}  # a sample that is shown more often is looked at once
         for index, sample in enumerate(bar.track(self._samples, description="first look")):
             if interrupt.asked:
                 return None
             if sample.image not in looks:
-                looks[sample.image] = FirstLook.at(sample, ways[index % 2], near)
+                looks[sample.image] = Looks.at(sample, ways[index % 2], near)
         self._shown = NearCrops(self._samples, [looks[sample.image] for sample in self._samples], plan)
         if self._deepen:
             depths = _SECOND_LOOK_CONVOLUTIONS

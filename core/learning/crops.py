@@ -18,7 +18,7 @@ from core.learning.augment import random_clutter, random_crop, random_look, with
 from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX, look_again, places_to_look
-from core.perception.segmentation import Segmenter
+from core.perception.segmentation import Probability, Segmenter
 from core.perception.skeleton import end_pixels
 from core.perception.thinning import thin_parts
 from core.perception.windows import window_around
@@ -28,6 +28,7 @@ _KEPT_SHARE = 0.5
 """Of the free memory, for decoded frames: 10 GB hold 6500 of 640x480."""
 _MISSED_SHARE = 0.35
 """Of the second look's windows: as many show a pixel that the first look got wrong. The others show what it would look at."""
+_LAST_SHARE = 0.5
 _JITTER_PX = 10.0
 _EDGE_PX = 4
 """What is wrong farther than this from the robot's outline is no blur of it: a piece was missed or invented."""
@@ -117,25 +118,17 @@ class FrameCrops(Dataset[Crop]):
 
 
 @dataclass(frozen=True, slots=True)
-class FirstLook:
-    """What a model saw in a frame: both probabilities as PNG, 0..255, and the places that a second look would go to.
-
-    ``wrong`` are places on pieces of robot that it missed or invented in the end, after its second look where it has one.
-    """
+class Seen:
+    """What a frame was taken for: both probabilities as PNG, 0..255, and the places that a second look would go to then."""
 
     vessel_png: bytes
     robot_png: bytes
     places: tuple[Point, ...]
-    wrong: tuple[Point, ...] = ()
 
     @classmethod
-    def at(cls, sample: Sample, segment: Segmenter, near: Segmenter | None = None) -> FirstLook:
-        """Look at a frame, with a second look by `near`; raises DatasetError."""
-        image, _, truth = sample.load(WORKING_SIZE_PX)
-        vessel, robot = segment(image)
+    def of(cls, vessel: Probability, robot: Probability) -> Seen:
         packed = [cv2.imencode(".png", np.rint(seen * 255).astype(np.uint8))[1].tobytes() for seen in (vessel, robot)]
-        found = look_again(image, (vessel, robot), near)[1] if near is not None else robot
-        return cls(packed[0], packed[1], tuple(places_to_look(robot)), tuple(_wrong_places(found >= np.float32(0.5), truth)))
+        return cls(packed[0], packed[1], tuple(places_to_look(robot)))
 
     def probabilities(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Vessel and robot (h, w), 0..255."""
@@ -144,15 +137,39 @@ class FirstLook:
         return vessel, robot
 
 
-class NearCrops(Dataset[Crop]):
-    """For the second look: windows as it is shown them, with what the first look (one per sample) says there.
+@dataclass(frozen=True, slots=True)
+class Looks:
+    """What a model saw in a frame at its first look, and in the end, where it has a second one.
 
+    ``wrong`` are places on pieces of robot that it missed or invented in the end.
+    """
+
+    first: Seen
+    last: Seen
+    wrong: tuple[Point, ...] = ()
+
+    @classmethod
+    def at(cls, sample: Sample, segment: Segmenter, near: Segmenter | None = None) -> Looks:
+        """Look at a frame, with a second look by `near`; raises DatasetError."""
+        image, _, truth = sample.load(WORKING_SIZE_PX)
+        probabilities = segment(image)
+        first = last = Seen.of(*probabilities)
+        if near is not None:
+            probabilities = look_again(image, probabilities, near)
+            last = Seen.of(*probabilities)
+        return cls(first, last, tuple(_wrong_places(probabilities[1] >= np.float32(0.5), truth)))
+
+
+class NearCrops(Dataset[Crop]):
+    """For the second look: windows as it is shown them, with what the first look (`looks`, one per sample) says there.
+
+    Half of them come with what was seen in the end instead: a second look may be followed by another one (``SecondLook``).
     ``plan.focus_share`` of them show a piece of robot that was missed or invented, of any frame with one.
     """
 
-    def __init__(self, samples: list[Sample], first_looks: list[FirstLook], plan: TrainingPlan) -> None:
-        self._plan, self._first_looks = plan, first_looks
-        self._failed = [place for place, look in enumerate(first_looks) if look.wrong]
+    def __init__(self, samples: list[Sample], looks: list[Looks], plan: TrainingPlan) -> None:
+        self._plan, self._looks = plan, looks
+        self._failed = [place for place, look in enumerate(looks) if look.wrong]
         self._frames = _Frames(samples)
         self._order = _Order(plan.seed, len(samples))
 
@@ -164,9 +181,10 @@ class NearCrops(Dataset[Crop]):
         focused = self._plan.focus_share > 0 and bool(self._failed) and rng.random() < self._plan.focus_share
         place = self._failed[int(rng.integers(len(self._failed)))] if focused else self._order[index]
         image, vessel, robot = self._frames[place]
-        first = self._first_looks[place]
-        seen_vessel, seen_robot = first.probabilities()
-        center = _beside(first.wrong, _WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, first.places, rng)
+        looks = self._looks[place]
+        seen = looks.last if rng.random() < _LAST_SHARE else looks.first
+        seen_vessel, seen_robot = seen.probabilities()
+        center = _beside(looks.wrong, _WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, seen.places, rng)
         x, y, width, height = window_around(center, (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
         cut = _filled(np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]]))

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from core.config import SegmentationConfig
-from core.learning.crops import FirstLook, NearCrops
+from core.learning.crops import Looks, NearCrops
 from core.learning.dataset import Sample, write_mask, write_png
 from core.learning.growing import with_first_look
 from core.learning.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, save_model, save_with_second_look
@@ -184,7 +184,7 @@ def _samples(folder: Path, count: int = 2) -> list[Sample]:
 
 def test_windows_are_shown_with_their_labels_and_the_first_look(tmp_path: Path) -> None:
     samples = _samples(tmp_path)
-    looks = [FirstLook.at(sample, First(bar(0, 230))) for sample in samples]
+    looks = [Looks.at(sample, First(bar(0, 230))) for sample in samples]
     plan = TrainingPlan(steps=20, batch=4, crop=(WINDOW_PX, WINDOW_PX), look_share=0.0, seed=3)
     crops = NearCrops(samples, looks, plan)
     assert len(crops) == 80
@@ -202,8 +202,8 @@ def test_windows_are_shown_with_their_labels_and_the_first_look(tmp_path: Path) 
 def test_what_the_first_look_got_wrong_is_shown(tmp_path: Path) -> None:
     """The first look is blind: without its errors, nobody would know where to look."""
     samples = _samples(tmp_path, 1)
-    looks = [FirstLook.at(samples[0], First(np.zeros(SIZE, np.float32)))]
-    assert looks[0].places == ()
+    looks = [Looks.at(samples[0], First(np.zeros(SIZE, np.float32)))]
+    assert looks[0].first.places == ()
     crops = NearCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0))
     shown = sum(bool(crops[index][1][1].any()) for index in range(100))
     assert shown > 40
@@ -211,11 +211,11 @@ def test_what_the_first_look_got_wrong_is_shown(tmp_path: Path) -> None:
 
 def test_wrong_are_pieces_missed_or_invented_and_not_the_blur_of_an_edge(tmp_path: Path) -> None:
     sample = _samples(tmp_path, 1)[0]  # the robot ends at 250
-    assert FirstLook.at(sample, First(bar(0, 252))).wrong == ()
-    missed = FirstLook.at(sample, First(bar(0, 150))).wrong
+    assert Looks.at(sample, First(bar(0, 252))).wrong == ()
+    missed = Looks.at(sample, First(bar(0, 150))).wrong
     assert missed
     assert all(150 < x < 250 and abs(y - 240) <= 4 for x, y in missed)
-    invented = FirstLook.at(sample, First(np.maximum(bar(0, 250), bar(400, 460, row=100)))).wrong
+    invented = Looks.at(sample, First(np.maximum(bar(0, 250), bar(400, 460, row=100)))).wrong
     assert invented
     assert all(400 <= x < 460 and abs(y - 100) <= 4 for x, y in invented)
 
@@ -226,15 +226,22 @@ def test_what_the_second_look_mends_is_not_wrong(tmp_path: Path) -> None:
 
     sample = _samples(tmp_path, 1)[0]
     first = First(bar(0, 210))
-    assert FirstLook.at(sample, first).wrong
-    assert FirstLook.at(sample, first, near).wrong == ()
-    assert FirstLook.at(sample, first, near).places == FirstLook.at(sample, first).places
+    assert Looks.at(sample, first).wrong
+    assert Looks.at(sample, first, near).wrong == ()
+    looks = Looks.at(sample, first, near)
+    assert looks.first == Looks.at(sample, first).last
+    ends = [max(x for x, _ in seen.places) for seen in (looks.first, looks.last)]
+    assert ends[0] == pytest.approx(209, abs=3) and ends[1] == pytest.approx(249, abs=3)
+    crops = NearCrops([sample], [looks], TrainingPlan(steps=10, batch=4, look_share=0.0))
+    shown = [tuple(part.numpy() for part in crops[index]) for index in range(40)]
+    mended = sum(bool(((planes[4] > 127) == (target[1] > 0)).all()) for planes, target in shown)
+    assert 8 < mended < 32, "half of the windows come with what was seen in the end"
 
 
 def test_focused_windows_show_what_was_wrong(tmp_path: Path) -> None:
     """Two frames, one of them understood: with focus, the piece that was missed in the other is in nearly every window."""
     samples = _samples(tmp_path)
-    looks = [FirstLook.at(samples[0], First(bar(0, 250))), FirstLook.at(samples[1], First(bar(0, 200)))]
+    looks = [Looks.at(samples[0], First(bar(0, 250))), Looks.at(samples[1], First(bar(0, 200)))]
     assert looks[0].wrong == () and looks[1].wrong
 
     def missed_shown(focus: float) -> int:
