@@ -278,7 +278,7 @@ def open_sights(config: PerceptionConfig) -> tuple[Sight, Sight]:
     plain: Segmenter = segmenter
     turned: Segmenter = Turned(segmenter)
     if near is not None:
-        plain, turned = SecondLook(plain, near), SecondLook(turned, Turned(near))
+        plain, turned = SecondLook(plain, near), SecondLook(turned, Turned(near), twice=True)
     return Sight(plain, info.calibration), Sight(turned, info.calibration_mirrored or info.calibration)
 
 

@@ -74,21 +74,26 @@ class SecondLook:
     ----------
     first : the first look, at all of the picture.
     near : the second network, which is asked about ``Planes``.
+    twice : the second look is followed by another one, at what it saw itself, and the mean of both counts.
     """
 
-    def __init__(self, first: Segmenter, near: Segmenter) -> None:
-        self._first, self._near = first, near
+    def __init__(self, first: Segmenter, near: Segmenter, *, twice: bool = False) -> None:
+        self._first, self._near, self._twice = first, near, twice
 
     @property
     def engine(self) -> str:
-        return f"{self._first.engine}, second look"
+        return f"{self._first.engine}, second look{' twice' if self._twice else ''}"
 
     def warm_up(self) -> None:
         """Let the second network be compiled; a picture without a robot would not ask it."""
         self._near(np.zeros((WINDOW_PX, WINDOW_PX, 5), np.uint8))
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        return look_again(image, self._first(image), self._near)
+        found = look_again(image, self._first(image), self._near)
+        if not self._twice:
+            return found
+        vessel, robot = (0.5 * (one + other) for one, other in zip(found, look_again(image, found, self._near), strict=True))
+        return vessel, robot
 
 
 def look_again(image: Image, seen: tuple[Probability, Probability], near: Segmenter) -> tuple[Probability, Probability]:

@@ -283,6 +283,24 @@ def test_what_was_held_out_is_still_known_after_the_second_look(model: Path, tmp
     assert open_second_look(SegmentationConfig(model=str(tmp_path / "tuned"), precision="fp32")) is not None
 
 
+def test_a_second_look_that_is_followed_by_another_counts_half() -> None:
+    """The first time it finds a piece of the tip, the second time all of it: what only one of them saw is seen by half."""
+
+    def near(planes: Planes, /) -> tuple[np.ndarray, np.ndarray]:
+        shown.append(planes.copy())
+        reach = 40 if len(shown) == 1 else 70
+        robot = np.zeros(planes.shape[:2], np.float32)
+        robot[76:85, : 80 + reach] = 1.0
+        return np.full(planes.shape[:2], 0.5, np.float32), robot
+
+    shown: list[Planes] = []
+    vessel, robot = SecondLook(First(bar(0, 300)), near, twice=True)(picture_of(bar(0, 370)))
+    assert [int(planes[:, :, 4].max()) for planes in shown[:2]] == [230, 255], "the second time it is shown what it found itself"
+    assert vessel[240, 300] == pytest.approx(0.5, abs=0.01)
+    assert robot[240, 315] == pytest.approx(1.0, abs=0.01)
+    assert robot[240, 360] == pytest.approx(0.5, abs=0.01)
+
+
 @pytest.mark.parametrize("device", ["openvino", "torch"])
 @pytest.mark.parametrize("precision", ["fp32", "int8"])
 def test_every_engine_can_look_again(model: Path, device: str, precision: str) -> None:
