@@ -5,12 +5,14 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
 from PySide6.QtCore import QObject, QThread, Signal
 
+from app.thread_priority import let_the_window_first
 from core.config import PerceptionConfig
 from core.control.modes import Act
 from core.control.pilot import Pilot
@@ -63,7 +65,8 @@ class EngineThread(QThread):
     """Runs one engine at a time.
 
     ``tick_ready`` carries no payload and comes only when the slot was empty, so a slow window falls behind by one tick at most.
-    ``start_engine`` closes the running engine and opens another one in the thread. ``stop`` ends the thread; it returns at once.
+    ``start_engine`` closes the running engine and opens another one in the thread; its loop turns in one beside. ``stop`` ends the
+    thread; it returns at once.
     """
 
     tick_ready = Signal()
@@ -74,7 +77,7 @@ class EngineThread(QThread):
         self.setObjectName("engine")
         self.ticks: Latest[Tick] = Latest()
         self.on_tick: Callable[[Tick], None] | None = None
-        """Gets every tick, in this thread; it must return at once."""
+        """Gets every tick, in the loop's thread; it must return at once."""
         self._lock = threading.Lock()
         self._changed = threading.Event()
         self._stopping = False
@@ -177,7 +180,9 @@ class EngineThread(QThread):
                 self._engine = engine
                 self._opened(engine)
                 self._report(EngineStatus(Phase.RUNNING))
-                self._turn(engine)
+                # In a thread of its own: what another engine will start (pilot, servos) must not wait behind perception.
+                with ThreadPoolExecutor(1, "engine turns", let_the_window_first) as turns:
+                    turns.submit(self._turn, engine).result()
         finally:
             try:
                 engine.close()  # STOP still finds its way meanwhile

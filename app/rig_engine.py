@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 
 from app.memory import give_back
+from app.thread_priority import let_the_window_first
 from core.config import Config, PerceptionConfig, SegmentationConfig
 from core.control.drive_view import LeftOver
 from core.control.engine import Engine, Perceive
@@ -71,7 +72,7 @@ class EngineMaker:
         if self._pilot is not None:  # a rig that could not be opened, or that nobody drives, acknowledges nothing either
             self._left_over, self._pilot = self._pilot.left_over, None
             give_back()
-        with ExitStack() as undo, ThreadPoolExecutor(1, "network") as beside:
+        with ExitStack() as undo, ThreadPoolExecutor(1, "network", let_the_window_first) as beside:
             loading = beside.submit(self._perception, leaving_a_core(config.perception))  # both take seconds
             rig = open_rig(config)
             undo.callback(rig.close)

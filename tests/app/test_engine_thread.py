@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -12,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
 from core.control.modes import Act
 from core.devices import DeviceError, EndOfStream
+from core.types import Tick
 from tests.app.fakes import FakeBench, FakeEngine
 
 
@@ -63,6 +66,34 @@ def test_opening_happens_outside_the_gui_thread(qtbot: QtBot, thread: EngineThre
     with qtbot.waitSignal(thread.tick_ready):
         thread.start_engine(open_engine)
     assert opened_in[0] != threading.get_ident()
+
+
+def _niceness() -> int:
+    return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux has priorities of threads")
+def test_the_loop_waits_behind_the_window_and_what_an_engine_starts_does_not(
+    qtbot: QtBot, thread: EngineThread, bench: FakeBench
+) -> None:
+    opened: list[int] = []
+    turned: list[int] = []
+
+    class Noting(FakeEngine):
+        def step(self, timeout_s: float) -> Tick | None:
+            turned.append(_niceness())
+            return super().step(timeout_s)
+
+    def open_engine() -> FakeEngine:
+        opened.append(_niceness())
+        return Noting(bench)
+
+    for count in (1, 2):  # the second one is opened after the first one's loop was told to wait
+        turned.clear()
+        thread.start_engine(open_engine)
+        qtbot.waitUntil(lambda count=count: len(opened) == count and len(turned) > 3)
+        assert opened[-1] == _niceness()
+        assert turned[-1] > _niceness() or turned[-1] == 19
 
 
 def test_known_error_becomes_one_line(qtbot: QtBot, thread: EngineThread, statuses: list[EngineStatus]) -> None:
