@@ -171,6 +171,13 @@ def test_a_full_disk_is_one_clear_error(picture: Path) -> None:
         assert (asked.returncode, asked.stderr) == (2, "error: output: the disk is full; make room, or write to another one\n")
 
 
+def test_a_dash_is_standard_output(picture: Path, tmp_path: Path) -> None:
+    done = run("perceive", picture, "--jsonl", "-", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["state"] is not None
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_small_file_that_says_it_is_huge_is_refused_before_it_is_decoded(tmp_path: Path) -> None:
     side = 30_000
     values = {256: side, 257: side, 258: 8, 259: 1, 262: 1, 273: 8, 277: 1, 278: side, 279: 4}  # width, height, bits, ...
