@@ -73,7 +73,7 @@ $python main.py train "${sets[@]}" --second-look --deepen --init "$out/near9" --
 $python main.py train "${sets[@]}" --second-look --init "$out/near10" --focus 0.5 --end-weight 4 --batch 24 --rate 4e-3 --steps 6000 \
     --seed 31 --out "$out/default"
 
-OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 480 --seed 950000 --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 960 --seed 950000 --workers 2
 $python main.py calibrate "$out/calibration" --model "$out/default"
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/test" --count 512 --seed 900000 --workers 2
 $python main.py benchmark --accuracy "$out/test" --model "$out/default" --store
