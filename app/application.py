@@ -91,11 +91,14 @@ def run_until_closed(
 
     application.aboutToQuit.connect(window.shut_down)
     signals = quit_on_signal(application)
-    window.show()
-    window.start()
-    then()
-    if language_problem():
-        say(language_problem(), True)
-    code = application.exec()
+    try:
+        window.show()
+        window.start()
+        then()
+        if language_problem():
+            say(language_problem(), True)
+        code = application.exec()
+    finally:
+        window.shut_down()  # does nothing a second time; left running, its threads would be waited for at the interpreter's end
     signals.stop()
     return code

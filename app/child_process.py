@@ -17,7 +17,7 @@ from typing import IO, Any
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 ROOT = Path(__file__).resolve().parent.parent
-LOW_PRIORITY = 10
+LOW_PRIORITY = 14
 _TAIL_BYTES = 8192
 
 

@@ -36,7 +36,13 @@ def train(
         int, typer.Option(min=0, help="for few frames of a new look: as often show so many of the twin, that nothing is forgotten")
     ] = 0,
     shallow: Annotated[bool, typer.Option("--shallow", help="a new network of two convolutions on every level")] = False,
-    deepen: Annotated[bool, typer.Option("--deepen", help="give the --init network the default's depth before training")] = False,
+    deepen: Annotated[
+        bool,
+        typer.Option(
+            "--deepen",
+            help="before training, give the network that learns the depth of the shipped one of its kind",
+        ),
+    ] = False,
     without: Annotated[
         list[str] | None,
         typer.Option(help="leave out frames of this family of looks, to be tested on; may be repeated"),

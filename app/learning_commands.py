@@ -122,7 +122,7 @@ def run_train(
 ) -> None:
     """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log.
 
-    With `deepen`, the network that learns first gets the convolutions that today's default shape has more; with `shallow`, a
+    With `deepen`, the network that learns first gets the convolutions that the shipped one of its kind has more; with `shallow`, a
     new network has two convolutions on every level. With `second_look`, it is the network of the second look of `init` that learns,
     and `out` is `init` with it. Where the plan keeps the normalisation, `data` is shown as often as the frames made now.
     """

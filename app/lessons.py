@@ -97,6 +97,11 @@ class SecondLookLesson:
         self._base = model_folder(init)
         self._has_one = has_second_look(init)
         self.network = load_network(self._base / SECOND_LOOK)[0] if self._has_one else with_first_look(load_network(self._base)[0])
+        shape = self.network.shape
+        has = (*shape.encoder_convolutions, shape.decoder_convolutions)
+        wanted = (*_SECOND_LOOK_CONVOLUTIONS[0], _SECOND_LOOK_CONVOLUTIONS[1])
+        if deepen and (has == wanted or any(one > other for one, other in zip(has, wanted, strict=True))):
+            raise UserError(f"the second look of {init} is as deep already; leave --deepen out")
         self._shown: NearCrops | None = None
 
     def sides(self, crop: tuple[int, int]) -> tuple[int, int]:
@@ -117,10 +122,10 @@ class SecondLookLesson:
             if sample.image not in looks:
                 looks[sample.image] = Looks.at(sample, ways[index % 2], near)
         self._shown = NearCrops(self._samples, [looks[sample.image] for sample in self._samples], plan)
-        if self._deepen:
+        if self._deepen and not interrupt.asked:
             depths = _SECOND_LOOK_CONVOLUTIONS
             self.network = deepened(self.network, depths[0], self._examples(), decoder_convolutions=depths[1])
-        return self._shown
+        return None if interrupt.asked else self._shown
 
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
         examples = self._examples() if whole else []

@@ -79,11 +79,14 @@ def _levels(network: DualUNet) -> list[nn.Sequential]:
 def _level_statistics(network: DualUNet, images: Iterable[NDArray[np.uint8]]) -> list[tuple[Tensor, Tensor]]:
     """Mean and variance per channel of what leaves each level."""
     levels = _levels(network)
-    kept: list[list[Tensor]] = [[] for _ in levels]
-    hooks = [
-        level.register_forward_hook(lambda _module, _inputs, output, at=at: kept[at].append(output.transpose(0, 1).flatten(1)))
-        for at, level in enumerate(levels)
-    ]
+    sums: list[tuple[int, Tensor, Tensor]] = [(0, torch.zeros(()), torch.zeros(())) for _ in levels]
+
+    def add(at: int, output: Tensor) -> None:
+        values = output.transpose(0, 1).flatten(1).double()
+        count, total, squares = sums[at]
+        sums[at] = count + values.shape[1], total + values.sum(dim=1), squares + values.square().sum(dim=1)
+
+    hooks = [level.register_forward_hook(lambda _m, _i, output, at=at: add(at, output)) for at, level in enumerate(levels)]
     stride = network.shape.stride
     try:
         with torch.no_grad():
@@ -93,10 +96,10 @@ def _level_statistics(network: DualUNet, images: Iterable[NDArray[np.uint8]]) ->
     finally:
         for hook in hooks:
             hook.remove()
-    if not kept[0]:
+    if not sums[0][0]:
         raise ValueError("without an image nobody knows what the new convolutions will meet")
-    flat = [torch.cat(outputs, dim=1) for outputs in kept]
-    return [(values.mean(dim=1), values.var(dim=1)) for values in flat]
+    means = [(total / count, squares / count) for count, total, squares in sums]
+    return [(mean.float(), (square - mean.square()).clamp(min=0).float()) for mean, square in means]
 
 
 @torch.no_grad()

@@ -109,6 +109,7 @@ def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> Non
         (("--base", "8", "--shallow"), "--base and --shallow contradict each other"),
         (("--init", "default", "--shallow"), "--shallow shapes a new network; the one of --init default has its shape"),
         (("--init", "default", "--second-look", "--shallow"), "--shallow is for the first look"),
+        (("--init", "default", "--second-look", "--deepen"), "the second look of default is as deep already"),
         (("--deepen",), "--deepen needs --init MODEL"),
         (("--focus", "0.5"), "--focus needs --init MODEL"),
         (("--held-out", "{set}"), "is trained on, so that it cannot judge"),
