@@ -31,7 +31,7 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None
             # Answers that would be refused for low confidence are the ones to learn from.
             segmentation = {"model": model, "mirrored": mirrored}
             overrides = {"perception": {"segmentation": segmentation, "quality": {"min_confidence": 0.0}}}
-            pipeline = open_pipeline(load_config(config_path, None, overrides).perception)
+            pipeline = open_pipeline(load_config(config_path, None, overrides).perception, recalibrating=True)
             title = "frames" if mirrored == "never" else "all orientations"
             found = score_set(samples, truth, pipeline, TrueMasks(), left_out.add)
             scores = list(bar.track(found, total=len(samples), description=title))

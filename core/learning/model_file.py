@@ -44,6 +44,8 @@ class ModelInfo(BaseModel):
     """What ``model.json`` says. Image height and width must be multiples of ``stride``; ``figures`` are measured.
 
     ``second_look_sha256`` is of the weights of its second look; None: it has none, or is older than this entry.
+    ``mirrored_second_looks`` is how often a picture seen in all orientations was looked at closely for ``calibration_mirrored``, 1
+    in a manifest older than this entry. Perception looks as often: a confidence is true of no other way of looking.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -61,6 +63,7 @@ class ModelInfo(BaseModel):
     training: dict[str, Any] = {}
     calibration: Calibration | None = None
     calibration_mirrored: Calibration | None = None
+    mirrored_second_looks: int = Field(1, ge=1, le=2)
     figures: dict[str, Any] = {}
 
     @property
@@ -283,9 +286,10 @@ def write_figures(folder: Path, figures: dict[str, Any]) -> None:
 def write_calibration(folder: Path, calibration: Calibration, mirrored: Calibration | None = None) -> None:
     """Store how evidence becomes confidence in the manifest of a model, atomically. Figures measured before are no longer true.
 
-    `mirrored` is for masks averaged over all orientations of a picture; None: the same.
+    `mirrored` is for masks averaged over all orientations of a picture, with the second look twice; None: the same.
     """
-    _update(folder, {"calibration": calibration, "calibration_mirrored": mirrored, "figures": {}})
+    changes = {"calibration": calibration, "calibration_mirrored": mirrored, "mirrored_second_looks": 2, "figures": {}}
+    _update(folder, changes)
 
 
 def _update(folder: Path, changes: dict[str, Any]) -> None:

@@ -263,22 +263,26 @@ def _port(config: PathConfig, image: Image) -> Point | None:
     return config.port_x_share * (width - 1), config.port_y_share * (height - 1)
 
 
-def open_pipeline(config: PerceptionConfig) -> Pipeline:
-    """Load the configured model and build the pipeline around it; raises ModelError."""
-    plain, turned = open_sights(config)
+def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False) -> Pipeline:
+    """Load the configured model and build the pipeline around it; raises ModelError. `recalibrating`: as ``open_sights`` has it."""
+    plain, turned = open_sights(config, recalibrating=recalibrating)
     stream = turned if config.segmentation.mirrored == "always" else plain
     single = plain if config.segmentation.mirrored == "never" else turned
     return Pipeline(stream.segment, config, stream.calibration, single, glance=stream)
 
 
-def open_sights(config: PerceptionConfig) -> tuple[Sight, Sight]:
-    """The configured model as it looks at a picture once, and in all its orientations; raises ModelError."""
+def open_sights(config: PerceptionConfig, *, recalibrating: bool = False) -> tuple[Sight, Sight]:
+    """The configured model as it looks at a picture once, and in all its orientations; raises ModelError.
+
+    A model whose confidence was calibrated on one second look goes on looking once; `recalibrating`, as it will look from then on.
+    """
     segmenter, near = open_segmenter(config.segmentation), open_second_look(config.segmentation)
     info = segmenter.info
     plain: Segmenter = segmenter
     turned: Segmenter = Turned(segmenter)
     if near is not None:
-        plain, turned = SecondLook(plain, near), SecondLook(turned, Turned(near), twice=True)
+        twice = recalibrating or info.calibration_mirrored is None or info.mirrored_second_looks == 2
+        plain, turned = SecondLook(plain, near), SecondLook(turned, Turned(near), twice=twice)
     return Sight(plain, info.calibration), Sight(turned, info.calibration_mirrored or info.calibration)
 
 
