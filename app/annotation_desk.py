@@ -105,7 +105,8 @@ class AnnotationDesk(QObject):
         self._retry.setInterval(_RETRY_MS)
         self._is_shut = False
         self._last_sign_s = self._counted_s = time.monotonic()
-        self._loading, self._saving, self._perceiving = (WorkThread(name, self) for name in ("loading", "saving", "perceiving"))
+        self._loading, self._saving = (WorkThread(name, self) for name in ("loading", "saving"))
+        self._perceiving = WorkThread("perceiving", self, behind=True)
         self._retry.timeout.connect(lambda: self._saving.submit("edit", self._write_all))
         self._loading.done.connect(self._on_loaded)
         self._loading.failed.connect(self._on_load_failed)

@@ -11,6 +11,8 @@ from functools import partial
 
 from PySide6.QtCore import QObject, Signal
 
+from app.thread_priority import let_the_window_first
+
 _log = logging.getLogger(__name__)
 
 
@@ -20,15 +22,20 @@ class WorkThread(QObject):
     ``done`` carries a job's key and what it gave, ``failed`` its key and one line; ``ended`` comes after the last job once it is
     stopped. It is no QThread: Qt aborts the program where one is destroyed that still runs, and a driver or a disk that hangs
     cannot be ended.
+
+    Parameters
+    ----------
+    behind : it computes for long: the window, and a rig that is driven beside it, come first.
     """
 
     done = Signal(object, object)
     failed = Signal(object, str)
     ended = Signal()
 
-    def __init__(self, name: str, parent: QObject | None = None) -> None:
+    def __init__(self, name: str, parent: QObject | None = None, *, behind: bool = False) -> None:
         super().__init__(parent)
         self.setObjectName(name)
+        self._behind = behind
         self._changed = threading.Condition()
         self._jobs: deque[tuple[Hashable, Callable[[], object]]] = deque()
         self._stopping = False
@@ -84,6 +91,8 @@ class WorkThread(QObject):
 
     def _run(self) -> None:
         """The thread."""
+        if self._behind:
+            let_the_window_first()
         self._work()
         with contextlib.suppress(RuntimeError):  # whoever asked has gone, and this object with it
             self.ended.emit()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 
+import pytest
 from pytestqt.qtbot import QtBot
 
 from app.work_thread import WorkThread
@@ -55,3 +58,20 @@ def test_stopping_finishes_what_must_not_be_lost(qtbot: QtBot) -> None:
         gate.set()
         assert thread.wait(2000)
         assert ran == ([0, 1, 2, 3, 4] if finish else [])
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux has priorities of threads")
+def test_one_that_computes_for_long_waits_behind_the_window(qtbot: QtBot) -> None:
+    def niceness() -> int:
+        return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+
+    found: dict[str, object] = {}
+    threads = [WorkThread("behind", behind=True), WorkThread("beside")]
+    for thread in threads:
+        name = thread.objectName()
+        thread.done.connect(lambda key, result: found.update({key: result}))
+        thread.submit(name, niceness)
+        thread.stop(finish=True)
+        assert thread.wait(2000)
+    qtbot.waitUntil(lambda: len(found) == 2)
+    assert found == {"behind": min(19, niceness() + 4), "beside": niceness()}
