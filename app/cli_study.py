@@ -14,7 +14,7 @@ from core.errors import UserError
 
 def perceive(
     images: Annotated[list[Path], typer.Argument(help="pictures, folders of pictures, or videos")],
-    jsonl: Annotated[Path | None, typer.Option(help="one JSON object per image; default, and -: standard output")] = None,
+    jsonl: Annotated[str, typer.Option(metavar="<path>", help="one JSON object per image; -: standard output")] = "-",
     masks: Annotated[Path | None, typer.Option(help="folder for <stem>_vessel.png and <stem>_robot.png")] = None,
     targets: Annotated[Path | None, typer.Option(help='JSON {"stem": [x, y]}: where the operator wants to go')] = None,
     overlay: Annotated[Path | None, typer.Option(help="folder for pictures with everything drawn in")] = None,
@@ -25,8 +25,8 @@ def perceive(
     """Vessel, robot, angle, distances and pose state of pictures or a video."""
     from app.perceive_command import Outputs, run_perceive
 
-    jsonl = None if jsonl == Path("-") else jsonl  # as programs that write to a pipe have it
-    run_perceive(images, Outputs(jsonl, masks, overlay), targets_path=targets, model=model, preset=preset, config_path=config)
+    lines = None if jsonl == "-" else Path(jsonl)  # ./- is a file
+    run_perceive(images, Outputs(lines, masks, overlay), targets_path=targets, model=model, preset=preset, config_path=config)
 
 
 def annotate(

@@ -176,6 +176,9 @@ def test_a_dash_is_standard_output(picture: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["state"] is not None
     assert list(tmp_path.iterdir()) == []
+    named = run("perceive", picture, "--jsonl", "./-", cwd=tmp_path)
+    assert (named.returncode, named.stdout) == (0, "")
+    assert json.loads((tmp_path / "-").read_text())["state"] == json.loads(done.stdout)["state"]
 
 
 def test_a_small_file_that_says_it_is_huge_is_refused_before_it_is_decoded(tmp_path: Path) -> None:
