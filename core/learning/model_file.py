@@ -288,7 +288,8 @@ def write_calibration(folder: Path, calibration: Calibration, mirrored: Calibrat
 
     `mirrored` is for masks averaged over all orientations of a picture, with the second look twice; None: the same.
     """
-    changes = {"calibration": calibration, "calibration_mirrored": mirrored, "mirrored_second_looks": 2, "figures": {}}
+    calibrations = {"calibration": calibration, "calibration_mirrored": mirrored}
+    changes: dict[str, Any] = calibrations | {"mirrored_second_looks": 2, "figures": {}}
     _update(folder, changes)
 
 
