@@ -51,6 +51,7 @@ FIXED = (
     "graph",
     "path",
     "pose",
+    "steadiness",
     # refusals
     "it has no pixels",
     "no centerline beside the robot's head",

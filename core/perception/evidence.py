@@ -28,7 +28,10 @@ _AROUND_PX = 60
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Signs of one answer; all are shares or ratios without unit, but ``log_length`` (natural logarithm of px)."""
+    """Signs of one answer; all are shares or ratios without unit, but ``log_length`` (natural logarithm of px) and the swings.
+
+    The swings are None where nobody looked for them: they take several times as long as all the rest (``steadiness``).
+    """
 
     robot_seen: float
     """Mean robot probability along the last 40 px."""
@@ -58,17 +61,22 @@ class Evidence:
     """Mean p(1 - p) of the robot around the head, against the robot's share there."""
     vessel_doubt: float
     """Mean p(1 - p) of the vessel around the head."""
+    theta_swing: float | None = None
+    """How much theta changes when the masks are drawn a little wider or narrower: mean of log(1 + degrees)."""
+    head_swing: float | None = None
+    """The same of the head: mean of log(1 + px)."""
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
         return tuple(field.name for field in fields(cls))
 
-    def to_array(self) -> NDArray[np.float64]:
-        return np.array(self.values(), np.float64)
-
     def values(self) -> tuple[float, ...]:
-        """The signs in the order of their ``names``."""
-        return tuple(getattr(self, name) for name in self.__slots__)
+        """The signs that are known, in the order of their ``names``."""
+        return tuple(value for value in (getattr(self, name) for name in self.__slots__) if value is not None)
+
+
+SWINGS = ("theta_swing", "head_swing")
+WITHOUT_SWINGS = tuple(name for name in Evidence.names() if name not in SWINGS)
 
 
 class Calibration(BaseModel):
@@ -85,15 +93,21 @@ class Calibration(BaseModel):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.features != Evidence.names():
+        if self.features not in (Evidence.names(), WITHOUT_SWINGS):
             raise ValueError("the calibration is of another version; run calibrate again")
         if {len(self.mean), len(self.scale), len(self.weights)} != {len(self.features)} or min(self.scale) <= 0.0:
             raise ValueError("the calibration is damaged; run calibrate again")
         return self
 
+    @property
+    def needs_swings(self) -> bool:
+        """Whether it was fitted on evidence with swings, and says nothing of any without."""
+        return SWINGS[0] in self.features
+
     def confidence(self, evidence: Evidence) -> float:
         """Probability 0..1 that the answer is right."""
-        standard = (evidence.to_array() - np.array(self.mean)) / np.array(self.scale)
+        signs = np.array([getattr(evidence, name) for name in self.features], np.float64)
+        standard = (signs - np.array(self.mean)) / np.array(self.scale)
         # What lies far beyond anything seen while fitting must not become certainty.
         logit = self.offset + float(np.clip(standard, -4.0, 4.0) @ np.array(self.weights))
         return float(1.0 / (1.0 + np.exp(-np.clip(logit, -30.0, 30.0))))

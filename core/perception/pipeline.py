@@ -7,10 +7,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from core.config import PathConfig, PerceptionConfig, TrackingConfig
-from core.perception import gaps, masks, quality, robot_path, skeleton
+from core.perception import gaps, masks, quality, robot_path, skeleton, steadiness
 from core.perception.centerline import find as find_centerline
 from core.perception.evidence import Calibration, collect
 from core.perception.glance import Background, Glances, look
@@ -48,10 +50,14 @@ class _Stopwatch:
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """A network as it is asked, and what its evidence means (None: not calibrated)."""
+    """A network as it is asked, and what its evidence means (None: not calibrated).
+
+    `swings`: how steady an answer is belongs to its evidence. It takes some four times as long as the geometry alone.
+    """
 
     segment: Segmenter
     calibration: Calibration | None = None
+    swings: bool = False
 
 
 class _Past:
@@ -164,30 +170,23 @@ class Pipeline:
             scene = self._see_all(scene, image, sight, watch, past)
         if scene.refusal is not None:
             return scene
-        found, skeletons, graph = scene.masks, scene.skeletons, scene.vessel_graph
-        assert found is not None and skeletons is not None and graph is not None
-        with watch.stage("path"):
-            previous = recall(past.memory, frame.captured_s, config.tracking) if past is not None else None
-            path = robot_path.find(skeletons, found, config, previous, graph, _port(config.path, image))
-        if isinstance(path, Refusal):
-            return replace(scene, refusal=path)
-        with watch.stage("pose"):
-            if target is not None:
-                routes = past.routes if past is not None else None
-                scene = _with_route(scene, graph, path.head, scene.to_working(target), found.vessel, routes)
-            elif past is not None:
-                past.routes.forget()
-            return self._pose(replace(scene, path=path), path, found, sight.calibration)
+        previous = recall(past.memory, frame.captured_s, config.tracking) if past is not None else None
+        scene = self._locate(scene, image, target, watch, previous, past.routes if past is not None else None)
+        return scene if scene.refusal is not None else self._judge(scene, image, target, watch, sight, previous)
 
     def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch, past: _Past | None) -> Scene:
         """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
-        config = self._config
         with watch.stage("network"):
             vessel_probability, robot_probability = sight.segment(image)
         with watch.stage("masks"):
-            found = masks.clean(vessel_probability, robot_probability, config)
+            found = masks.clean(vessel_probability, robot_probability, self._config)
             if past is not None:
                 found = replace(found, robot=past.lookalikes.without(found.robot, image, scene.captured_s))
+        return self._draw(scene, found, watch)
+
+    def _draw(self, scene: Scene, found: Masks, watch: _Stopwatch) -> Scene:
+        """Skeletons and vessel graph of the masks found."""
+        config = self._config
         scene = replace(scene, masks=found, refusal=quality.check_masks(found))
         if scene.refusal is not None:
             return scene
@@ -219,32 +218,95 @@ class Pipeline:
             skeletons = gaps.repair(skeletons, config.gaps)
         return replace(scene, skeletons=skeletons, vessel_graph=known.graph)
 
-    def _pose(self, scene: Scene, path: RobotPath, found: Masks, calibration: Calibration | None) -> Scene:
-        """Vectors, the centerline's piece, the pose, and the quality gate's word on each."""
-        config = self._config
-        graph, skeletons = scene.vessel_graph, scene.skeletons
-        assert graph is not None
+    def _locate(
+        self,
+        scene: Scene,
+        image: Image,
+        target: Point | None,
+        watch: _Stopwatch,
+        previous: RobotPath | None,
+        routes: RouteMemory | None = None,
+    ) -> Scene:
+        """The robot's path, the way to the target, the centerline's piece and both vectors, or why one of them is not to be had."""
+        config, found, skeletons, graph = self._config, scene.masks, scene.skeletons, scene.vessel_graph
+        assert found is not None
         assert skeletons is not None
-        robot_vector = fit_robot_vector(path.points, config.vectors.robot_length_px, config.vectors.line_fit)
-        refusal = quality.check_path(path, found, config)
-        if robot_vector is None or refusal is not None:
-            return replace(scene, robot_vector=robot_vector, refusal=refusal or Refusal(Reason.TOO_SHORT, "it has no direction"))
-        centerline = find_centerline(graph, skeletons.vessel, path.head, robot_vector.direction, config.vectors, scene.route)
-        vessel_vector = fit_vessel_vector(centerline, config.vectors.line_fit) if centerline is not None else None
-        scene = replace(scene, robot_vector=robot_vector, centerline=centerline, vessel_vector=vessel_vector)
-        refusal = quality.check_centerline(centerline, config.quality)
-        if centerline is None or vessel_vector is None or refusal is not None:
-            return replace(scene, refusal=refusal or Refusal(Reason.NO_VESSEL, "the centerline beside the head has no direction"))
-        evidence = collect(path, robot_vector, centerline, found, config)
+        assert graph is not None
+        with watch.stage("path"):
+            path = robot_path.find(skeletons, found, config, previous, graph, _port(config.path, image))
+        if isinstance(path, Refusal):
+            return replace(scene, refusal=path)
+        with watch.stage("pose"):
+            if target is not None:
+                scene = _with_route(scene, graph, path.head, scene.to_working(target), found.vessel, routes)
+            elif routes is not None:
+                routes.forget()
+            robot_vector = fit_robot_vector(path.points, config.vectors.robot_length_px, config.vectors.line_fit)
+            scene = replace(scene, path=path, robot_vector=robot_vector)
+            refusal = quality.check_path(path, found, config)
+            if robot_vector is None or refusal is not None:
+                return replace(scene, refusal=refusal or Refusal(Reason.TOO_SHORT, "it has no direction"))
+            centerline = find_centerline(graph, skeletons.vessel, path.head, robot_vector.direction, config.vectors, scene.route)
+            vessel_vector = fit_vessel_vector(centerline, config.vectors.line_fit) if centerline is not None else None
+            refusal = quality.check_centerline(centerline, config.quality)
+            if refusal is None and vessel_vector is None:
+                refusal = Refusal(Reason.NO_VESSEL, "the centerline beside the head has no direction")
+            return replace(scene, centerline=centerline, vessel_vector=vessel_vector, refusal=refusal)
+
+    def _judge(
+        self, scene: Scene, image: Image, target: Point | None, watch: _Stopwatch, sight: Sight, previous: RobotPath | None
+    ) -> Scene:
+        """The pose of what was located, with its evidence and confidence, or the quality gate's word against it."""
+        config, found, path, centerline = self._config, scene.masks, scene.path, scene.centerline
+        robot, vessel = scene.robot_vector, scene.vessel_vector
+        assert found is not None
+        assert path is not None
+        assert centerline is not None
+        assert robot is not None
+        assert vessel is not None
+        with watch.stage("pose"):
+            pose = measure(robot, vessel, config.pose)
+            evidence = collect(path, robot, centerline, found, config)
+        if sight.swings:
+            with watch.stage("steadiness"):
+                believed = replace(found, robot_probability=_believed(found, config))
+                others = [
+                    self._answer(scene, image, target, masks.clean(*shifted, config), previous)
+                    for shifted in steadiness.neighbours(believed)
+                ]
+                theta, head = steadiness.swings((path.head, pose.theta_signed_deg), others)
+                evidence = replace(evidence, theta_swing=theta, head_swing=head)
         scene = replace(scene, evidence=evidence.values())
-        if calibration is not None:
-            confidence = calibration.confidence(evidence)
+        if sight.calibration is not None:
+            confidence = sight.calibration.confidence(evidence)
         else:
             confidence = quality.confidence(path, centerline, found, config)
         refusal = quality.check_confidence(confidence, config.quality)
         if refusal is not None:
             return replace(scene, refusal=refusal)
-        return replace(scene, pose=measure(robot_vector, vessel_vector, config.pose, confidence))
+        return replace(scene, pose=replace(pose, confidence=confidence))
+
+    def _answer(
+        self, scene: Scene, image: Image, target: Point | None, found: Masks, previous: RobotPath | None
+    ) -> steadiness.Answer | None:
+        """Head and signed theta of the same frame with other masks; None for a refusal."""
+        watch = _Stopwatch()
+        bare = Scene(scene.frame_index, scene.captured_s, scene.source_size, scene.scale, scale_xy=scene.scale_xy)
+        bare = self._draw(bare, found, watch)
+        if bare.refusal is None:
+            bare = self._locate(bare, image, target, watch, previous)
+        if bare.refusal is not None or bare.path is None or bare.robot_vector is None or bare.vessel_vector is None:
+            return None
+        return bare.path.head, measure(bare.robot_vector, bare.vessel_vector, self._config.pose).theta_signed_deg
+
+
+def _believed(found: Masks, config: PerceptionConfig) -> NDArray[np.float32]:
+    """The robot's probability (h, w), 0 around what a stream knows to be none."""
+    none = masks.clean_robot(found.robot_probability, config) & ~found.robot
+    if not none.any():
+        return found.robot_probability
+    around = cv2.dilate(none.view(np.uint8), np.ones((9, 9), np.uint8)) > 0
+    return np.where(around & ~found.robot, np.float32(0), found.robot_probability)
 
 
 def _with_route(scene: Scene, graph: VesselGraph, head: Point, target: Point, vessel: Mask, routes: RouteMemory | None) -> Scene:
@@ -274,7 +336,8 @@ def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False) -> P
 def open_sights(config: PerceptionConfig, *, recalibrating: bool = False) -> tuple[Sight, Sight]:
     """The configured model as it looks at a picture once, and in all its orientations; raises ModelError.
 
-    A model whose confidence was calibrated on one second look goes on looking once; `recalibrating`, as it will look from then on.
+    A model whose confidence was calibrated on one second look, or without swings, goes on without; `recalibrating`, as it will be
+    from then on.
     """
     segmenter, near = open_segmenter(config.segmentation), open_second_look(config.segmentation)
     info = segmenter.info
@@ -283,7 +346,9 @@ def open_sights(config: PerceptionConfig, *, recalibrating: bool = False) -> tup
     if near is not None:
         twice = recalibrating or info.calibration_mirrored is None or info.mirrored_second_looks == 2
         plain, turned = SecondLook(plain, near), SecondLook(turned, Turned(near), twice=twice)
-    return Sight(plain, info.calibration), Sight(turned, info.calibration_mirrored or info.calibration)
+    surest = info.calibration_mirrored or info.calibration
+    swings = recalibrating or (surest is not None and surest.needs_swings)
+    return Sight(plain, info.calibration), Sight(turned, surest, swings)
 
 
 class NoPerception:

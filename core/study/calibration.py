@@ -35,6 +35,8 @@ def is_right(score: FrameScore) -> bool:
 def fit(evidence: Sequence[Sequence[float]], right: Sequence[bool], fitted_on: dict[str, Any]) -> Calibration:
     """Fit a calibration on the evidence of answered frames (N, F) and whether each answer was right.
 
+    `evidence` is with or without the swings, but the same in all rows.
+
     Raises
     ------
     CalibrationError
@@ -48,7 +50,7 @@ def fit(evidence: Sequence[Sequence[float]], right: Sequence[bool], fitted_on: d
     standard = np.clip((x - mean) / scale, -4.0, 4.0)
     regression = LogisticRegression(C=0.3, max_iter=1000).fit(standard, np.array(right))
     return Calibration(
-        features=Evidence.names(),
+        features=Evidence.names()[: x.shape[1]],
         mean=tuple(mean.tolist()),
         scale=tuple(scale.tolist()),
         weights=tuple(regression.coef_[0].tolist()),

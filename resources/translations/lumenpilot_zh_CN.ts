@@ -757,6 +757,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>steadiness</source>
+        <translation>稳定性</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>it has no pixels</source>
         <translation>图像没有像素</translation>
     </message>

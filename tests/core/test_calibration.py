@@ -1,6 +1,6 @@
 """Evidence of an answer counted by hand; a calibration that learns from it, survives the manifest, and tells the truth."""
 
-from dataclasses import astuple, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -64,7 +64,7 @@ def test_a_head_in_the_corner_is_no_trouble() -> None:
     line = LINE - [20.0, 60.0]
     path = RobotPath(line[::-1], 1.0, None, False, 0.0, 4.0)
     found = collect(path, Vector((40.0, 0.0), (20.0, 0.0), (0.0, 0.0)), PIECE, _masks(), CONFIG)
-    assert np.isfinite(found.to_array()).all()
+    assert np.isfinite(found.values()).all()
     assert (found.lead, found.off_border) == (1.0, 1.0)
 
 
@@ -73,7 +73,7 @@ def _answers(count: int, seed: int = 0) -> tuple[list[tuple[float, ...]], list[b
     rng = np.random.default_rng(seed)
     beyond = rng.uniform(0, 1, count)
     right = rng.uniform(0, 1, count) < 1 / (1 + np.exp(8 * (beyond - 0.5)))
-    return [astuple(replace(GOOD, beyond=float(b))) for b in beyond], right.tolist()
+    return [replace(GOOD, beyond=float(b)).values() for b in beyond], right.tolist()
 
 
 def test_the_calibration_finds_what_matters_and_its_promises_hold() -> None:
@@ -88,6 +88,19 @@ def test_the_calibration_finds_what_matters_and_its_promises_hold() -> None:
     assert error < 0.05
     assert auroc(confidence, np.array(right)) == pytest.approx(auroc(-np.array([row[8] for row in evidence]), np.array(right)))
     assert calibration.fitted_on == {"set": "made", "answers": 2000, "right": sum(_answers(2000)[1])}
+
+
+def test_swings_count_for_a_calibration_that_was_fitted_on_them() -> None:
+    evidence, right = _answers(500)
+    rng = np.random.default_rng(3)
+    swings = [(*row, float(rng.normal(0.2 if good else 2.0, 0.3)), 0.1) for row, good in zip(evidence, right, strict=True)]
+    without, with_ = fit(evidence, right, {}), fit(swings, right, {})
+    assert (without.needs_swings, with_.needs_swings) == (False, True)
+    steady, unsteady = (replace(GOOD, beyond=0.5, theta_swing=swing, head_swing=0.1) for swing in (0.2, 2.0))
+    assert with_.confidence(steady) > 0.9
+    assert with_.confidence(unsteady) < 0.1
+    assert without.confidence(steady) == without.confidence(unsteady) == pytest.approx(0.5, abs=0.1)
+    assert Calibration.model_validate_json(with_.model_dump_json()) == with_
 
 
 def test_evidence_beyond_all_that_was_seen_is_no_certainty() -> None:

@@ -6,9 +6,11 @@ import pytest
 
 from core.config import Config, PerceptionConfig, TrackingConfig
 from core.learning.model_file import ModelInfo
+from core.perception import steadiness
+from core.perception.evidence import WITHOUT_SWINGS, Evidence
 from core.perception.pipeline import NoPerception, Pipeline, Sight, open_pipeline
 from core.perception.segmentation import Turned, open_segmenter
-from core.types import Frame, Image, Points, PoseState, Reason, Scene
+from core.types import Frame, Image, Masks, Points, PoseState, Reason, Scene
 from hardware.twin.world import TwinWorld
 from tests.core.drawing import SIZE, curve, depth, probability
 
@@ -95,6 +97,66 @@ def test_a_refusal_keeps_what_was_found_before_it(pipeline: Pipeline, network: D
     assert scene.masks is not None
     assert scene.skeletons is None
     assert list(scene.latency_ms) == ["prepare", "network", "masks", "total"]
+
+
+# ---- how steady an answer is ----
+
+
+def swings(network: DrawnNetwork) -> tuple[float, float]:
+    """Of theta and head, as they lie in the evidence."""
+    scene = Pipeline(network, CONFIG, single=Sight(network, swings=True)).perceive_single(frame())
+    assert reason(scene) is None
+    assert list(scene.latency_ms) == [*STAGES[:-1], "steadiness", "total"]
+    assert scene.evidence is not None
+    named = dict(zip(Evidence.names(), scene.evidence, strict=True))
+    return named["theta_swing"], named["head_swing"]
+
+
+def test_a_clear_answer_stays_as_it_is_whatever_number_draws_the_edges(network: DrawnNetwork) -> None:
+    theta, head = swings(network)
+    assert 0.0 <= theta < np.log1p(1.0)
+    assert 0.0 <= head < np.log1p(1.0)
+
+
+def test_an_answer_that_hangs_on_that_number_is_told_by_its_swing(network: DrawnNetwork) -> None:
+    """Beyond the head lies a bent piece that two of the four ways take for robot."""
+    bent = curve((270, 239), (300, 243), (325, 258), (345, 278))
+    network.robot = np.maximum(network.robot, np.float32(0.45) * probability(depth(bent, 4.0)))
+    theta, head = swings(network)
+    assert theta > np.log1p(10.0) / 3
+    assert head > np.log1p(20.0) / 3
+    assert len(network.shapes) == 1, "the network is not asked again"
+
+
+def test_without_being_asked_nobody_looks_for_swings(pipeline: Pipeline) -> None:
+    scene = pipeline.perceive_single(frame())
+    assert scene.evidence is not None
+    assert len(scene.evidence) == len(WITHOUT_SWINGS)
+
+
+def test_an_answer_that_is_lost_counts_as_the_largest_swing() -> None:
+    same, lost = steadiness.swings(((10.0, 10.0), 5.0), [((10.0, 10.0), 5.0)]), steadiness.swings(((10.0, 10.0), 5.0), [None])
+    assert same == (0.0, 0.0)
+    assert lost == steadiness.swings(((10.0, 10.0), 5.0), [((500.0, 10.0), 120.0)])
+    assert steadiness.swings(((0.0, 0.0), 179.0), [((3.0, 4.0), -179.0)]) == pytest.approx((np.log(3.0), np.log(6.0)))
+
+
+def test_edges_are_drawn_wider_and_narrower_all_four_ways() -> None:
+    shares = np.linspace(0.0, 1.0, 101, dtype=np.float32)[None]
+    masks = Masks(shares >= 0.5, shares >= 0.5, shares, shares)
+    edges = [tuple(round(float(shares[p >= 0.5].min()), 2) for p in ways) for ways in steadiness.neighbours(masks)]
+    assert sorted(edges) == [(0.34, 0.34), (0.34, 0.67), (0.67, 0.34), (0.67, 0.67)]
+
+
+def test_in_a_stream_what_is_known_to_be_no_robot_does_not_shake_an_answer(network: DrawnNetwork) -> None:
+    text = VESSEL[(VESSEL[:, 0] >= 420) & (VESSEL[:, 0] <= 450)]
+    pipeline = Pipeline(network, CONFIG, glance=None)
+    pipeline._stream = Sight(network, swings=True)
+    for k, x in enumerate(range(270, 416, 5)):
+        network.draw(VESSEL[VESSEL[:, 0] <= x], text)
+        scene = pipeline(frame(k * FRAME_S))
+        assert scene.evidence is not None
+        assert scene.evidence[-1] < np.log1p(3.0), f"at column {x}"
 
 
 # ---- single images and streams ----
