@@ -12,6 +12,7 @@ import core.study.calibration as fitting
 from app.calibrate_command import run_calibrate
 from core.config import PerceptionConfig
 from core.learning.model_file import INFO, MODELS, read_model_info
+from core.perception.evidence import WITHOUT_SWINGS
 from core.perception.pipeline import open_sights
 from core.study.calibration import CalibrationError
 from hardware.twin.synth import SynthPlan, write_set
@@ -31,18 +32,23 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def model(tmp_path: Path) -> Path:
-    """The shipped model, as one from before there was a word about how often it looks closely."""
+    """The shipped model, as one from before there was a word about how often it looks closely, or of swings."""
     shutil.copytree(MODELS / "default", tmp_path / "older")
     info = json.loads((tmp_path / "older" / INFO).read_text())
     del info["mirrored_second_looks"]
+    for part in ("features", "mean", "scale", "weights"):
+        info["calibration_mirrored"][part] = info["calibration_mirrored"][part][: len(WITHOUT_SWINGS)]
     (tmp_path / "older" / INFO).write_text(json.dumps(info))
     return tmp_path / "older"
 
 
 def _looks(model: Path, **how: bool) -> list[bool]:
-    """Whether a picture is looked at closely twice: seen once, and in all orientations."""
+    """Whether a picture is looked at closely twice, and its answer's swings looked for: seen once, and in all orientations."""
     config = PerceptionConfig.model_validate({"segmentation": {"model": str(model), "threads": 1}})
-    return [getattr(sight.segment, "engine", "").endswith("second look twice") for sight in open_sights(config, **how)]
+    sights = open_sights(config, **how)
+    twice = [getattr(sight.segment, "engine", "").endswith("second look twice") for sight in sights]
+    assert twice == [sight.swings for sight in sights]
+    return twice
 
 
 def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
@@ -58,6 +64,7 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
     assert info.figures == {}
     assert info.calibration is not None
     assert info.calibration_mirrored is not None
+    assert (info.calibration.needs_swings, info.calibration_mirrored.needs_swings) == (False, True)
     assert info.calibration != info.calibration_mirrored
     assert info.calibration.fitted_on["set"] == "set"
     assert _looks(model) == [False, True]
