@@ -43,6 +43,9 @@ def train(
             help="before training, give the network that learns the depth of the shipped one of its kind",
         ),
     ] = False,
+    widen: Annotated[
+        bool, typer.Option("--widen", help="with --second-look: before training, give it the width of the shipped one")
+    ] = False,
     without: Annotated[
         list[str] | None,
         typer.Option(help="leave out frames of this family of looks, to be tested on; may be repeated"),
@@ -104,6 +107,7 @@ def train(
         deepen=deepen,
         shallow=shallow,
         second_look=second_look,
+        widen=widen,
     )
 
 

@@ -119,12 +119,14 @@ def run_train(
     deepen: bool = False,
     shallow: bool = False,
     second_look: bool = False,
+    widen: bool = False,
 ) -> None:
     """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log.
 
     With `deepen`, the network that learns first gets the convolutions that the shipped one of its kind has more; with `shallow`, a
     new network has two convolutions on every level. With `second_look`, it is the network of the second look of `init` that learns,
-    and `out` is `init` with it. Where the plan keeps the normalisation, `data` is shown as often as the frames made now.
+    and `out` is `init` with it; with `widen`, it first gets the channels that the shipped one has more. Where the plan keeps the
+    normalisation, `data` is shown as often as the frames made now.
     """
     looks = inputs.looks_to_make()
 
@@ -138,6 +140,8 @@ def run_train(
     if second_look and outputs.held_out is not None:
         raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
     _check_choices(init, base, plan, deepen=deepen, shallow=shallow, second_look=second_look)
+    if widen and not second_look:
+        raise DatasetError("--widen is for the second look; give --second-look too, or leave it out")
     if outputs.held_out is not None and any(is_same(outputs.held_out, folder) for folder in inputs.data):
         raise DatasetError(f"{outputs.held_out}: is trained on, so that it cannot judge; give --held-out another folder")
     if not inputs.data and not inputs.synthetic:
@@ -159,7 +163,7 @@ def run_train(
     torch.manual_seed(plan.seed)
     lesson: Lesson
     if second_look:
-        lesson = SecondLookLesson(samples, init, deepen=deepen)
+        lesson = SecondLookLesson(samples, init, deepen=deepen, widen=widen)
     else:
         lesson = FrameLesson(samples, init, base, deepen=deepen, shallow=shallow)
     plan = replace(plan, crop=lesson.sides(plan.crop))

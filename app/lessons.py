@@ -16,7 +16,7 @@ from core.config import SegmentationConfig
 from core.errors import UserError
 from core.learning.crops import FrameCrops, Looks, NearCrops
 from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample
-from core.learning.growing import deepened, with_first_look
+from core.learning.growing import deepened, widened, with_first_look
 from core.learning.model_file import SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look, second_look_of
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX, Planes
@@ -32,6 +32,8 @@ _EXAMPLES = 40
 """Training frames from which an eight-bit network learns its ranges."""
 _SECOND_LOOK_CONVOLUTIONS = ((3, 3, 3, 4, 4), 2)
 """Of each encoder level, and of every decoder level: a faint tip is decided on the fine ones."""
+_SECOND_LOOK_WIDTHS = ((32, 64, 80, 128, 192), (32, 48, 48, 64))
+"""Of its encoder and its decoders: half of the wrong states are decided by a pixel or a few degrees, which the fine levels see."""
 
 
 class Lesson(Protocol):
@@ -90,7 +92,7 @@ class FrameLesson:
 class SecondLookLesson:
     """The network of a model's second look, from the one that it has, or else from its network for whole pictures."""
 
-    def __init__(self, samples: list[Sample], init: str | None, *, deepen: bool) -> None:
+    def __init__(self, samples: list[Sample], init: str | None, *, deepen: bool, widen: bool = False) -> None:
         if init is None:
             raise UserError("--second-look needs --init MODEL, whose first look it looks again after")
         self._samples, self._init, self._deepen = samples, init, deepen
@@ -102,6 +104,11 @@ class SecondLookLesson:
         wanted = (*_SECOND_LOOK_CONVOLUTIONS[0], _SECOND_LOOK_CONVOLUTIONS[1])
         if deepen and (has == wanted or any(one > other for one, other in zip(has, wanted, strict=True))):
             raise UserError(f"the second look of {init} is as deep already; leave --deepen out")
+        if widen:
+            have, want = (*shape.widths, *shape.decoder_widths), (*_SECOND_LOOK_WIDTHS[0], *_SECOND_LOOK_WIDTHS[1])
+            if have == want or any(one > other for one, other in zip(have, want, strict=True)):
+                raise UserError(f"the second look of {init} is as wide already; leave --widen out")
+            self.network = widened(self.network, *_SECOND_LOOK_WIDTHS)
         self._shown: NearCrops | None = None
 
     def sides(self, crop: tuple[int, int]) -> tuple[int, int]:

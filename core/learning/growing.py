@@ -1,11 +1,13 @@
-"""A trained network made deeper, or given more to see, without forgetting: what is added changes nothing at first.
+"""A trained network made deeper or wider, or given more to see, without forgetting: what is added changes nothing at first.
 
 T. Chen et al., "Net2Net: accelerating learning via knowledge transfer", ICLR 2016: as every level ends in a rectifier, a
-convolution that copies its input changes nothing, and training goes on from where the shallower network stood.
+convolution that copies its input changes nothing, and training goes on from where the shallower network stood. New channels are not
+copies, as they are there, but drawn anew, and at first nobody listens to them.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -68,6 +70,54 @@ def with_first_look(network: DualUNet) -> DualUNet:
     kernel[:, : state[name].shape[1]] = state[name]
     wider.load_state_dict(state | {name: kernel})
     return wider
+
+
+def widened(network: DualUNet, widths: tuple[int, int, int, int, int], decoder_widths: tuple[int, int, int, int]) -> DualUNet:
+    """A copy of `network` with this many channels per level, which computes the same.
+
+    The new channels see all that the old ones see, with weights drawn anew; the old ones do not mind them at first.
+
+    Raises
+    ------
+    ValueError
+        A level would lose channels.
+    """
+    old = network.shape
+    if any(new < had for new, had in zip(widths + decoder_widths, old.widths + old.decoder_widths, strict=True)):
+        raise ValueError(f"the network has {old.widths} and {old.decoder_widths} channels and cannot be cut down to fewer")
+    wider = DualUNet(replace(old, widths=widths, decoder_widths=decoder_widths)).eval()
+    state = {
+        name: _widened(new, network.state_dict()[name], _kept_inputs(name, network, wider))
+        for name, new in wider.state_dict().items()
+    }
+    wider.load_state_dict(state)
+    return wider
+
+
+def _kept_inputs(name: str, network: DualUNet, wider: DualUNet) -> list[int] | None:
+    """Which of the wider kernel's inputs the old one had; None: the first ones."""
+    found = re.fullmatch(r"(?:vessel|robot)\.blocks\.(\d)\.0\.weight", name)
+    if found is None:
+        return None
+    # What comes from below and what comes from the encoder lie behind each other.
+    level = 3 - int(found[1])
+    below, beside, start = network.shape.decoder_widths[level], network.shape.widths[level], wider.shape.decoder_widths[level]
+    return [*range(below), *range(start, start + beside)]
+
+
+def _widened(new: Tensor, old: Tensor, inputs: list[int] | None) -> Tensor:
+    """`new` with `old` in it, and nothing new in what the old outputs see."""
+    result = new.clone()
+    if new.dim() < 4:  # one value per channel, or a count
+        result[tuple(slice(size) for size in old.shape)] = old
+        return result
+    if new.shape[2:] == (2, 2):  # an up-sampling has its inputs first
+        result[:, : old.shape[1]] = 0
+        result[: old.shape[0], : old.shape[1]] = old
+        return result
+    result[: old.shape[0]] = 0
+    result[: old.shape[0], inputs if inputs is not None else slice(old.shape[1])] = old
+    return result
 
 
 def _levels(network: DualUNet) -> list[nn.Sequential]:

@@ -1,10 +1,12 @@
-"""A deepened network computes what the shallower one did, and learns on."""
+"""A deepened or widened network computes what it did before, and learns on."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
-from core.learning.growing import deepened
+from core.learning.growing import deepened, widened
 from core.perception.unet import DualUNet, UNetShape
 
 SMALL = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
@@ -45,3 +47,39 @@ def test_nothing_is_cut_away() -> None:
         deepened(DualUNet(SMALL), (2, 2, 2, 2, 2), IMAGES, decoder_convolutions=0)
     with pytest.raises(ValueError, match="without an image"):
         deepened(DualUNet(SMALL), (2, 2, 3, 2, 2), [])
+
+
+WIDER = (6, 4, 12, 8, 9), (8, 4, 6, 5)
+
+
+@pytest.mark.parametrize("inputs", [3, 5])
+def test_the_wider_network_says_the_same(inputs: int) -> None:
+    torch.manual_seed(2)
+    network = DualUNet(replace(SMALL, inputs=inputs, decoder_convolutions=2))
+    for _ in range(20):
+        network.train()(torch.rand(2, inputs, 64, 64))
+    wider = widened(network, *WIDER)
+    assert (wider.shape.widths, wider.shape.decoder_widths) == WIDER
+    picture = torch.rand(1, inputs, 64, 96)
+    with torch.no_grad():
+        torch.testing.assert_close(wider(picture), network.eval()(picture), rtol=1e-4, atol=1e-4)
+        torch.testing.assert_close(wider.train()(picture), network.train()(picture), rtol=1e-4, atol=1e-4)
+
+
+def test_new_channels_can_learn() -> None:
+    """At first the old channels do not listen to the new ones, but they can begin to at the first step, and the new ones then."""
+    torch.manual_seed(3)
+    wider = widened(DualUNet(SMALL), *WIDER).train()
+    optimizer = torch.optim.SGD(wider.parameters(), lr=0.1)
+    for _ in range(2):
+        optimizer.zero_grad()
+        wider(torch.rand(2, 3, 64, 64)).square().mean().backward()
+        optimizer.step()
+    for kernel in (wider.encoder[0][0].weight, wider.robot.blocks[0][0].weight):
+        assert kernel.grad is not None
+        assert float(kernel.grad[-1].abs().sum()) > 0
+
+
+def test_no_channel_is_cut_away() -> None:
+    with pytest.raises(ValueError, match="cannot be cut down to fewer"):
+        widened(DualUNet(SMALL), (4, 4, 8, 8, 8), (4, 4, 4, 3))

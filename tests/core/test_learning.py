@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -284,7 +285,7 @@ def test_the_robots_ends_are_told_where_they_count_for_more(tmp_path: Path) -> N
             rows, columns = np.nonzero(labels[2] == labels[2].max())
             robot = np.argwhere(labels[1])
             assert np.hypot(*(robot - (rows[0], columns[0])).T).min() <= 2.0, "it is on the robot"
-            assert labels[2].mean() < 25, "and nowhere else"
+            assert labels[2].mean() < 55, "and nowhere else"
     assert seen > 10
 
 
@@ -292,9 +293,10 @@ def test_the_robots_ends_are_told_where_they_count_for_more(tmp_path: Path) -> N
 def test_a_robot_does_not_end_where_it_is_cut_off(width: int) -> None:
     robot = np.zeros((160, 160), bool)
     robot[60 : 60 + width, :100] = True
-    peak = np.argwhere(_nearness(robot) == 255)
-    assert len(peak) == 1, "one end, the right one"
-    assert 99 - width <= peak[0][1] <= 99
+    near = _nearness(robot)
+    peaks, places = cv2.connectedComponents((near == 255).view(np.uint8))
+    assert peaks == 2, "one end beside the background, the right one"
+    assert 99 - width <= np.argwhere(places == 1)[:, 1].mean() <= 99
     robot[60 : 60 + width] = True
     assert not _nearness(robot).any()
     robot[:] = False
