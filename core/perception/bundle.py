@@ -86,23 +86,23 @@ def resample(bundle: Bundle, step_px: float) -> Bundle:
     return Bundle(polyline.point_at(bundle.points, along, marks), starts)
 
 
-def smooth(bundle: Bundle, sigma: float) -> Bundle:
+def smooth(bundle: Bundle, sigma: float, *, keeps_bends: bool = False) -> Bundle:
     """``polyline.smooth`` of each line."""
     pad = int(np.ceil(3.0 * sigma))
     lines = bundle.split(bundle.points)
     long = [line for line in lines if len(line) > pad]
     if not long:
-        return Bundle.of([polyline.smooth(line, sigma) for line in lines]) if lines else bundle
+        return Bundle.of([polyline.smooth(line, sigma, keeps_bends=keeps_bends) for line in lines]) if lines else bundle
     # The lines mirrored through their ends lie one behind the other; what the filter gives between two of them is left out.
     padded = np.concatenate([part for line in long for part in polyline.mirrored(line, pad)])
-    filtered = polyline.filtered(padded, pad, sigma)
+    filtered = polyline.filtered(padded, pad, sigma, keeps_bends=keeps_bends)
     smoothed, place = [], 0
     for line in lines:
         if len(line) > pad:
             smoothed.append(filtered[place : place + len(line)])
             place += len(line) + 2 * pad
         else:
-            smoothed.append(polyline.smooth(line, sigma))
+            smoothed.append(polyline.smooth(line, sigma, keeps_bends=keeps_bends))
     return Bundle(np.concatenate(smoothed), bundle.starts)
 
 

@@ -86,10 +86,14 @@ def distance_to_segments(start: Points, end: Points, point: Point) -> tuple[NDAr
     return np.hypot(gap[:, 0], gap[:, 1]), share
 
 
-def smooth(points: Points, sigma: float) -> Points:
-    """Gaussian smoothing along a polyline, `sigma` in points; both ends stay where they are."""
+def smooth(points: Points, sigma: float, *, keeps_bends: bool = False) -> Points:
+    """Smoothing along a polyline, `sigma` in points; both ends stay where they are.
+
+    Gaussian means draw a bend inwards, by sigma^2 / 2R on a circle of radius R. With `keeps_bends` the weights have no second
+    moment, so that parabolas stay as they are, for some more noise at the same sigma.
+    """
     pad = min(len(points) - 1, int(np.ceil(3.0 * sigma)))
-    return points if pad < 1 else filtered(np.concatenate(mirrored(points, pad)), pad, sigma)
+    return points if pad < 1 else filtered(np.concatenate(mirrored(points, pad)), pad, sigma, keeps_bends=keeps_bends)
 
 
 def mirrored(points: Points, pad: int) -> tuple[Points, Points, Points]:
@@ -100,9 +104,9 @@ def mirrored(points: Points, pad: int) -> tuple[Points, Points, Points]:
     return 2.0 * points[0] - points[pad:0:-1], points, 2.0 * points[-1] - points[-2 : -pad - 2 : -1]
 
 
-def filtered(points: Points, pad: int, sigma: float) -> Points:
-    """Gaussian means of 2 `pad` + 1 neighbouring points each, shape (N - 2 pad, 2)."""
-    kernel = _gaussian(pad, sigma)
+def filtered(points: Points, pad: int, sigma: float, *, keeps_bends: bool = False) -> Points:
+    """Weighted means of 2 `pad` + 1 neighbouring points each, as ``smooth`` has it, shape (N - 2 pad, 2)."""
+    kernel = _bend_keeping(pad, sigma) if keeps_bends else _gaussian(pad, sigma)
     smoothed = np.empty((len(points) - 2 * pad, 2))
     for axis in (0, 1):
         smoothed[:, axis] = np.correlate(points[:, axis], kernel)
@@ -153,3 +157,14 @@ def across(tangent: Points) -> Points:
     np.divide(-tangent[:, 1], length, out=unit[:, 0])
     np.divide(tangent[:, 0], length, out=unit[:, 1])
     return unit
+
+
+@lru_cache(maxsize=64)
+def _bend_keeping(pad: int, sigma: float) -> NDArray[np.float64]:
+    """A Gaussian times the parabola that leaves it the sum 1 and no second moment; too short for that, the Gaussian."""
+    if pad < 2:
+        return _gaussian(pad, sigma)
+    square = (np.arange(-pad, pad + 1) / sigma) ** 2
+    gaussian = np.exp(-0.5 * square)
+    zeroth, second, fourth = (float((gaussian * square**power).sum()) for power in range(3))
+    return np.asarray(gaussian * (fourth - second * square) / (zeroth * fourth - second**2))

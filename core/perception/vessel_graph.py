@@ -18,8 +18,8 @@ from core.types import GraphEdge, Mask, Point, Points, VesselGraph
 MAX_CHAINS = 200
 """A vessel tree with all its spurs has some twenty to fifty chains of pixels; a skeleton of more is a mesh of noise."""
 STEP_PX = 2.0
-SMOOTHING_PX = 8.0
-"""Standard deviation of the smoothing along the way: more than a radius of boundary noise, less than a bend."""
+SMOOTHING_PX = 9.0
+"""Of the smoothing along the way, which keeps bends: more than a radius of boundary noise."""
 SPUR_RADII = 1.5
 """A spur of thinning runs from the middle to a bump or corner of the wall: at most about one and a half lumen radii."""
 END_TRIM_RADII = 1.0
@@ -227,14 +227,17 @@ def _merged(lines: list[_Line]) -> list[_Line]:
 
 def _centre(lines: list[_Line], radius: _RadiusMap) -> None:
     """All lines made even, smooth and centred in the lumen, with the radius along them."""
-    even = bundle.smooth(bundle.resample(Bundle.of([line.points for line in lines]), STEP_PX), SMOOTHING_PX / STEP_PX)
+    even = bundle.smooth(
+        bundle.resample(Bundle.of([line.points for line in lines]), STEP_PX), SMOOTHING_PX / STEP_PX, keeps_bends=True
+    )
     normal = bundle.normals(even)
     probe = 0.5 * radius.at(even.points)[:, None] * normal
     wider, narrower = np.split(radius.at(np.concatenate([even.points + probe, even.points - probe])), 2)
     counts = np.diff(even.starts)
     # A line of one or two points has no inner point to centre.
     shift = np.where(np.repeat(counts, counts) < 3, 0.0, 0.5 * (wider - narrower))
-    centred = bundle.smooth(Bundle(even.points + shift[:, None] * normal, even.starts), SMOOTHING_PX / STEP_PX)
+    moved = Bundle(even.points + shift[:, None] * normal, even.starts)
+    centred = bundle.smooth(moved, SMOOTHING_PX / STEP_PX, keeps_bends=True)
     for line, points in zip(lines, centred.split(centred.points), strict=True):
         line.points = points
     _measure(lines, radius)

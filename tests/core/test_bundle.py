@@ -36,15 +36,16 @@ def test_resampling_is_that_of_each_line(step_px: float) -> None:
         np.testing.assert_allclose(again, polyline.resample(line, step_px), atol=1e-9)
 
 
+@pytest.mark.parametrize("keeps_bends", [False, True])
 @pytest.mark.parametrize("sigma", [1.0, 4.0])
-def test_smoothing_and_normals_are_those_of_each_line(sigma: float) -> None:
+def test_smoothing_and_normals_are_those_of_each_line(sigma: float, keeps_bends: bool) -> None:
     even = bundle.resample(ALL, 2.0)
-    smooth = bundle.smooth(even, sigma)
+    smooth = bundle.smooth(even, sigma, keeps_bends=keeps_bends)
     normals = Bundle(bundle.normals(smooth), smooth.starts)
     for line, again, across in zip(
         even.split(even.points), smooth.split(smooth.points), normals.split(normals.points), strict=True
     ):
-        np.testing.assert_allclose(again, polyline.smooth(line, sigma), atol=1e-9)
+        np.testing.assert_allclose(again, polyline.smooth(line, sigma, keeps_bends=keeps_bends), atol=1e-9)
         if len(line) > 1:
             np.testing.assert_allclose(across, polyline.normals(again), atol=1e-9)
 

@@ -39,6 +39,26 @@ def test_smoothing_keeps_the_ends_and_leaves_a_straight_line_alone() -> None:
     assert np.abs(smoothed[9:-9] - line[9:-9]).max() < 0.1
 
 
+def test_smoothing_that_keeps_bends_leaves_a_circle_where_it_is() -> None:
+    """By hand: a Gaussian of 8 px draws a circle of radius 40 inwards by 8^2 / 80 = 0.8 px."""
+    angle = np.arange(0, 2.0, 0.05)
+    circle = 40.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    inner = slice(13, -13)
+    drawn = 40.0 - np.hypot(*polyline.smooth(circle, 4.0)[inner].T)
+    kept = 40.0 - np.hypot(*polyline.smooth(circle, 4.0, keeps_bends=True)[inner].T)
+    assert drawn == pytest.approx(0.8, abs=0.05)
+    assert np.abs(kept).max() < 0.02
+    rough = np.random.default_rng(4).normal(0, 0.5, circle.shape)
+    smoothed = polyline.smooth(circle + rough, 5.0, keeps_bends=True)[16:-16]
+    assert np.hypot(*smoothed.T).std() < 0.25
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 9])
+def test_a_short_line_is_smoothed_as_far_as_it_goes(count: int) -> None:
+    line = np.column_stack([np.arange(count, dtype=float), np.zeros(count)])
+    np.testing.assert_allclose(polyline.smooth(line, 5.0, keeps_bends=True), line, atol=1e-9)
+
+
 def test_a_map_is_sampled_between_pixels_and_beyond_its_border() -> None:
     ramp = np.tile(np.arange(8, dtype=np.float32), (6, 1))
     assert polyline.sample(ramp, np.array([[2.5, 3.0], [-4.0, 1.0], [20.0, 1.0]])).tolist() == [2.5, 0.0, 7.0]
