@@ -8,13 +8,14 @@ look got wrong. What it says replaces the first look's probabilities there, of r
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from core.perception.masks import clean_mask
-from core.perception.segmentation import Probability, Segmenter
+from core.perception.segmentation import Probability, Segmenter, see
 from core.perception.skeleton import MAX_KNOTS, end_pixels
 from core.perception.thinning import thin_parts
 from core.perception.windows import MARGIN_PX, window_around
@@ -85,8 +86,10 @@ class SecondLook:
         return f"{self._first.engine}, second look{' twice' if self._twice else ''}"
 
     def warm_up(self) -> None:
-        """Let the second network be compiled; a picture without a robot would not ask it."""
-        self._near(np.zeros((WINDOW_PX, WINDOW_PX, 5), np.uint8))
+        """Let the second network be compiled for one window and for several; a picture without a robot would not ask it."""
+        window = np.zeros((WINDOW_PX, WINDOW_PX, 5), np.uint8)
+        for count in (1, 2):
+            see(self._near, [window] * count)
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         found = look_again(image, self._first(image), self._near)
@@ -105,30 +108,30 @@ def look_again(image: Image, seen: tuple[Probability, Probability], near: Segmen
         for place in places_to_look(robot):
             if len(looked) < _MAX_LOOKS and all(math.dist(place, other) > _SEEN_PX for other in looked):
                 looked.append(place)
-        for place in looked[before:]:
-            _look_at(place, image, seen, near, (vessel, robot))
+        _look_at(looked[before:], image, seen, near, (vessel, robot))
         if len(looked) == before:
             break
     return vessel, robot
 
 
 def _look_at(
-    place: Point,
+    places: Sequence[Point],
     image: Image,
     seen: tuple[Probability, Probability],
     near: Segmenter,
     probabilities: tuple[Probability, Probability],
 ) -> None:
-    """Replace both probabilities in the window around `place`; the network is shown those of the first look."""
+    """Replace both probabilities in the windows around `places`; the network is shown those of the first look."""
     height, width = image.shape[:2]
-    x, y, across, down = window_around(place, (width, height), WINDOW_PX)
-    part = np.s_[y : y + down, x : x + across]
-    found = near(planes_of(image[part], seen[0][part], seen[1][part]))
-    columns = _fade(across, x > 0, x + across < width)
-    rows = _fade(down, y > 0, y + down < height)
-    weight = rows[:, None] * columns[None, :]
-    for whole, near_it in zip(probabilities, found, strict=True):
-        whole[part] += weight * (near_it - whole[part])
+    windows = [window_around(place, (width, height), WINDOW_PX) for place in places]
+    parts = [np.s_[y : y + down, x : x + across] for x, y, across, down in windows]
+    found = see(near, [planes_of(image[part], seen[0][part], seen[1][part]) for part in parts])
+    for (x, y, across, down), part, near_it in zip(windows, parts, found, strict=True):
+        columns = _fade(across, x > 0, x + across < width)
+        rows = _fade(down, y > 0, y + down < height)
+        weight = rows[:, None] * columns[None, :]
+        for whole, anew in zip(probabilities, near_it, strict=True):
+            whole[part] += weight * (anew - whole[part])
 
 
 def _fade(length: int, at_start: bool, at_end: bool) -> NDArray[np.float32]:

@@ -9,7 +9,7 @@ from core.learning.model_file import ModelInfo
 from core.perception import steadiness
 from core.perception.evidence import WITHOUT_SWINGS, Evidence
 from core.perception.pipeline import NoPerception, Pipeline, Sight, open_pipeline
-from core.perception.segmentation import Turned, open_segmenter
+from core.perception.segmentation import OpenVinoSegmenter, Turned
 from core.types import Frame, Image, Masks, Points, PoseState, Reason, Scene
 from hardware.twin.world import TwinWorld
 from tests.core.drawing import SIZE, curve, depth, probability
@@ -378,17 +378,16 @@ def test_single_pictures_may_be_looked_at_more_often_than_a_stream() -> None:
 def test_the_configuration_says_what_is_seen_in_all_orientations(
     mirrored: str, stream: int, single: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    config = PerceptionConfig.model_validate({"segmentation": {"mirrored": mirrored}})
+    config = PerceptionConfig.model_validate({"segmentation": {"mirrored": mirrored, "device": "openvino"}})
     pipeline = open_pipeline(config)
     seen: list[tuple[int, ...]] = []
-    segmenter = type(open_segmenter(config.segmentation))
-    call = segmenter.__call__
+    infer = OpenVinoSegmenter._infer
 
-    def counted(self: object, image: np.ndarray) -> object:
-        seen.append(image.shape)
-        return call(self, image)  # type: ignore[arg-type]
+    def counted(self: OpenVinoSegmenter, images: list[np.ndarray]) -> object:
+        seen.extend(image.shape for image in images)
+        return infer(self, images)
 
-    monkeypatch.setattr(segmenter, "__call__", counted)
+    monkeypatch.setattr(OpenVinoSegmenter, "_infer", counted)
     image = np.random.default_rng(0).integers(60, 200, (120, 160, 3), dtype=np.uint8)
     pipeline(Frame(0, 0.0, image))
     assert len(seen) == stream

@@ -3,6 +3,12 @@
 import subprocess
 import sys
 
+import numpy as np
+import pytest
+
+from core.config import SegmentationConfig
+from core.perception.segmentation import Pairing, Turned, open_segmenter, see
+
 TWO_MODELS = """
 import gc, os, signal
 import numpy as np
@@ -26,3 +32,39 @@ def test_a_signal_is_survived_when_models_were_opened_and_dropped() -> None:
     """OpenVINO's stack for signals is unmapped when a second one gives it back: Ctrl-C after a change of the model killed us."""
     done = subprocess.run([sys.executable, "-c", TWO_MODELS], capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stdout) == (0, "heard\n"), done.stderr
+
+
+def pictures() -> list[np.ndarray]:
+    rng = np.random.default_rng(6)
+    sizes = [(96, 128), (96, 128), (70, 128), (96, 128), (128, 96)]
+    return [rng.integers(0, 256, (*size, 3)).astype(np.uint8) for size in sizes]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_what_is_seen_together_is_what_is_seen_alone(turned: bool) -> None:
+    segment = open_segmenter(SegmentationConfig(device="openvino", threads=1))
+    assert isinstance(segment, Pairing)
+    looking = Turned(segment) if turned else segment
+    for alone, together in zip([looking(image) for image in pictures()], see(looking, pictures()), strict=True):
+        for one, other in zip(alone, together, strict=True):
+            assert one.shape == other.shape
+            # In eight bits a value at the middle of a step may be rounded to either side.
+            assert float(np.abs(one - other).mean()) < 0.002
+
+
+def test_who_cannot_see_together_is_asked_one_by_one() -> None:
+    asked = []
+
+    class OneByOne:
+        engine = "a test's"
+
+        def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            asked.append(image.shape)
+            return image[:, :, 0] / np.float32(255), image[:, :, 1] / np.float32(255)
+
+    images = pictures()
+    found = see(Turned(OneByOne()), images)
+    assert len(asked) == 8 * len(images)
+    for image, (vessel, robot) in zip(images, found, strict=True):
+        np.testing.assert_allclose(vessel, image[:, :, 0] / 255, atol=1e-5)
+        np.testing.assert_allclose(robot, image[:, :, 1] / 255, atol=1e-5)
