@@ -139,9 +139,7 @@ def run_train(
 
     if second_look and outputs.held_out is not None:
         raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
-    _check_choices(init, base, plan, deepen=deepen, shallow=shallow, second_look=second_look)
-    if widen and not second_look:
-        raise DatasetError("--widen is for the second look; give --second-look too, or leave it out")
+    _check_choices(init, base, plan, deepen=deepen, shallow=shallow, second_look=second_look, widen=widen)
     if outputs.held_out is not None and any(is_same(outputs.held_out, folder) for folder in inputs.data):
         raise DatasetError(f"{outputs.held_out}: is trained on, so that it cannot judge; give --held-out another folder")
     if not inputs.data and not inputs.synthetic:
@@ -196,7 +194,9 @@ def run_train(
     _console.print(f"model written to {out}{ending}", soft_wrap=True)
 
 
-def _check_choices(init: str | None, base: int | None, plan: Any, *, deepen: bool, shallow: bool, second_look: bool) -> None:
+def _check_choices(
+    init: str | None, base: int | None, plan: Any, *, deepen: bool, shallow: bool, second_look: bool, widen: bool
+) -> None:
     """Raise DatasetError for options that could have no effect beside the others."""
     from core.learning.dataset import DatasetError
 
@@ -210,6 +210,10 @@ def _check_choices(init: str | None, base: int | None, plan: Any, *, deepen: boo
         raise DatasetError(f"{shapes[0]} shapes a new network; the one of --init {init} has its shape: leave one of them out")
     if init is None and deepen:
         raise DatasetError("--deepen needs --init MODEL, which is to be made deeper")
+    if widen and not second_look:
+        raise DatasetError("--widen is for the second look; give --second-look too, or leave it out")
+    if widen and plan.keeps_statistics:
+        raise DatasetError("--widen needs the normalisation that --remember keeps as it is; leave one of them out")
     if init is None and plan.focus_share > 0:
         raise DatasetError("--focus needs --init MODEL, which tells what is hard")
 

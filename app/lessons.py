@@ -105,10 +105,11 @@ class SecondLookLesson:
         if deepen and (has == wanted or any(one > other for one, other in zip(has, wanted, strict=True))):
             raise UserError(f"the second look of {init} is as deep already; leave --deepen out")
         if widen:
-            have, want = (*shape.widths, *shape.decoder_widths), (*_SECOND_LOOK_WIDTHS[0], *_SECOND_LOOK_WIDTHS[1])
-            if have == want or any(one > other for one, other in zip(have, want, strict=True)):
+            widths, decoder_widths = _SECOND_LOOK_WIDTHS
+            wider = _each_larger(shape.widths, widths), _each_larger(shape.decoder_widths, decoder_widths)
+            if wider == (shape.widths, shape.decoder_widths):
                 raise UserError(f"the second look of {init} is as wide already; leave --widen out")
-            self.network = widened(self.network, *_SECOND_LOOK_WIDTHS)
+            self.network = widened(self.network, *wider)
         self._shown: NearCrops | None = None
 
     def sides(self, crop: tuple[int, int]) -> tuple[int, int]:
@@ -157,6 +158,11 @@ def has_second_look(model: str) -> bool:
 def default_shape(*, deep: bool = True) -> UNetShape:
     """The shipped network: chosen in docs/method.md by accuracy against time on two cores without bf16."""
     return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2, (2, 2, 3, 4, 4) if deep else (2, 2, 2, 2, 2))
+
+
+def _each_larger(some: tuple[int, ...], others: tuple[int, ...]) -> Any:
+    """The larger one at each place."""
+    return tuple(max(one, other) for one, other in zip(some, others, strict=True))
 
 
 def _some(samples: list[Sample]) -> list[Sample]:

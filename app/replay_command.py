@@ -160,6 +160,7 @@ def replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None =
 
 def _warm_up(reader: SessionReader, pipeline: Pipeline) -> None:
     """The first picture waits for the network's first run, which would spoil the latency."""
+    pipeline.warm_up()
     frame = reader.frame(0) if len(reader) else None
     if frame is not None:
         pipeline(frame)

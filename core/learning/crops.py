@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -22,9 +23,9 @@ from core.perception.segmentation import Probability, Segmenter
 from core.perception.skeleton import end_pixels
 from core.perception.thinning import thin_parts
 from core.perception.windows import window_around
-from core.types import Mask, Point
+from core.types import Image, Mask, Point
 
-_KEPT_SHARE = 0.6
+_KEPT_SHARE = 0.55
 """Of the free memory, for decoded frames: 10 GB hold 6500 of 640x480, or 3600 with all that was seen of them."""
 _MISSED_SHARE = 0.35
 """Of the second look's windows: as many show a pixel that the first look got wrong. The others show what it would look at."""
@@ -43,26 +44,27 @@ Crop = tuple[Tensor, Tensor]
 near they are (0..255)."""
 
 
-class _Frames:
-    """Labelled frames at working size as planes (h, w, count): red, green, blue, vessel, robot (0, 1), and what `more` adds.
+class _Kept:
+    """Arrays by what they are of. Decoding costs more than cropping, so they are kept as far as they fit."""
 
-    Decoding costs as much as cropping, so frames are kept as far as they fit.
-    """
-
-    def __init__(self, samples: Sequence[Sample], more: Callable[[int], Sequence[NDArray[np.uint8]]] = lambda _place: ()) -> None:
-        self._samples, self._more = samples, more
-        self._kept: dict[int, NDArray[np.uint8]] = {}
+    def __init__(self) -> None:
+        self._arrays: dict[Hashable, tuple[NDArray[Any], ...]] = {}
         self._room = _free_memory() * _KEPT_SHARE
 
-    def __getitem__(self, place: int) -> NDArray[np.uint8]:
-        planes = self._kept.get(place)
-        if planes is None:
-            image, vessel, robot = self._samples[place].load(WORKING_SIZE_PX)
-            planes = np.dstack([image, vessel.view(np.uint8), robot.view(np.uint8), *self._more(place)])
+    def get(self, key: Hashable, make: Callable[[], tuple[NDArray[Any], ...]]) -> tuple[NDArray[Any], ...]:
+        """What was kept under `key`, or what `make` gives."""
+        arrays = self._arrays.get(key)
+        if arrays is None:
+            arrays = make()
             if self._room > 0:
-                self._kept[place] = planes
-                self._room -= planes.nbytes
-        return planes
+                self._arrays[key] = arrays
+                self._room -= sum(array.nbytes for array in arrays)
+        return arrays
+
+    def frame(self, sample: Sample) -> tuple[Image, Mask, Mask]:
+        """A labelled frame at working size; one that is shown more often is kept once."""
+        image, vessel, robot = self.get(sample.image, lambda: sample.load(WORKING_SIZE_PX))
+        return image, vessel, robot
 
 
 def _free_memory() -> float:
@@ -98,7 +100,7 @@ class FrameCrops(Dataset[Crop]):
     def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
         self._plan = plan
         self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
-        self._frames = _Frames(samples)
+        self._samples, self._kept = samples, _Kept()
         self._order = _Order(plan.seed, len(samples))
 
     def __len__(self) -> int:
@@ -113,9 +115,7 @@ class FrameCrops(Dataset[Crop]):
             place = self._order[index]
             if self._chances is not None and rng.random() < self._plan.focus_share:
                 place = int(np.searchsorted(self._chances, rng.random(), side="right"))
-            planes = self._frames[place]
-            picture = np.ascontiguousarray(planes[:, :, :3])
-            image, vessel, robot = random_crop(picture, planes[:, :, 3] > 0, planes[:, :, 4] > 0, size, rng)
+            image, vessel, robot = random_crop(*self._kept.frame(self._samples[place]), size, rng)
             if self._plan.strip_share > 0 and rng.random() < self._plan.strip_share:
                 image = with_strips(image, vessel, robot, rng)
         if rng.random() < self._plan.look_share:
@@ -176,31 +176,24 @@ class NearCrops(Dataset[Crop]):
     def __init__(self, samples: list[Sample], looks: list[Looks], plan: TrainingPlan) -> None:
         self._plan, self._looks = plan, looks
         self._failed = [place for place, look in enumerate(looks) if look.wrong]
-        self._frames = _Frames(samples, self._seen)
+        self._samples, self._kept = samples, _Kept()
         self._order = _Order(plan.seed, len(samples))
 
     def __len__(self) -> int:
         return self._plan.steps * self._plan.batch
 
-    def _seen(self, place: int) -> tuple[NDArray[np.uint8], ...]:
-        """What the first look made of vessel and robot, and what both looks did."""
-        looks = self._looks[place]
-        return *looks.first.probabilities(), *looks.last.probabilities()
-
     def __getitem__(self, index: int) -> Crop:
         rng = np.random.default_rng((self._plan.seed, index))
         focused = self._plan.focus_share > 0 and bool(self._failed) and rng.random() < self._plan.focus_share
         place = self._failed[int(rng.integers(len(self._failed)))] if focused else self._order[index]
-        planes, looks = self._frames[place], self._looks[place]
-        seen, (in_vessel, in_robot) = (looks.last, (7, 8)) if rng.random() < _LAST_SHARE else (looks.first, (5, 6))
-        robot = planes[:, :, 4] > 0
-        center = (
-            _beside(looks.wrong, _WRONG_JITTER_PX, robot, rng)
-            if focused
-            else _place(planes[:, :, in_robot], robot, seen.places, rng)
-        )
-        x, y, width, height = window_around(center, (planes.shape[1], planes.shape[0]), WINDOW_PX)
-        cut = _filled(planes[y : y + height, x : x + width, [0, 1, 2, in_vessel, in_robot, 3, 4]])
+        sample, looks = self._samples[place], self._looks[place]
+        image, vessel, robot = self._kept.frame(sample)
+        seen = looks.last if rng.random() < _LAST_SHARE else looks.first
+        seen_vessel, seen_robot = self._kept.get((sample.image, seen is not looks.first), seen.probabilities)
+        center = _beside(looks.wrong, _WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, seen.places, rng)
+        x, y, width, height = window_around(center, (image.shape[1], image.shape[0]), WINDOW_PX)
+        part = np.s_[y : y + height, x : x + width]
+        cut = _filled(np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]]))
         # Quarter turns and mirror images cost no sharpness; the first look has seen all other angles and sizes.
         cut = np.rot90(cut, int(rng.integers(4)))
         cut = cut[:, ::-1] if rng.random() < 0.5 else cut

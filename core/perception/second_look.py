@@ -1,8 +1,8 @@
 """A second look at the robot's ends: a small network that sees the picture and what the first look took it for, close by.
 
 Most answers that are lost are lost at the robot's tip (docs/method.md), a few hundred of three hundred thousand pixels. The second
-network has the first one's widths, but is shown nothing else in training: windows around ends, and around pixels that the first
-look got wrong. What it says replaces the first look's probabilities there, of robot and vessel.
+network is wider than the first one on its fine levels, and in training it is shown nothing but windows around ends, and around
+pixels that the first look got wrong. What it says replaces the first look's probabilities there, of robot and vessel.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ MAX_CHAINS = 200
 """A vessel tree with all its spurs has some twenty to fifty chains of pixels; a skeleton of more is a mesh of noise."""
 STEP_PX = 2.0
 SMOOTHING_PX = 9.0
-"""Of the smoothing along the way, which keeps bends: more than a radius of boundary noise."""
+"""Standard deviation of the smoothing along the way, which keeps bends: more than a radius of boundary noise."""
 SPUR_RADII = 1.5
 """A spur of thinning runs from the middle to a bump or corner of the wall: at most about one and a half lumen radii."""
 END_TRIM_RADII = 1.0

@@ -96,7 +96,7 @@ def check_self_test(config: PerceptionConfig) -> Check:
 def _eight_bit_off(config: SegmentationConfig, image: Image) -> str | None:
     """How far an eight-bit network is off where its sums are large, in a brighter picture; None: no more than it may."""
     from core.perception.second_look import WINDOW_PX, planes_of
-    from core.perception.segmentation import OpenVinoSegmenter, open_second_look, open_segmenter
+    from core.perception.segmentation import OpenVinoSegmenter, open_second_look, open_segmenter, see
     from core.perception.windows import window_around
 
     used, used_near = open_segmenter(config), open_second_look(config)
@@ -105,14 +105,15 @@ def _eight_bit_off(config: SegmentationConfig, image: Image) -> str | None:
     exact = config.model_copy(update={"device": "openvino", "precision": "fp32"})
     bright = np.asarray(cv2.convertScaleAbs(image, alpha=_BRIGHTER), np.uint8)
     seen = open_segmenter(exact)(bright)
-    found = [(_apart(used(bright), seen), _EIGHT_BIT_OFF)]
+    # As single pictures are: two at once.
+    found = [(_apart(see(used, [bright, bright])[1], seen), _EIGHT_BIT_OFF)]
     near = open_second_look(exact)
     if used_near is not None and near is not None:
         row, column = np.unravel_index(int(np.argmax(seen[1])), seen[1].shape)
         x, y, width, height = window_around((float(column), float(row)), (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
         planes = planes_of(bright[part], seen[0][part], seen[1][part])
-        found.append((_apart(used_near(planes), near(planes)), _EIGHT_BIT_NEAR_OFF))
+        found.append((_apart(see(used_near, [planes, planes])[1], near(planes)), _EIGHT_BIT_NEAR_OFF))
     return next((f"{off:.3f} (at most {allowed:g})" for off, allowed in found if off > allowed), None)
 
 

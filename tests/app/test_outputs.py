@@ -112,6 +112,7 @@ def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> Non
         (("--init", "default", "--second-look", "--deepen"), "the second look of default is as deep already"),
         (("--deepen",), "--deepen needs --init MODEL"),
         (("--init", "default", "--widen"), "--widen is for the second look; give --second-look too"),
+        (("--init", "default", "--second-look", "--widen", "--remember", "4"), "--widen needs the normalisation that --remember"),
         (("--focus", "0.5"), "--focus needs --init MODEL"),
         (("--held-out", "{set}"), "is trained on, so that it cannot judge"),
     ],

@@ -11,7 +11,16 @@ import pytest
 from core.images import read_image
 from core.learning.augment import random_clutter, random_crop, random_look, with_strips
 from core.learning.crops import FrameCrops, _nearness
-from core.learning.dataset import DatasetError, find_labelled, find_samples, leave_out_looks, read_truth, write_mask, write_png
+from core.learning.dataset import (
+    DatasetError,
+    Sample,
+    find_labelled,
+    find_samples,
+    leave_out_looks,
+    read_truth,
+    write_mask,
+    write_png,
+)
 from core.learning.optimizer import make_optimizers, orthogonalised
 from core.learning.training import Progress, TrainingPlan, computes_in_bf16, loss_of, train
 from core.perception.unet import DualUNet, UNetShape
@@ -305,6 +314,24 @@ def test_a_robot_does_not_end_where_it_is_cut_off(width: int) -> None:
     assert not _nearness(np.zeros((160, 160), bool)).any()
 
 
+def test_the_loss_is_torchs_cross_entropy_and_dice() -> None:
+    import torch
+
+    rng = torch.Generator().manual_seed(8)
+    logits = 20 * torch.randn(2, 2, 8, 8, generator=rng)
+    target = (torch.rand(2, 2, 8, 8, generator=rng) > 0.6).float()
+    probability = torch.sigmoid(logits)
+
+    def dice(axes: tuple[int, ...], room: float) -> torch.Tensor:
+        return (2 * (probability * target).sum(dim=axes) + room) / ((probability + target).sum(dim=axes) + room)
+
+    entropy = torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction="none").mean(dim=(0, 2, 3))
+    expected = entropy * torch.tensor([1.0, 5.0]) + 1 - 0.5 * (dice((0, 2, 3), 1) + dice((2, 3), 50).mean(dim=0))
+    loss, plain = loss_of(logits, target, robot_weight=1.5)
+    torch.testing.assert_close(loss, (expected * torch.tensor([1.0, 1.5])).sum())
+    torch.testing.assert_close(plain, dice((0, 2, 3), 1))
+
+
 def test_what_is_wrong_near_an_end_costs_more() -> None:
     import torch
 
@@ -401,19 +428,18 @@ def test_hard_frames_are_shown_more_often(tmp_path: Path) -> None:
     samples = find_samples([_toy_set(tmp_path / "set", 4)])
     plan = TrainingPlan(steps=100, batch=4, crop=(64, 64), clutter_share=0.0, look_share=0.0, focus_share=0.5)
     crops = FrameCrops(samples, plan, np.array([0.01, 0.01, 0.01, 0.97]))
-    drawn: list[int] = []
-    frames = crops._frames
+    drawn: list[str] = []
+    frame = crops._kept.frame
 
-    class Watched:
-        def __getitem__(self, place: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            drawn.append(place)
-            return frames[place]
+    def watched(sample: Sample) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        drawn.append(sample.stem)
+        return frame(sample)
 
-    crops._frames = Watched()  # type: ignore[assignment]
+    crops._kept.frame = watched  # type: ignore[method-assign]
     for index in range(400):
         crops[index]
     # Half evenly over four frames, half nearly always the hard one: 1/8 + 0.49.
-    assert drawn.count(3) / 400 == pytest.approx(0.61, abs=0.06)
+    assert drawn.count(samples[3].stem) / 400 == pytest.approx(0.61, abs=0.06)
 
 
 def test_difficulty_is_what_a_model_loses(tmp_path: Path) -> None:

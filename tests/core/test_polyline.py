@@ -53,10 +53,13 @@ def test_smoothing_that_keeps_bends_leaves_a_circle_where_it_is() -> None:
     assert np.hypot(*smoothed.T).std() < 0.25
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 9])
-def test_a_short_line_is_smoothed_as_far_as_it_goes(count: int) -> None:
-    line = np.column_stack([np.arange(count, dtype=float), np.zeros(count)])
-    np.testing.assert_allclose(polyline.smooth(line, 5.0, keeps_bends=True), line, atol=1e-9)
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 6, 9, 13, 20])
+def test_the_ends_of_a_bend_and_short_bends_are_kept_better_than_by_a_gaussian(count: int) -> None:
+    angle = 0.05 * np.arange(count)
+    arc = 40.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    kept, drawn = (np.abs(40.0 - np.hypot(*polyline.smooth(arc, 4.5, keeps_bends=keeps).T)).max() for keeps in (True, False))
+    assert kept < 0.25
+    assert kept <= drawn + 1e-9
 
 
 def test_a_map_is_sampled_between_pixels_and_beyond_its_border() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import shutil
 from pathlib import Path
 
@@ -195,7 +196,7 @@ def test_windows_are_shown_with_their_labels_and_the_first_look(tmp_path: Path) 
         assert np.array_equal(planes[0] < 100, target[1] > 0), "picture and label were turned alike"
         has_end += bool((planes[4] > 127).any())
     assert has_end > 30
-    again = NearCrops(samples, looks, plan)
+    again = pickle.loads(pickle.dumps(NearCrops(samples, looks, plan)))  # as it comes to a loader that was spawned
     assert all(one.equal(other) for one, other in zip(crops[7], again[7], strict=True))
 
 

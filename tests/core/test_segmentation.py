@@ -2,12 +2,15 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
-from core.config import SegmentationConfig
-from core.perception.segmentation import Pairing, Turned, open_segmenter, see
+from core.learning.model_file import save_model
+from core.perception.segmentation import OpenVinoSegmenter, Pairing, Turned, see
+from core.perception.unet import DualUNet, UNetShape
 
 TWO_MODELS = """
 import gc, os, signal
@@ -40,16 +43,32 @@ def pictures() -> list[np.ndarray]:
     return [rng.integers(0, 256, (*size, 3)).astype(np.uint8) for size in sizes]
 
 
+@pytest.fixture(scope="module")
+def undecided(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small model of random weights whose answers differ from place to place and from picture to picture."""
+    torch.manual_seed(7)
+    network = DualUNet(UNetShape((8, 8, 8, 8, 8), (8, 8, 8, 8), 1, 2))
+    for decoder in (network.vessel, network.robot):
+        torch.nn.init.normal_(decoder.output.weight)
+        torch.nn.init.zeros_(decoder.output.bias)
+    folder = tmp_path_factory.mktemp("models") / "undecided"
+    save_model(network, folder, training={}, figures={}, examples=pictures())
+    return folder
+
+
+@pytest.mark.parametrize("precision", ["int8", "fp32"])
 @pytest.mark.parametrize("turned", [False, True])
-def test_what_is_seen_together_is_what_is_seen_alone(turned: bool) -> None:
-    segment = open_segmenter(SegmentationConfig(device="openvino", threads=1))
+def test_what_is_seen_together_is_what_is_seen_alone(undecided: Path, precision: str, turned: bool) -> None:
+    segment = OpenVinoSegmenter(undecided, 1, precision)
     assert isinstance(segment, Pairing)
     looking = Turned(segment) if turned else segment
-    for alone, together in zip([looking(image) for image in pictures()], see(looking, pictures()), strict=True):
-        for one, other in zip(alone, together, strict=True):
-            assert one.shape == other.shape
-            # In eight bits a value at the middle of a step may be rounded to either side.
-            assert float(np.abs(one - other).mean()) < 0.002
+    alone = [np.stack(looking(image)) for image in pictures()]
+    together = [np.stack(found) for found in see(looking, pictures())]
+    assert [found.shape for found in together] == [(2, *image.shape[:2]) for image in pictures()]
+    for one, other in zip(alone, together, strict=True):
+        # In eight bits a value at the middle of a step may be rounded to either side.
+        assert np.abs(one - other).mean() < 0.0005
+    assert np.abs(alone[0] - alone[1]).mean() > 0.005, "another picture, another answer"
 
 
 def test_who_cannot_see_together_is_asked_one_by_one() -> None:
