@@ -110,6 +110,7 @@ def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> Non
         (("--init", "default", "--shallow"), "--shallow shapes a new network; the one of --init default has its shape"),
         (("--init", "default", "--second-look", "--shallow"), "--shallow is for the first look"),
         (("--init", "default", "--second-look", "--deepen"), "the second look of default is as deep already"),
+        (("--init", "default", "--second-look", "--widen"), "the second look of default is as wide already"),
         (("--deepen",), "--deepen needs --init MODEL"),
         (("--init", "default", "--widen"), "--widen is for the second look; give --second-look too"),
         (("--init", "default", "--second-look", "--widen", "--remember", "4"), "--widen needs the normalisation that --remember"),
