@@ -25,7 +25,7 @@ from core.perception.thinning import thin_parts
 from core.perception.windows import window_around
 from core.types import Image, Mask, Point
 
-_KEPT_SHARE = 0.55
+_KEPT_SHARE = 0.5
 """Of the free memory, for decoded frames: 10 GB hold 6500 of 640x480, or 3600 with all that was seen of them."""
 _MISSED_SHARE = 0.35
 """Of the second look's windows: as many show a pixel that the first look got wrong. The others show what it would look at."""

@@ -36,13 +36,13 @@ class Segmenter(Protocol):
 
 @runtime_checkable
 class Pairing(Protocol):
-    """A segmenter that sees several images in less time than one after the other."""
+    """A segmenter that sees several images of one size in less time than one after the other."""
 
     def together(self, images: Sequence[Image]) -> list[tuple[Probability, Probability]]: ...
 
 
 def see(segmenter: Segmenter, images: Sequence[Image]) -> list[tuple[Probability, Probability]]:
-    """What `segmenter` finds in each of the images, all at once where it is able to."""
+    """What `segmenter` finds in each of the images (of one size), at once where it is able to."""
     return segmenter.together(images) if isinstance(segmenter, Pairing) else [segmenter(image) for image in images]
 
 
@@ -149,17 +149,9 @@ class OpenVinoSegmenter:
         return self._infer([image])[0]
 
     def together(self, images: Sequence[Image]) -> list[tuple[Probability, Probability]]:
-        """Of each of the images; those of one size by twos, which keeps two cores busier than one after the other does."""
-        found: list[tuple[Probability, Probability] | None] = [None] * len(images)
-        by_size: dict[tuple[int, ...], list[int]] = {}
-        for place, image in enumerate(images):
-            by_size.setdefault(image.shape, []).append(place)
-        for places in by_size.values():
-            for first in range(0, len(places), _AT_ONCE):
-                some = places[first : first + _AT_ONCE]
-                for place, one in zip(some, self._infer([images[place] for place in some]), strict=True):
-                    found[place] = one
-        return [one for one in found if one is not None]
+        """Of each of the images, by twos: that keeps two cores busier than one after the other does."""
+        pairs = (images[first : first + _AT_ONCE] for first in range(0, len(images), _AT_ONCE))
+        return [found for pair in pairs for found in self._infer(pair)]
 
     def _infer(self, images: Sequence[Image]) -> list[tuple[Probability, Probability]]:
         """Of one or more images of one size."""

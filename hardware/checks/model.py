@@ -105,15 +105,16 @@ def _eight_bit_off(config: SegmentationConfig, image: Image) -> str | None:
     exact = config.model_copy(update={"device": "openvino", "precision": "fp32"})
     bright = np.asarray(cv2.convertScaleAbs(image, alpha=_BRIGHTER), np.uint8)
     seen = open_segmenter(exact)(bright)
-    # As single pictures are: two at once.
-    found = [(_apart(see(used, [bright, bright])[1], seen), _EIGHT_BIT_OFF)]
+    # Three are seen as two at once, as single pictures are, and one by itself, as in a stream.
+    found = [(_apart(one, seen), _EIGHT_BIT_OFF) for one in see(used, [bright] * 3)]
     near = open_second_look(exact)
     if used_near is not None and near is not None:
         row, column = np.unravel_index(int(np.argmax(seen[1])), seen[1].shape)
         x, y, width, height = window_around((float(column), float(row)), (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
         planes = planes_of(bright[part], seen[0][part], seen[1][part])
-        found.append((_apart(see(used_near, [planes, planes])[1], near(planes)), _EIGHT_BIT_NEAR_OFF))
+        exactly = near(planes)
+        found += [(_apart(one, exactly), _EIGHT_BIT_NEAR_OFF) for one in see(used_near, [planes] * 3)]
     return next((f"{off:.3f} (at most {allowed:g})" for off, allowed in found if off > allowed), None)
 
 
