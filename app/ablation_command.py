@@ -120,11 +120,11 @@ def _open_masks(config: PerceptionConfig, true_masks: bool) -> tuple[SameMasks, 
     from core.perception.pipeline import Pipeline, open_sights
 
     if true_masks:
-        masks, calibration = SameMasks(TrueMasks()), None
+        masks, calibration, known = SameMasks(TrueMasks()), None, None
     else:
         sight = open_sights(config)[0]
-        masks, calibration = SameMasks(sight.segment), sight.calibration
-    return masks, lambda settings: Pipeline(masks, settings, calibration)
+        masks, calibration, known = SameMasks(sight.segment), sight.calibration, sight.familiarity
+    return masks, lambda settings: Pipeline(masks, settings, calibration, familiarity=known)
 
 
 def _measure_set(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -14,15 +16,22 @@ from core.config import load_config
 from core.perception.evidence import Calibration
 
 
-def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None:
-    """Perceive every frame of a labelled set, once and in all orientations; store a calibration of each in the model's manifest."""
+def run_calibrate(folder: Path, *, model: str, config_path: Path | None, knows: Sequence[Path] = ()) -> None:
+    """Perceive every frame of a labelled set, once and in all orientations; store a calibration of each in the model's manifest.
+
+    And what kind of pictures these and those in `knows` are: others are refused from then on.
+    """
     from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.model_file import model_folder, sha256_of, write_calibration
-    from core.perception.pipeline import open_pipeline
+    from core.perception.pipeline import open_pipeline, open_sights
+    from core.perception.second_look import SecondLook
+    from core.perception.segmentation import open_segmenter
     from core.study.accuracy import TrueMasks, score_set
     from core.study.calibration import describe_confidence, fit, is_right
+    from core.study.known_pictures import find_known, fit_familiarity, signatures_in
 
     samples, truth = find_labelled(folder, POSE_KEYS)
+    pictures = [picture for known in (folder, *knows) for picture in find_known(known)]
     described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
     calibrations: list[Calibration] = []
     target, tables, left_out = model_folder(model), [], LeftOut()
@@ -31,7 +40,8 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None
             # Answers that would be refused for low confidence are the ones to learn from.
             segmentation = {"model": model, "mirrored": mirrored}
             overrides = {"perception": {"segmentation": segmentation, "quality": {"min_confidence": 0.0}}}
-            pipeline = open_pipeline(load_config(config_path, None, overrides).perception, recalibrating=True)
+            config = load_config(config_path, None, overrides).perception
+            pipeline = open_pipeline(config, recalibrating=True)
             title = "frames" if mirrored == "never" else "all orientations"
             found = score_set(samples, truth, pipeline, TrueMasks(), left_out.add)
             scores = list(bar.track(found, total=len(samples), description=title))
@@ -43,8 +53,19 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None) -> None
             table.add_row("right answers", str(sum(right for _, right in pairs)))
             table.add_row("AUROC before, on this set", f"{describe_confidence(scores)['confidence_auroc']:.3f}")
             tables.append(table)
+        looked = signatures_in(pictures, open_segmenter(config.segmentation), config, left_out.add)
+        signed = list(bar.track(looked, total=len(pictures), description="kinds of pictures"))
     left_out.tell(len(scores))
-    write_calibration(target, *calibrations)
+    usable = [one for one in signed if one is not None]
+    familiarity = fit_familiarity(
+        np.array([signature for signature, _ in usable]),
+        [group for _, group in usable],
+        config.working_size_px,
+        described | {"knows": [also.name for also in knows]},
+    )
+    again = open_sights(config, recalibrating=True)[1].segment
+    looks = again.looks if isinstance(again, SecondLook) else 1
+    write_calibration(target, *calibrations, second_looks=looks, familiarity=familiarity)
     Console(markup=False, emoji=False).print(*tables)
     sys.stderr.write("measure it on another set: main.py benchmark --accuracy SET\n")
 

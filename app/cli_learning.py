@@ -114,9 +114,15 @@ def train(
 def calibrate(
     folder: Annotated[Path, typer.Argument(help="labelled folder as synth writes it, which training has never seen")],
     model: Annotated[str, typer.Option(help="model in resources/models, or a folder; its model.json is rewritten")] = "default",
+    knows: Annotated[
+        list[Path] | None, typer.Option("--knows", help="another folder of pictures, labelled or not, of a kind that it knows, too")
+    ] = None,
     config: ConfigOption = None,
 ) -> None:
-    """Teach a model what its confidence means: the share of right answers among those that it is so sure of."""
+    """Teach a model what its confidence means: the share of right answers among those that it is so sure of.
+
+    And which kinds of pictures it knows: it refuses others from then on (perception.quality.max_novelty).
+    """
     from app.calibrate_command import run_calibrate
 
-    run_calibrate(folder, model=model, config_path=config)
+    run_calibrate(folder, model=model, config_path=config, knows=knows or ())

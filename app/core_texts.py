@@ -191,6 +191,8 @@ TEMPLATES = (
     "99 % of it is brighter than {a} (overexposed above {b} of 255)",
     "sharpness {a} (at least {b})",
     "highest vessel probability {a}, but only in specks",
+    "highest robot probability {a}, but only in specks; it does not know such pictures: {why}",
+    "highest robot probability {a}; it does not know such pictures: {why}",
     "highest robot probability {a}, but only in specks",
     "highest vessel probability {a}",
     "highest robot probability {a}",
@@ -201,6 +203,7 @@ TEMPLATES = (
     "{a} % of its last {b} px lie in the vessel (at least {c} %)",
     "a second branch fits {a} % as well (at most {b} %)",
     "{a} % (at least {b} %)",
+    "distance {a} from the pictures that it knows (at most {b})",
     "{a} px since the last frame (at most {b} px)",
     "the target is {a} px beside the vessel",
     # advice

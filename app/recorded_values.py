@@ -41,6 +41,8 @@ def value_lines(row: RecordedRow) -> list[str]:
         )
     elif scene.refusal is not None:
         lines.append(tr("no pose: {why}", why=refusal_text(scene.refusal)))
+    if scene.novelty is not None:
+        lines.append(tr("distance from the kinds of pictures that the model knows {novelty:.2f}", novelty=scene.novelty))
     if scene.route_problem:
         lines.append(tr("no way to the target: {why}", why=tr_text(scene.route_problem)))
     if status is not None:

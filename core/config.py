@@ -135,6 +135,12 @@ class QualityConfig(_Section):
     max_bridged_share: Share = Field(0.4, description="repaired length over path length")
     max_ambiguity: Share = Field(0.95, description="how near the second best path may come to the best one")
     min_confidence: Share = Field(0.3, description="below it there is no answer")
+    max_novelty: float = Field(
+        1.0,
+        gt=0.0,
+        le=1000.0,
+        description="distance from the pictures that the model knows; 1: hardly any of them is farther",
+    )
     several_robots_share: Share = Field(0.5, description="a second robot this large against the first one")
 
 

@@ -168,6 +168,7 @@ class Reason(StrEnum):
     AMBIGUOUS_PATH = "robot path ambiguous"
     AMBIGUOUS_BRANCH = "ambiguous branch"
     LOW_CONFIDENCE = "low confidence"
+    UNLIKE_TRAINING = "unlike the training data"
     HEAD_JUMP = "head jumped"
 
 
@@ -214,7 +215,8 @@ class Scene:
     ``scale`` is working pixels per source pixel along the longer side, and ``scale_xy`` in x and y, which differ by the rounding to
     whole pixels (None: both are ``scale``); ``source_size`` is (width, height) of the frame. Stages that were not reached are None.
     ``latency_ms`` maps stage name to milliseconds, with "total". ``route_problem`` says why there is no way to the target.
-    ``window`` is the part of the working image that was looked at anew in a stream; None: all of it.
+    ``window`` is the part of the working image that was looked at anew in a stream; None: all of it. ``novelty`` is how far the
+    picture is from those that the model knows, 1 at the limit; None: the model was not taught which, or only a window was seen.
     """
 
     frame_index: int
@@ -236,6 +238,7 @@ class Scene:
     route_problem: str = ""
     scale_xy: tuple[float, float] | None = None
     window: Window | None = None
+    novelty: float | None = None
 
     def points_to_source(self, points: Points) -> Points:
         """Working pixels (N, 2) -> source pixels (N, 2); pixel centres are at integers in both."""

@@ -1,4 +1,4 @@
-"""Faults 11 to 20: what perception says, and the model that it rests on."""
+"""Faults 11 to 20, and 43: what perception says, and the model that it rests on."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from core.control.modes import Act, Mode
 from core.learning.model_file import INFO, WEIGHTS, ModelError, load_network, model_folder, read_model_info, sha256_of
 from core.perception.pipeline import open_pipeline
 from core.perception.pose import classify
-from core.types import Image, Point, Scene
+from core.types import Image, Point, Reason, Refusal, Scene
 from hardware.checks.model import judge as judge_model
 from hardware.twin.world import TwinWorld
 
@@ -306,3 +306,28 @@ def wrong_model(kit: Kit) -> Seen:
         problems += [] if Cause.MODEL_UNFIT in bench.view.against_arming else ["it could be armed"]
         seen = judge(bench, start, Wanted((), (Cause.MODEL_UNFIT,)), *problems)
         return replace(seen, reaction=f"refuses to arm: {check.detail}")
+
+
+@fault(
+    43,
+    "picture of an unknown kind",
+    injected="perception says that the pictures are unlike all that the model knows: three of them, then all",
+    wanted="HOLD at the first, and on again; then DISARM",
+)
+def unknown_kind(kit: Kit) -> Seen:
+    with open_bench(kit) as bench:
+        start = mark(bench.hand_over())
+        left = 3
+        refusal = Refusal(Reason.UNLIKE_TRAINING, "distance 1.30 from the pictures that it knows (at most 1.00)")
+
+        def unlike(scene: Scene) -> Scene:
+            nonlocal left
+            left -= 1
+            return replace(scene, pose=None, refusal=refusal) if left >= 0 else scene
+
+        bench.hooks.scene = unlike
+        bench.until(lambda view: view.mode is Mode.AUTONOMOUS and left < -2, 1.0)
+        bench.hooks.scene = lambda scene: replace(scene, pose=None, refusal=refusal)
+        bench.run(1.0)
+        causes = Cause.UNKNOWN_KIND, Cause.POSE_LOST
+        return judge(bench, start, Wanted((Mode.HOLD, Mode.AUTONOMOUS, *_TO_ADVISORY), causes, Cause.POSE_LOST, blank=True))

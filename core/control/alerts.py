@@ -95,6 +95,7 @@ _FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
     Cause.BRANCH_UNCLEAR: ("Two branches fit", "click the destination in the picture"),
     Cause.POOR_VIEW: ("Robot or vessel not clearly seen", "improve light and focus, remove what covers them"),
     Cause.CONFIDENCE_LOW: ("Perception is not sure enough", "improve light and focus, or drive by hand"),
+    Cause.UNKNOWN_KIND: ("The picture is of an unknown kind", "teach the model pictures of this rig, or drive by hand"),
     Cause.POSE_STALE: ("The pose is too old", "wait a moment; close other programs if it stays"),
     Cause.NO_TARGET: ("No way to a destination", "click a destination ahead of the robot"),
     Cause.DEADMAN: ("Deadman released", "press it again at once, or hand over again"),

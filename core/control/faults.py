@@ -74,6 +74,7 @@ class Cause(StrEnum):
     BRANCH_UNCLEAR = "two branches fit"
     POOR_VIEW = "robot or vessel not clear"
     CONFIDENCE_LOW = "confidence too low"
+    UNKNOWN_KIND = "picture of an unknown kind"
     POSE_STALE = "pose stale"
     NO_TARGET = "no way to a destination"
     DEADMAN = "deadman released"
@@ -136,6 +137,7 @@ _TABLE: dict[tuple[Area, Reaction], tuple[Cause, ...]] = {
         Cause.BRANCH_UNCLEAR,
         Cause.POOR_VIEW,
         Cause.CONFIDENCE_LOW,
+        Cause.UNKNOWN_KIND,
         Cause.POSE_STALE,
     ),
     (Area.PROGRAM, Reaction.DISARM): (Cause.COMMANDS_REJECTED,),
@@ -157,6 +159,7 @@ AT_ONCE: dict[Reason, Cause] = {
     Reason.AMBIGUOUS_BRANCH: Cause.BRANCH_UNCLEAR,
     Reason.HEAD_JUMP: Cause.HEAD_JUMP,
     Reason.LOW_CONFIDENCE: Cause.CONFIDENCE_LOW,
+    Reason.UNLIKE_TRAINING: Cause.UNKNOWN_KIND,
     Reason.BLURRED: Cause.POOR_VIEW,
     Reason.NO_VESSEL: Cause.POOR_VIEW,
     Reason.TOO_SHORT: Cause.POOR_VIEW,

@@ -104,7 +104,7 @@ def _same(before: Image, image: Image) -> bool:
 def is_sound(scene: Scene) -> bool:
     """Whether every number of a scene that anything is decided by is finite."""
     arrays: list[NDArray[np.floating]] = []
-    numbers: list[float] = []
+    numbers: list[float] = [] if scene.novelty is None else [scene.novelty]
     if scene.masks is not None:
         arrays += [scene.masks.vessel_probability, scene.masks.robot_probability]
     if (pose := scene.pose) is not None:

@@ -21,6 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from core.config import RESOURCES
 from core.errors import UserError
 from core.perception.evidence import Calibration
+from core.perception.familiarity import Familiarity
 from core.types import Image
 
 if TYPE_CHECKING:
@@ -63,7 +64,8 @@ class ModelInfo(BaseModel):
     training: dict[str, Any] = {}
     calibration: Calibration | None = None
     calibration_mirrored: Calibration | None = None
-    mirrored_second_looks: int = Field(1, ge=1, le=2)
+    familiarity: Familiarity | None = None
+    mirrored_second_looks: int = Field(1, ge=1, le=4)  # second_look.MOST_LOOKS, which cannot be imported from here
     figures: dict[str, Any] = {}
 
     @property
@@ -78,6 +80,10 @@ class ModelInfo(BaseModel):
             raise ValueError(f"stride {self.stride} is not 16 times the shape's fold {fold!r}")
         if type(inputs) is not int or inputs not in (3, 5):
             raise ValueError(f"the shape's inputs are 3 or 5, not {inputs!r}")
+        widths = self.shape.get("widths")
+        deepest = widths[-1] if isinstance(widths, list | tuple) and widths else None
+        if self.familiarity is not None and (not isinstance(deepest, int) or self.familiarity.size != 2 * deepest):
+            raise ValueError("familiarity is of another network; run calibrate again")
         return self
 
 
@@ -243,8 +249,8 @@ def _put(scratch: Path, folder: Path) -> None:
 def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs: Any) -> None:
     """Write `folder`: the model in `base` with `network` for its second look. The rest of the arguments are ``save_model``'s.
 
-    What was measured of `base`, figures and calibrations, is not true of the new model and left out; but Dice on held-out frames is
-    its network's alone, and stays.
+    What was measured of `base`, figures and calibrations, is not true of the new model and left out; but Dice on held-out frames
+    and the kinds of pictures that it knows are its network's alone, and stay.
     """
     check_can_write(folder)
     folder = folder.resolve()
@@ -283,13 +289,26 @@ def write_figures(folder: Path, figures: dict[str, Any]) -> None:
     _update(folder, {"figures": figures})
 
 
-def write_calibration(folder: Path, calibration: Calibration, mirrored: Calibration | None = None) -> None:
+def write_calibration(
+    folder: Path,
+    calibration: Calibration,
+    mirrored: Calibration | None = None,
+    *,
+    second_looks: int = 1,
+    familiarity: Familiarity | None = None,
+) -> None:
     """Store how evidence becomes confidence in the manifest of a model, atomically. Figures measured before are no longer true.
 
-    `mirrored` is for masks averaged over all orientations of a picture, with the second look twice; None: the same.
+    `mirrored` is for masks averaged over all orientations of a picture, looked at closely `second_looks` times; None: the same.
+    `familiarity` is what kind of pictures the model knows; None: nobody has looked.
     """
-    calibrations = {"calibration": calibration, "calibration_mirrored": mirrored}
-    changes: dict[str, Any] = calibrations | {"mirrored_second_looks": 2, "figures": {}}
+    changes: dict[str, Any] = {
+        "calibration": calibration,
+        "calibration_mirrored": mirrored,
+        "mirrored_second_looks": second_looks,
+        "familiarity": familiarity,
+        "figures": {},
+    }
     _update(folder, changes)
 
 

@@ -15,13 +15,14 @@ from core.config import PathConfig, PerceptionConfig, TrackingConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton, steadiness
 from core.perception.centerline import find as find_centerline
 from core.perception.evidence import Calibration, collect
+from core.perception.familiarity import Familiarity
 from core.perception.glance import Background, Glances, look
 from core.perception.lookalikes import Lookalikes
 from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
 from core.perception.route_memory import RouteMemory
-from core.perception.second_look import SecondLook
-from core.perception.segmentation import Segmenter, Turned, open_second_look, open_segmenter, to_working
+from core.perception.second_look import MOST_LOOKS, SecondLook
+from core.perception.segmentation import Segmenter, Turned, open_second_look, open_segmenter, recognise, to_working
 from core.perception.tracking import Memory, check_jump, recall
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
@@ -53,11 +54,13 @@ class Sight:
     """A network as it is asked, and what its evidence means (None: not calibrated).
 
     `swings`: how steady an answer is belongs to its evidence. It takes some four times as long as the geometry alone.
+    `familiarity`: what kind of pictures the network knows (None: nobody has told).
     """
 
     segment: Segmenter
     calibration: Calibration | None = None
     swings: bool = False
+    familiarity: Familiarity | None = None
 
 
 class _Past:
@@ -68,9 +71,10 @@ class _Past:
         self.routes = RouteMemory(config)
         self.lookalikes = Lookalikes(config)
         self.glances = Glances(config)
+        self.unlike = False
 
     def forget(self) -> None:
-        self.memory = None
+        self.memory, self.unlike = None, False
         for part in (self.routes, self.lookalikes, self.glances):
             part.forget()
 
@@ -91,8 +95,9 @@ class Pipeline:
         calibration: Calibration | None = None,
         single: Sight | None = None,
         glance: Sight | None = None,
+        familiarity: Familiarity | None = None,
     ) -> None:
-        self._stream = Sight(segmenter, calibration)
+        self._stream = Sight(segmenter, calibration, familiarity=familiarity)
         self._single = single or self._stream
         self._offered = glance
         self._glance = glance if config.tracking.window_px else None
@@ -108,7 +113,8 @@ class Pipeline:
 
     def with_config(self, config: PerceptionConfig) -> Pipeline:
         """The same networks under other thresholds, with no memory; what is set of the networks themselves is not looked at."""
-        return Pipeline(self._stream.segment, config, self._stream.calibration, self._single, self._offered)
+        stream = self._stream
+        return Pipeline(stream.segment, config, stream.calibration, self._single, self._offered, stream.familiarity)
 
     def warm_up(self) -> None:
         """Compile the networks for a stream of 4:3 pictures. Else the first pictures wait for it, up to a second each."""
@@ -172,17 +178,36 @@ class Pipeline:
             return scene
         previous = recall(past.memory, frame.captured_s, config.tracking) if past is not None else None
         scene = self._locate(scene, image, target, watch, previous, past.routes if past is not None else None)
+        if scene.refusal is not None:
+            return scene
+        # What was found is kept: it is what somebody who teaches the model this rig begins with.
+        scene = replace(scene, refusal=self._check_kind(scene, past))
         return scene if scene.refusal is not None else self._judge(scene, image, target, watch, sight, previous)
+
+    def _check_kind(self, scene: Scene, past: _Past | None) -> Refusal | None:
+        """Whether the picture is of a kind that the model does not know. A stream remembers; a window tells nothing of it."""
+        refusal = quality.check_kind(scene.novelty, self._config.quality, refused_before=past is not None and past.unlike)
+        if past is not None and scene.novelty is not None:
+            past.unlike = refusal is not None
+        return refusal
 
     def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch, past: _Past | None) -> Scene:
         """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
         with watch.stage("network"):
-            vessel_probability, robot_probability = sight.segment(image)
+            vessel_probability, robot_probability, signature = recognise(sight.segment, [image])[0]
         with watch.stage("masks"):
             found = masks.clean(vessel_probability, robot_probability, self._config)
             if past is not None:
                 found = replace(found, robot=past.lookalikes.without(found.robot, image, scene.captured_s))
-        return self._draw(scene, found, watch)
+            if sight.familiarity is not None and signature is not None:
+                scene = replace(scene, novelty=sight.familiarity.novelty(signature))
+        scene = self._draw(scene, found, watch)
+        if scene.refusal is not None and scene.refusal.reason is Reason.NO_ROBOT:
+            # That there is none may come of the picture's kind: who sees one there has to be told.
+            other = quality.check_kind(scene.novelty, self._config.quality)
+            hint = f"; it does not know such pictures: {other.detail}" if other is not None else ""
+            scene = replace(scene, refusal=replace(scene.refusal, detail=scene.refusal.detail + hint))
+        return scene
 
     def _draw(self, scene: Scene, found: Masks, watch: _Stopwatch) -> Scene:
         """Skeletons and vessel graph of the masks found."""
@@ -330,25 +355,31 @@ def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False) -> P
     plain, turned = open_sights(config, recalibrating=recalibrating)
     stream = turned if config.segmentation.mirrored == "always" else plain
     single = plain if config.segmentation.mirrored == "never" else turned
-    return Pipeline(stream.segment, config, stream.calibration, single, glance=stream)
+    return Pipeline(stream.segment, config, stream.calibration, single, stream, stream.familiarity)
 
 
 def open_sights(config: PerceptionConfig, *, recalibrating: bool = False) -> tuple[Sight, Sight]:
     """The configured model as it looks at a picture once, and in all its orientations; raises ModelError.
 
-    A model whose confidence was calibrated on one second look, or without swings, goes on without; `recalibrating`, as it will be
-    from then on.
+    A model whose confidence was calibrated on fewer second looks, or without swings, goes on like that; `recalibrating`, as it will
+    be from then on.
     """
     segmenter, near = open_segmenter(config.segmentation), open_second_look(config.segmentation)
     info = segmenter.info
     plain: Segmenter = segmenter
     turned: Segmenter = Turned(segmenter)
     if near is not None:
-        twice = recalibrating or info.calibration_mirrored is None or info.mirrored_second_looks == 2
-        plain, turned = SecondLook(plain, near), SecondLook(turned, Turned(near), twice=twice)
+        if recalibrating or info.calibration is None:
+            looks = MOST_LOOKS
+        else:
+            looks = info.mirrored_second_looks if info.calibration_mirrored is not None else 1
+        plain, turned = SecondLook(plain, near), SecondLook(turned, Turned(near), looks=looks)
     surest = info.calibration_mirrored or info.calibration
     swings = recalibrating or (surest is not None and surest.needs_swings)
-    return Sight(plain, info.calibration), Sight(turned, surest, swings)
+    known = info.familiarity if not recalibrating else None
+    if known is not None and known.working_size_px != config.working_size_px:
+        known = None  # at another size the same picture is another one to the network
+    return Sight(plain, info.calibration, familiarity=known), Sight(turned, surest, swings, known)
 
 
 class NoPerception:

@@ -20,6 +20,8 @@ from core.types import Centerline, Image, Mask, Masks, Reason, Refusal, RobotPat
 SAMPLE_STEP = 4
 """Brightness is judged on every fourth pixel."""
 _LEAST_CONTRAST = 4.0
+_KNOWN_AGAIN_SHARE = 0.9
+"""Of the limit. The kind belongs to the rig, not to one frame: a rig at the limit must not stop and go with every other one."""
 MAX_ROBOT_SHARE = 0.3
 """Of the image. A robot of 60 px across all of it is half of that; thinning a larger one takes long, and finds none."""
 
@@ -93,6 +95,17 @@ def check_masks(masks: Masks) -> Refusal | None:
             Reason.NO_ROBOT, f"what looks like it covers {100 * share:.0f} % of the image (at most {100 * MAX_ROBOT_SHARE:.0f} %)"
         )
     return None
+
+
+def check_kind(novelty: float | None, config: QualityConfig, *, refused_before: bool = False) -> Refusal | None:
+    """UNLIKE_TRAINING, where the picture is of a kind that the model does not know; None also where nobody can tell.
+
+    `refused_before`: the last picture of a stream was, and what lies about at the limit stays so.
+    """
+    limit = config.max_novelty * (_KNOWN_AGAIN_SHARE if refused_before else 1.0)
+    if not config.enabled or novelty is None or novelty <= limit:
+        return None
+    return Refusal(Reason.UNLIKE_TRAINING, f"distance {novelty:.2f} from the pictures that it knows (at most {limit:.2f})")
 
 
 def check_graph(graph: VesselGraph, config: VectorConfig) -> Refusal | None:

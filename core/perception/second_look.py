@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception.masks import clean_mask
-from core.perception.segmentation import Probability, Segmenter, see
+from core.perception.segmentation import Probability, Recognised, Segmenter, recognise, see
 from core.perception.skeleton import MAX_KNOTS, end_pixels
 from core.perception.thinning import thin_parts
 from core.perception.windows import MARGIN_PX, window_around
@@ -31,6 +31,11 @@ _ROUNDS = 2
 _FAINT = 0.1
 """Where nothing is taken for a robot, the likeliest place is looked at, if it is as likely as this."""
 _MIN_AREA_PX = 20
+_SHIFTS_PX: tuple[Point, ...] = ((0.0, 0.0), (14.0, 10.0), (-14.0, -10.0))
+"""By how much the windows of the later looks lie beside the ends: what a network says of a pixel depends a bit on where its window
+begins, and where a pixel decides, the mean of several is surer than any of them."""
+MOST_LOOKS = 1 + len(_SHIFTS_PX)
+"""How often a single picture is looked at closely: once at what the first look saw, and then at what that gave."""
 
 Planes = NDArray[np.uint8]
 """Shape (h, w, 5): red, green, blue, and the first look's probabilities of vessel and robot as 0..255."""
@@ -75,15 +80,23 @@ class SecondLook:
     ----------
     first : the first look, at all of the picture.
     near : the second network, which is asked about ``Planes``.
-    twice : the second look is followed by another one, at what it saw itself, and the mean of both counts.
+    looks : how often, up to ``MOST_LOOKS``; all but the first one look at what that one saw, through windows that lie a bit beside
+        each other, and the mean of all counts.
     """
 
-    def __init__(self, first: Segmenter, near: Segmenter, *, twice: bool = False) -> None:
-        self._first, self._near, self._twice = first, near, twice
+    def __init__(self, first: Segmenter, near: Segmenter, *, looks: int = 1) -> None:
+        if not 1 <= looks <= MOST_LOOKS:
+            raise ValueError(f"a picture is looked at closely 1 to {MOST_LOOKS} times, not {looks}")
+        self._first, self._near, self._looks = first, near, looks
+
+    @property
+    def looks(self) -> int:
+        """How often a picture is looked at closely."""
+        return self._looks
 
     @property
     def engine(self) -> str:
-        return f"{self._first.engine}, second look{' twice' if self._twice else ''}"
+        return f"{self._first.engine}, second look{f' {self._looks} times' if self._looks > 1 else ''}"
 
     def warm_up(self) -> None:
         """Let the second network be compiled for one window and for several; a picture without a robot would not ask it."""
@@ -92,15 +105,34 @@ class SecondLook:
             see(self._near, [window] * count)
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        found = look_again(image, self._first(image), self._near)
-        if not self._twice:
+        return self._look(image, self._first(image))
+
+    def recognise(self, images: Sequence[Image]) -> list[Recognised]:
+        """The signatures are the first look's, which sees the whole pictures."""
+        seen = recognise(self._first, images)
+        return [(*self._look(image, (v, r)), signature) for image, (v, r, signature) in zip(images, seen, strict=True)]
+
+    def _look(self, image: Image, seen: tuple[Probability, Probability]) -> tuple[Probability, Probability]:
+        found = look_again(image, seen, self._near)
+        if self._looks == 1:
             return found
-        vessel, robot = (0.5 * (one + other) for one, other in zip(found, look_again(image, found, self._near), strict=True))
+        vessel, robot = (probability.copy() for probability in found)
+        for shift in _SHIFTS_PX[: self._looks - 1]:
+            anew = look_again(image, found, self._near, shift)
+            vessel += anew[0]
+            robot += anew[1]
+        vessel /= self._looks
+        robot /= self._looks
         return vessel, robot
 
 
-def look_again(image: Image, seen: tuple[Probability, Probability], near: Segmenter) -> tuple[Probability, Probability]:
-    """Probabilities of vessel and robot after a second look at the ends of what the first one has `seen` in the picture."""
+def look_again(
+    image: Image, seen: tuple[Probability, Probability], near: Segmenter, shift_px: Point = (0.0, 0.0)
+) -> tuple[Probability, Probability]:
+    """Probabilities of vessel and robot after a second look at the ends of what the first one has `seen` in the picture.
+
+    `shift_px`: by how much (x, y) the windows' middles lie beside the ends.
+    """
     vessel, robot = (probability.copy() for probability in seen)
     looked: list[Point] = []
     for _ in range(_ROUNDS):
@@ -108,22 +140,23 @@ def look_again(image: Image, seen: tuple[Probability, Probability], near: Segmen
         for place in places_to_look(robot):
             if len(looked) < _MAX_LOOKS and all(math.dist(place, other) > _SEEN_PX for other in looked):
                 looked.append(place)
-        _look_at(looked[before:], image, seen, near, (vessel, robot))
+        middles = [(x + shift_px[0], y + shift_px[1]) for x, y in looked[before:]]
+        _look_at(middles, image, seen, near, (vessel, robot))
         if len(looked) == before:
             break
     return vessel, robot
 
 
 def _look_at(
-    places: Sequence[Point],
+    middles: Sequence[Point],
     image: Image,
     seen: tuple[Probability, Probability],
     near: Segmenter,
     probabilities: tuple[Probability, Probability],
 ) -> None:
-    """Replace both probabilities in the windows around `places`; the network is shown those of the first look."""
+    """Replace both probabilities in the windows around `middles`; the network is shown those of the first look."""
     height, width = image.shape[:2]
-    windows = [window_around(place, (width, height), WINDOW_PX) for place in places]
+    windows = [window_around(place, (width, height), WINDOW_PX) for place in middles]
     parts = [np.s_[y : y + down, x : x + across] for x, y, across, down in windows]
     found = see(near, [planes_of(image[part], seen[0][part], seen[1][part]) for part in parts])
     for (x, y, across, down), part, near_it in zip(windows, parts, found, strict=True):

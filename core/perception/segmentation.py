@@ -6,7 +6,7 @@ import functools
 import os
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from core.config import SegmentationConfig
 from core.learning.model_file import INFO, ONNX, ONNX_INT8, ModelError, check_files, model_folder, read_model_info, second_look_of
+from core.perception.familiarity import Signature, signature_of
 from core.types import Image
 
 Probability = NDArray[np.float32]
@@ -41,6 +42,24 @@ class Pairing(Protocol):
     def together(self, images: Sequence[Image]) -> list[tuple[Probability, Probability]]: ...
 
 
+Recognised = tuple[Probability, Probability, Signature | None]
+"""Probabilities of vessel and robot, and the picture's signature; None: the network's deepest level is not to be had."""
+
+
+@runtime_checkable
+class Recognising(Protocol):
+    """A segmenter that also tells what kind of pictures it sees (``familiarity.py``)."""
+
+    def recognise(self, images: Sequence[Image]) -> list[Recognised]: ...
+
+
+def recognise(segmenter: Segmenter, images: Sequence[Image]) -> list[Recognised]:
+    """What `segmenter` finds in each of the images (of one size), and their signatures where it is able to tell."""
+    if isinstance(segmenter, Recognising):
+        return segmenter.recognise(images)
+    return [(*found, None) for found in see(segmenter, images)]
+
+
 def see(segmenter: Segmenter, images: Sequence[Image]) -> list[tuple[Probability, Probability]]:
     """What `segmenter` finds in each of the images (of one size), at once where it is able to."""
     return segmenter.together(images) if isinstance(segmenter, Pairing) else [segmenter(image) for image in images]
@@ -63,14 +82,28 @@ class Turned:
         return f"{self._segment.engine}, {2 * len(self._turns)} orientations"
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
+        return self._look(image)[:2]
+
+    def recognise(self, images: Sequence[Image]) -> list[Recognised]:
+        """The signature is that of the picture as it was first shown: one turned upside down is of another kind, a bit."""
+        return [self._look(image) for image in images]
+
+    def _look(self, image: Image) -> Recognised:
         sums = np.zeros((2, *image.shape[:2]), np.float32)
+        signature: Signature | None = None
         for turn in self._turns:
             turned = np.rot90(image, turn)
-            found = see(self._segment, [np.ascontiguousarray(turned[:, ::step]) for step in (1, -1)])
-            for step, one in zip((1, -1), found, strict=True):
-                sums += np.rot90(np.stack(one)[:, :, ::step], -turn, axes=(1, 2))
+            pair = [np.ascontiguousarray(turned[:, ::step]) for step in (1, -1)]
+            found: list[Recognised]
+            if turn == self._turns[0]:
+                found = recognise(self._segment, pair)
+                signature = found[0][2]
+            else:
+                found = [(*one, None) for one in see(self._segment, pair)]
+            for step, (vessel, robot, _) in zip((1, -1), found, strict=True):
+                sums += np.rot90(np.stack([vessel, robot])[:, :, ::step], -turn, axes=(1, 2))
         sums /= np.float32(2 * len(self._turns))
-        return sums[0], sums[1]
+        return sums[0], sums[1], signature
 
 
 def to_working(image: Image, working_size_px: int) -> tuple[Image, tuple[float, float]]:
@@ -96,6 +129,12 @@ def _padded(image: Image, stride: int) -> Image:
         return image
     border = cv2.BORDER_REFLECT_101 if min(height, width) > stride else cv2.BORDER_REPLICATE
     return np.asarray(cv2.copyMakeBorder(image, 0, down, 0, right, border), np.uint8)
+
+
+def _cropped(probabilities: NDArray[np.float32], image: Image) -> tuple[Probability, Probability]:
+    """Vessel and robot without the padding. Copies: the next call uses the engine's output again."""
+    height, width = image.shape[:2]
+    return probabilities[0, :height, :width].copy(), probabilities[1, :height, :width].copy()
 
 
 _making_core = threading.Lock()
@@ -135,6 +174,11 @@ class OpenVinoSegmenter:
             reason = str(error).strip().splitlines()[-1]
             raise ModelError(f"{folder / name}: cannot be read ({reason}); restore the model folder") from None
         self._file = folder / name
+        # The second look's windows are parts of pictures, of which nobody asks what kind they are.
+        deepest = _deepest(self._model) if self.info.planes == 3 else None
+        self._recognises = deepest is not None
+        if deepest is not None:
+            self._model.add_outputs(deepest)
         self._requests: dict[tuple[int, int, int], Any] = {}
 
     @property
@@ -146,21 +190,26 @@ class OpenVinoSegmenter:
         return f"OpenVINO CPU {'int8' if self._int8 else 'fp32'}"
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        return self._infer([image])[0]
+        return self.together([image])[0]
 
     def together(self, images: Sequence[Image]) -> list[tuple[Probability, Probability]]:
         """Of each of the images, by twos: that keeps two cores busier than one after the other does."""
-        pairs = (images[first : first + _AT_ONCE] for first in range(0, len(images), _AT_ONCE))
-        return [found for pair in pairs for found in self._infer(pair)]
+        return [_cropped(one, image) for image, (one, _) in zip(images, self._infer(images), strict=True)]
 
-    def _infer(self, images: Sequence[Image]) -> list[tuple[Probability, Probability]]:
-        """Of one or more images of one size."""
-        height, width = images[0].shape[:2]
-        padded = np.stack([_padded(image, self.info.stride) for image in images])
-        request = self._request(padded.shape[:3])
-        # The output tensor is reused by the next call, hence the copies.
-        output = request.infer({0: padded}, share_inputs=True, share_outputs=True)[0]
-        return [(one[0, :height, :width].copy(), one[1, :height, :width].copy()) for one in output]
+    def recognise(self, images: Sequence[Image]) -> list[Recognised]:
+        """The same, and each image's signature."""
+        return [
+            (*_cropped(one, image), signature_of(deepest, one[0]) if deepest is not None else None)
+            for image, (one, deepest) in zip(images, self._infer(images), strict=True)
+        ]
+
+    def _infer(self, images: Sequence[Image]) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32] | None]]:
+        """Of images of one size: probabilities (2, H, W) with padding, and the deepest level; valid until the next is asked for."""
+        for first in range(0, len(images), _AT_ONCE):
+            padded = np.stack([_padded(image, self.info.stride) for image in images[first : first + _AT_ONCE]])
+            results = self._request(padded.shape[:3]).infer({0: padded}, share_inputs=True, share_outputs=True)
+            for place, probabilities in enumerate(results[0]):
+                yield probabilities, results[1][place] if self._recognises else None
 
     def _request(self, key: tuple[int, int, int]) -> Any:
         """To be asked about so many images of this height and width."""
@@ -176,6 +225,13 @@ class OpenVinoSegmenter:
                 reason = str(error).strip().splitlines()[-1]
                 raise ModelError(f"{self._file}: is no network of {INFO}'s shape ({reason}); restore the model folder") from None
         return self._requests[key]
+
+
+def _deepest(model: Any) -> Any | None:
+    """The output of the encoder's last level, with which both decoders begin, in OpenVINO's graph; None where none is such."""
+    inputs = [node.input_value(0) for node in model.get_ordered_ops() if node.get_type_name() == "ConvolutionBackpropData"]
+    names = [found.get_node().get_friendly_name() for found in inputs]
+    return next((found for found, name in zip(inputs, names, strict=True) if names.count(name) == 2), None)
 
 
 class TorchSegmenter:
@@ -199,12 +255,22 @@ class TorchSegmenter:
         return f"torch {self._device.type.upper()}"
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        height, width = image.shape[:2]
+        return _cropped(self._infer(image)[0].float().cpu().numpy(), image)
+
+    def recognise(self, images: Sequence[Image]) -> list[Recognised]:
+        """Of each of the images, with its signature."""
+        found = ([part.float().cpu().numpy() for part in self._infer(image)] for image in images)
+        return [
+            (*_cropped(seen, image), signature_of(deepest, seen[0])) for image, (seen, deepest) in zip(images, found, strict=True)
+        ]
+
+    def _infer(self, image: Image) -> tuple[Any, Any]:
+        """Probabilities (2, H, W) with padding, and the deepest level, on the device."""
         torch = self._torch
         batch = torch.from_numpy(np.ascontiguousarray(_padded(image, self.info.stride)))[None].to(self._device)
         with torch.inference_mode(), torch.autocast("cuda", torch.float16, enabled=self._device.type == "cuda"):
-            output = self._network(batch)[0].float().cpu().numpy()
-        return np.ascontiguousarray(output[0, :height, :width]), np.ascontiguousarray(output[1, :height, :width])
+            probabilities, deepest = self._network.with_deepest(batch)
+        return probabilities[0], deepest[0]
 
 
 def cuda_present() -> bool:

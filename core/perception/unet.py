@@ -114,6 +114,10 @@ class DualUNet(nn.Module):
         self.robot = _Decoder(shape)
 
     def forward(self, image: Tensor) -> Tensor:
+        return self.with_deepest(image)[0]
+
+    def with_deepest(self, image: Tensor) -> tuple[Tensor, Tensor]:
+        """The logits, and what the encoder's last level gives, (N, ``shape.widths[4]``, H / stride, W / stride)."""
         x = (image - 0.5) * 4.0
         if self.shape.fold > 1:
             x = nn.functional.pixel_unshuffle(x, self.shape.fold)
@@ -125,7 +129,7 @@ class DualUNet(nn.Module):
         outputs = [decoder(bottom, skips) for decoder in (self.vessel, self.robot)]
         if self.shape.fold > 1:
             outputs = [nn.functional.pixel_shuffle(output, self.shape.fold) for output in outputs]
-        return torch.cat(outputs, dim=1)
+        return torch.cat(outputs, dim=1), bottom
 
 
 class Probabilities(nn.Module):
@@ -136,4 +140,14 @@ class Probabilities(nn.Module):
         self.network = network
 
     def forward(self, image: Tensor) -> Tensor:
-        return torch.sigmoid(self.network(image.permute(0, 3, 1, 2).to(torch.float32) / 255.0))
+        return torch.sigmoid(self.network(_scaled(image)))
+
+    def with_deepest(self, image: Tensor) -> tuple[Tensor, Tensor]:
+        """The probabilities, and what a ``DualUNet`` has in its deepest level."""
+        assert isinstance(self.network, DualUNet)
+        logits, deepest = self.network.with_deepest(_scaled(image))
+        return torch.sigmoid(logits), deepest
+
+
+def _scaled(image: Tensor) -> Tensor:
+    return image.permute(0, 3, 1, 2).to(torch.float32) / 255.0

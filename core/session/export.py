@@ -107,6 +107,7 @@ _COLUMNS: dict[str, Callable[[RecordedRow, float], Any]] = {
     "c_tail_px": _pose("c_tail_px"),
     "crossed": _pose("crossed"),
     "confidence": _pose("confidence"),
+    "novelty": lambda row, _: row.scene.novelty,
     "refusal": lambda row, _: str(row.scene.refusal) if row.scene.refusal else None,
     "head_x_px": _head(0),
     "head_y_px": _head(1),

@@ -142,6 +142,7 @@ def _scene(record: Row, index: int, captured_s: float) -> Scene:
         latency_ms={stage: number(ms, f"latency_ms.{stage}") for stage, ms in stages.items() if ms is not None},
         route_problem=text(scene.get("route_problem", ""), "route_problem"),
         scale_xy=(scale_xy[0], scale_xy[1]) if scale_xy is not None else None,
+        novelty=maybe_number(record.get("novelty"), "novelty"),  # sessions of before have none
     )
 
 

@@ -88,6 +88,7 @@ def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, dropped_rows
         "c_tail_px": c_tail,
         "crossed": pose.crossed if pose else None,
         "confidence": confidence,
+        "novelty": finite(scene.novelty, 4) if scene.novelty is not None else None,
         "refusal": {"reason": scene.refusal.reason.value, "detail": scene.refusal.detail} if scene.refusal else None,
         "advice": _whole(_advice(tick.advice), "advice", broken),
         "sent": _whole(_command(tick.sent), "sent", broken),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from core.config import PerceptionConfig
-from core.perception.segmentation import Probability, Segmenter
+from core.perception.segmentation import Probability, Recognised, Segmenter, recognise
 from core.study.accuracy import TrueMasks
 from core.types import Image, Mask
 
@@ -114,7 +114,7 @@ class SameMasks:
 
     def __init__(self, network: Segmenter) -> None:
         self._network = network
-        self._kept: tuple[Probability, Probability] | None = None
+        self._kept: Recognised | None = None
 
     @property
     def engine(self) -> str:
@@ -127,6 +127,10 @@ class SameMasks:
             self._network.show(vessel, robot)
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
+        return self.recognise([image])[0][:2]
+
+    def recognise(self, images: Sequence[Image]) -> list[Recognised]:
+        """Of the frame's one image."""
         if self._kept is None:
-            self._kept = self._network(image)
-        return self._kept
+            (self._kept,) = recognise(self._network, images)
+        return [self._kept]

@@ -1382,6 +1382,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>highest robot probability {a}, but only in specks; it does not know such pictures: {why}</source>
+        <translation>机器人最高概率 {a}，但只是零星斑点；模型不认识这类图像：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>highest robot probability {a}; it does not know such pictures: {why}</source>
+        <translation>机器人最高概率 {a}；模型不认识这类图像：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>highest robot probability {a}, but only in specks</source>
         <translation>机器人概率最高 {a}，但只是零星斑点</translation>
     </message>
@@ -1429,6 +1439,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>{a} % (at least {b} %)</source>
         <translation>{a} %（至少 {b} %）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>distance {a} from the pictures that it knows (at most {b})</source>
+        <translation>与已知图像的距离为 {a}（最多 {b}）</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -3109,6 +3124,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/recorded_values.py"/>
         <source>confidence {confidence:.2f}, crossed {crossed}</source>
         <translation>置信度 {confidence:.2f}，越过：{crossed}</translation>
+    </message>
+    <message>
+        <location filename="../../app/recorded_values.py"/>
+        <source>distance from the kinds of pictures that the model knows {novelty:.2f}</source>
+        <translation>与模型已知图像类型的距离 {novelty:.2f}</translation>
     </message>
     <message>
         <location filename="../../app/recorded_values.py"/>
@@ -7329,6 +7349,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/wording.py"/>
+        <source>Picture of an unknown kind</source>
+        <translation>未知类型的图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/wording.py"/>
+        <source>teach the model with labelled pictures of this rig</source>
+        <translation>用本装置的已标注图像训练模型</translation>
+    </message>
+    <message>
+        <location filename="../../app/wording.py"/>
         <source>The head jumped</source>
         <translation>头端位置跳变</translation>
     </message>
@@ -7461,6 +7491,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>low confidence</source>
         <translation>置信度低</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>unlike the training data</source>
+        <translation>与训练数据不同</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -7661,6 +7696,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>confidence too low</source>
         <translation>置信度过低</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>picture of an unknown kind</source>
+        <translation>未知类型的图像</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8231,6 +8271,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>improve light and focus, or drive by hand</source>
         <translation>改善光照和对焦，或手动驾驶</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>The picture is of an unknown kind</source>
+        <translation>图像属于未知类型</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>teach the model pictures of this rig, or drive by hand</source>
+        <translation>用本装置的图像训练模型，或手动驱动</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9451,6 +9501,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>below it there is no answer</source>
         <translation>低于此不给结果</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Max novelty</source>
+        <translation>新异度上限</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>distance from the pictures that the model knows; 1: hardly any of them is farther</source>
+        <translation>与模型已知图像的距离；1：几乎没有已知图像更远</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

@@ -9,11 +9,14 @@ from pathlib import Path
 import pytest
 
 import core.study.calibration as fitting
+import core.study.known_pictures as knowing
 from app.calibrate_command import run_calibrate
 from core.config import PerceptionConfig
+from core.learning.dataset import DatasetError
 from core.learning.model_file import INFO, MODELS, read_model_info
 from core.perception.evidence import WITHOUT_SWINGS
 from core.perception.pipeline import open_sights
+from core.perception.second_look import MOST_LOOKS
 from core.study.calibration import CalibrationError
 from hardware.twin.synth import SynthPlan, write_set
 
@@ -32,10 +35,10 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def model(tmp_path: Path) -> Path:
-    """The shipped model, as one from before there was a word about how often it looks closely, or of swings."""
+    """The shipped model, as one from before it told how often it looks closely, of swings, and of kinds of pictures."""
     shutil.copytree(MODELS / "default", tmp_path / "older")
     info = json.loads((tmp_path / "older" / INFO).read_text())
-    del info["mirrored_second_looks"]
+    del info["mirrored_second_looks"], info["familiarity"]
     for part in ("features", "mean", "scale", "weights"):
         info["calibration_mirrored"][part] = info["calibration_mirrored"][part][: len(WITHOUT_SWINGS)]
     (tmp_path / "older" / INFO).write_text(json.dumps(info))
@@ -43,31 +46,50 @@ def model(tmp_path: Path) -> Path:
 
 
 def _looks(model: Path, **how: bool) -> list[bool]:
-    """Whether a picture is looked at closely twice, and its answer's swings looked for: seen once, and in all orientations."""
+    """Whether a picture is looked at closely four times, and its answer's swings looked for: seen once, and in all orientations."""
     config = PerceptionConfig.model_validate({"segmentation": {"model": str(model), "threads": 1}})
     sights = open_sights(config, **how)
-    twice = [getattr(sight.segment, "engine", "").endswith("second look twice") for sight in sights]
-    assert twice == [sight.swings for sight in sights]
-    return twice
+    often = [getattr(sight.segment, "engine", "").endswith(f"second look {MOST_LOOKS} times") for sight in sights]
+    assert often == [sight.swings for sight in sights]
+    return often
 
 
 def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
-    frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch
+    frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert _looks(MODELS / "default") == [False, True]
     assert _looks(model) == [False, False]
     assert _looks(model, recalibrating=True) == [False, True]
     monkeypatch.setattr(fitting, "_LEAST", 1)
-    run_calibrate(frames, model=str(model), config_path=None)
+    monkeypatch.setattr(knowing, "LEAST", 4)
+    more = tmp_path / "more"
+    shutil.copytree(frames / "images", more)
+    run_calibrate(frames, model=str(model), config_path=None, knows=[more])
     info = read_model_info(model)
-    assert info.mirrored_second_looks == 2
+    assert info.mirrored_second_looks == MOST_LOOKS
     assert info.figures == {}
     assert info.calibration is not None
     assert info.calibration_mirrored is not None
     assert (info.calibration.needs_swings, info.calibration_mirrored.needs_swings) == (False, True)
     assert info.calibration != info.calibration_mirrored
     assert info.calibration.fitted_on["set"] == "set"
+    assert info.familiarity is not None
+    assert info.familiarity.fitted_on["knows"] == ["more"]
+    assert 10 < info.familiarity.fitted_on["pictures"] <= 20
     assert _looks(model) == [False, True]
+
+
+def test_with_too_few_vessels_the_model_stays_as_it_is(frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = (model / INFO).read_bytes()
+    monkeypatch.setattr(fitting, "_LEAST", 1)
+    with pytest.raises(knowing.FamiliarityError, match="pictures show a vessel; 40 are needed"):
+        run_calibrate(frames, model=str(model), config_path=None)
+    assert (model / INFO).read_bytes() == before
+
+
+def test_a_folder_without_pictures_is_said_before_anything_else(frames: Path, model: Path, tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="no pictures"):
+        run_calibrate(frames, model=str(model), config_path=None, knows=[tmp_path])
 
 
 def test_too_few_frames_leave_the_model_as_it_is(frames: Path, model: Path) -> None:

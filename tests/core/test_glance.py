@@ -9,6 +9,8 @@ import pytest
 from core.config import PerceptionConfig, TrackingConfig
 from core.perception.glance import Glances, cells_of, has_changed, look, window_around
 from core.perception.pipeline import Pipeline, Sight
+from core.perception.segmentation import Recognised
+from core.study.known_pictures import fit_familiarity
 from core.types import Frame, Image, Reason
 from tests.core.drawing import SIZE, curve
 
@@ -174,3 +176,30 @@ def test_a_stream_that_is_wound_back_is_looked_at_whole() -> None:
     see(pipeline, 5.0, picture(300))
     see(pipeline, 4.0, picture(300))
     assert network.shown == [WHOLE, WHOLE]
+
+
+class Kind(Colours):
+    """Also tells what kind of picture it is."""
+
+    def __init__(self, signature: np.ndarray) -> None:
+        super().__init__()
+        self.signature = signature
+
+    def recognise(self, images: list[Image]) -> list[Recognised]:
+        return [(*self(image), self.signature) for image in images]
+
+
+def test_a_window_tells_nothing_of_the_kind_and_who_is_refused_for_it_is_looked_at_whole() -> None:
+    signatures = np.random.default_rng(0).normal(size=(100, 4)).astype(np.float32)
+    network = Kind(signatures[0])
+    familiarity = fit_familiarity(signatures, list(range(100)), 640, {})
+    pipeline = Pipeline(network, CONFIG, glance=Sight(network), familiarity=familiarity)
+    scenes = [see(pipeline, 0.05 * index, picture(300 + 4 * index)) for index in range(3)]
+    assert [scene.window is None for scene in scenes] == [True, False, False]
+    assert [scene.novelty is None for scene in scenes] == [False, True, True]
+    assert all(scene.pose is not None for scene in scenes)
+    network.signature = np.full(4, 50.0, np.float32)
+    assert see(pipeline, 0.2, picture(312)).pose is not None, "it is asked for again with the next whole look"
+    later = [see(pipeline, 2.0 + 0.05 * index, picture(312)) for index in range(2)]
+    assert [scene.refusal.reason for scene in later if scene.refusal] == [Reason.UNLIKE_TRAINING] * 2
+    assert [scene.window for scene in later] == [None, None]

@@ -17,7 +17,7 @@ from core.learning.dataset import Sample, write_mask, write_png
 from core.learning.growing import with_first_look
 from core.learning.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, save_model, save_with_second_look
 from core.learning.training import TrainingPlan
-from core.perception.second_look import WINDOW_PX, Planes, SecondLook, places_to_look, planes_of
+from core.perception.second_look import MOST_LOOKS, WINDOW_PX, Planes, SecondLook, places_to_look, planes_of
 from core.perception.segmentation import OpenVinoSegmenter, open_second_look
 from core.perception.unet import DualUNet, UNetShape
 from core.perception.windows import MARGIN_PX, window_around
@@ -295,11 +295,37 @@ def test_a_second_look_that_is_followed_by_another_counts_half() -> None:
         return np.full(planes.shape[:2], 0.5, np.float32), robot
 
     shown: list[Planes] = []
-    vessel, robot = SecondLook(First(bar(0, 300)), near, twice=True)(picture_of(bar(0, 370)))
+    vessel, robot = SecondLook(First(bar(0, 300)), near, looks=2)(picture_of(bar(0, 370)))
     assert [int(planes[:, :, 4].max()) for planes in shown[:2]] == [230, 255], "the second time it is shown what it found itself"
     assert vessel[240, 300] == pytest.approx(0.5, abs=0.01)
     assert robot[240, 315] == pytest.approx(1.0, abs=0.01)
     assert robot[240, 360] == pytest.approx(0.5, abs=0.01)
+
+
+def test_later_looks_are_through_windows_beside_each_other_and_the_mean_counts() -> None:
+    """The network's answer depends on where its window begins: the mean of four looks lies between."""
+    picture = picture_of(bar(0, 300))
+    picture[:, :, 1], picture[:, :, 2] = np.arange(640) // 4, (np.arange(480) // 4)[:, None]
+
+    def near(planes: Planes, /) -> tuple[np.ndarray, np.ndarray]:
+        shown.append((4 * int(planes[0, 0, 1]), 4 * int(planes[0, 0, 2])))
+        said = 0.8 if len(shown) == 1 else 0.4
+        return np.full(planes.shape[:2], said, np.float32), (planes[:, :, 0] > 0).astype(np.float32)
+
+    shown: list[tuple[int, int]] = []
+    segmenter = SecondLook(First(bar(0, 300)), near, looks=MOST_LOOKS)
+    vessel, _ = segmenter(picture)
+    begins = np.array(shown) - shown[0]
+    assert begins.tolist()[:2] == [[0, 0], [0, 0]]
+    assert np.abs(begins[2:] - [[14, 10], [-14, -10]]).max() <= 4
+    assert vessel[240, 298] == pytest.approx((0.8 + 3 * 0.4) / 4, abs=0.01)
+    assert segmenter.engine == "drawn, second look 4 times"
+
+
+@pytest.mark.parametrize("looks", [0, MOST_LOOKS + 1])
+def test_more_looks_than_there_are_windows_for_are_refused(looks: int) -> None:
+    with pytest.raises(ValueError, match=f"1 to {MOST_LOOKS} times, not {looks}"):
+        SecondLook(First(bar(0, 300)), Near(), looks=looks)
 
 
 @pytest.mark.parametrize("device", ["openvino", "torch"])

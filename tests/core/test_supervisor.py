@@ -201,6 +201,7 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.BRANCH_UNCLEAR: _frames(1, refusal=Reason.AMBIGUOUS_BRANCH),
     Cause.POOR_VIEW: _frames(1, refusal=Reason.BLURRED),
     Cause.CONFIDENCE_LOW: _frames(1, confidence=0.39),
+    Cause.UNKNOWN_KIND: _frames(1, refusal=Reason.UNLIKE_TRAINING),
     Cause.POSE_STALE: _mute(FrameReport, 0.15625, frames_arrive=True),
     Cause.NO_TARGET: _frames(1, route=RouteState.NONE),
     Cause.DEADMAN: _mute(DeadmanReport, 0.09375),
@@ -232,7 +233,7 @@ REACTIONS = {
     Reaction.HOLD: {
         Cause.BUS_SILENT, Cause.CAMERA_SILENT, Cause.IMAGE_BLACK, Cause.IMAGE_WHITE, Cause.FRAMES_LOST, Cause.NOT_FINITE,
         Cause.COMMAND_REJECTED, Cause.HEAD_LOST, Cause.HEAD_JUMP, Cause.BRANCH_UNCLEAR, Cause.POOR_VIEW, Cause.CONFIDENCE_LOW,
-        Cause.POSE_STALE, Cause.NO_TARGET, Cause.DEADMAN,
+        Cause.UNKNOWN_KIND, Cause.POSE_STALE, Cause.NO_TARGET, Cause.DEADMAN,
     },
 }  # fmt: skip
 
