@@ -12,7 +12,7 @@ from rich.table import Table
 
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
-from core.config import load_config
+from core.config import PerceptionConfig, load_config
 from core.perception.evidence import Calibration
 
 
@@ -35,13 +35,10 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None, knows: 
     described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
     calibrations: list[Calibration] = []
     target, tables, left_out = model_folder(model), [], LeftOut()
+    config = _configuration(model, config_path, "always")
     with progress_bar() as bar:
         for mirrored in ("never", "always"):
-            # Answers that would be refused for low confidence are the ones to learn from.
-            segmentation = {"model": model, "mirrored": mirrored}
-            overrides = {"perception": {"segmentation": segmentation, "quality": {"min_confidence": 0.0}}}
-            config = load_config(config_path, None, overrides).perception
-            pipeline = open_pipeline(config, recalibrating=True)
+            pipeline = open_pipeline(_configuration(model, config_path, mirrored), recalibrating=True)
             title = "frames" if mirrored == "never" else "all orientations"
             found = score_set(samples, truth, pipeline, TrueMasks(), left_out.add)
             scores = list(bar.track(found, total=len(samples), description=title))
@@ -53,21 +50,22 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None, knows: 
             table.add_row("right answers", str(sum(right for _, right in pairs)))
             table.add_row("AUROC before, on this set", f"{describe_confidence(scores)['confidence_auroc']:.3f}")
             tables.append(table)
-        looked = signatures_in(pictures, open_segmenter(config.segmentation), config, left_out.add)
-        signed = list(bar.track(looked, total=len(pictures), description="kinds of pictures"))
-    left_out.tell(len(scores))
-    usable = [one for one in signed if one is not None]
-    familiarity = fit_familiarity(
-        np.array([signature for signature, _ in usable]),
-        [group for _, group in usable],
-        config.working_size_px,
-        described | {"knows": [also.name for also in knows]},
-    )
+        looked = signatures_in(pictures, open_segmenter(config.segmentation), config, left_out.add) if scores else iter(())
+        signed = [one for one in bar.track(looked, total=len(pictures), description="kinds of pictures") if one is not None]
+    left_out.tell(len(pictures) - len(left_out) if scores else 0)
+    known, signatures = [picture for picture, _ in signed], np.array([signature for _, signature in signed])
+    familiarity = fit_familiarity(known, signatures, config.working_size_px, described | {"knows": [also.name for also in knows]})
     again = open_sights(config, recalibrating=True)[1].segment
     looks = again.looks if isinstance(again, SecondLook) else 1
     write_calibration(target, *calibrations, second_looks=looks, familiarity=familiarity)
     Console(markup=False, emoji=False).print(*tables)
     sys.stderr.write("measure it on another set: main.py benchmark --accuracy SET\n")
+
+
+def _configuration(model: str, config_path: Path | None, mirrored: str) -> PerceptionConfig:
+    """Answers that would be refused for low confidence are the ones to learn from."""
+    overrides = {"segmentation": {"model": model, "mirrored": mirrored}, "quality": {"min_confidence": 0.0}}
+    return load_config(config_path, None, {"perception": overrides}).perception
 
 
 def _table(title: str, calibration: Calibration) -> Table:

@@ -196,6 +196,7 @@ TEMPLATES = (
     "highest robot probability {a}, but only in specks",
     "highest vessel probability {a}",
     "highest robot probability {a}",
+    "what looks like it covers {a} % of the image (at most {b} %); it does not know such pictures: {why}",
     "what looks like it covers {a} % of the image (at most {b} %)",
     "its mask has no centerline, or more than {a} branches",
     "{a} px long (at least {b} px)",

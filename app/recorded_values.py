@@ -41,8 +41,6 @@ def value_lines(row: RecordedRow) -> list[str]:
         )
     elif scene.refusal is not None:
         lines.append(tr("no pose: {why}", why=refusal_text(scene.refusal)))
-    if scene.novelty is not None:
-        lines.append(tr("distance from the kinds of pictures that the model knows {novelty:.2f}", novelty=scene.novelty))
     if scene.route_problem:
         lines.append(tr("no way to the target: {why}", why=tr_text(scene.route_problem)))
     if status is not None:
@@ -59,6 +57,8 @@ def value_lines(row: RecordedRow) -> list[str]:
             tr("fault: {cause}: {detail}", cause=tr_text(str(fault.cause)), detail=tr_text(fault.detail)) for fault in drive.active
         ]
         lines += [tr("against arming: {reason}", reason=tr_text(str(reason))) for reason in drive.against_arming]
+    if scene.novelty is not None:
+        lines.append(tr("distance from the kinds of pictures that the model knows {novelty:.2f}", novelty=scene.novelty))
     if row.bus is not None:
         lines += ["", tr("servo bus"), *_flat(row.bus)]
     return lines[:_MOST_LINES]

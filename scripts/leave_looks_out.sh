@@ -15,4 +15,7 @@ OMP_NUM_THREADS=1 $python main.py synth --out "$out/test" --count 512 --seed 900
 export OMP_WAIT_POLICY=passive
 $python main.py train --data "$out/frames" "${without[@]/#/--without=}" --look-share 0.35 --shallow --steps 5000 --seed 30 --out "$out/model"
 $python main.py calibrate "$out/calib" --model "$out/model"
+# As if it knew all kinds of pictures; then as it ships, where a look that it has not seen may be refused.
+printf '[perception.quality]\nmax_novelty = 1000.0\n' > "$out/any_kind.toml"
+$python main.py benchmark --accuracy "$out/test" --model "$out/model" --config "$out/any_kind.toml"
 $python main.py benchmark --accuracy "$out/test" --model "$out/model"

@@ -330,4 +330,5 @@ def unknown_kind(kit: Kit) -> Seen:
         bench.hooks.scene = lambda scene: replace(scene, pose=None, refusal=refusal)
         bench.run(1.0)
         causes = Cause.UNKNOWN_KIND, Cause.POSE_LOST
-        return judge(bench, start, Wanted((Mode.HOLD, Mode.AUTONOMOUS, *_TO_ADVISORY), causes, Cause.POSE_LOST, blank=True))
+        wanted = Wanted((Mode.HOLD, Mode.AUTONOMOUS, *_TO_ADVISORY), causes, Cause.POSE_LOST, within_s=0.1, blank=True)
+        return judge(bench, start, wanted)

@@ -114,7 +114,14 @@ class Pipeline:
     def with_config(self, config: PerceptionConfig) -> Pipeline:
         """The same networks under other thresholds, with no memory; what is set of the networks themselves is not looked at."""
         stream = self._stream
-        return Pipeline(stream.segment, config, stream.calibration, self._single, self._offered, stream.familiarity)
+        return Pipeline(
+            stream.segment,
+            config,
+            stream.calibration,
+            single=self._single,
+            glance=self._offered,
+            familiarity=stream.familiarity,
+        )
 
     def warm_up(self) -> None:
         """Compile the networks for a stream of 4:3 pictures. Else the first pictures wait for it, up to a second each."""
@@ -174,14 +181,14 @@ class Pipeline:
             scene = self._see_window(scene, image, chosen, sight, watch, past)
         else:
             scene = self._see_all(scene, image, sight, watch, past)
+        unlike = self._check_kind(scene, past)
         if scene.refusal is not None:
-            return scene
+            return _with_hint(scene, unlike)
         previous = recall(past.memory, frame.captured_s, config.tracking) if past is not None else None
         scene = self._locate(scene, image, target, watch, previous, past.routes if past is not None else None)
-        if scene.refusal is not None:
-            return scene
-        # What was found is kept: it is what somebody who teaches the model this rig begins with.
-        scene = replace(scene, refusal=self._check_kind(scene, past))
+        if scene.refusal is None and unlike is not None:
+            # What was found is kept: it is what somebody who teaches the model this rig begins with.
+            scene = replace(scene, refusal=unlike)
         return scene if scene.refusal is not None else self._judge(scene, image, target, watch, sight, previous)
 
     def _check_kind(self, scene: Scene, past: _Past | None) -> Refusal | None:
@@ -199,15 +206,11 @@ class Pipeline:
             found = masks.clean(vessel_probability, robot_probability, self._config)
             if past is not None:
                 found = replace(found, robot=past.lookalikes.without(found.robot, image, scene.captured_s))
-            if sight.familiarity is not None and signature is not None:
-                scene = replace(scene, novelty=sight.familiarity.novelty(signature))
-        scene = self._draw(scene, found, watch)
-        if scene.refusal is not None and scene.refusal.reason is Reason.NO_ROBOT:
-            # That there is none may come of the picture's kind: who sees one there has to be told.
-            other = quality.check_kind(scene.novelty, self._config.quality)
-            hint = f"; it does not know such pictures: {other.detail}" if other is not None else ""
-            scene = replace(scene, refusal=replace(scene.refusal, detail=scene.refusal.detail + hint))
-        return scene
+            known = sight.familiarity
+            # At another size the same picture is another one to the network; without a vessel half of a signature says nothing.
+            if known is not None and known.working_size_px == self._config.working_size_px and found.vessel.any():
+                scene = replace(scene, novelty=known.novelty(signature) if signature is not None else None)
+        return self._draw(scene, found, watch)
 
     def _draw(self, scene: Scene, found: Masks, watch: _Stopwatch) -> Scene:
         """Skeletons and vessel graph of the masks found."""
@@ -325,6 +328,14 @@ class Pipeline:
         return bare.path.head, measure(bare.robot_vector, bare.vessel_vector, self._config.pose).theta_signed_deg
 
 
+def _with_hint(scene: Scene, unlike: Refusal | None) -> Scene:
+    """That there is no robot may come of the picture's kind: who sees one there has to be told."""
+    refusal = scene.refusal
+    if unlike is None or refusal is None or refusal.reason is not Reason.NO_ROBOT:
+        return scene
+    return replace(scene, refusal=replace(refusal, detail=f"{refusal.detail}; it does not know such pictures: {unlike.detail}"))
+
+
 def _believed(found: Masks, config: PerceptionConfig) -> NDArray[np.float32]:
     """The robot's probability (h, w), 0 around what a stream knows to be none."""
     none = masks.clean_robot(found.robot_probability, config) & ~found.robot
@@ -355,7 +366,7 @@ def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False) -> P
     plain, turned = open_sights(config, recalibrating=recalibrating)
     stream = turned if config.segmentation.mirrored == "always" else plain
     single = plain if config.segmentation.mirrored == "never" else turned
-    return Pipeline(stream.segment, config, stream.calibration, single, stream, stream.familiarity)
+    return Pipeline(stream.segment, config, stream.calibration, single=single, glance=stream, familiarity=stream.familiarity)
 
 
 def open_sights(config: PerceptionConfig, *, recalibrating: bool = False) -> tuple[Sight, Sight]:
@@ -377,8 +388,6 @@ def open_sights(config: PerceptionConfig, *, recalibrating: bool = False) -> tup
     surest = info.calibration_mirrored or info.calibration
     swings = recalibrating or (surest is not None and surest.needs_swings)
     known = info.familiarity if not recalibrating else None
-    if known is not None and known.working_size_px != config.working_size_px:
-        known = None  # at another size the same picture is another one to the network
     return Sight(plain, info.calibration, familiarity=known), Sight(turned, surest, swings, known)
 
 

@@ -21,7 +21,8 @@ SAMPLE_STEP = 4
 """Brightness is judged on every fourth pixel."""
 _LEAST_CONTRAST = 4.0
 _KNOWN_AGAIN_SHARE = 0.9
-"""Of the limit. The kind belongs to the rig, not to one frame: a rig at the limit must not stop and go with every other one."""
+"""Of the limit. The kind belongs to the rig, not to one frame: a rig at the limit must not stop and go with every other one, and is
+known again only where it was seen well below, however long that takes, or where the stream begins anew."""
 MAX_ROBOT_SHARE = 0.3
 """Of the image. A robot of 60 px across all of it is half of that; thinning a larger one takes long, and finds none."""
 

@@ -6,7 +6,7 @@ import functools
 import os
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -44,6 +44,7 @@ class Pairing(Protocol):
 
 Recognised = tuple[Probability, Probability, Signature | None]
 """Probabilities of vessel and robot, and the picture's signature; None: the network's deepest level is not to be had."""
+Seen = tuple[Probability, Probability] | Recognised
 
 
 @runtime_checkable
@@ -82,25 +83,23 @@ class Turned:
         return f"{self._segment.engine}, {2 * len(self._turns)} orientations"
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        return self._look(image)[:2]
+        return self._look(image, see)[:2]
 
     def recognise(self, images: Sequence[Image]) -> list[Recognised]:
         """The signature is that of the picture as it was first shown: one turned upside down is of another kind, a bit."""
-        return [self._look(image) for image in images]
+        return [self._look(image, recognise) for image in images]
 
-    def _look(self, image: Image) -> Recognised:
+    def _look(self, image: Image, first: Callable[[Segmenter, Sequence[Image]], Sequence[Seen]]) -> Recognised:
+        """The mean, and what else `first` told of the picture where it was asked first."""
         sums = np.zeros((2, *image.shape[:2]), np.float32)
         signature: Signature | None = None
         for turn in self._turns:
             turned = np.rot90(image, turn)
             pair = [np.ascontiguousarray(turned[:, ::step]) for step in (1, -1)]
-            found: list[Recognised]
-            if turn == self._turns[0]:
-                found = recognise(self._segment, pair)
+            found: Sequence[Seen] = (first if turn == self._turns[0] else see)(self._segment, pair)
+            if len(found[0]) == 3:
                 signature = found[0][2]
-            else:
-                found = [(*one, None) for one in see(self._segment, pair)]
-            for step, (vessel, robot, _) in zip((1, -1), found, strict=True):
+            for step, (vessel, robot, *_) in zip((1, -1), found, strict=True):
                 sums += np.rot90(np.stack([vessel, robot])[:, :, ::step], -turn, axes=(1, 2))
         sums /= np.float32(2 * len(self._turns))
         return sums[0], sums[1], signature

@@ -134,6 +134,7 @@ def _pose(row: RecordedRow) -> dict[str, Any]:
         "c_head_px": pose.c_head_px if pose else None,
         "c_tail_px": pose.c_tail_px if pose else None,
         "confidence": pose.confidence if pose else None,
+        "novelty": row.scene.novelty,
         "state": pose.state.value if pose else None,
         "state_number": list(PoseState).index(pose.state) if pose else None,
         "refusal": str(row.scene.refusal) if row.scene.refusal else "",

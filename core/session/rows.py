@@ -73,6 +73,9 @@ def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, dropped_rows
         values = _whole([finite(value, 4) for value in numbers], "pose", broken)
     pose = pose if values is not None else None
     theta, c_head, c_tail, confidence = values or (None,) * 4
+    novelty = finite(scene.novelty, 4) if scene.novelty is not None else None
+    if scene.novelty is not None and novelty is None:
+        broken.append("novelty")
     row = {
         "index": tick.frame.index,
         "captured_s": finite(tick.frame.captured_s, 6),
@@ -88,7 +91,7 @@ def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, dropped_rows
         "c_tail_px": c_tail,
         "crossed": pose.crossed if pose else None,
         "confidence": confidence,
-        "novelty": finite(scene.novelty, 4) if scene.novelty is not None else None,
+        "novelty": novelty,
         "refusal": {"reason": scene.refusal.reason.value, "detail": scene.refusal.detail} if scene.refusal else None,
         "advice": _whole(_advice(tick.advice), "advice", broken),
         "sent": _whole(_command(tick.sent), "sent", broken),

@@ -24,6 +24,7 @@ _AXES = 16
 _PICTURES_PER_AXIS = 8
 _LIMIT_SHARE = 0.995
 _LEAST_SCALE = 1e-2
+_LEAST_HALF = 10
 _NEIGHBOURS = 16
 """Where nobody tells which pictures show the same, so many in a row are taken to."""
 
@@ -34,9 +35,10 @@ class FamiliarityError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class KnownPicture:
-    """A picture, and the ``group`` of those that show the same phantom or rig: they say little about each other."""
+    """A picture of a folder, and the ``group`` of those there that show the same phantom: they say little about each other."""
 
     file: Path
+    folder: Path
     group: Hashable
 
 
@@ -54,17 +56,15 @@ def find_known(folder: Path) -> list[KnownPicture]:
     truth = read_truth(folder) if (folder / "truth.jsonl").is_file() else {}
     seeds = [truth.get(file.stem, {}).get("seed") for file in files]
     return [
-        KnownPicture(file, (str(folder), index // _NEIGHBOURS if seed is None else f"seed {seed}"))
+        KnownPicture(file, folder, index // _NEIGHBOURS if seed is None else f"seed {seed}")
         for index, (file, seed) in enumerate(zip(files, seeds, strict=True))
     ]
 
 
 def signatures_in(
     pictures: Sequence[KnownPicture], segment: Segmenter, config: PerceptionConfig, on_unreadable: Callable[[UserError], None]
-) -> Iterator[tuple[Signature, Hashable] | None]:
-    """Of each picture, its signature and group; None for one that perception would not ask the kind of.
-
-    Such are those that cannot be read, that are refused before the network sees them, and that show no vessel.
+) -> Iterator[tuple[KnownPicture, Signature] | None]:
+    """Each picture with its signature; None where it cannot be read, is refused before the network sees it, or shows no vessel.
 
     Raises
     ------
@@ -85,41 +85,50 @@ def signatures_in(
         if signature is None:
             raise FamiliarityError("the network's deepest level is not to be had: it cannot tell kinds of pictures; train it again")
         usable = masks.clean(vessel, robot, config).vessel.any() and bool(np.isfinite(signature).all())
-        yield (signature, picture.group) if usable else None
+        yield (picture, signature) if usable else None
 
 
 def fit_familiarity(
-    signatures: NDArray[np.float32], groups: Sequence[Hashable], working_size_px: int, fitted_on: dict[str, Any]
+    pictures: Sequence[KnownPicture], signatures: NDArray[np.float32], working_size_px: int, fitted_on: dict[str, Any]
 ) -> Familiarity:
-    """Fit where the signatures (N, F) of known pictures lie; of the same N each one's group.
+    """Fit where the signatures (N, F) of N known pictures lie.
 
-    The limit is what 995 of 1000 pictures keep to (the farthest one of few) when they are judged by the other half of the groups:
+    The limit is what 995 of 1000 pictures keep to (the farthest one of few) when they are judged by the other half of their groups:
     of pictures that were fitted to, or whose like were, it would be too narrow for any new one.
 
     Raises
     ------
     FamiliarityError
-        There are less than ``LEAST``.
+        There are less than ``LEAST``, or all are the same.
     """
     if len(signatures) < LEAST:
         raise FamiliarityError(f"{len(signatures)} pictures show a vessel; {LEAST} are needed; give it more (synth --count)")
-    first = _first_half(groups)
-    fit_first, fit_second = _Fit(signatures[first]), _Fit(signatures[~first])
-    apart = [
-        fit_second.familiarity(1.0, working_size_px, {}).distance(signatures[first]),
-        fit_first.familiarity(1.0, working_size_px, {}).distance(signatures[~first]),
-    ]
+    first = _first_half(pictures)
+    apart = [_Fit(signatures[~half]).distance(signatures[half]) for half in (first, ~first)]
     limit = float(np.quantile(np.concatenate(apart), _LIMIT_SHARE))
+    if limit <= 0.0:
+        raise FamiliarityError("all pictures are the same; give it pictures that differ as those of the rig do")
     return _Fit(signatures).familiarity(limit, working_size_px, fitted_on | {"pictures": len(signatures)})
 
 
-def _first_half(groups: Sequence[Hashable]) -> NDArray[np.bool_]:
-    """Every other group; of a single one the first half of its pictures."""
-    order = list(dict.fromkeys(groups))
-    if len(order) < 2:
-        return np.arange(len(groups)) < len(groups) // 2
-    chosen = set(order[::2])
-    return np.array([group in chosen for group in groups])
+def _first_half(pictures: Sequence[KnownPicture]) -> NDArray[np.bool_]:
+    """Every other group of each folder; of a folder with one group its first pictures.
+
+    Each folder's kind has to be in both halves: judged by pictures among which there are none of its kind, it would be taken for
+    the limit of all.
+    """
+    first = np.zeros(len(pictures), np.bool_)
+    for folder in dict.fromkeys(picture.folder for picture in pictures):
+        places = [place for place, picture in enumerate(pictures) if picture.folder == folder]
+        order = list(dict.fromkeys(pictures[place].group for place in places))
+        if len(order) < 2:
+            first[places[: (len(places) + 1) // 2]] = True
+            continue
+        chosen = set(order[::2])
+        first[[place for place in places if pictures[place].group in chosen]] = True
+    if min(first.sum(), (~first).sum()) < _LEAST_HALF:  # one group holds nearly all of them
+        first = np.arange(len(pictures)) % 2 == 0
+    return first
 
 
 class _Fit:
@@ -131,9 +140,13 @@ class _Fit:
         _, size, directions = np.linalg.svd(((signatures - self._mean) / self._scale).astype(np.float64), full_matrices=False)
         share = size**2 / count
         axes = max(1, min(_AXES, count // _PICTURES_PER_AXIS))
-        smallest = 1e-6 * float(share.sum())
+        smallest = max(1e-6 * float(share.sum()), 1e-12)
         self._directions, self._spread = directions[:axes], np.sqrt(np.maximum(share[:axes], smallest))
         self._across = np.array([max(float(share[axes:].sum()), smallest)])
+
+    def distance(self, signatures: NDArray[np.float32]) -> NDArray[np.float64]:
+        """``Familiarity.distance`` of what was fitted."""
+        return self.familiarity(1.0, 1, {}).distance(signatures)
 
     def familiarity(self, limit: float, working_size_px: int, fitted_on: dict[str, Any]) -> Familiarity:
         numbers = packed(self._mean, self._scale, self._directions, self._spread, self._across)

@@ -1407,6 +1407,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>what looks like it covers {a} % of the image (at most {b} %); it does not know such pictures: {why}</source>
+        <translation>疑似部分占图像的 {a} %（最多 {b} %）；模型不认识这类图像：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>what looks like it covers {a} % of the image (at most {b} %)</source>
         <translation>疑似部分占图像的 {a} %（最多 {b} %）</translation>
     </message>
@@ -3127,11 +3132,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/recorded_values.py"/>
-        <source>distance from the kinds of pictures that the model knows {novelty:.2f}</source>
-        <translation>与模型已知图像类型的距离 {novelty:.2f}</translation>
-    </message>
-    <message>
-        <location filename="../../app/recorded_values.py"/>
         <source>no way to the target: {why}</source>
         <translation>无路可达目标：{why}</translation>
     </message>
@@ -3149,6 +3149,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/recorded_values.py"/>
         <source>against arming: {reason}</source>
         <translation>不能待命：{reason}</translation>
+    </message>
+    <message>
+        <location filename="../../app/recorded_values.py"/>
+        <source>distance from the kinds of pictures that the model knows {novelty:.2f}</source>
+        <translation>与模型已知图像类型的距离 {novelty:.2f}</translation>
     </message>
     <message>
         <location filename="../../app/recorded_values.py"/>
@@ -8280,7 +8285,7 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     <message>
         <location filename="../../app/core_texts.py"/>
         <source>teach the model pictures of this rig, or drive by hand</source>
-        <translation>用本装置的图像训练模型，或手动驱动</translation>
+        <translation>用本装置的图像训练模型，或手动驾驶</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

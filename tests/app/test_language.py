@@ -24,12 +24,14 @@ from app.operator_window import OperatorWindow
 from app.settings_desk import SettingsDesk
 from app.tool_tips import QUANTITY, tip
 from app.wording import advice_headline
-from core.config import Config
+from core.config import Config, QualityConfig
 from core.config_schema import Bounds
 from core.control.alerts import ALERTS
+from core.perception.pipeline import _with_hint
+from core.perception.quality import check_kind
 from core.profiles import Profiles
 from core.settings_file import read_settings
-from core.types import Advice, Speed
+from core.types import Advice, Reason, Refusal, Scene, Speed
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine
 
@@ -163,6 +165,25 @@ def test_texts_with_values_are_translated_and_filled(chinese: None) -> None:
 )
 def test_texts_of_the_layers_below_are_translated_where_they_are_known(chinese: None, text: str, translated: str) -> None:
     assert tr_text(text) == translated
+
+
+@pytest.mark.parametrize(
+    "detail",
+    [
+        "highest robot probability 0.28",
+        "highest robot probability 0.71, but only in specks",
+        "what looks like it covers 41 % of the image (at most 30 %)",
+    ],
+)
+def test_a_refusal_with_a_hint_at_the_pictures_kind_is_translated(chinese: None, detail: str) -> None:
+    unlike = check_kind(1.234, QualityConfig())
+    scene = Scene(0, 0.0, (640, 480), 1.0, refusal=Refusal(Reason.NO_ROBOT, detail))
+    hinted = _with_hint(scene, unlike).refusal
+    assert hinted is not None
+    assert hinted.detail.startswith(detail)
+    assert "1.23" in hinted.detail
+    assert re.search("[A-Za-z]", tr_text(hinted.detail)) is None
+    assert re.search("[A-Za-z]", tr_text(detail)) is None
 
 
 def test_ranges_of_settings_are_translated(chinese: None) -> None:

@@ -29,7 +29,7 @@ from core.perception.pipeline import Pipeline, Sight, open_pipeline, open_sights
 from core.perception.second_look import SecondLook
 from core.perception.segmentation import OpenVinoSegmenter, Recognised, TorchSegmenter, Turned, recognise
 from core.perception.unet import DualUNet, UNetShape
-from core.study.known_pictures import LEAST, FamiliarityError, find_known, fit_familiarity, signatures_in
+from core.study.known_pictures import LEAST, FamiliarityError, KnownPicture, find_known, fit_familiarity, signatures_in
 from core.types import Frame, Image, Reason, Refusal
 from hardware.twin.phantoms import PHANTOM_NAMES
 from hardware.twin.world import TwinWorld
@@ -44,8 +44,13 @@ def known(count: int, seed: int = 0) -> np.ndarray:
     return (2.0 + rng.normal(size=(count, 3)) @ directions + rng.normal(0, 0.2, (count, 24))).astype(np.float32)
 
 
+def shown(count: int, groups: list[int] | None = None, folder: str = "set") -> list[KnownPicture]:
+    """Pictures of a folder, each of a group of its own unless told otherwise."""
+    return [KnownPicture(Path(f"{index}.png"), Path(folder), group) for index, group in enumerate(groups or range(count))]
+
+
 def fitted(signatures: np.ndarray, groups: list[int] | None = None) -> Familiarity:
-    return fit_familiarity(signatures, groups or list(range(len(signatures))), 640, {})
+    return fit_familiarity(shown(len(signatures), groups), signatures, 640, {})
 
 
 def test_a_signature_is_the_mean_over_all_and_over_the_vessel() -> None:
@@ -62,7 +67,7 @@ def test_a_signature_is_the_mean_over_all_and_over_the_vessel() -> None:
 
 
 def test_new_pictures_of_the_known_kind_are_familiar_and_others_are_not() -> None:
-    familiarity = fit_familiarity(known(400), list(range(400)), 640, {"set": "drawn"})
+    familiarity = fit_familiarity(shown(400), known(400), 640, {"set": "drawn"})
     assert familiarity.fitted_on == {"set": "drawn", "pictures": 400}
     assert familiarity.distance(known(400)).mean() == pytest.approx(1.0, abs=0.1)
     fresh = familiarity.distance(known(2000, seed=1)) / familiarity.limit
@@ -94,9 +99,27 @@ def test_pictures_of_one_phantom_do_not_vouch_for_each_other(told: bool) -> None
     assert refused < 0.1 if told else refused > 0.2
 
 
-def test_one_phantom_alone_is_halved() -> None:
-    familiarity = fitted(known(60), [0] * 60)
+@pytest.mark.parametrize("groups", [[0] * 60, [0] * 59 + [1]])
+def test_one_phantom_alone_is_halved(groups: list[int]) -> None:
+    familiarity = fitted(known(60), groups)
     assert (familiarity.distance(known(500, seed=9)) / familiarity.limit > 1.0).mean() < 0.1
+
+
+@pytest.mark.parametrize("count", [12, 80])
+def test_another_folder_of_one_rig_does_not_open_the_door_to_everything(count: int) -> None:
+    rig = np.zeros(24, np.float32)
+    rig[5] = 6.0
+    signatures = np.concatenate([known(400), known(count, seed=1) + rig])
+    pictures = [*shown(400), *shown(count, [0] * count, "rig")]
+    familiarity = fit_familiarity(pictures, signatures, 640, {})
+    assert (familiarity.distance(known(200, seed=2) + rig) / familiarity.limit > 1.0).mean() < 0.1, "it is known"
+    rig[5], rig[7] = 0.0, 6.0
+    assert (familiarity.distance(known(200, seed=2) + rig) / familiarity.limit > 1.0).mean() > 0.9, "others are not"
+
+
+def test_pictures_that_are_all_the_same_are_said() -> None:
+    with pytest.raises(FamiliarityError, match="all pictures are the same"):
+        fitted(np.ones((50, 24), np.float32))
 
 
 def test_known_pictures_are_grouped_by_their_seed_or_by_their_place(tmp_path: Path) -> None:
@@ -111,6 +134,7 @@ def test_known_pictures_are_grouped_by_their_seed_or_by_their_place(tmp_path: Pa
     a, b, c = (picture.group for picture in find_known(tmp_path / "set"))
     assert a == c != b
     groups = [picture.group for picture in find_known(tmp_path / "plain")]
+    assert {picture.folder for picture in find_known(tmp_path / "plain")} == {tmp_path / "plain"}
     assert len(set(groups[:16])) == 1 and groups[16] not in groups[:16]
     with pytest.raises(DatasetError, match=r"no pictures \(png, jpg"):
         find_known(tmp_path)
@@ -148,6 +172,7 @@ def test_it_survives_json_and_damage_is_said() -> None:
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     torch.manual_seed(7)
     network = DualUNet(SHAPE)
+    torch.nn.init.constant_(network.vessel.output.bias, 3.0)  # nearly all is vessel
     with torch.no_grad():  # a normalisation that fits: else hardly anything reaches the deepest level
         for _ in range(100):
             network.train()(torch.from_numpy(np.stack(pictures(3)).transpose(0, 3, 1, 2)).float() / 255)
@@ -219,7 +244,7 @@ def perceived(
     segment: Kind, config: PerceptionConfig | None = None, familiarity: Familiarity | None = FAMILIARITY
 ) -> Reason | None:
     scene = Pipeline(segment, config or PerceptionConfig(), familiarity=familiarity)(Frame(0, 0.0, IMAGE))
-    assert (scene.novelty is None) == (familiarity is None)
+    assert (scene.novelty is None) == (familiarity is None or not segment.vessel)
     return None if scene.refusal is None else scene.refusal.reason
 
 
@@ -289,10 +314,15 @@ def test_what_a_model_knows_is_kept_in_its_manifest_and_used(model: Path) -> Non
     assert [sight.familiarity for sight in open_sights(config, recalibrating=True)] == [None, None], (
         "all of them are to be learnt from"
     )
+    smaller = config.model_copy(update={"working_size_px": 320})
     pipeline = open_pipeline(config)
-    for one in (pipeline, pipeline.with_config(config)):
-        assert one(Frame(0, 0.0, pictures(1)[0])).novelty is not None
-        assert one.perceive_single(Frame(0, 0.0, pictures(1)[0])).novelty is not None
+    asked = [(pipeline, True), (pipeline.with_config(config), True), (pipeline.with_config(smaller), False)]
+    for one, told in (*asked, (open_pipeline(smaller), False), (open_pipeline(smaller).with_config(config), True)):
+        for scene in (one(Frame(0, 0.0, pictures(1)[0])), one.perceive_single(Frame(0, 0.0, pictures(1)[0]))):
+            # At another size than it was learnt at nobody can tell.
+            assert scene.masks is not None
+            assert scene.masks.vessel.any()
+            assert (scene.novelty is not None) is told
 
 
 def test_of_another_network_it_is_refused(model: Path, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Windows in a stream: when one is enough, what it renews, and what stays."""
 
 import functools
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ from core.config import PerceptionConfig, TrackingConfig
 from core.perception.glance import Glances, cells_of, has_changed, look, window_around
 from core.perception.pipeline import Pipeline, Sight
 from core.perception.segmentation import Recognised
-from core.study.known_pictures import fit_familiarity
+from core.study.known_pictures import KnownPicture, fit_familiarity
 from core.types import Frame, Image, Reason
 from tests.core.drawing import SIZE, curve
 
@@ -192,7 +193,7 @@ class Kind(Colours):
 def test_a_window_tells_nothing_of_the_kind_and_who_is_refused_for_it_is_looked_at_whole() -> None:
     signatures = np.random.default_rng(0).normal(size=(100, 4)).astype(np.float32)
     network = Kind(signatures[0])
-    familiarity = fit_familiarity(signatures, list(range(100)), 640, {})
+    familiarity = fit_familiarity([KnownPicture(Path(), Path(), index) for index in range(100)], signatures, 640, {})
     pipeline = Pipeline(network, CONFIG, glance=Sight(network), familiarity=familiarity)
     scenes = [see(pipeline, 0.05 * index, picture(300 + 4 * index)) for index in range(3)]
     assert [scene.window is None for scene in scenes] == [True, False, False]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from core.control.drive_view import DriveView
+from core.control.frame_reports import is_sound
 from core.control.modes import Mode
 from core.session.checked import Damaged
 from core.session.events import Event, EventKind, event_from_json, event_to_json, events_between
@@ -31,6 +33,24 @@ def test_pose_vectors_advice_command_and_status_come_back_as_they_were() -> None
     for name in ("pose", "robot_vector", "vessel_vector", "latency_ms", "refusal", "scale_xy", "source_size", "route_problem"):
         assert getattr(row.scene, name) == getattr(tick.scene, name), name
     assert (row.advice, row.sent, row.status) == (tick.advice, tick.sent, tick.status)
+
+
+@pytest.mark.parametrize("novelty", [None, 0.8712])
+def test_the_distance_from_known_pictures_comes_back_and_older_rows_have_none(novelty: float | None) -> None:
+    tick = tick_of(7, 12.25, full=True)
+    tick = replace(tick, scene=replace(tick.scene, novelty=novelty))
+    assert through_json(tick).scene.novelty == novelty
+    record = PLACE | row_of(light_tick(tick), None)
+    del record["novelty"]
+    assert row_from_json(json.loads(json.dumps(record))).scene.novelty is None
+
+
+def test_a_distance_that_is_no_number_is_named() -> None:
+    tick = tick_of(7, 12.25, full=True)
+    tick = replace(tick, scene=replace(tick.scene, novelty=math.nan))
+    assert not is_sound(tick.scene)
+    row = row_of(light_tick(tick), None)
+    assert (row["novelty"], row["not_finite"]) == (None, ["novelty"])
 
 
 def test_lines_come_back_within_half_a_pixel_and_keep_their_ends() -> None:
