@@ -182,10 +182,12 @@ def _find_zero(bench: Bench, servos: ServosConfig, name: str, then_mm: float, ma
         rest = _look(bench, probe)
         begun = _steps(bench, probe, rest, -_SLACK_MM, _STEP_MM, is_begun)[-1].position_mm
         # Once more from slack, in small steps: a fraction of a millimetre takes the head through its whole way. And with another
-        # look at rest: the head does not come back to where it was by itself.
-        probe.move_to(begun - _STEP_MM - _BELOW_MM)
+        # look at rest: the head does not come back to where it was by itself. From three steps before, because out of the picture's
+        # plane the first one beyond taut shows next to nothing, and steps before it tell where it begins, too.
+        slack_mm = begun - 3.0 * _STEP_MM
+        probe.move_to(slack_mm - _BELOW_MM)
         rest = _look(bench, probe)
-        steps = _steps(bench, probe, rest, begun - _STEP_MM - _FINE_MM, _FINE_MM, is_enough)
+        steps = _steps(bench, probe, rest, slack_mm - _FINE_MM, _FINE_MM, is_enough)
         try:
             taut_mm = taut_at_mm(steps)
         except NeverTaut:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.calibration.look import HeadMove
 from core.errors import UserError
@@ -18,6 +19,7 @@ from core.errors import UserError
 _LEAST_SIDEWAYS_PX, _LEAST_SHORTENING_PX = 1.2, 0.25
 _ENOUGH_SIDEWAYS_PX, _ENOUGH_SHORTENING_PX = 5.0, 1.4
 _LEAST_POINTS = 2
+_STARTS = 401
 
 
 class NeverTaut(UserError):
@@ -63,8 +65,23 @@ def taut_at_mm(steps: Sequence[Step]) -> float:
         first -= 1
     if len(ways) - first < _LEAST_POINTS:
         raise NeverTaut("the head does not follow the wire: is it hung in, does the head lie free? Or zero it by eye")
-    at = np.array([step.position_mm for step in steps[first:]])
-    slope, offset = np.polyfit(at, np.array(ways[first:]), 1)
-    if slope <= 0.0:
+    at = np.array([step.position_mm for step in steps])
+    if np.polyfit(at[first:], np.array(ways[first:]), 1)[0] <= 0.0:
         raise NeverTaut("the head does not follow the wire's pull: pull it by hand, or zero it by eye")
-    return float(np.clip(-offset / slope, steps[0].position_mm, at[0]))
+    # A root makes much of the little that noise does while the wire is slack; and the last step before may show some of its way.
+    slack = max(0, first - 1)
+    told = np.array([0.0] * slack + ways[first:])
+    return _start_of_line(np.concatenate([at[:slack], at[first:]]), told, float(at[first]))
+
+
+def _start_of_line(at: NDArray[np.float64], ways: NDArray[np.float64], latest: float) -> float:
+    """Where the line starts that is 0 up to there and then rises, by least squares over all steps; `latest` at the latest.
+
+    The steps before tell as much as those after: seen in pixels the head goes by half a pixel at a time, and a line through the few
+    steps after the first of these would start anywhere.
+    """
+    starts = np.linspace(min(at[0], latest), latest, _STARTS)
+    beyond = np.maximum(0.0, at[None, :] - starts[:, None])
+    slopes = beyond @ ways / np.maximum((beyond**2).sum(axis=1), 1e-12)
+    left_over = ((ways[None, :] - slopes[:, None] * beyond) ** 2).sum(axis=1)
+    return float(starts[np.argmin(left_over)])

@@ -213,7 +213,7 @@ def test_a_head_against_the_wall_teaches_nothing() -> None:
 def test_the_line_is_followed_back_to_where_it_starts() -> None:
     # taut at 0.5 mm, 20 px per mm
     steps = [Step(at, _move(-20.0 * max(0.0, at - 0.5))) for at in (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)]
-    assert taut_at_mm(steps) == pytest.approx(0.5)
+    assert taut_at_mm(steps) == pytest.approx(0.5, abs=0.001)
     assert [is_begun(step) for step in steps] == [False, False, False, True, True, True]
     assert is_enough(steps[-1])
     assert not is_enough(steps[-2])
@@ -222,6 +222,13 @@ def test_the_line_is_followed_back_to_where_it_starts() -> None:
 def test_out_of_the_picture_the_root_of_the_shortening_is_the_line() -> None:
     steps = [Step(at, _move(longer_px=-5.0 * max(0.0, at - 0.2) ** 2)) for at in (0.0, 0.2, 0.4, 0.5, 0.6, 0.75)]
     assert taut_at_mm(steps) == pytest.approx(0.2, abs=0.01)
+
+
+def test_a_head_that_goes_by_half_pixels_is_followed_back_by_what_it_did_before() -> None:
+    """Taut at 1.5 mm; seen in pixels its way has steps, and the line through those after the first one alone starts at 1.1 mm."""
+    seen = (-0.02, -0.06, 0.03, -0.04, -0.2, -0.02, -0.45, -0.51, -0.51, -0.52, -0.53, -1.01, -1.53)
+    steps = [Step(1.18 + 0.06 * index, _move(longer_px=longer)) for index, longer in enumerate(seen)]
+    assert taut_at_mm(steps) == pytest.approx(1.5, abs=0.25)
 
 
 def test_a_wire_that_is_hung_out_is_told() -> None:

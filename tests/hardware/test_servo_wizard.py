@@ -58,8 +58,10 @@ def test_wires_are_left_where_they_just_become_taut(straight: tuple[LockTwin, Be
     twin.moved.clear()
     found = servo_wizard.find_zeros(bench, twin.wiring, lambda _: None)
     assert found.problems == ()
-    assert np.array(found.slack_mm) == pytest.approx(slack_mm, abs=0.15)
-    assert _tendon_mm(twin) == pytest.approx(np.zeros(4), abs=0.15)
+    # Right and left act in the picture's plane. Up and down bend the head out of it: it shows by a pixel or two of shortening.
+    for off_mm in (np.array(found.slack_mm) - slack_mm, _tendon_mm(twin)):
+        assert np.abs(off_mm[:2]).max() < 0.1
+        assert np.abs(off_mm[2:]).max() < 0.3
     # never more than what shows the head's way beyond taut
     by_id = {joint.id: joint.sign for joint in twin.wiring.joints}
     assert max(by_id[servo_id] * at_mm for servo_id, at_mm in twin.moved) < 1.2
