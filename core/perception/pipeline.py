@@ -183,7 +183,7 @@ class Pipeline:
             scene = self._see_all(scene, image, sight, watch, past)
         unlike = self._check_kind(scene, past)
         if scene.refusal is not None:
-            return _with_hint(scene, unlike)
+            return replace(scene, refusal=quality.hinted(scene.refusal, unlike))
         previous = recall(past.memory, frame.captured_s, config.tracking) if past is not None else None
         scene = self._locate(scene, image, target, watch, previous, past.routes if past is not None else None)
         if scene.refusal is None and unlike is not None:
@@ -326,14 +326,6 @@ class Pipeline:
         if bare.refusal is not None or bare.path is None or bare.robot_vector is None or bare.vessel_vector is None:
             return None
         return bare.path.head, measure(bare.robot_vector, bare.vessel_vector, self._config.pose).theta_signed_deg
-
-
-def _with_hint(scene: Scene, unlike: Refusal | None) -> Scene:
-    """That there is no robot may come of the picture's kind: who sees one there has to be told."""
-    refusal = scene.refusal
-    if unlike is None or refusal is None or refusal.reason is not Reason.NO_ROBOT:
-        return scene
-    return replace(scene, refusal=replace(refusal, detail=f"{refusal.detail}; it does not know such pictures: {unlike.detail}"))
 
 
 def _believed(found: Masks, config: PerceptionConfig) -> NDArray[np.float32]:

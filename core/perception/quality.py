@@ -7,6 +7,8 @@ nothing speaks against the answer.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +109,13 @@ def check_kind(novelty: float | None, config: QualityConfig, *, refused_before: 
     if not config.enabled or novelty is None or novelty <= limit:
         return None
     return Refusal(Reason.UNLIKE_TRAINING, f"distance {novelty:.2f} from the pictures that it knows (at most {limit:.2f})")
+
+
+def hinted(refusal: Refusal, unlike: Refusal | None) -> Refusal:
+    """The refusal of a picture of an unknown kind: that there is no robot may come of that, and who sees one has to be told."""
+    if unlike is None or refusal.reason is not Reason.NO_ROBOT:
+        return refusal
+    return replace(refusal, detail=f"{refusal.detail}; it does not know such pictures: {unlike.detail}")
 
 
 def check_graph(graph: VesselGraph, config: VectorConfig) -> Refusal | None:

@@ -27,11 +27,10 @@ from app.wording import advice_headline
 from core.config import Config, QualityConfig
 from core.config_schema import Bounds
 from core.control.alerts import ALERTS
-from core.perception.pipeline import _with_hint
-from core.perception.quality import check_kind
+from core.perception.quality import check_kind, hinted
 from core.profiles import Profiles
 from core.settings_file import read_settings
-from core.types import Advice, Reason, Refusal, Scene, Speed
+from core.types import Advice, Reason, Refusal, Speed
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine
 
@@ -176,13 +175,10 @@ def test_texts_of_the_layers_below_are_translated_where_they_are_known(chinese: 
     ],
 )
 def test_a_refusal_with_a_hint_at_the_pictures_kind_is_translated(chinese: None, detail: str) -> None:
-    unlike = check_kind(1.234, QualityConfig())
-    scene = Scene(0, 0.0, (640, 480), 1.0, refusal=Refusal(Reason.NO_ROBOT, detail))
-    hinted = _with_hint(scene, unlike).refusal
-    assert hinted is not None
-    assert hinted.detail.startswith(detail)
-    assert "1.23" in hinted.detail
-    assert re.search("[A-Za-z]", tr_text(hinted.detail)) is None
+    told = hinted(Refusal(Reason.NO_ROBOT, detail), check_kind(1.234, QualityConfig())).detail
+    assert told.startswith(detail)
+    assert "1.23" in told
+    assert re.search("[A-Za-z]", tr_text(told)) is None
     assert re.search("[A-Za-z]", tr_text(detail)) is None
 
 
