@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -17,16 +14,15 @@ from torch.utils.data import Dataset
 
 from core.learning.augment import random_clutter, random_crop, random_look, with_strips
 from core.learning.dataset import WORKING_SIZE_PX, Sample
+from core.learning.kept_frames import KeptFrames
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX, look_again, places_to_look
 from core.perception.segmentation import Probability, Segmenter
 from core.perception.skeleton import end_pixels
 from core.perception.thinning import thin_parts
 from core.perception.windows import window_around
-from core.types import Image, Mask, Point
+from core.types import Mask, Point
 
-_KEPT_SHARE = 0.5
-"""Of the free memory, for decoded frames: 10 GB hold 6500 of 640x480, or 3600 with all that was seen of them."""
 _MISSED_SHARE = 0.35
 """Of the second look's windows: as many show a pixel that the first look got wrong. The others show what it would look at."""
 _LAST_SHARE = 0.5
@@ -42,37 +38,6 @@ _BORDER_PX = 8.0
 Crop = tuple[Tensor, Tensor]
 """uint8 (planes, h, w) and its labels uint8 (2 or 3, h, w): vessel, robot (0, 1), and where the plan weighs the robot's ends, how
 near they are (0..255)."""
-
-
-class _Kept:
-    """Arrays by what they are of. Decoding costs more than cropping, so they are kept as far as they fit."""
-
-    def __init__(self) -> None:
-        self._arrays: dict[Hashable, tuple[NDArray[Any], ...]] = {}
-        self._room = _free_memory() * _KEPT_SHARE
-
-    def get(self, key: Hashable, make: Callable[[], tuple[NDArray[Any], ...]]) -> tuple[NDArray[Any], ...]:
-        """What was kept under `key`, or what `make` gives."""
-        arrays = self._arrays.get(key)
-        if arrays is None:
-            arrays = make()
-            if self._room > 0:
-                self._arrays[key] = arrays
-                self._room -= sum(array.nbytes for array in arrays)
-        return arrays
-
-    def frame(self, sample: Sample) -> tuple[Image, Mask, Mask]:
-        """A labelled frame at working size; one that is shown more often is kept once."""
-        image, vessel, robot = self.get(sample.image, lambda: sample.load(WORKING_SIZE_PX))
-        return image, vessel, robot
-
-
-def _free_memory() -> float:
-    """Bytes that are free, or a modest guess where the system does not tell."""
-    try:
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, ValueError, OSError):
-        return 4e9
 
 
 class _Order:
@@ -100,7 +65,7 @@ class FrameCrops(Dataset[Crop]):
     def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
         self._plan = plan
         self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
-        self._samples, self._kept = samples, _Kept()
+        self._samples, self._kept = samples, KeptFrames(len(samples))
         self._order = _Order(plan.seed, len(samples))
 
     def __len__(self) -> int:
@@ -176,7 +141,7 @@ class NearCrops(Dataset[Crop]):
     def __init__(self, samples: list[Sample], looks: list[Looks], plan: TrainingPlan) -> None:
         self._plan, self._looks = plan, looks
         self._failed = [place for place, look in enumerate(looks) if look.wrong]
-        self._samples, self._kept = samples, _Kept()
+        self._samples, self._kept = samples, KeptFrames(len(samples))
         self._order = _Order(plan.seed, len(samples))
 
     def __len__(self) -> int:
