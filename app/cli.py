@@ -21,7 +21,7 @@ from app.cli_options import ConfigOption, RigOption
 from app.cli_rigs import doctor, rig_commands
 from app.cli_sessions import play, record, replay, session_commands
 from app.cli_study import ablation, annotate, evaluate, perceive
-from app.memory import share_heaps
+from app.memory import keep_freed, share_heaps
 from core.errors import UserError
 from core.picture_limit import limit_pictures
 
@@ -45,6 +45,7 @@ def main() -> None:
     with suppress(OSError, RuntimeError, ValueError):  # there is not always a standard error
         faulthandler.enable()  # a memory fault says at least where, and not only that
     share_heaps()
+    keep_freed()
     limit_pictures()
     if sys.stdout is None:  # started with a closed one: what is told there is told to nobody
         sys.stdout = open(os.devnull, "w")

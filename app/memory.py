@@ -8,7 +8,10 @@ import sys
 from collections.abc import Callable
 
 _ARENAS = 2
-_M_ARENA_MAX = -8  # malloc.h
+_KEPT_BYTES = 64 << 20
+_FROM_HEAP_BYTES = 32 << 20
+"""The most that glibc takes from a heap at all; above it pages are asked of the system."""
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # malloc.h
 
 
 def share_heaps() -> None:
@@ -20,6 +23,18 @@ def share_heaps() -> None:
     limit = _c_function("mallopt")
     if limit is not None:
         limit(_M_ARENA_MAX, _ARENAS)
+
+
+def keep_freed() -> None:
+    """Let each heap keep what is freed at its end, for the next picture.
+
+    By default the C library hands it back above a few megabytes, and each picture's arrays are cleared page by page anew: 1200 page
+    faults a frame, 1.5 of its 30 ms of processor time. ``give_back`` takes it from here, too.
+    """
+    option = _c_function("mallopt")
+    if option is not None:
+        option(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+        option(_M_MMAP_THRESHOLD, _FROM_HEAP_BYTES)
 
 
 def give_back() -> None:

@@ -77,3 +77,29 @@ def test_threads_share_two_heaps(how: str, fewest: int, most: int, tmp_path: Pat
     command = [sys.executable, "-c", _MANY_THREADS, how, str(tmp_path / "heaps.xml")]
     subprocess.run(command, check=True, timeout=60, cwd=Path(__file__).parents[2])
     assert fewest <= (tmp_path / "heaps.xml").read_text(encoding="utf-8").count("<heap nr=") <= most
+
+
+_PICTURES = """
+import resource, sys
+import numpy as np
+from app.memory import keep_freed
+if sys.argv[1] == "kept":
+    keep_freed()
+def picture():
+    masks = [np.ones(1_200_000, np.uint8) for _ in range(8)]
+for _ in range(5):
+    picture()
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(50):
+    picture()
+print((resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before) / 50)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries have other heaps")
+@pytest.mark.parametrize(("how", "fewest", "most"), [("kept", 0, 50), ("default", 500, 1e6)])
+def test_a_picture_takes_its_memory_from_the_one_before(how: str, fewest: float, most: float) -> None:
+    """Pages that are asked for anew, 4 kB each, for 10 MB that are freed and needed again."""
+    command = [sys.executable, "-c", _PICTURES, how]
+    told = subprocess.run(command, check=True, timeout=60, cwd=Path(__file__).parents[2], capture_output=True, text=True)
+    assert fewest <= float(told.stdout) <= most
