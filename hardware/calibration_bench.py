@@ -20,7 +20,7 @@ from core.config import Config
 from core.devices import Camera, DeviceError
 from core.safety_config import SafetyConfig
 from core.servo_config import JointConfig, ServosConfig
-from core.types import Command, Frame, Image, Scene
+from core.types import Command, Frame, Image, Reason, Scene
 from hardware.cameras.camera_feed import CameraFeed
 from hardware.rig import START_INSERTION_MM, RigKind, kind_of, real_camera
 from hardware.servo_wizard import Bench
@@ -188,7 +188,9 @@ class LiveEyes:
         frames = self._feed.take(_LOOKS, _LOOK_WITHIN_S, alive)
         paths, why = [], ""
         for scene in self._perceived(frames, alive):
-            if scene.path is not None:
+            # What is measured here moves the robot later: a picture of a kind that nobody answers for says nothing.
+            unknown = scene.refusal is not None and scene.refusal.reason is Reason.UNLIKE_TRAINING
+            if scene.path is not None and not unknown:
                 paths.append(scene.points_to_source(scene.path.points))
             elif scene.refusal is not None:
                 why = str(scene.refusal)
