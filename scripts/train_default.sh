@@ -28,6 +28,9 @@ OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames19" --count 320 --seed
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames20" --count 960 --seed 1137000 --workers 2
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames21" --count 3600 --seed 1138000 --workers 2
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames22" --count 360 --seed 1142000 --family bench --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames23" --count 3400 --seed 1143000 --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames24" --count 400 --seed 1147000 --family bench --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames25" --count 6400 --seed 1148000 --workers 2
 # Two threads that spin for each other lose half their time as soon as anything else runs, and two that sleep at once a quarter of it:
 # so they spin for a moment. And memory that is given back after each step has to be cleared for the next one.
 export OMP_WAIT_POLICY=passive GOMP_SPINCOUNT=20000 GLIBC_TUNABLES=glibc.malloc.hugetlb=1
@@ -85,7 +88,11 @@ $python main.py train "${sets[@]}" --second-look --widen --init "$out/near11" --
     --steps 11000 --seed 33 --out "$out/near12"
 # And once more, on others that nobody has seen.
 $python main.py train --data "$out/frames21" --data "$out/frames22" --look-share 0.35 --second-look --init "$out/near12" --focus 0.4 \
-    --end-weight 4 --batch 24 --rate 5e-3 --steps 12500 --seed 34 --out "$out/default"
+    --end-weight 4 --batch 24 --rate 5e-3 --steps 12500 --seed 34 --out "$out/near13"
+# And once more, on three times as many frames, two of three of which nobody has seen: it had begun to know the last ones.
+sets=(--data "$out/frames21" --data "$out/frames22" --data "$out/frames23" --data "$out/frames24" --data "$out/frames25")
+$python main.py train "${sets[@]}" --look-share 0.5 --second-look --init "$out/near13" --focus 0.4 --end-weight 4 --batch 24 --rate 5e-3 \
+    --steps 12500 --seed 35 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 960 --seed 950000 --workers 2
 # The twin's own look is in none of the random families, and has to be known, too.

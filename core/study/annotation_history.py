@@ -30,13 +30,19 @@ class History:
     """The edits of one annotation: what is in force, and what undo and redo lead to.
 
     A new edit after an undo starts a branch: redo no longer leads to what was undone, but its entries stay in the journal.
+
+    Parameters
+    ----------
+    entries : the journal, in order.
+    last : the highest number that is taken, also by an entry that is not among these because its record is damaged.
     """
 
-    def __init__(self, entries: Iterable[JournalEntry] = ()) -> None:
+    def __init__(self, entries: Iterable[JournalEntry] = (), *, last: int = 0) -> None:
         self._contents: dict[int, Annotation] = {0: Annotation()}
         self._actions: dict[int, str] = {0: ""}
         self._bases: dict[int, int] = {}
-        self._now = self._tip = self._last = 0
+        self._now = self._tip = 0
+        self._last = last
         for entry in entries:
             self._take(entry)
 

@@ -58,23 +58,32 @@ def salvage(damaged: Path, target: Path) -> tuple[int, list[str]]:
 def _readable(source: sqlite3.Connection, table: str, problems: list[str]) -> tuple[list[str], list[tuple[Any, ...]]]:
     try:
         names = [str(row[1]) for row in source.execute(f"PRAGMA table_info({table})")]
-        rows = list(_rows(source, table))
+        rows = list(_rows(source, table, problems))
     except (sqlite3.Error, UnicodeDecodeError) as error:
         problems.append(f"table {table} is lost ({error})")
         return [], []
     return names, rows
 
 
-def _rows(source: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
-    """All rows by row number: where a page is damaged, the numbers on it are stepped over."""
-    number, misses = 0, 0
+def _rows(source: sqlite3.Connection, table: str, problems: list[str]) -> Iterator[tuple[Any, ...]]:
+    """All rows by row number: where a page is damaged, the numbers on it are stepped over, and named."""
+    number, misses, whole = 0, 0, 0
     while number < _MAX_ROW and misses < _MISSES:
         try:
             for row in source.execute(f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid", (number,)):
                 if int(row[0]) <= number:  # damaged links between pages can lead in a circle
                     raise sqlite3.DatabaseError("rows out of order")
-                number, misses = int(row[0]), 0
+                number = int(row[0])
+                if misses:
+                    problems.append(f"{_numbers(whole + 1, number - 1)} of {table} cannot be read")
+                misses, whole = 0, number
                 yield row[1:]
-            return
+            break
         except (sqlite3.DatabaseError, UnicodeDecodeError):
             number, misses = number + 1, misses + 1
+    if misses:
+        problems.append(f"the rows of {table} after number {whole} cannot be read")
+
+
+def _numbers(first: int, last: int) -> str:
+    return f"row {first}" if first == last else f"rows {first} to {last}"

@@ -226,12 +226,15 @@ class AnnotationStore:
                 entries.append(entry_from(row))
             except (ValueError, TypeError) as error:
                 self._note(f"{self.path.name}: edit {row[0]} of image {key.sha256[:12]} is damaged ({error}); left out")
-        return History(entries)
+        return History(entries, last=max((row[0] for row in rows if isinstance(row[0], int)), default=0))
 
     def take_rows(
         self, columns: Mapping[str, Sequence[str]], tables: Mapping[str, Sequence[Sequence[Any]]], problems: list[str]
     ) -> None:
-        """Rows as they lay in a damaged file, each by itself: what does not fit is named in `problems`."""
+        """Rows as they lay in a damaged file, each by itself: what does not fit is named in `problems`.
+
+        So is what belongs to a row that is lost: its number will be another one's.
+        """
         with self._transaction() as database:
             for table, rows in tables.items():
                 known = {row[1] for row in database.execute(f"PRAGMA table_info({table})")}
@@ -243,6 +246,13 @@ class AnnotationStore:
                         database.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", row)
                     except sqlite3.IntegrityError as error:
                         problems.append(f"a row of {table} is damaged ({error}); left out")
+            # In this order: the edits of an annotation go with it.
+            for table, belongs_to, parents in (("annotations", "image_id", "images"), ("journal", "annotation_id", "annotations")):
+                orphans = f"FROM {table} WHERE {belongs_to} NOT IN (SELECT id FROM {parents})"
+                lost, count = database.execute(f"SELECT count(DISTINCT {belongs_to}), count(*) {orphans}").fetchone()
+                if count:
+                    problems.append(f"{lost} of {parents} are lost, and with them {count} of {table}")
+                    database.execute(f"DELETE {orphans}")
 
     # ---- the file
 

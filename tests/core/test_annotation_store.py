@@ -144,6 +144,27 @@ def test_a_flipped_bit_in_a_record_is_found_and_the_others_are_read(tmp_path: Pa
         assert "rater ann, repeat 1: damaged (its check sum does not fit); left out" in store.problems[0]
 
 
+def test_after_a_damaged_last_edit_editing_goes_on(tmp_path: Path) -> None:
+    """Its number stays taken: the next edit must not ask for it again, here or in a salvaged file."""
+    path = tmp_path / "a.sqlite"
+    with known(path) as store:
+        history = History()
+        for note in ("one", "two", "three"):
+            save(store, history, Annotation(note=note))
+        store._database.execute("UPDATE journal SET content = replace(content, 'three', 'thrae')")
+    salvage(path, tmp_path / "b.sqlite")
+    for name in ("a.sqlite", "b.sqlite"):
+        with AnnotationStore(tmp_path / name) as store:
+            history = store.history(KEY)
+            assert history.current == Annotation(note="two")
+            assert "edit 3" in store.problems[0]
+            save(store, history, Annotation(note="four"))
+            history.undo()
+            assert history.current == Annotation(note="two")
+        with AnnotationStore(tmp_path / name) as store:
+            assert store.annotations()[0].content.note == store.history(KEY).current.note == "four"
+
+
 def test_a_study_keeps_its_settings(tmp_path: Path) -> None:
     with known(tmp_path / "a.sqlite") as store:
         assert store.study_settings("pilot") is None
@@ -277,3 +298,75 @@ def test_damaged_files_end_in_one_line_and_salvage_reads_what_is_readable(tmp_pa
         assert path.read_bytes() == before, "the damaged file is as it was"
     assert refused > 5
     assert salvaged > 40 * 20
+
+
+_PAGE = 4096
+_TABLE_LEAF = 0x0D
+
+
+def _pages_with(data: bytes, *words: bytes) -> list[int]:
+    """Offsets of those pages with rows that hold all the words."""
+    starts = range(0, len(data), _PAGE)
+    return [at for at in starts if data[at] == _TABLE_LEAF and all(word in data[at : at + _PAGE] for word in words)]
+
+
+def _without_page(data: bytes, at: int) -> bytes:
+    return data[:at] + b"\xff" * _PAGE + data[at + _PAGE :]
+
+
+@pytest.fixture(scope="module")
+def sixty(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """An annotation file of sixty images, each annotated."""
+    path = tmp_path_factory.mktemp("sixty") / "a.sqlite"
+    with AnnotationStore(path) as store:
+        store._database.execute("PRAGMA synchronous = OFF")
+        for number in range(60):
+            key = ItemKey(f"{number:064x}", "", "ann")
+            store.add_image(ImageRecord(key.sha256, f"{number}.png", 640, 480), 1000, 5)
+            save(store, History(), Annotation(tuple((float(x), 50.5) for x in range(40)), note=f"note {number}"), key)
+    return path.read_bytes()
+
+
+def test_an_image_that_is_lost_takes_its_annotation_with_it(sixty: bytes, tmp_path: Path) -> None:
+    """Otherwise its number, and with it the annotation, would go to the next image that is added."""
+    page = _pages_with(sixty, b"59.png")[-1]
+    (tmp_path / "damaged.sqlite").write_bytes(_without_page(sixty, page))
+    kept, problems = salvage(tmp_path / "damaged.sqlite", tmp_path / "b.sqlite")
+    assert 0 < kept < 60
+    lost = 60 - kept
+    assert problems == [
+        f"the rows of images after number {kept} cannot be read",
+        f"{lost} of images are lost, and with them {lost} of annotations",
+        f"{lost} of annotations are lost, and with them {lost} of journal",
+    ]
+    with AnnotationStore(tmp_path / "b.sqlite") as store:
+        assert {one.key.sha256 for one in store.annotations()} == set(store.images())
+        new = ItemKey("f" * 64, "", "ann")
+        store.add_image(ImageRecord(new.sha256, "new.png", 640, 480), 1, 1)
+        assert len(store.annotations()) == kept
+        assert not store.history(new).can_undo
+
+
+def test_an_annotation_that_is_lost_can_be_made_anew(sixty: bytes, tmp_path: Path) -> None:
+    page = _pages_with(sixty, b"note 59", b"as is")[-1]
+    (tmp_path / "damaged.sqlite").write_bytes(_without_page(sixty, page))
+    kept, problems = salvage(tmp_path / "damaged.sqlite", tmp_path / "b.sqlite")
+    assert 0 < kept < 60
+    assert any("of annotations after number" in problem for problem in problems)
+    with AnnotationStore(tmp_path / "b.sqlite") as store:
+        assert len(store.images()) == 60
+        lost = ItemKey(f"{59:064x}", "", "ann")
+        history = store.history(lost)
+        assert not history.can_undo
+        save(store, history, Annotation(note="again"), lost)
+        assert store.annotations()[-1].content.note == "again"
+
+
+def test_rows_within_a_table_that_cannot_be_read_are_named(sixty: bytes, tmp_path: Path) -> None:
+    page = _pages_with(sixty, b"note 20", b"as is")[0]
+    (tmp_path / "damaged.sqlite").write_bytes(_without_page(sixty, page))
+    kept, problems = salvage(tmp_path / "damaged.sqlite", tmp_path / "b.sqlite")
+    assert 40 < kept < 60
+    (span,) = [problem for problem in problems if problem.endswith("of annotations cannot be read")]
+    first, last = (int(word) for word in span.split() if word.isdigit())
+    assert last - first + 1 == 60 - kept
