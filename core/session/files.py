@@ -7,7 +7,9 @@ import fcntl
 import json
 import os
 import secrets
+import shutil
 import threading
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
@@ -60,6 +62,35 @@ def is_being_written(folder: Path) -> bool:
         return True
     except OSError:
         return False
+
+
+@contextlib.contextmanager
+def alone_in(work: Path, busy: str) -> Iterator[None]:
+    """An empty folder for one process at a time; what a killed one has left there is removed, and in the end the folder itself.
+
+    A window leaves a recovery going on when it is closed, and the next window offers it again. Raises SessionError (`busy`) and
+    OSError.
+    """
+    while True:
+        work.mkdir(parents=True, exist_ok=True)
+        held = os.open(work, os.O_RDONLY)
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(held)
+            raise SessionError(busy) from None
+        except OSError:
+            pass  # a drive without locks
+        if work.exists() and os.path.samestat(os.fstat(held), work.stat()):
+            break
+        os.close(held)  # the other one has just ended, and taken its folder along
+    try:
+        for left in work.iterdir():
+            left.unlink()
+        yield
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+        os.close(held)
 
 
 def add_event(session: Path, event: Event) -> Event:

@@ -26,7 +26,7 @@ from core.session.events import EventKind
 from core.session.export import Advance, new_file
 from core.session.mcap_schemas import SCHEMAS
 from core.session.packet_check import PacketCheck
-from core.session.pictures import video_path
+from core.session.pictures import video_number
 from core.session.reader import SessionReader
 from core.session.recorded import RecordedRow
 from core.session.remux import has_h264
@@ -247,9 +247,12 @@ def _times(reader: SessionReader) -> Callable[[int, int], float]:
 
 def _video(reader: SessionReader, clock: _Clock) -> Iterator[Message]:
     time_of, floor = _times(reader), 0
-    for number in range(len(reader.videos)):
+    for path in reader.videos:
+        number = video_number(path)
+        if number is None:
+            continue
         try:
-            for pts_ms, data in _annex_b(video_path(reader.folder, number), PacketCheck(partial(reader.known_picture, number))):
+            for pts_ms, data in _annex_b(path, PacketCheck(partial(reader.known_picture, number))):
                 time_s = time_of(number, pts_ms)
                 floor = max(floor, clock.ns(time_s))
                 coded = base64.b64encode(data).decode()

@@ -9,11 +9,22 @@ from __future__ import annotations
 import re
 import zlib
 from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
 
 _START = re.compile(b"\x00\x00\x00?\x01")
 
-Known = Callable[[int], tuple[int, int | None] | None]
-"""Time in ms -> place of its row in the file's order, and the packet's checksum (None: the row has none). None: no row has it."""
+
+class PictureRow(NamedTuple):
+    """What the rows tell of a picture: place of its row among the good ones, the row's own number, and the checksum of the packet
+    (None: the row has none)."""
+
+    place: int
+    number: int
+    crc: int | None
+
+
+Known = Callable[[int], PictureRow | None]
+"""Time in ms -> its picture's row. None: no row has it."""
 
 
 def checksum_with_codes(packet: bytes) -> int:
@@ -47,25 +58,31 @@ class PacketCheck:
 
     def __init__(self, known: Known) -> None:
         self._known = known
-        self._last: int | None = None
+        self._last: PictureRow | None = None
+        self._unknown = 0
         self._is_whole = False
 
     def take(self, pts_ms: int, data: bytes, *, is_key: bool, is_corrupt: bool = False) -> bool:
         """Can the picture of this packet be trusted? After a damaged or missing one none can until the next key picture."""
         found = self._known(pts_ms)
         if found is not None:
-            place, wanted = found
-            if self._last is not None and place != self._last + 1:
+            if self._last is not None and not self._follows(self._last, found):
                 self._is_whole = False
-            if is_corrupt or (wanted is not None and checksum_with_lengths(data) != wanted):
+            if is_corrupt or (found.crc is not None and checksum_with_lengths(data) != found.crc):
                 self._is_whole = False
                 return False
-            self._last = place
+            self._last, self._unknown = found, 0
         elif is_corrupt:
             self._is_whole = False
             return False
+        else:
+            self._unknown += 1
         self._is_whole = self._is_whole or is_key
         return self._is_whole
+
+    def _follows(self, last: PictureRow, found: PictureRow) -> bool:
+        """Is no picture missing in between? Where rows are lost, too, their pictures must have come by."""
+        return found.place == last.place + 1 and found.number - last.number - 1 <= self._unknown
 
     def fail(self) -> None:
         """The decoder refused the packet."""

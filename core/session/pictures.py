@@ -14,7 +14,7 @@ import av.error
 import cv2
 import numpy as np
 
-from core.session.packet_check import Known, PacketCheck
+from core.session.packet_check import Known, PacketCheck, PictureRow
 from core.session.remux import has_h264
 from core.session.video_in import open_video
 from core.types import Image
@@ -27,6 +27,12 @@ _OPEN_FILES = 2
 
 def video_path(folder: Path, number: int) -> Path:
     return folder / f"video_{number:04d}.mkv"
+
+
+def video_number(path: Path) -> int | None:
+    """Of a video file; None when it is none of ours."""
+    digits = path.stem.rpartition("_")[2]
+    return int(digits) if digits.isascii() and digits.isdigit() else None
 
 
 def to_rgb(frame: av.VideoFrame) -> Image:
@@ -111,9 +117,7 @@ class Pictures:
     on_problem : is told of each file and each picture that cannot be read, once.
     """
 
-    def __init__(
-        self, folder: Path, known: Callable[[int, int], tuple[int, int | None] | None], on_problem: Callable[[str], None]
-    ) -> None:
+    def __init__(self, folder: Path, known: Callable[[int, int], PictureRow | None], on_problem: Callable[[str], None]) -> None:
         self._known = known
         self._folder = folder
         self._on_problem = on_problem

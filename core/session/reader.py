@@ -16,7 +16,8 @@ from core.session.checked import Damaged
 from core.session.events import Event, event_from_json
 from core.session.lines import lines_of, parse, parse_line
 from core.session.manifest import EVENTS, FRAMES, Manifest, SessionError, read_manifest
-from core.session.pictures import Pictures, packet_times, video_path
+from core.session.packet_check import PictureRow
+from core.session.pictures import Pictures, packet_times, video_number
 from core.session.recorded import RecordedRow, row_from_json
 from core.session.row_index import RowIndex, Timeline
 from core.types import Frame, Image, Tick
@@ -185,12 +186,13 @@ class SessionReader:
     def loose_pictures(self) -> tuple[tuple[int, int], ...]:
         """(video, pts_ms) of all pictures in the files, for a session that has lost its rows. Reads the files once, undecoded."""
         found: list[tuple[int, int]] = []
-        for number in range(len(self.videos)):
-            found += [(number, pts_ms) for pts_ms, _ in packet_times(video_path(self.folder, number))]
+        for path in self.videos:
+            if (number := video_number(path)) is not None:
+                found += [(number, pts_ms) for pts_ms, _ in packet_times(path)]
         return tuple(found)
 
-    def known_picture(self, video: int, pts_ms: int) -> tuple[int, int | None] | None:
-        """What the rows tell of a picture: place of its row and checksum of its packet (see ``packet_check``)."""
+    def known_picture(self, video: int, pts_ms: int) -> PictureRow | None:
+        """What the rows tell of a picture."""
         return self._index.picture(video, pts_ms)
 
     def loose_picture(self, video: int, pts_ms: int) -> Image | None:

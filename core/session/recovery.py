@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -13,7 +12,7 @@ import numpy as np
 
 from core.session.checked import Damaged
 from core.session.events import event_from_json, was_added_later
-from core.session.files import is_being_written
+from core.session.files import alone_in, is_being_written
 from core.session.lines import Line, lines_of, parse_line
 from core.session.manifest import (
     EVENTS,
@@ -28,7 +27,7 @@ from core.session.manifest import (
     sync_folder,
     write_manifest,
 )
-from core.session.pictures import packet_times
+from core.session.pictures import packet_times, video_number
 from core.session.reader import check_is_session
 from core.session.recorded import row_from_json
 from core.session.remux import Expected, remux
@@ -119,7 +118,7 @@ def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda 
     Raises
     ------
     SessionError
-        Not a session, being recorded, recovered before, nothing left in it, or the copy cannot be written.
+        Not a session, being recorded or recovered, recovered before, nothing left in it, or the copy cannot be written.
     """
     session = session.absolute()
     check_is_session(session)
@@ -127,23 +126,27 @@ def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda 
         raise SessionError(f"{session}: is being recorded; stop the recording first")
     parent = session.parent if into is None else into.absolute()
     target, work = parent / (session.name + RECOVERED), parent / f".{session.name}.recovering"
-    if target.exists():
-        raise SessionError(f"{target}: is there already; remove it to recover again")
     try:
-        shutil.rmtree(work, ignore_errors=True)
-        work.mkdir(parents=True)
-        recovery = _salvage(session, work, target, on_bytes)
-        work.rename(target)
-        sync_folder(parent)
+        with alone_in(work, f"{session}: is being recovered already; wait until that has ended"):
+            if target.exists():
+                raise SessionError(f"{target}: is there already; remove it to recover again")
+            recovery = _salvage(session, work, target, on_bytes)
+            for path in work.iterdir():
+                _sync(path)
+            work.rename(target)
+            sync_folder(parent)
     except VideoError as error:
         raise SessionError(f"{error}; make room or choose another folder") from None
     except OSError as error:
         is_source = error.filename is not None and Path(error.filename).parent == session
         what_to_do = "let it be read, and try again" if is_source else "make room or choose another folder"
         raise SessionError(f"{error.filename or work}: {error.strerror or error}; {what_to_do}") from None
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
     return recovery
+
+
+def _sync(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
 
 
 def expected_loss(session: Path, on_bytes: OnBytes = lambda _: None) -> Recovery:
@@ -163,7 +166,7 @@ def expected_loss(session: Path, on_bytes: OnBytes = lambda _: None) -> Recovery
     _copy_lines(session / FRAMES, nowhere, found, _take_row, on_bytes)
     _copy_lines(session / EVENTS, nowhere, found, _take_event, lambda _: None)
     for path in sorted(session.glob("video_*.mkv")):
-        if (video := _number_of(path)) is not None:
+        if (video := video_number(path)) is not None:
             found.kept |= {(video, pts_ms) for pts_ms, _ in packet_times(path)}
         on_bytes(path.stat().st_size)
     if not found.rows and not found.kept:
@@ -191,6 +194,9 @@ def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Reco
         on_bytes(path.stat().st_size)
     if not found.rows and not found.kept:
         raise SessionError(f"{session}: nothing left to recover: neither rows nor pictures can be read")
+    if manifest.kind == "UNKNOWN" and found.places:
+        # The rows' clock began anywhere; its moment that the folder's name tells of is the first row's.
+        manifest = manifest.model_copy(update={"started_monotonic_s": found.places[0][2]})
     loss = _loss(session, manifest, found)
     counts = Counts(frames=len(found.rows), events=found.events, videos=found.videos, dropped=manifest.counts.dropped)
     counts.bytes = sum(path.stat().st_size for path in work.iterdir())
@@ -247,7 +253,7 @@ def _take_event(line: Line, found: _Salvage) -> None:
 
 
 def _copy_video(path: Path, target: Path, found: _Salvage) -> None:
-    video = _number_of(path)
+    video = video_number(path)
     if video is None:
         found.problems.append(f"{path.name}: not a name of ours; left out")
         return
@@ -255,12 +261,6 @@ def _copy_video(path: Path, target: Path, found: _Salvage) -> None:
     found.problems += done.problems
     found.kept |= {(video, pts_ms) for pts_ms in done.kept_ms}
     found.videos += bool(done.kept_ms)
-
-
-def _number_of(path: Path) -> int | None:
-    """Of a video file; None when it is none of ours."""
-    digits = path.stem.rpartition("_")[2]
-    return int(digits) if digits.isascii() and digits.isdigit() else None
 
 
 def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:

@@ -11,7 +11,7 @@ from typing import Any
 import av
 import av.error
 
-from core.session.packet_check import PacketCheck
+from core.session.packet_check import PacketCheck, PictureRow
 from core.session.video import VideoError
 from core.session.video_in import open_video
 
@@ -88,7 +88,7 @@ def _copy(container: Any, target: Path, expected: Sequence[Expected], done: Remu
 
 def _whole(container: Any, stream: Any, expected: Sequence[Expected], done: Remuxed) -> Iterator[tuple[Any, int]]:
     """Packets whose picture can be trusted, in order."""
-    known = {one.pts_ms: (place, one.crc) for place, one in enumerate(expected)}
+    known = {one.pts_ms: PictureRow(place, one.row, one.crc) for place, one in enumerate(expected)}
     check, gaps = PacketCheck(known.get), _gaps(expected)
     last_ms, left_out = -1, 0
     for packet in _packets(container, stream, done):

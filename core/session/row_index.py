@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from core.control.modes import Mode
 from core.session.checked import Damaged, count, maybe_number, number, text
 from core.session.lines import Line, is_sealed, lines_of, parse_line
+from core.session.packet_check import PictureRow
 from core.types import PoseState
 
 _STATES: dict[Any, int] = {None: -1, **{state.value: place for place, state in enumerate(PoseState)}}
@@ -85,15 +86,15 @@ class RowIndex:
             row, time_s, video, pts, theta, state, mode, _ = (np.array(column) for column in self._columns)
         return Timeline(row, time_s, video, pts, theta, state, mode)
 
-    def picture(self, video: int, pts_ms: int) -> tuple[int, int | None] | None:
-        """Place of the row whose picture is at this time of this file, and the checksum of its packet; None: no such row yet."""
+    def picture(self, video: int, pts_ms: int) -> PictureRow | None:
+        """The row whose picture is at this time of this file; None: no such row yet."""
         key = _key(video, pts_ms)
         with self._lock:
             place = bisect_left(self._keys, key)
             if place == len(self._keys) or self._keys[place] != key:
                 return None
-            crc = self._columns[-1][place]
-        return place, None if crc < 0 else crc
+            number, crc = self._columns[0][place], self._columns[-1][place]
+        return PictureRow(place, number, None if crc < 0 else crc)
 
     def close(self) -> None:
         self._stop.set()

@@ -144,6 +144,20 @@ def test_mcap_of_a_lossless_session_has_pictures(tmp_path: Path) -> None:
     assert [number_in(np.asarray(image, np.uint8)) for image in decoded] == [0, 1, 2]
 
 
+def test_mcap_has_the_pictures_of_all_videos_that_are_left(tmp_path: Path) -> None:
+    config = QUICK.model_copy(update={"split_s": 1.0})
+    session = record(tmp_path, (tick_of(i, 1000.0 + i / 30.0) for i in range(75)), config)
+    found = []
+    for name in ("whole.mcap", "left.mcap"):
+        with SessionReader(session) as reader:
+            export_mcap(reader, tmp_path / name)
+        found.append(messages(tmp_path / name)["/camera/video"])
+        (session / "video_0000.mkv").unlink(missing_ok=True)
+    whole, left = found
+    assert 30 < len(left) < len(whole) == 75
+    assert left == whole[-len(left) :]
+
+
 def test_mcap_keeps_what_the_session_is(session: Path, tmp_path: Path) -> None:
     with SessionReader(session) as reader:
         export_mcap(reader, tmp_path / "x.mcap")

@@ -12,6 +12,7 @@ import sys
 import time
 from pathlib import Path
 
+import av
 import pytest
 
 from core.session.events import Event, EventKind
@@ -63,6 +64,20 @@ def read_all(session: Path) -> tuple[list[int], list[int], tuple[str, ...]]:
             [frame.index for frame in frames if frame is not None],
             reader.problems,
         )
+
+
+def without_packet(path: Path, place: int) -> None:
+    """The video without its n-th packet."""
+    whole = path.with_suffix(".whole")
+    path.rename(whole)
+    with av.open(str(whole), format="matroska") as source, av.open(str(path), "w", format="matroska") as target:
+        stream = source.streams.video[0]
+        copy = target.add_stream_from_template(stream)
+        packets = [packet for packet in source.demux(stream) if packet.size]
+        for packet in packets[:place] + packets[place + 1 :]:
+            packet.stream, packet.dts = copy, packet.pts
+            target.mux_one(packet)
+    whole.unlink()
 
 
 def cut(path: Path, share: float) -> None:
@@ -287,6 +302,68 @@ def test_a_session_whose_manifest_is_lost_claims_nothing(session: Path) -> None:
     manifest = read_manifest(done.folder)
     assert manifest.kind == "UNKNOWN"
     assert len(read_all(done.folder)[1]) == COUNT
+
+
+def test_without_a_manifest_the_clock_is_the_rows_own(session: Path) -> None:
+    """Its moment is what the folder's name tells of; otherwise exports would be late by as long as the computer was on."""
+    (session / "manifest.json").unlink()
+    manifest = read_manifest(recover(session).folder)
+    assert manifest.started_monotonic_s == 1000.0
+    assert session.name.startswith(f"session_{manifest.started_utc:%Y%m%dT%H%M%SZ}")
+
+
+def test_two_recoveries_of_one_session_do_not_meet(session: Path) -> None:
+    """A window leaves one going on when it is closed, and the next window offers it again."""
+    refused: list[str] = []
+
+    def another(_bytes: int) -> None:
+        if not refused:
+            with pytest.raises(SessionError) as error:
+                recover(session)
+            refused.append(str(error.value))
+
+    done = recover(session, on_bytes=another)
+    assert refused == [f"{session}: is being recovered already; wait until that has ended"]
+    assert checked(session, done) == (list(range(COUNT)), list(range(COUNT)))
+    assert sorted(path.name for path in session.parent.iterdir()) == [session.name, done.folder.name]
+
+
+def test_what_a_killed_recovery_left_is_in_nobodys_way(session: Path) -> None:
+    left = session.parent / f".{session.name}.recovering"
+    left.mkdir()
+    (left / "video_0007.mkv").write_bytes(b"half")
+    done = recover(session)
+    assert not (done.folder / "video_0007.mkv").exists()
+    assert checked(session, done) == (list(range(COUNT)), list(range(COUNT)))
+
+
+def test_a_picture_that_is_lost_with_its_row_takes_along_what_builds_on_it(session: Path) -> None:
+    lost = COUNT // 2
+    path = session / "frames.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:lost] + lines[lost + 1 :]))
+    rows, pictures, _ = read_all(session)
+    assert rows == pictures == [index for index in range(COUNT) if index != lost], "the row alone: its picture has come by"
+
+    without_packet(session / "video_0000.mkv", lost)
+    for folder in (session, recover(session).folder):
+        rows, pictures, _ = read_all(folder)  # which looks that no picture is another one's
+        assert rows == [index for index in range(COUNT) if index != lost]
+        assert pictures[:lost] == list(range(lost))
+        assert lost + 1 not in pictures
+
+
+def test_videos_count_by_their_numbers(tmp_path: Path) -> None:
+    """The first of three files is lost: the pictures of the others are those of their own times."""
+    config = QUICK.model_copy(update={"split_s": 1.0})
+    session = record(tmp_path, (tick_of(i, 1000.0 + i / FPS, full=True) for i in range(COUNT)), config)
+    assert len(list(session.glob("video_*.mkv"))) == 3
+    (session / "video_0000.mkv").unlink()
+    with SessionReader(session) as reader:
+        assert reader.wait(20.0)
+        kept = [(video, pts_ms) for video, pts_ms in zip(reader.timeline().video, reader.timeline().pts_ms, strict=True) if video]
+        assert list(reader.loose_pictures) == kept
+        assert 30 < len(kept) < COUNT
 
 
 def test_a_session_that_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
