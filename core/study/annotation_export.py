@@ -17,6 +17,7 @@ from core.study.annotation_images import FoundImage
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotation_report import manual_measurements
 from core.study.annotations import AnnotationError, MaskPolygon, MaskTarget, measure_lines
+from core.study.mask_areas import area_polygon
 from core.study.mask_polygons import fill
 from core.types import Mask, Vector
 
@@ -177,9 +178,9 @@ def _coco_piece(piece: Sequence[MaskPolygon], size: tuple[int, int]) -> dict[str
     box = [0, 0, 0, 0]
     if len(rows):
         box = [int(columns.min()), int(rows.min()), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1]
-    # COCO counts from pixel corners, we from pixel centres.
-    polygon = [round(value + 0.5, 3) for point in piece[0].points for value in point]
-    segmentation = [polygon] if len(piece) == 1 else {"size": [size[1], size[0]], "counts": run_lengths(mask)}
+    polygon = area_polygon(mask)
+    whole = {"size": [size[1], size[0]], "counts": run_lengths(mask)}
+    segmentation = whole if polygon is None else [[round(value, 3) for point in polygon.tolist() for value in point]]
     return {"segmentation": segmentation, "bbox": box, "area": int(mask.sum()), "iscrowd": 0}
 
 

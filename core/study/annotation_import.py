@@ -12,6 +12,7 @@ import numpy as np
 
 from core.study.annotation_images import FoundImage
 from core.study.annotations import Annotation, AnnotationError, Line, MaskPolygon, MaskTarget, line_from
+from core.study.mask_areas import polygons_of_area
 from core.study.mask_polygons import polygons_of
 from core.types import Mask
 
@@ -110,8 +111,7 @@ def _labelme(path: Path, content: dict[str, Any], by_name: Mapping[str, list[Fou
         where = f"{path}: shape {number}"
         try:
             target = _target(where, shape["label"], problems)
-            # labelme counts from pixel corners, we from pixel centres
-            points = tuple((x - 0.5, y - 0.5) for x, y in line_from(shape["points"]))
+            points = line_from(shape["points"])
             kind = shape.get("shape_type", "polygon")
         except (TypeError, KeyError, ValueError, AttributeError):
             problems.append(f"{where} is damaged; left out")
@@ -122,9 +122,13 @@ def _labelme(path: Path, content: dict[str, Any], by_name: Mapping[str, list[Fou
             (x0, y0), (x1, y1) = points
             kind, points = "polygon", ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
         if kind == "polygon" and len(points) >= 3:
-            masks.append(MaskPolygon(target, points))
+            found = polygons_of_area(np.array(points), target, image.record.size)
+            if not found:
+                problems.append(f"{where} covers no pixel; left out")
+            masks += found
         elif kind in ("linestrip", "line") and len(points) >= 2 and target.value not in lines:
-            lines[target.value] = points
+            # labelme counts from pixel corners, we from pixel centres
+            lines[target.value] = tuple((x - 0.5, y - 0.5) for x, y in points)
         else:
             problems.append(f"{where} is a {kind} of {len(points)} points, not a polygon or the one line of its label; left out")
     if not masks and not lines:
@@ -167,12 +171,14 @@ def _segmentation(segmentation: Any, target: MaskTarget, size: tuple[int, int]) 
         if not isinstance(segmentation.get("counts"), list):
             raise ValueError("compressed run lengths are not read: write polygons or plain run lengths")
         return list(polygons_of(_from_run_lengths(segmentation, size), target, 0.0))
-    polygons = []
+    polygons: list[MaskPolygon] = []
     for flat in segmentation:
         points = line_from(list(zip(flat[::2], flat[1::2], strict=True)))
         if len(points) < 3:
             raise ValueError("a polygon of fewer than three points")
-        polygons.append(MaskPolygon(target, tuple((x - 0.5, y - 0.5) for x, y in points)))
+        polygons += polygons_of_area(np.array(points), target, size)
+    if not polygons:
+        raise ValueError("covers no pixel")
     return polygons
 
 
@@ -194,4 +200,6 @@ def _target(where: str, label: Any, problems: list[str]) -> MaskTarget | None:
 
 def merged(old: Annotation, new: Annotation) -> Annotation:
     """The imported parts put into what is there: only where there was nothing, so that no work by hand is lost."""
-    return replace(old, robot=old.robot or new.robot, vessel=old.vessel or new.vessel, masks=old.masks or new.masks)
+    drawn = {mask.target for mask in old.masks}
+    masks = old.masks + tuple(mask for mask in new.masks if mask.target not in drawn)
+    return replace(old, robot=old.robot or new.robot, vessel=old.vessel or new.vessel, masks=masks)

@@ -48,7 +48,9 @@ def polygons_of(
 def _outline(contour: Any, target: MaskTarget, tolerance_px: float, is_hole: bool) -> list[MaskPolygon]:
     if len(contour) < 3 or (tolerance_px > 0 and cv2.contourArea(contour) < _MIN_AREA_PX):
         return []
-    points = cv2.approxPolyDP(contour, tolerance_px, True)[:, 0] if tolerance_px > 0 else contour[:, 0]
+    points = cv2.approxPolyDP(contour, tolerance_px, True)[:, 0]
+    if tolerance_px == 0 and len(points) < 3:  # a line of pixels, there and back
+        points = contour[:, 0]
     return [MaskPolygon(target, _line(points), is_hole)] if len(points) >= 3 else []
 
 

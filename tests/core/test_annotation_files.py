@@ -7,6 +7,7 @@ import random
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -17,6 +18,7 @@ from core.study.annotation_images import FoundImage
 from core.study.annotation_import import merged, read_files
 from core.study.annotation_records import ImageRecord, ItemKey, StoredAnnotation
 from core.study.annotations import Annotation, AnnotationError, MaskPolygon, MaskTarget, View
+from core.study.mask_areas import area_of, area_polygon
 from core.study.mask_polygons import fill, polygons_of
 from core.types import PoseState
 
@@ -84,13 +86,58 @@ def test_coco_goes_out_and_comes_back(image: FoundImage, tmp_path: Path) -> None
     content = json.loads(out.read_text())
     first, second = content["annotations"]
     assert (first["bbox"], first["area"]) == ([5, 5, 55, 35], int(hole.sum()))
-    assert second["segmentation"] == [[20.5, 18.5, 40.5, 18.5, 40.5, 22.5, 20.5, 22.5]]
+    (flat,) = second["segmentation"]
+    assert shoelace(np.reshape(flat, (-1, 2))) == pytest.approx(second["area"], abs=0.6), "an area, but for its four corners"
+    assert (min(flat[::2]), max(flat[::2]), min(flat[1::2]), max(flat[1::2])) == (20.0, 41.0, 18.0, 23.0)
     (back,), problems = read_files([out], [image])
     assert problems == []
     for target in MaskTarget:
         assert np.array_equal(fill(back.content.masks, target, SIZE), fill(masks, target, SIZE))
     with pytest.raises(AnnotationError, match="is there already"):
         export_coco([stored(with_masks(*masks))], [image], out)
+
+
+def shoelace(points: np.ndarray) -> float:
+    """The area of a polygon (N, 2)."""
+    (x0, y0), (x1, y1) = points.T, np.roll(points, -1, axis=0).T
+    return abs(float(np.sum(x0 * y1 - x1 * y0))) / 2.0
+
+
+def test_a_polygon_is_the_area_of_the_pixels_whose_centres_it_encloses() -> None:
+    bar = np.zeros((48, 64), bool)
+    bar[10:14, 20:50] = True
+    corners = np.array([(20.0, 10.0), (50.0, 10.0), (50.0, 14.0), (20.0, 14.0)])
+    assert np.array_equal(area_of(corners, SIZE), bar)
+    assert np.array_equal(area_of(corners + 0.4, SIZE), bar), "no centre is passed"
+    assert np.array_equal(area_of(corners + [-1000.0, 0.0], SIZE), np.zeros_like(bar))
+    assert np.array_equal(area_of(np.array([(-9.0, -9.0), (99.0, -9.0), (99.0, 99.0), (-9.0, 99.0)]), SIZE), np.ones_like(bar))
+    triangle = area_of(np.array([(0.0, 0.0), (4.0, 0.0), (0.0, 4.0)]), (5, 5))
+    assert triangle[:4].astype(int).tolist() == [[1, 1, 1, 0, 0], [1, 1, 0, 0, 0], [1, 0, 0, 0, 0], [0, 0, 0, 0, 0]]
+
+
+def test_masks_of_any_shape_come_back_as_they_were() -> None:
+    rng = np.random.default_rng(4)
+    told = 0
+    for _ in range(60):
+        drawn = np.zeros((48, 64), np.uint8)
+        points = np.cumsum(rng.integers(-9, 10, (6, 2)), axis=0) + (32, 24)
+        cv2.polylines(drawn, [points.astype(np.int32)], False, 1, int(rng.integers(1, 7)))
+        if (polygon := area_polygon(drawn > 0)) is not None:
+            told += 1
+            assert np.array_equal(area_of(polygon, SIZE), drawn > 0)
+            assert shoelace(polygon) == pytest.approx(drawn.sum(), rel=0.12)
+    assert told > 20
+    holed = np.ones((9, 9), bool)
+    holed[4, 4] = False
+    assert area_polygon(holed) is None
+    assert area_polygon(np.zeros((9, 9), bool)) is None
+
+
+def test_masks_of_vessel_and_robot_may_come_from_two_files() -> None:
+    both = merged(with_masks(VESSEL_BOX), Annotation(masks=(ROBOT_BOX,)))
+    assert both.masks == (VESSEL_BOX, ROBOT_BOX)
+    other = MaskPolygon(MaskTarget.VESSEL, ROBOT_BOX.points)
+    assert merged(both, Annotation(masks=(other,))).masks == both.masks, "what was drawn by hand stays"
 
 
 def test_run_lengths_by_hand() -> None:
@@ -101,7 +148,7 @@ def test_run_lengths_by_hand() -> None:
 
 
 def labelme(**more: Any) -> dict[str, Any]:
-    shape = {"label": "Vessel", "shape_type": "polygon", "points": [[10.5, 10.5], [50.5, 10.5], [50.5, 30.5], [10.5, 30.5]]}
+    shape = {"label": "Vessel", "shape_type": "polygon", "points": [[10, 10], [51, 10], [51, 31], [10, 31]]}
     line = {"label": "robot", "shape_type": "linestrip", "points": [[1.5, 1.5], [9.5, 1.5]]}
     return {"imagePath": "..\\frames\\frame.png", "imageWidth": 64, "imageHeight": 48, "shapes": [shape, line]} | more
 
@@ -116,7 +163,9 @@ def read(tmp_path: Path, image: FoundImage, content: object) -> tuple[list[Annot
 def test_labelme_polygons_and_lines(tmp_path: Path, image: FoundImage) -> None:
     (content,), problems = read(tmp_path, image, labelme())
     assert problems == []
-    assert content == Annotation(robot=((1.0, 1.0), (9.0, 1.0)), masks=(VESSEL_BOX,))
+    assert content.robot == ((1.0, 1.0), (9.0, 1.0))
+    for target in MaskTarget:
+        assert np.array_equal(fill(content.masks, target, SIZE), fill([VESSEL_BOX], target, SIZE))
 
 
 @pytest.mark.parametrize(
@@ -132,6 +181,7 @@ def test_labelme_polygons_and_lines(tmp_path: Path, image: FoundImage) -> None:
         (labelme(shapes=[{"label": "bone", "points": []}]), "shape 1: unknown label 'bone'"),
         (labelme(shapes=[{"label": "robot", "points": [[1, "x"]]}]), "shape 1 is damaged; left out"),
         (labelme(shapes=[{"label": "robot", "points": [[1, 1]]}]), "shape 1 is a polygon of 1 points"),
+        (labelme(shapes=[{"label": "robot", "points": [[1, 1], [1.2, 1], [1.2, 9]]}]), "shape 1 covers no pixel; left out"),
         ({"images": [], "annotations": []}, "its images or categories are damaged; left out"),
     ],
 )
@@ -145,7 +195,7 @@ def test_one_bad_shape_leaves_the_others(tmp_path: Path, image: FoundImage) -> N
     content = labelme()
     content["shapes"].insert(0, {"label": "robot", "points": None})
     (found,), problems = read(tmp_path, image, content)
-    assert found.masks == (VESSEL_BOX,)
+    assert np.array_equal(fill(found.masks, MaskTarget.VESSEL, SIZE), fill([VESSEL_BOX], MaskTarget.VESSEL, SIZE))
     assert problems == ["shape 1 is damaged; left out"]
 
 
@@ -163,7 +213,7 @@ def test_files_damaged_at_random_never_raise(tmp_path: Path, image: FoundImage) 
 
 def test_an_import_never_takes_the_place_of_work_by_hand() -> None:
     new = Annotation(((1.0, 1.0), (2.0, 2.0)), masks=(ROBOT_BOX,))
-    assert merged(with_masks(VESSEL_BOX), new) == with_masks(VESSEL_BOX)
+    assert merged(with_masks(VESSEL_BOX, ROBOT_BOX), new) == with_masks(VESSEL_BOX, ROBOT_BOX)
     assert merged(Annotation(note="mine"), new) == Annotation(new.robot, masks=new.masks, note="mine")
 
 
