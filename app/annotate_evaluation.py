@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from app.learning_commands import progress_bar
@@ -37,7 +39,7 @@ def compared_rows(
         raise AnnotationError(f"{where}: none of its annotated images is here")
     manual = manual_measurements(done, {image.sha256: image.sha256 for image in images})
     pipeline = open_pipeline(config.perception)
-    folders = {here[row.image].path.parent for row in manual}
+    folders = _names_of({here[row.image].path.parent for row in manual})
     rows: list[Measurement] = []
     reasons: Counter[str] = Counter()
     with progress_bar() as bar:
@@ -46,7 +48,7 @@ def compared_rows(
                 image = here[row.image]
                 scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(image.path)))
                 angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
-                group = image.path.parent.name if len(folders) > 1 else None  # pictures of one session are alike
+                group = folders[image.path.parent] if len(folders) > 1 else None  # pictures of one session are alike
                 rows.append(replace(row, image=image.path.name, algorithm_angle=angle, algorithm_state=state, group=group))
                 if scene.refusal is not None and row.state is not None:
                     reasons[scene.refusal.reason.value] += 1
@@ -54,6 +56,12 @@ def compared_rows(
             if not rows:
                 raise
     return rows, dict(sorted(reasons.items())), pipeline.engine, len(manual) - len(rows)
+
+
+def _names_of(folders: set[Path]) -> dict[Path, str]:
+    """Each folder from the one on that they have in common: sessions may all be called alike inside."""
+    common = Path(os.path.commonpath([folder.absolute() for folder in folders]))
+    return {folder: folder.absolute().relative_to(common).as_posix() for folder in folders}
 
 
 def raters_agreement(

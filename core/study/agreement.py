@@ -102,14 +102,14 @@ def angle_statistics(manual_deg: Floats, algorithm_deg: Floats) -> dict[str, Flo
     } | shares(error)
 
 
-def _repeat_statistics(first_deg: Floats, second_deg: Floats) -> dict[str, Floats]:
-    """Of the two manual measures: ICC, and the standard deviation of one measure, which is that of the difference / sqrt(2)."""
+def _repeat_statistics(first_deg: Floats, second_deg: Floats, spread: Floats) -> dict[str, Floats]:
+    """Of the two manual measures: ICC, and the standard deviation of one measure: that of the differences, each by its `spread`."""
     difference = second_deg - first_deg
     mean = difference.mean(-1)
-    sd = difference.std(-1, ddof=1) if difference.shape[-1] > 1 else np.full(mean.shape, np.nan)
+    sd = (difference / spread).std(-1, ddof=1) if difference.shape[-1] > 1 else np.full(mean.shape, np.nan)
     return {
         "mean_difference_deg": mean,
-        "repeatability_sd_deg": sd / np.sqrt(2.0),
+        "repeatability_sd_deg": sd,
         "icc": icc_absolute(np.stack([first_deg, second_deg], -1)),
     }
 
@@ -122,18 +122,23 @@ def angle_metrics(manual_deg: Floats, algorithm_deg: Floats, seed: int = 0, grou
     return _with_intervals(angle_statistics, (manual_deg, algorithm_deg), seed, group)
 
 
-def repeat_metrics(first_deg: Floats, second_deg: Floats, seed: int = 0, group: Group = None) -> dict[str, Any]:
+def repeat_metrics(
+    first_deg: Floats, second_deg: Floats, seed: int = 0, group: Group = None, counts: Floats | None = None
+) -> dict[str, Any]:
     """Agreement of two manual measures of the same images, both of shape (n,), with 95 % bootstrap intervals under ``ci95``.
 
-    `group` as in ``bootstrap_rows``.
+    `group` as in ``bootstrap_rows``. `counts` (n, 2): of how many single measures each one is the mean (None: of one). A difference
+    of such means has the standard deviation of one measure, times the root of 1/n1 + 1/n2; the ICC is that of the means.
     """
-    return _with_intervals(_repeat_statistics, (first_deg, second_deg), seed, group)
+    counts = np.ones((len(first_deg), 2)) if counts is None else counts
+    spread = np.sqrt((1.0 / counts).sum(axis=1))
+    return _with_intervals(_repeat_statistics, (first_deg, second_deg, spread), seed, group)
 
 
 def _with_intervals(statistics: Any, columns: tuple[Floats, ...], seed: int, group: Group) -> dict[str, Any]:
     n = len(columns[0])
     if n == 0:
-        names = statistics(*(np.zeros(1) for _ in columns))
+        names = statistics(*(np.ones(1) for _ in columns))
         return {"n": 0} | dict.fromkeys(names) | {"ci95": dict.fromkeys(names)}
     values: Mapping[str, Floats] = statistics(*columns)
     point = {name: float(value) if np.isfinite(value) else None for name, value in values.items()}

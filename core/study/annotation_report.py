@@ -174,7 +174,8 @@ def _common(name: str, group: Sequence[StoredAnnotation]) -> Measurement:
         first, later = first[:1], first[1:]
     states = [one.content.state.value for one in telling if one.content.state is not None]
     state = Counter(states).most_common(1)[0][0] if states else None
-    return Measurement(name, fmean(first) if first else None, fmean(later) if later else None, state, None, None)
+    counts = max(len(first), 1), max(len(later), 1)
+    return Measurement(name, fmean(first) if first else None, fmean(later) if later else None, state, None, None, counts=counts)
 
 
 def _label(one: StoredAnnotation) -> str:

@@ -31,7 +31,8 @@ class EvaluationError(UserError):
 class Measurement:
     """One image, measured by hand (once or twice) and by the algorithm; None = not measured. Field names are the CSV's columns.
 
-    ``group`` is the session or phantom that the image is of; images of one group are alike. None: not known.
+    ``group`` is the session or phantom that the image is of; images of one group are alike. None: not known. ``counts``: of how many
+    single measures ``angle_1`` and ``angle_2`` are the means.
     """
 
     image: str
@@ -41,6 +42,7 @@ class Measurement:
     algorithm_angle: float | None
     algorithm_state: str | None
     group: str | None = None
+    counts: tuple[int, int] = (1, 1)
 
     @property
     def manual_angle_deg(self) -> float | None:
@@ -50,7 +52,7 @@ class Measurement:
 
 
 GROUP = "group"
-COLUMNS = tuple(column.name for column in fields(Measurement) if column.name != GROUP)
+COLUMNS = tuple(column.name for column in fields(Measurement) if column.name not in (GROUP, "counts"))
 
 
 def read_measurements(path: Path) -> list[Measurement]:
@@ -177,6 +179,7 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
     pairs = angle_pairs(rows)
     twice_rows = [row for row in rows if row.angle_1 is not None and row.angle_2 is not None]
     twice = np.array([(row.angle_1, row.angle_2) for row in twice_rows], np.float64).reshape(-1, 2)
+    counts = np.array([row.counts for row in twice_rows], np.float64).reshape(-1, 2)
     labelled = [row for row in rows if row.state is not None and row.algorithm_state is not None]
     measured = [row for row in rows if row.manual_angle_deg is not None and row.algorithm_angle is not None]
     manual, algorithm = [str(row.state) for row in labelled], [str(row.algorithm_state) for row in labelled]
@@ -185,7 +188,7 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
         "intervals": _drawn(measured if measured else labelled),
         "angle": angle_metrics(pairs.manual_deg, pairs.algorithm_deg, seed, _members(measured)),
         "state": state_metrics(manual, algorithm, seed, _members(labelled)),
-        "manual": repeat_metrics(twice[:, 0], twice[:, 1], seed, _members(twice_rows)),
+        "manual": repeat_metrics(twice[:, 0], twice[:, 1], seed, _members(twice_rows), counts),
     }
     return metrics | {"notes": _angle_notes(metrics, rows) + _state_notes(metrics["state"])}
 
@@ -224,6 +227,10 @@ def _angle_notes(metrics: dict[str, Any], rows: Sequence[Measurement]) -> list[s
         notes.append("All manual or all algorithmic angles are equal: their correlation is undefined.")
     if angle["n"] > 1 and manual["n"] < 2:
         notes.append("Fewer than two images were measured twice by hand: repeatability and the manual ICC are undefined.")
+    elif any(r.counts != (1, 1) for r in rows):
+        notes.append(
+            "The two manual angles are means over several raters: the manual ICC is that of such means, not of one measure."
+        )
     return notes
 
 

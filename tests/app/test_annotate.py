@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from app.annotate_command import AnnotateOptions, StudyOptions, _config, _queue, run_annotate
+from app.annotate_evaluation import _names_of
 from app.annotate_sources import default_store, image_files
 from app.evaluate_command import run_evaluate
 from core.config import Config, TwinConfig
@@ -273,3 +274,9 @@ def test_worst_first_looks_at_disagreement_too(folder: Path) -> None:
         assert entry is not None
         store.save(ItemKey(images[0].sha256, "", "ann"), View.AS_IS, entry, content, measured, 9.0)
     assert [name for name, _, _ in queue(folder, order="worst")].index(last) < 2
+
+
+def test_sessions_that_are_called_alike_inside_are_told_apart() -> None:
+    one, other = Path("data/run_1/images"), Path("data/run_2/images")
+    assert _names_of({one, other}) == {one: "run_1/images", other: "run_2/images"}
+    assert _names_of({one}) == {one: "."}

@@ -65,6 +65,14 @@ def test_two_manual_measures() -> None:
     assert found["repeatability_sd_deg"] == pytest.approx(np.sqrt(3.0) / np.sqrt(2.0))  # differences 1, 1, 4
 
 
+@pytest.mark.parametrize(("first", "later"), [(1, 1), (3, 1), (3, 3), (4, 8)])
+def test_of_means_over_raters_the_spread_of_one_measure_is_told(first: int, later: int) -> None:
+    rng = np.random.default_rng(5)
+    means = [rng.normal(40.0, 3.0, (4000, count)).mean(axis=1) for count in (first, later)]
+    found = repeat_metrics(means[0], means[1], counts=np.tile([float(first), float(later)], (4000, 1)))
+    assert found["repeatability_sd_deg"] == pytest.approx(3.0, rel=0.04)
+
+
 @pytest.mark.parametrize("constant", [5.0, 0.1])
 def test_constant_values_have_no_correlation(constant: float) -> None:
     found = angle_metrics(np.full(3, constant), np.array([1.0, 2.0, 3.0]))

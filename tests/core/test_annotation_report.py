@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from core.config import PerceptionConfig
 from core.study.annotation_records import ItemKey, StoredAnnotation
 from core.study.annotation_report import agreement_report, choose_study, manual_measurements, write_measures
 from core.study.annotations import Annotation, AnnotationError, View, measure_lines
+from core.study.evaluation import evaluate
 from core.types import PoseState
 
 TRUE_DEG = np.linspace(0.0, 60.0, 200)
@@ -91,6 +93,15 @@ def test_the_common_answer() -> None:
     assert common(*twice) == (5.0, 9.0, "C")
     assert common(answer("i", "ann", 1, None, None), answer("i", "bob", 1, 3.0, c)) == (3.0, None, "C")
     assert common(answer("i", "ann", 1, None, None)) == (None, None, None)
+
+
+def test_a_row_tells_of_how_many_measures_its_angles_are_the_means() -> None:
+    answers = [answer("i", who, k, 4.0, PoseState.B) for who, repeats in (("ann", (1, 2, 3)), ("bob", (1,))) for k in repeats]
+    (row,) = manual_measurements(answers, {})
+    assert row.counts == (2, 2)
+    rows = [replace(row, image=str(k), angle_1=4.0 + k, algorithm_angle=5.0 + k) for k in range(3)]
+    assert any("means over several raters" in note for note in evaluate(rows)["notes"])
+    assert not any("means" in note for note in evaluate([replace(one, counts=(1, 1)) for one in rows])["notes"])
 
 
 def test_several_studies_ask_for_a_choice() -> None:
