@@ -42,24 +42,28 @@ class RingSaver:
         return self._thread is None or not self._thread.is_alive()
 
     def _write(self, about: About, frames: list[EncodedFrame], events: list[Event], now_s: float) -> None:
-        problem = ""
-        folder: Path | None = None
+        files: SessionFiles | None = None
+        problem, written = "", 0
         try:
             first_s = frames[0].captured_s
             files = SessionFiles(self._parent, about, self._config, first_s=first_s, now_s=now_s, origin="last seconds")
-            folder = files.folder
-            try:
-                for event in events:
-                    files.write_event(event)
-                for frame in frames:
-                    files.write_frame(frame)
-            finally:
-                problem = files.close("saved from memory", 0)
+            for event in events:
+                files.write_event(event)
+            for frame in frames:
+                files.write_frame(frame)
+                written += 1
         except (VideoError, SessionError) as error:
             problem = str(error)
         except OSError as error:
             problem = f"{error.filename or self._parent}: {error.strerror or error}"
-        if problem:
+        if files is not None:
+            # The folder itself says that it is not whole: a message in a window is soon forgotten.
+            at_end = files.close(problem or "saved from memory", len(frames) - written)
+            problem = problem or at_end
+        if not problem:
+            self._board.show(saving=False, saved=files.folder if files is not None else None)
+        elif not written:
             self._board.show(saving=False, problem=f"the last seconds were not saved: {problem}")
         else:
-            self._board.show(saving=False, saved=folder)
+            part = f"{written} of {len(frames)} frames"
+            self._board.show(saving=False, problem=f"of the last seconds only {part} were saved: {problem}")

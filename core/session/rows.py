@@ -131,7 +131,7 @@ def _scene(scene: Scene, with_masks: bool, broken: list[str]) -> Row:
         "route_problem": scene.route_problem,
         "bridges": [[_point(a), _point(b)] for a, b in scene.skeletons.bridges] if scene.skeletons else None,
         "masks": _masks(scene.masks) if scene.masks and with_masks else None,
-        "graph": _whole(_graph(scene.vessel_graph), "graph", broken) if scene.vessel_graph and with_masks else None,
+        "graph": _graph(scene.vessel_graph, broken) if scene.vessel_graph and with_masks else None,
     }
 
 
@@ -190,7 +190,11 @@ def _outlines(mask: Mask, leave_px: float) -> list[list[int]]:
     return [np.diff(outline, axis=0, prepend=0).ravel().tolist() for outline in outlines]
 
 
-def _graph(graph: VesselGraph) -> Row:
+def _graph(graph: VesselGraph, broken: list[str]) -> Row | None:
+    """None where a node or a radius is no number: an edge that leads nowhere is no edge."""
+    if not all(np.isfinite(numbers).all() for numbers in (graph.nodes, *(edge.radius for edge in graph.edges))):
+        broken.append("graph")
+        return None
     edges = [
         [edge.start, edge.end, _line(edge.points, 1), finite(float(edge.radius.mean()) if edge.radius.size else 0.0, 1)]
         for edge in graph.edges

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from core.config import PerceptionConfig
-from core.learning.dataset import write_mask
+from core.images import ImageError, read_image
+from core.learning.dataset import IMAGE_ENDINGS, write_mask, write_png
 from core.study.annotation_images import FoundImage
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotation_report import manual_measurements
@@ -73,7 +74,7 @@ def export_training_set(
             if not go_on():
                 raise AnnotationError(f"{out}: given up half-way; it is no whole set")
             image, stem = here[sha256], stems[sha256]
-            shutil.copyfile(image.path, out / "images" / f"{stem}{image.path.suffix.lower()}")
+            _put_image(image.path, out / "images", stem)
             for target in MaskTarget:
                 mask = fill(one.content.masks, target, image.record.size)
                 write_mask(out / "masks" / f"{stem}_{target.value}.png", mask)
@@ -82,6 +83,18 @@ def export_training_set(
     except OSError as error:
         raise AnnotationError(f"{error.filename or out}: cannot be written ({error.strerror}); choose another --out") from None
     return len(complete), problems
+
+
+def _put_image(path: Path, folder: Path, stem: str) -> None:
+    """The file as it is, or as PNG where it is of a kind that training does not look for. Raises OSError, AnnotationError."""
+    ending = path.suffix.lower()
+    if ending in IMAGE_ENDINGS:
+        shutil.copyfile(path, folder / f"{stem}{ending}")
+        return
+    try:
+        write_png(folder / f"{stem}.png", read_image(path))
+    except ImageError as error:
+        raise AnnotationError(str(error)) from None
 
 
 def _stems(images: Sequence[FoundImage]) -> dict[str, str]:

@@ -31,8 +31,8 @@ class EvaluationError(UserError):
 class Measurement:
     """One image, measured by hand (once or twice) and by the algorithm; None = not measured. Field names are the CSV's columns.
 
-    ``group`` is the session or phantom that the image is of; images of one group are alike. None: not known. ``counts``: of how many
-    single measures ``angle_1`` and ``angle_2`` are the means.
+    ``group`` is the session or phantom that the image is of; images of one group are alike. None: not known. ``counts``: of how
+    many single measures ``angle_1`` and ``angle_2`` are the means.
     """
 
     image: str
@@ -228,9 +228,7 @@ def _angle_notes(metrics: dict[str, Any], rows: Sequence[Measurement]) -> list[s
     if angle["n"] > 1 and manual["n"] < 2:
         notes.append("Fewer than two images were measured twice by hand: repeatability and the manual ICC are undefined.")
     elif any(r.counts != (1, 1) for r in rows):
-        notes.append(
-            "The two manual angles are means over several raters: the manual ICC is that of such means, not of one measure."
-        )
+        notes.append("The two manual angles are means over several raters: the manual ICC is that of means, not of one measure.")
     return notes
 
 

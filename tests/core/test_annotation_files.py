@@ -62,6 +62,16 @@ def test_a_training_set_is_what_training_reads(image: FoundImage, tmp_path: Path
         export_training_set([newer], [image], out)
 
 
+@pytest.mark.parametrize("ending", [".webp", ".JPG"])
+def test_training_finds_every_image_of_its_set(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"frame{ending}"
+    cv2.imwrite(str(path), np.full((48, 64, 3), 90, np.uint8))
+    image = FoundImage(path, ImageRecord("ab" * 32, path.name, *SIZE))
+    assert export_training_set([stored(with_masks(VESSEL_BOX, ROBOT_BOX))], [image], tmp_path / "set") == (1, [])
+    (sample,), _ = find_labelled(tmp_path / "set")
+    assert sample.load()[0].mean() == pytest.approx(90, abs=2)
+
+
 def test_a_training_set_leaves_out_half_done_images_by_name(image: FoundImage, tmp_path: Path) -> None:
     with pytest.raises(AnnotationError, match="no image has both a vessel and a robot mask"):
         export_training_set([stored(with_masks(VESSEL_BOX))], [image], tmp_path / "set")

@@ -114,6 +114,18 @@ def test_what_is_not_finite_becomes_none_and_is_named() -> None:
     assert row.scene.vessel_vector is not None
 
 
+@pytest.mark.parametrize("where", ["node", "radius"])
+def test_a_graph_with_a_place_that_is_none_is_left_out(where: str) -> None:
+    scene = full_scene(0, 1.0)
+    assert scene.vessel_graph is not None
+    (scene.vessel_graph.nodes[0] if where == "node" else scene.vessel_graph.edges[0].radius)[0] = np.nan
+    tick = replace(tick_of(0, 1.0, full=True), scene=scene)
+    assert row_of(tick, None)["not_finite"] == ["graph"]
+    row = through_json(tick)
+    assert row.scene.vessel_graph is None
+    assert row.scene.pose == scene.pose
+
+
 def test_a_light_tick_keeps_what_is_recorded() -> None:
     tick = tick_of(0, 1.0, full=True)
     light = light_tick(tick)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -290,6 +291,31 @@ def test_the_last_seconds_are_saved_without_having_recorded(tmp_path: Path) -> N
         assert 2.0 <= reader.duration_s <= 3.0
         assert [e.text for e in reader.events if e.kind is EventKind.NOTE] == ["new"]
         assert manifest.started_monotonic_s == reader.timeline().time_s[0]
+
+
+def test_last_seconds_that_were_saved_in_part_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the folder, too: the message in the window is gone the next day."""
+    writes = SessionFiles.write_frame
+    written: list[int] = []
+
+    def full_after_twenty(files: SessionFiles, frame: EncodedFrame) -> None:
+        if len(written) == 20:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(files.folder))
+        written.append(1)
+        writes(files, frame)
+
+    monkeypatch.setattr(SessionFiles, "write_frame", full_after_twenty)
+    with writer_in(tmp_path, replace_config(ring_s=60.0)) as writer:
+        for tick in ticks(50):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().problem)
+        assert writer.status().problem.startswith("of the last seconds only 20 of 50 frames were saved: ")
+        assert writer.status().saved is None
+    (session,) = (path for path in tmp_path.iterdir() if path.is_dir())
+    manifest = read_manifest(session)
+    assert (manifest.counts.frames, manifest.counts.dropped) == (20, 30)
+    assert manifest.ended.endswith("No space left on device")
 
 
 def test_a_recording_and_the_last_seconds_share_one_encoder(tmp_path: Path) -> None:
