@@ -89,6 +89,7 @@ FIXED = (
     "zeroing the servos",
     "switching the torque off",
     "stopped meanwhile: acknowledge, then switch the servos on again",
+    "the torque was switched off meanwhile: switch the servos on again",
     # phantoms of the twin
     "S-curve",
     "Y-branch",

@@ -140,22 +140,19 @@ class DriveDesk(QObject):
     @Slot()
     def switch_on(self) -> None:
         pilot = self._thread.pilot
-        if pilot is not None:
-            pilot.switch_on()
+        if pilot is not None and pilot.switch_on():
             self._panels.log(EventKind.OPERATOR, tr("servos on"))
 
     @Slot(int)
     def reboot(self, servo_id: int) -> None:
         pilot = self._thread.pilot
-        if pilot is not None:
-            pilot.reboot(servo_id)
+        if pilot is not None and pilot.reboot(servo_id):
             self._panels.log(EventKind.OPERATOR, tr("restart servo {servo_id}", servo_id=servo_id))
 
     @Slot(object)
     def zero(self, names: Sequence[JointName] | None) -> None:
         pilot = self._thread.pilot
-        if pilot is not None:
-            pilot.zero(names)
+        if pilot is not None and pilot.zero(names):
             self._panels.log(
                 EventKind.OPERATOR,
                 tr("zero {what}", what=", ".join(tr_text(name) for name in names) if names else tr("all servos")),
@@ -164,8 +161,7 @@ class DriveDesk(QObject):
     @Slot()
     def torque_off(self) -> None:
         pilot = self._thread.pilot
-        if pilot is not None:
-            pilot.torque_off()
+        if pilot is not None and pilot.torque_off():
             self._panels.log(EventKind.OPERATOR, tr("torque off"))
 
     def drive(self, jog: Jog) -> None:

@@ -87,7 +87,7 @@ def who_drives(view: DriveView | None) -> str:
         return tr("the program drives")
     if view.permitted is Source.OPERATOR:
         return tr("you steer")
-    return tr("nothing moves") if view.servos_on or view.latched is not None else tr("servos are off")
+    return tr("nothing moves") if view.servos_on or view.latched is not None else tr("servos follow nobody")
 
 
 def next_step(view: DriveView) -> NextStep:
@@ -103,8 +103,12 @@ def next_step(view: DriveView) -> NextStep:
         return NextStep(Step.SERVOS_ON, False, sentence(view.busy).rstrip(".。"), tr("this takes a moment"))
     if not view.servos_on:
         faults = tuple(fault.cause for fault in view.active if AREA[fault.cause] is Area.SERVOS and _holds(fault))
-        rest = tr("press {key}: they are checked, then hold where they are", key=Step.SERVOS_ON.value.key)
-        return _refused(Step.SERVOS_ON, faults) if faults else NextStep(Step.SERVOS_ON, True, tr("The servos are off"), rest)
+        rest = tr("press {key}: they are checked with the torque off, then tighten the wires", key=Step.SERVOS_ON.value.key)
+        return (
+            _refused(Step.SERVOS_ON, faults)
+            if faults
+            else NextStep(Step.SERVOS_ON, True, tr("The servos follow nobody, but may still pull"), rest)
+        )
     if view.mode is Mode.ARMED:
         return _hand_over(view)
     if view.against_arming:

@@ -183,14 +183,14 @@ class ServoTable(QWidget):
 
     def _offer(self) -> None:
         free = self._reachable and not self._armed
-        why = "" if free else tr("disarm first") if self._armed else tr("the servo bus is not open")
+        why = "" if free else tr("press STOP or Torque off first") if self._armed else tr("the servo bus is not open")
         self._restart_button.setEnabled(free)
         self._zero_button.setEnabled(free)
         self._off_button.setEnabled(self._reachable)
         self._restart_button.setToolTip(why or tr("Restart one servo, which clears its error; its joint must be zeroed again"))
         self._zero_button.setToolTip(why or tr("The present positions become 0 mm; the wires must be slack"))
         self._off_button.setToolTip(
-            tr("Disarm and let all motors go, which releases the wires' tension") if self._reachable else why
+            tr("Let all motors go, which releases the wires' tension; not while armed") if self._reachable else why
         )
         self._question.cancel()  # it was asked under other circumstances
 

@@ -41,6 +41,7 @@ class Hindrance(StrEnum):
     CAMERA_SETTLING = "camera not well for long enough"
     PERCEPTION_SETTLING = "perception not well for long enough"
     SERVOS_UNCHECKED = "servos not checked"
+    SERVOS_BUSY = "servos busy"
     NOT_YET_ARMED = "arm first"
     ALREADY_AUTONOMOUS = "already handed over"
     NO_DESTINATION = "no destination chosen"

@@ -108,25 +108,30 @@ class Pilot:
         self._busy_s = self._clock()
         self._inbox.post(act)
 
-    def switch_on(self) -> None:
-        """Check the servos and switch their torque on. Refused, with an alert, unless in ADVISORY with nothing to acknowledge."""
-        if self._may_request():
+    def switch_on(self) -> bool:
+        """Check the servos and switch their torque on. Refused, with an alert, unless in ADVISORY with nothing to acknowledge and
+        nothing under way; tells whether it was not. So do the next three."""
+        if is_free := self._may_request():
             self._requests.switch_on()
+        return is_free
 
-    def zero(self, names: Sequence[JointName] | None = None) -> None:
+    def zero(self, names: Sequence[JointName] | None = None) -> bool:
         """Take the present positions, of all joints or of those named, for zero; refused like ``switch_on``."""
-        if self._may_request():
+        if is_free := self._may_request():
             self._requests.zero(names)
+        return is_free
 
-    def reboot(self, servo_id: int) -> None:
+    def reboot(self, servo_id: int) -> bool:
         """Restart a servo, which clears its hardware error; also while a fault waits to be acknowledged."""
-        if self._may_request(although_latched=True):
+        if is_free := self._may_request(although_latched=True):
             self._requests.reboot(servo_id)
+        return is_free
 
-    def torque_off(self) -> None:
-        """Let the wires go slack; also while a fault waits to be acknowledged."""
-        if self._may_request(although_latched=True):
+    def torque_off(self) -> bool:
+        """Let the wires go slack; also while a fault waits to be acknowledged, and after whatever is under way."""
+        if is_free := self._may_request(although_latched=True, although_busy=True):
             self._requests.torque_off()
+        return is_free
 
     def halt(self) -> None:
         """The program ends: from the next turn on nobody drives, and the robot holds."""
@@ -254,20 +259,21 @@ class Pilot:
 
     # ---- parts of a turn
 
-    def _may_request(self, *, although_latched: bool = False) -> bool:
+    def _may_request(self, *, although_latched: bool = False, although_busy: bool = False) -> bool:
         """Whether the servos are free for a request, which follows; if not, an alert says why. One at a time."""
-        view = self.view
-        reasons: list[Hindrance] = []
+        view, busy, reason = self.view, self._requests.busy, None
         if view.mode in ARMED_MODES:
-            reasons.append(Hindrance.ALREADY_ARMED)
+            reason = Hindrance.ALREADY_ARMED
         elif view.latched is not None and not although_latched:
-            reasons.append(Hindrance.IS_STOPPED if view.mode is Mode.STOPPED else Hindrance.UNACKNOWLEDGED)
-        for reason in reasons:
-            with self._lock:
-                self._alerts.append(Alert(reason, ALERTS[reason]))
-        if not reasons:
+            reason = Hindrance.IS_STOPPED if view.mode is Mode.STOPPED else Hindrance.UNACKNOWLEDGED
+        elif busy and not although_busy:
+            reason = Hindrance.SERVOS_BUSY
+        if reason is None:
             self._busy_s = self._clock()
-        return not reasons and not self._requests.busy
+            return True
+        with self._lock:
+            self._alerts.append(Alert(reason, ALERTS[reason], busy if reason is Hindrance.SERVOS_BUSY else ""))
+        return False
 
     def _hear(self, inputs: Inputs, sent: SentMotion | None, seen: Seen | None, now_s: float) -> None:
         """Add to the events what servos, controls and the way say now."""

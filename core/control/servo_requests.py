@@ -17,7 +17,7 @@ _log = logging.getLogger(__name__)
 
 
 class Interrupted(DeviceError):
-    """STOP came while the servos were being switched on."""
+    """STOP, or the wish to let the wires go, came while the servos were being switched on."""
 
 
 class ServoRequests:
@@ -34,8 +34,15 @@ class ServoRequests:
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="servo request")
         self._lock = threading.Lock()
         self._stops = 0
+        self._offs = 0
         self._blocked = False
-        self.busy = ""
+        self._waiting: list[str] = []
+
+    @property
+    def busy(self) -> str:
+        """What is being done; "" for nothing."""
+        with self._lock:
+            return self._waiting[0] if self._waiting else ""
 
     def stopped(self) -> None:
         """STOP: what is running or waiting must not switch anything on, and nothing does before an acknowledgement."""
@@ -45,8 +52,9 @@ class ServoRequests:
 
     def switch_on(self) -> None:
         """Check the servos and switch their torque on; a bus process that is gone is started again."""
-        stops = self._stops
-        self._request("checking the servos", lambda: self._switch_on(stops))
+        with self._lock:
+            asked = self._stops, self._offs
+        self._request("checking the servos", lambda: self._switch_on(asked))
 
     def acknowledge(self) -> None:
         """The operator has seen why the servos were stopped."""
@@ -63,7 +71,9 @@ class ServoRequests:
         self._request(f"restarting servo {servo_id}", lambda: self._off_and(lambda: self._robot.reboot(servo_id)))
 
     def torque_off(self) -> None:
-        """Let the wires go slack."""
+        """Let the wires go slack, at once after what is under way; servos that are being switched on are not."""
+        with self._lock:
+            self._offs += 1
         self._request("switching the torque off", lambda: self._off_and(self._robot.torque_off))
 
     def close(self) -> None:
@@ -81,31 +91,43 @@ class ServoRequests:
                 _log.error("%s failed", what, exc_info=error)
                 self._post(ServosChecked((f"{what} failed ({type(error).__name__}: {error}): start the rig again",)))
             finally:
-                self.busy = ""
+                self._ended(what)
 
-        self.busy = what
+        with self._lock:
+            self._waiting.append(what)
         try:
             self._worker.submit(run)
         except RuntimeError:  # closed already
-            self.busy = ""
+            self._ended(what)
 
-    def _switch_on(self, stops: int) -> None:
+    def _ended(self, what: str) -> None:
+        with self._lock:
+            self._waiting.remove(what)
+
+    def _switch_on(self, asked: tuple[int, int]) -> None:
         robot = self._robot
         self._post(ServosOff())
-        if robot.failure is not None and self._may_go_on(stops):
+        self._check(asked)
+        if robot.failure is not None:
             robot.connect()
         for step in (robot.disarm, robot.acknowledge, robot.arm):
-            if not self._may_go_on(stops):
-                raise Interrupted("stopped meanwhile: acknowledge, then switch the servos on again")
+            self._check(asked)
             step()
-        if not self._may_go_on(stops):
+        try:
+            self._check(asked)
+        except Interrupted:
             robot.stop()
-            raise Interrupted("stopped meanwhile: acknowledge, then switch the servos on again")
+            raise
         self._post(ServosChecked())
 
-    def _may_go_on(self, stops: int) -> bool:
+    def _check(self, asked: tuple[int, int]) -> None:
+        """Raise Interrupted when something came since that speaks against switching on."""
         with self._lock:
-            return self._stops == stops and not self._blocked
+            is_stopped, is_off = self._blocked or self._stops != asked[0], self._offs != asked[1]
+        if is_stopped:
+            raise Interrupted("stopped meanwhile: acknowledge, then switch the servos on again")
+        if is_off:
+            raise Interrupted("the torque was switched off meanwhile: switch the servos on again")
 
     def _off_and(self, do: Callable[[], None]) -> None:
         """Nobody drives any more before the servos were switched on again."""

@@ -135,7 +135,7 @@ class ServoBus:
         Raises
         ------
         NotReady
-            A joint has no zero, or a servo reports a hardware error.
+            A joint has no zero, has lost it by a restart, or a servo reports a hardware error.
         WrongServo, NoAnswer, Refused
             The torque of all servos is off again, or the message says of which one it may be on.
         """
@@ -148,7 +148,8 @@ class ServoBus:
                 self._line.write(joint.id, setup.TORQUE, b"\0")
             for joint in self._joints:
                 self._configure(joint)
-                setup.map_block(self._line, joint)
+                if setup.map_block(self._line, joint):  # else nobody would ever know: it counts from another turn now
+                    self._zeros.pop(joint.id, None)
                 setup.set_profile(self._line, joint)
             self._check_zeroed()
             setup.goal_to_position(self._line, self.config)
@@ -285,7 +286,8 @@ class ServoBus:
     def _check_zeroed(self) -> None:
         missing = [joint.name for joint in self._joints if joint.id not in self._zeros]
         if missing:
-            raise NotReady(f"not zeroed: {', '.join(missing)}: slacken the wires and zero before arming")
+            names = ", ".join(missing)
+            raise NotReady(f"not zeroed: {names} (or restarted since then): slacken the wires and zero before arming")
 
     def _configure(self, joint: JointConfig) -> None:
         if setup.configure(self._line, joint):

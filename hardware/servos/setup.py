@@ -102,11 +102,13 @@ def configure(line: ServoLine, joint: JointConfig) -> bool:
     return bool(wrong)
 
 
-def map_block(line: ServoLine, joint: JointConfig) -> None:
-    """Gather the status block; not written when it is in place already."""
+def map_block(line: ServoLine, joint: JointConfig) -> bool:
+    """Gather the status block; not written when it is in place already. True: it was not, so that the servo has restarted."""
     wanted = indirect_addresses()
-    if line.read(joint.id, INDIRECT_ADDRESS, len(wanted)) != wanted:
-        line.write(joint.id, INDIRECT_ADDRESS, wanted)
+    if line.read(joint.id, INDIRECT_ADDRESS, len(wanted)) == wanted:
+        return False
+    line.write(joint.id, INDIRECT_ADDRESS, wanted)
+    return True
 
 
 def set_profile(line: ServoLine, joint: JointConfig) -> None:

@@ -927,6 +927,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the torque was switched off meanwhile: switch the servos on again</source>
+        <translation>期间力矩已关闭：请重新开启舵机</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>S-curve</source>
         <translation>S 形弯</translation>
     </message>
@@ -2402,8 +2407,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
-        <source>servos are off</source>
-        <translation>舵机未开启</translation>
+        <source>servos follow nobody</source>
+        <translation>舵机未受控</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
@@ -2412,8 +2417,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
-        <source>press {key}: they are checked, then hold where they are</source>
-        <translation>按 {key}：先检查舵机，然后保持原位</translation>
+        <source>press {key}: they are checked with the torque off, then tighten the wires</source>
+        <translation>按 {key}：先在无力矩下检查，然后张紧驱动丝</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
@@ -2477,8 +2482,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
-        <source>The servos are off</source>
-        <translation>舵机未开启</translation>
+        <source>The servos follow nobody, but may still pull</source>
+        <translation>舵机未受控，但可能仍有拉力</translation>
     </message>
     <message>
         <location filename="../../app/operator_devices.py"/>
@@ -6220,8 +6225,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>disarm first</source>
-        <translation>请先解除待命</translation>
+        <source>press STOP or Torque off first</source>
+        <translation>请先停止或关闭力矩</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -6240,8 +6245,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>Disarm and let all motors go, which releases the wires' tension</source>
-        <translation>解除待命并放开所有电机，驱动丝张力随之释放</translation>
+        <source>Let all motors go, which releases the wires' tension; not while armed</source>
+        <translation>松开所有电机，驱动丝随之松弛；待命时不可用</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -7784,6 +7789,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>servos busy</source>
+        <translation>舵机忙</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>arm first</source>
         <translation>请先进入待命</translation>
     </message>
@@ -7944,8 +7954,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>free the wire, restart the servo, zero it, then acknowledge</source>
-        <translation>松开驱动丝，重启舵机并归零，然后确认</translation>
+        <source>free the wire, restart the servo, acknowledge, then zero it</source>
+        <translation>松开驱动丝，重启舵机，确认，然后归零</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8004,8 +8014,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>start the servo bus again, then acknowledge</source>
-        <translation>重新启动舵机总线，然后确认</translation>
+        <source>acknowledge, then switch the servos on: that starts it again</source>
+        <translation>确认，然后开启舵机：总线会随之重新启动</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8014,8 +8024,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>zero the servos again, then acknowledge</source>
-        <translation>重新给舵机归零，然后确认</translation>
+        <source>acknowledge, then zero the servos again</source>
+        <translation>确认，然后将舵机重新归零</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8459,8 +8469,23 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>The servos follow nobody</source>
+        <translation>舵机未受控</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>switch them on; that checks them, too</source>
         <translation>请开启；开启时会一并检查</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>The servos are busy</source>
+        <translation>舵机正忙</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>ask again when that has ended</source>
+        <translation>请在其结束后再试</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

@@ -86,7 +86,7 @@ def asked(bar: ModeBar) -> list[str]:
     ("view", "mode", "who"),
     [
         (None, "ADVISORY", "pictures only"),
-        (OFF, "ADVISORY", "servos are off"),
+        (OFF, "ADVISORY", "servos follow nobody"),
         (READY, "ADVISORY", "you steer"),
         (DriveView(0.0, latched=Fault(Cause.HOT)), "ADVISORY", "nothing moves"),
         (ARMED, "ARMED", "you steer"),
@@ -135,7 +135,12 @@ def test_badge_repaints_only_for_something_new(qtbot: QtBot, monkeypatch: pytest
 @pytest.mark.parametrize(
     ("view", "step", "granted", "text"),
     [
-        (OFF, Step.SERVOS_ON, True, "The servos are off. Press F3: they are checked, then hold where they are."),
+        (
+            OFF,
+            Step.SERVOS_ON,
+            True,
+            "The servos follow nobody, but may still pull. Press F3: they are checked with the torque off, then tighten the wires.",
+        ),
         (DriveView(0.0, busy="checking the servos"), Step.SERVOS_ON, False, "Checking the servos. This takes a moment."),
         (READY, Step.ARM, True, "You steer. Press F6 to arm; then you can hand over to the program."),
         (ARMED, Step.HAND_OVER, True, "Ready. Hold Shift, then press F7 to hand over."),

@@ -372,7 +372,7 @@ def test_while_armed_only_the_torque_can_be_let_go(table: ServoTable) -> None:
         "Switch all torque off": True,
     }
     assert not button(table, "Zero").isEnabled()
-    assert button(table, "Zero").toolTip() == "disarm first"
+    assert button(table, "Zero").toolTip() == "press STOP or Torque off first"
     table.show_status(None, SERVOS)
     assert not button(table, "Torque off").isEnabled()
 

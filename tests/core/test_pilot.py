@@ -286,6 +286,47 @@ def test_zeroing_restarting_and_letting_go_need_switching_on_afterwards(bench: B
             bench.done().turn()
 
 
+@pytest.mark.parametrize("during", ["disarm", "arm"])
+def test_letting_the_wires_go_is_never_lost_behind_what_is_under_way(bench: Bench, during: str) -> None:
+    """Checking seven servos on a bad line takes seconds; who changes his mind meanwhile finds the servos without torque."""
+    under_way, go_on, plain = threading.Event(), threading.Event(), getattr(bench.robot, during)
+
+    def slow() -> None:
+        plain()
+        if not under_way.is_set():
+            under_way.set()
+            assert go_on.wait(10.0)
+
+    setattr(bench.robot, during, slow)
+    assert bench.pilot.switch_on()
+    assert under_way.wait(10.0)
+    assert bench.pilot.torque_off()
+    go_on.set()
+    bench.done().turn(2)
+    assert bench.robot.calls[-2:] == ["disarm", "torque off"]
+    assert not bench.pilot.view.servos_on
+    assert bench.robot.calls.count("arm") == (during == "arm")
+
+
+def test_while_the_servos_are_busy_other_requests_are_refused_aloud(bench: Bench) -> None:
+    under_way, go_on = threading.Event(), threading.Event()
+
+    def slow() -> None:
+        under_way.set()
+        assert go_on.wait(10.0)
+
+    bench.robot.arm = slow  # type: ignore[method-assign]
+    assert bench.pilot.switch_on()
+    assert under_way.wait(10.0)
+    for request in (bench.pilot.zero, bench.pilot.switch_on, lambda: bench.pilot.reboot(3)):
+        assert not request()
+        (alert,) = bench.pilot.news().alerts
+        assert (alert.key, alert.detail) == (Hindrance.SERVOS_BUSY, "checking the servos")
+    go_on.set()
+    assert bench.done().turn(2).pilot.view.servos_on
+    assert "zero" not in bench.robot.calls
+
+
 def test_following_the_advice_is_measured(bench: Bench) -> None:
     bench.on().jog = Jog(bend=0.5, advance=0.5)
     assert bench.seconds(1.0).pilot.view.follow_share == 1.0

@@ -786,6 +786,20 @@ def test_27_a_restarted_servo_is_noticed_disarmed_and_must_be_zeroed(twin: SoftS
     assert armed.is_armed
 
 
+def test_27_a_servo_that_restarts_between_disarming_and_arming_is_not_armed(twin: SoftServoBus, armed: ServoBus) -> None:
+    """Nobody has read it meanwhile: the block that it has forgotten is the only sign, and arming must not wipe it off."""
+    armed.disarm()
+    twin.stir(5, lambda servo: servo.restart(silent_s=0.0))
+    with pytest.raises(NotReady, match="not zeroed: advance "):
+        armed.arm()
+    assert not armed.is_armed
+    assert not any(state.torque for state in _states(armed))
+    assert [ticks is None for ticks in armed.zero_ticks] == [False] * 4 + [True] + [False] * 2
+    armed.set_zero(["advance"])
+    armed.arm()
+    assert armed.is_armed
+
+
 def test_27_a_reboot_clears_the_error_and_the_turns(twin: SoftServoBus, bus: ServoBus) -> None:
     twin.stir(5, lambda servo: servo.turn(3 * 4096))
     twin.stir(5, lambda servo: servo.alert(32))
