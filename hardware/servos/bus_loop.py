@@ -44,6 +44,7 @@ class BusLoop:
         self._ended = self._quiet = self._lost = False
         self._reopen_at_s = 0.0
         self._stop_s = -math.inf
+        self._owes_torque_off, self._off_problem = False, ""
         self._does: dict[str, Callable[[Request], None]] = {
             "open": lambda _: self._open(),
             "zero": lambda request: bus.set_zero(request.details.get("names")),
@@ -97,7 +98,8 @@ class BusLoop:
         started_s = time.monotonic()
         self._cycle += 1
         silence_s = self._guard.silence_s(self._end.heartbeat(), started_s)
-        self._quiet = not self._guard.armed and silence_s > self._servos.heartbeat_timeout_s + _LINGER_S
+        is_settled = not self._guard.armed and not self._owes_torque_off
+        self._quiet = is_settled and silence_s > self._servos.heartbeat_timeout_s + _LINGER_S
         self._readings = ()
         if self._bus.is_open and not self._quiet:
             self._guard_port(self._talk)
@@ -116,6 +118,8 @@ class BusLoop:
             self._end_motion(fault)
         elif self._guard.armed:
             self._drive()
+        elif self._owes_torque_off:
+            self._pay_torque_off()
         elif self._settle > 0:
             self._settle -= 1
             if not self._holds():
@@ -135,18 +139,34 @@ class BusLoop:
     def _end_motion(self, fault: Fault) -> None:
         """Goal = measured; no more goals. What stops may switch the torque off, too."""
         self._guard.end_motion(fault)
+        stops = REACTION[fault.cause] is Reaction.STOP and self._servos.torque_off_on_stop
+        self._owes_torque_off = self._owes_torque_off or stops
         if not self._bus.is_open:
             return
         self._settle = _SETTLE_CYCLES
         self._bus.disarm()
-        if REACTION[fault.cause] is Reaction.STOP and self._servos.torque_off_on_stop:
-            try:
-                self._bus.torque_off()
-            except PortLost:
-                raise
-            except ServoError as error:
-                first = self._guard.latched or fault  # the first cause stays
-                self._guard.latched = replace(first, detail=f"{first.detail} {error}".strip())
+        if self._owes_torque_off:
+            self._pay_torque_off()
+
+    def _pay_torque_off(self) -> None:
+        """Torque off, tried again with each turn until the servos say so: a burst of noise takes three packets in a row."""
+        try:
+            self._bus.torque_off()
+        except PortLost:
+            raise
+        except ServoError as error:
+            self._tell_of_torque(str(error))
+        else:
+            self._owes_torque_off = False
+            self._tell_of_torque("")
+
+    def _tell_of_torque(self, problem: str) -> None:
+        """In the line of the first cause, which stays; no longer, once it is over."""
+        first = self._guard.latched
+        if first is not None and problem != self._off_problem:
+            detail = first.detail.removesuffix(self._off_problem).strip()
+            self._guard.latched = replace(first, detail=f"{detail} {problem}".strip())
+            self._off_problem = problem
 
     def _holds(self) -> bool:
         """Whether all servos that tell have a goal where they are; a hold has no answer, and may have got lost."""
@@ -165,6 +185,7 @@ class BusLoop:
 
     def _lose_port(self) -> None:
         self._guard.end_motion(self._guard.lost_port())
+        self._owes_torque_off = self._servos.torque_off_on_stop
         self._readings = ()
         self._lost = True
         self._reopen_at_s = time.monotonic() + _REOPEN_S
@@ -187,6 +208,7 @@ class BusLoop:
         self._guard.check_arming()
         self._bus.arm()
         self._settle = 0
+        self._owes_torque_off, self._off_problem = False, ""
         self._guard.set_armed(time.monotonic())
 
     def _disarm(self) -> None:
@@ -204,6 +226,7 @@ class BusLoop:
         self._guard.disarm()
         self._settle = 0
         self._bus.torque_off()
+        self._owes_torque_off = False
 
     def _serve(self, request: Request, *, after_stop: bool) -> None:
         """Do it and answer. `after_stop`: STOP came while the request waited, and nobody can have seen that who asked before."""

@@ -18,7 +18,7 @@ _MAX_VELOCITY, _MAX_ACCELERATION = 1023, 32767
 _DEFAULT_CURRENT_MA = 2.69
 # Robotis e-Manual, Present Current(126). XL430 servos report a load in 0.1 % there, and are not listed.
 _CURRENT_MA = {
-    **dict.fromkeys((1000, 1010, 1040, 1050), 1.34),  # XH430
+    **dict.fromkeys((1040, 1050), 1.34),  # XH430-V, of 24 V; the XH430-W, of 12 V, count like the others
     **dict.fromkeys((1190, 1200, 1210, 1220, 1230, 1240), 1.0),  # XL330, XC330
 }
 _LOAD_MODELS = frozenset({1060, 1070, 1080, 1090})

@@ -16,6 +16,7 @@ from hardware.servos.errors import NotReady, ServoError, TorqueStillOn
 from hardware.servos.guard_end import Request
 from hardware.servos.line import LineCounts
 from hardware.servos.servo_robot import ServoRobot
+from hardware.servos.status_block import MissingServo
 
 
 class PaperBus:
@@ -30,6 +31,9 @@ class PaperBus:
 
     def disarm(self) -> None:
         self.told.append("hold")
+
+    def read(self) -> tuple[MissingServo, ...]:
+        return tuple(MissingServo(joint.name, joint.id, 0.0, 1, "silent") for joint in ServosConfig().joints)
 
     def set_zero(self, names: object) -> None:
         self.told.append("zero")
@@ -80,6 +84,13 @@ class Paper:
         self.end.stop = stop
         self.end.waiting = Request(1, request) if request is not None else None
         self.loop._listen_until(self.now_s)
+
+    def turn(self) -> None:
+        """A cycle in which the servos say nothing new."""
+        self.now_s += 0.02
+        self.loop._guard.see = lambda *_: None  # type: ignore[method-assign]
+        self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
+        self.loop._talk()
 
     @property
     def stopped(self) -> bool:
@@ -144,6 +155,38 @@ def test_the_first_cause_stays_when_the_torque_cannot_be_switched_off(monkeypatc
     assert paper.latched.cause is Cause.SERVO_SILENT
     assert "up" in paper.latched.detail
     assert "cut the servos' power" in paper.latched.detail
+
+
+def test_a_torque_off_that_failed_is_tried_until_the_servos_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One burst of noise takes all three packets, and STOP that is held for seconds counts as one."""
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+    paper.bus.torque_stays = True
+    paper.hear(stop=True)
+    for _ in range(10):
+        paper.hear(stop=True)
+        paper.turn()
+    assert paper.latched is not None
+    assert paper.latched.detail.count("cut the servos' power") == 1
+    assert paper.bus.told == ["hold"], "no second hold, under which a tendon would creep"
+    paper.bus.torque_stays = False
+    for _ in range(3):
+        paper.turn()
+    assert paper.bus.told[:2] == ["hold", "torque off"]
+    assert paper.bus.told.count("torque off") == 1
+    assert "cut the servos' power" not in paper.latched.detail
+
+
+def test_without_that_policy_the_wires_stay_under_tension(paper: Paper) -> None:
+    paper.hear(stop=True)
+    paper.turn()
+    assert "torque off" not in paper.bus.told
+
+
+def test_a_port_that_comes_back_owes_the_torque_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+    paper.loop._lose_port()
+    paper.turn()
+    assert paper.bus.told == ["torque off"]
 
 
 def test_a_robot_that_is_closed_while_it_connects_keeps_no_bus_process(monkeypatch: pytest.MonkeyPatch) -> None:
