@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from core.camera_config import CameraConfig
 from core.errors import UserError
@@ -252,6 +252,13 @@ class Config(_Section):
     window: WindowConfig = WindowConfig()
     record: RecordConfig = RecordConfig()
 
+    @field_validator("servos")
+    @classmethod
+    def _check_servos(cls, servos: ServosConfig) -> ServosConfig:
+        if servos.port is not None and servos.too_loose:
+            raise ValueError(servos.too_loose)
+        return servos
+
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
@@ -315,7 +322,7 @@ def _one_line(path: str, error: ValidationError) -> str:
     bounds = _field_range(first["loc"])
     what = f"must be {bounds}" if bounds and first["type"] != "extra_forbidden" else _allowed(first)
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    got = "" if first["type"] == "extra_forbidden" else f", got {first['input']!r}"
+    got = "" if first["type"] == "extra_forbidden" or isinstance(first["input"], dict | BaseModel) else f", got {first['input']!r}"
     return f"{path}: {key}: {what}{got}{more}"
 
 

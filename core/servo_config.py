@@ -67,6 +67,10 @@ def _feed(name: JointName, number: int, low_mm: float, high_mm: float) -> JointC
     )
 
 
+_MAX_HEARTBEAT_S = _MAX_WATCHDOG_S = 0.5
+_MIN_BUS_HZ = 20.0
+
+
 class ServosConfig(_Section):
     """The bus and its seven joints."""
 
@@ -105,6 +109,17 @@ class ServosConfig(_Section):
             if not joint.low_mm <= rest_mm <= joint.high_mm:
                 raise ValueError(f"joint {joint.name}: {what} must lie between low_mm and high_mm, or it would be driven at rest")
         return self
+
+    @property
+    def too_loose(self) -> str:
+        """What real servos may not be driven with, in one line; "" for nothing. The wizard is more patient, and moves one servo.
+
+        The safety rules want a hold within 100 ms and an end after 500 ms of silence.
+        """
+        for name, limit in (("heartbeat_timeout_s", _MAX_HEARTBEAT_S), ("watchdog_s", _MAX_WATCHDOG_S)):
+            if getattr(self, name) > limit:
+                return f"{name} must be {limit:g} at most with real servos"
+        return "" if self.bus_hz >= _MIN_BUS_HZ else f"bus_hz must be {_MIN_BUS_HZ:g} at least with real servos"
 
     @model_validator(mode="after")
     def _check_times(self) -> Self:

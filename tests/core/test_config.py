@@ -38,6 +38,15 @@ def test_a_users_file_wins_over_the_preset_and_keeps_the_rest(tmp_path: Path) ->
         ("[perception.pose]\nd_allow_px = nan\n", ["perception.pose.d_allow_px"]),
         ("[perception.gaps]\nrule = 'nearest'\n", ["perception.gaps.rule", "components", "every_pair"]),
         ("[perception\n", ["not valid TOML"]),
+        (
+            "[servos]\nport = '/dev/ttyUSB0'\nheartbeat_timeout_s = 3.0\n",
+            ["servos: ", "heartbeat_timeout_s must be 0.5 at most with real servos"],
+        ),
+        ("[servos]\nport = '/dev/ttyUSB0'\nwatchdog_s = 2.0\n", ["watchdog_s must be 0.5 at most with real servos"]),
+        (
+            "[servos]\nport = '/dev/ttyUSB0'\nbus_hz = 5.0\nwatchdog_s = 0.4\n",
+            ["bus_hz must be 20 at least with real servos"],
+        ),
         ("perception = 3\n", ["perception"]),
     ],
 )
@@ -50,6 +59,10 @@ def test_a_bad_file_is_one_line_with_file_key_and_range(tmp_path: Path, text: st
     assert str(path) in message
     for word in words:
         assert word in message
+
+
+def test_the_twins_servos_may_be_more_patient(tmp_path: Path) -> None:
+    assert load_config(_write(tmp_path, "[servos]\nheartbeat_timeout_s = 3.0\n")).servos.heartbeat_timeout_s == 3.0
 
 
 def test_missing_file_and_unknown_preset_are_named(tmp_path: Path) -> None:

@@ -55,6 +55,15 @@ def test_a_rig_comes_back_as_it_was_saved(config: Config) -> None:
     assert [one.name for one in list_rigs()] == ["bench 1"]
 
 
+def test_a_rig_with_real_servos_keeps_to_the_safety_rules() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    text = path.read_text()
+    assert "heartbeat_timeout_s = 0.5" in text
+    path.write_text(text.replace("heartbeat_timeout_s = 0.5", "heartbeat_timeout_s = 5.0"))
+    with pytest.raises(RigFileError, match=r"servos: heartbeat_timeout_s must be 0\.5 at most"):
+        read_rig(path)
+
+
 def test_the_configuration_takes_the_rig_over() -> None:
     path = write_rig(make_rig(REAL, "bench 1", KNOWN))
     config = with_rig(load_config(overrides={"advice": {"slow_mm_s": 2.0}}), read_rig(path), path)
