@@ -219,6 +219,8 @@ class AnnotationDesk(QObject):
         self._loading.submit(place, load, urgent=urgent, once=True)
 
     def _on_loaded(self, place: int, loaded: LoadedItem) -> None:
+        if place in self._loaded:
+            return  # asked for once more before the first answer was heard: what has been begun since stays
         self._loaded[place] = loaded
         if place not in self._histories:  # one that was edited meanwhile knows more than the disk
             history, kept = loaded.history, self._contents.get(self.items[place].key, Annotation())

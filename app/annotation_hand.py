@@ -207,6 +207,12 @@ class AnnotationHand:
             return Ending(tool=self.tool)
         return Ending()
 
+    def complete(self, radius_px: float) -> Edit | None:
+        """Whatever is under way is done: a stroke of the brush, a point that is dragged, an outline that has an inside."""
+        if self.stroke:
+            return self.end_stroke(radius_px)
+        return self.release() if self._held is not None else self.end().edit if self.drawing.draft else None
+
     def take_out(self, point: Point, reach: Reach) -> Edit | None:
         """The point at a place goes; None where there is none."""
         touch = self.under(point, reach)
@@ -240,7 +246,7 @@ class AnnotationHand:
         """The selected point; without one, the last point of what is being drawn."""
         selected, line, draft = self.drawing.selected, self.tool.value.line, self.drawing.draft
         if draft:
-            self.drawing = replace(self.drawing, draft=draft[:-1], rubber=())
+            self.drop_draft_point()
         elif selected is not None:
             fewer = remove(self.annotation, selected.line, selected.place)
             is_left = selected.line < len(fewer.masks) and len(fewer.masks) == len(self.annotation.masks)
@@ -251,6 +257,10 @@ class AnnotationHand:
         elif line is not None and line_of(self.annotation, line):
             return self._done("take out a point", remove(self.annotation, line, len(line_of(self.annotation, line)) - 1))
         return None
+
+    def drop_draft_point(self) -> None:
+        """The last point of the outline that is being drawn goes."""
+        self.drawing = replace(self.drawing, draft=self.drawing.draft[:-1], rubber=())
 
     def clear(self) -> Edit | None:
         """The whole line or outline of the selected point; without one, the line of the tool."""

@@ -87,6 +87,7 @@ class AnnotatorWindow(WindowFrame):
 
     def open(self, place: int) -> None:
         """Take an item in hand; it is blank until it is loaded."""
+        self.panels.canvas.complete()
         self._keep_note()
         if place != self._desk.index:
             self.panels.canvas.blank()
@@ -196,11 +197,13 @@ class AnnotatorWindow(WindowFrame):
 
     def set_state(self, state: PoseState) -> None:
         """The rater's word on the pose."""
+        self.panels.canvas.complete()
         self.panels.canvas.close_line()
         self._desk.edit(f"state {state.value}", replace(self._desk.annotation, state=state, cannot_tell=False))
 
     def toggle_cannot_tell(self) -> None:
         """\"Can't tell\" is an answer; once more takes it back."""
+        self.panels.canvas.complete()
         annotation = self._desk.annotation
         self.panels.canvas.close_line()
         if annotation.cannot_tell:
@@ -209,13 +212,18 @@ class AnnotatorWindow(WindowFrame):
             self._desk.edit("can't tell", replace(annotation, cannot_tell=True, state=None))
 
     def undo(self) -> None:
-        """Back one edit, and say which."""
+        """Back one edit, and say which; while an outline is drawn, its last point."""
+        if self.panels.canvas.take_back_draft_point():
+            self.say(tr("Undone: {action}", action=tr("the outline's last point")))
+            return
+        self.panels.canvas.complete()
         action = self._desk.history.undo_action
         self._desk.undo()
         self.say(tr("Undone: {action}", action=tr_text(action)) if action else tr("Nothing to undo"))
 
     def redo(self) -> None:
         """Forward one edit, and say which."""
+        self.panels.canvas.complete()
         can_redo = self._desk.history.can_redo
         self._desk.redo()
         self.say(tr("Done again: {action}", action=tr_text(self._desk.history.undo_action)) if can_redo else tr("Nothing to redo"))
@@ -241,6 +249,7 @@ class AnnotatorWindow(WindowFrame):
 
     def take_tool(self, tool: Tool) -> None:
         """Take a tool, by key, chip or menu."""
+        self.panels.canvas.complete()
         self.panels.canvas.set_tool(tool)
         self.panels.canvas.set_brush(False)
         self.panels.bar.show_tool(tool, brush_on=False)
@@ -341,6 +350,12 @@ class AnnotatorWindow(WindowFrame):
 
     def tell_saved(self) -> None:
         """Where the annotations are."""
+        self.panels.canvas.complete()
+        self._keep_note()
+        self._desk.settle()
+        if self._desk.unsaved:
+            self.say(tr("{count} edits could not be written.", count=self._desk.unsaved), is_fault=True)
+            return
         self.say(tr("Every edit is saved at once, in {path}", path=self._desk.store_path))
 
     def _on_escape(self) -> None:
@@ -359,6 +374,7 @@ class AnnotatorWindow(WindowFrame):
 
     def _may_close(self) -> bool:
         """Edits that cannot be written are asked about."""
+        self.panels.canvas.complete()
         self._keep_note()
         self._desk.settle()
         return not self._desk.unsaved or self._may_lose()

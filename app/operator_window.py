@@ -26,6 +26,7 @@ from app.widgets.tour_overlay import TourOverlay
 from app.window_frame import WindowFrame
 from core.config import Config, PerceptionConfig
 from core.control.hand import Jog
+from core.control.modes import ARMED_MODES
 from core.control.pilot import Pilot
 from core.devices import DeviceError
 from core.rig_file import RigFileError, as_calibrated
@@ -301,6 +302,15 @@ class OperatorWindow(WindowFrame):
 
     @Slot(str)
     def _choose_phantom(self, name: str) -> None:
+        """Unless that would break something off: its key lies among those that drive."""
+        view = self._desk.view
+        is_armed = view is not None and view.mode in ARMED_MODES
+        if is_armed or self._recorder.status.recording:
+            why = tr("the robot is armed: disarm it first") if is_armed else tr("a session is being recorded: end it first")
+            self.say(tr("The phantom stays as it is: {why}", why=why), is_fault=True)
+            if self._panels.picker is not None:
+                self._panels.picker.show_name(self._config.twin.phantom)
+            return
         twin = self._config.twin.model_copy(update={"phantom": name})
         self._config = self._config.model_copy(update={"twin": twin})
         self._panels.live.setFocus()

@@ -52,6 +52,7 @@ class PlayerWindow(WindowFrame):
         self._asked_s = 0.0
         self._shown: Decoded | None = None
         self.seek_ms = 0.0
+        self._note_s = 0.0
         self._refused: deque[Event] = deque()
         self._decode = DecodeThread(reader, self)
         self._keeper = PlayerKeeper(reader, pictures_folder(config.window.pictures_folder), self)
@@ -350,8 +351,12 @@ class PlayerWindow(WindowFrame):
 
     @Slot()
     def begin_note(self) -> None:
-        """Write a note at this time."""
+        """Write a note at this time; one that is being written is gone on with."""
         self.pause()
+        if self.panels.note.isVisible():
+            self.panels.note.setFocus()
+            return
+        self._note_s = self._clock.position_s
         self.panels.note.clear()
         self.panels.note.show()
         self.panels.note.setFocus()
@@ -365,7 +370,7 @@ class PlayerWindow(WindowFrame):
         text = self.panels.note.kept_text
         self._end_note()
         if text and len(self._course):
-            event = Event(self._course.first_s + self._clock.position_s, EventKind.NOTE, text)
+            event = Event(self._course.first_s + self._note_s, EventKind.NOTE, text)
             self._keeper.add_note(event)
 
     @Slot(object)
@@ -378,7 +383,8 @@ class PlayerWindow(WindowFrame):
         if self._refused and not self.panels.note.isVisible() and not self._is_shut:
             event = self._refused.popleft()
             self.begin_note()
-            self.seek(event.time_s - self._course.first_s)
+            self._note_s = event.time_s - self._course.first_s
+            self.seek(self._note_s)
             self.panels.note.setText(event.text)
 
     # ---- the window
@@ -406,6 +412,9 @@ class PlayerWindow(WindowFrame):
         elif panels.note.isVisible():
             self._end_note()
         elif self.focusWidget() is not panels.live:
+            # What was typed there and not confirmed would count when the field is left.
+            position = panels.bar.position
+            position.lineEdit().setText(f"{position.prefix()}{position.textFromValue(position.value())}{position.suffix()}")
             panels.live.setFocus()
         elif self._keeper.has_clip:
             self._keeper.cancel_clip()
@@ -420,6 +429,12 @@ class PlayerWindow(WindowFrame):
             self.panels.live.setFocus()
             return
         super().keyPressEvent(event)
+
+    def _may_close(self) -> bool:
+        """A note that is being written is kept."""
+        if self.panels.note.isVisible():
+            self._keep_note()
+        return super()._may_close()
 
     def _let_go(self) -> None:
         self._turn.stop()

@@ -182,7 +182,9 @@ class SettingsDesk(QObject):
         if note is None:
             return
         self._tried = None
+        self._stills.forget()
         self._window.take_settings(with_changes(self._window.config, before, config, _NOW))
+        self._window.show_still(None)  # of a rig that is over, what was tried out on its last picture must not stay: it looks alive
         _take_theme(self._window.config)
         self._window.say(tr("Settings saved in {path}", path=self._file.path) + (f". {note}" if note else ""))
         dialog.draft.mark_saved()

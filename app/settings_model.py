@@ -51,7 +51,7 @@ class SettingsDraft:
         return self._defaults[key]
 
     def entry(self, key: str) -> str:
-        """What stands in the field: the value, or what was typed and is not allowed."""
+        """What stands in the field: what was typed, to the letter, or the value. "12." is the beginning of a decimal."""
         return self._entries.get(key, as_text(self.value(key)))
 
     def is_changed(self, key: str) -> bool:
@@ -110,10 +110,11 @@ class SettingsDraft:
             message = _own_message(candidate, key)
             if not message:
                 self._data = candidate
+        self._entries[key] = text
         if message:
-            self._entries[key], self._errors[key] = text, message
+            self._errors[key] = message
         else:
-            self._forget_entry(key)
+            self._errors.pop(key, None)
         self._check_sections()
         return message
 

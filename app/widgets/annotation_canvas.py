@@ -21,7 +21,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import theme
-from app.annotation_hand import AnnotationHand, Edit, Measure, Reach
+from app.annotation_hand import AnnotationHand, Edit, Ending, Measure, Reach
 from app.annotation_tool import Tool
 from app.language import mark, tr
 from app.palette import ON_PICTURE
@@ -205,6 +205,21 @@ class AnnotationCanvas(QWidget):
         near = replace(whole, zoom=whole.zoom * _CLOSE_UP, center=middle).inside()
         self._set_view(whole if self._view == near else near)
 
+    def complete(self) -> None:
+        """Before something else happens to the picture: nothing that was drawn by hand is lost."""
+        edit = self._hand.complete(self._brush_px)
+        if edit is not None:
+            self._tell(edit)
+        self.update()
+
+    def take_back_draft_point(self) -> bool:
+        """Undo while an outline is drawn: its last point goes; False when none is drawn."""
+        if not self._hand.drawing.draft:
+            return False
+        self._hand.drop_draft_point()
+        self.update()
+        return True
+
     def simplify_masks(self, tolerance_px: float = 1.0) -> None:
         """Fewer points on the outlines of the tool's masks."""
         self._tell(self._hand.simplify(tolerance_px))
@@ -214,6 +229,8 @@ class AnnotationCanvas(QWidget):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if not self._levels:
             return
+        if (self._hand.stroke or self._hand.held is not None) and event.buttons() != event.button():
+            return  # another button, by mistake, while one draws
         self._pressed_at = event.position()
         point, button = self._under(event.position()), event.button()
         self._cursor, self._cross_by_key = point, False
@@ -262,14 +279,12 @@ class AnnotationCanvas(QWidget):
             self._pan_from = None
             self._renew_cursor()
             if event.button() == Qt.MouseButton.RightButton and is_click:
-                edit = self._hand.take_out(self._under(event.position()), self._reach())
-                if edit is not None:
-                    self._tell(edit)
-                else:
-                    self.end_line()
+                self._tell_ending(self._hand.take_out(self._under(event.position()), self._reach()) or self._hand.end())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         """The first of its clicks has set the last point."""
+        if not self._levels:
+            return
         if event.button() == Qt.MouseButton.LeftButton and not self.brush_on and not self._space_held:
             self.end_line()
         else:
@@ -290,14 +305,20 @@ class AnnotationCanvas(QWidget):
 
     def end_line(self) -> None:
         """Enter: the outline or line that is being drawn is complete."""
-        ending = self._hand.end()
-        if ending.edit is not None:
-            self._tell(ending.edit)
-        elif ending.tool is not None:
-            self.line_ended.emit(ending.tool)
-        else:
+        if not self._tell_ending(self._hand.end()):
             self.ended.emit()
         self.update()
+
+    def _tell_ending(self, ending: Ending | Edit) -> bool:
+        """What a key or click has ended; False when there was nothing to end."""
+        edit = ending.edit if isinstance(ending, Ending) else ending
+        if edit is not None:
+            self._tell(edit)
+        elif isinstance(ending, Ending) and ending.tool is not None:
+            self.line_ended.emit(ending.tool)
+        else:
+            return False
+        return True
 
     def let_go(self) -> bool:
         """Escape: drop what is being drawn or selected; False when there was nothing."""

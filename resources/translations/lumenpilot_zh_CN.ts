@@ -562,6 +562,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/annotator_window.py"/>
+        <source>the outline's last point</source>
+        <translation>轮廓的最后一点</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator_window.py"/>
         <source>this image cannot be shown</source>
         <translation>此图像无法显示</translation>
     </message>
@@ -2657,6 +2662,21 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/operator_window.py"/>
+        <source>the robot is armed: disarm it first</source>
+        <translation>机器人处于待命：请先解除待命</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_window.py"/>
+        <source>a session is being recorded: end it first</source>
+        <translation>正在录制会话：请先结束录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_window.py"/>
+        <source>The phantom stays as it is: {why}</source>
+        <translation>体模保持不变：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_window.py"/>
         <source>the picture is not live</source>
         <translation>当前不是实时图像</translation>
     </message>
@@ -3447,11 +3467,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/rig_desk.py"/>
-        <source>the robot is armed: disarm it first</source>
-        <translation>机器人处于待命：请先解除待命</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_desk.py"/>
         <source>a stop or fault is not acknowledged: acknowledge it first</source>
         <translation>有停止或故障未确认：请先确认</translation>
     </message>
@@ -3459,11 +3474,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/rig_desk.py"/>
         <source>wait: {what}</source>
         <translation>请稍候：{what}</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_desk.py"/>
-        <source>a session is being recorded: end it first</source>
-        <translation>正在录制会话：请先结束录制</translation>
     </message>
     <message>
         <location filename="../../app/rig_desk.py"/>

@@ -214,6 +214,70 @@ def test_points_are_dragged_put_in_and_taken_out(rater: Rater) -> None:
     assert len(drawn(rater).robot) == 2
 
 
+def _both_lines(rater: Rater) -> None:
+    rater.click(*ROBOT)
+    rater.press(Qt.Key.Key_Return)
+    rater.click(*VESSEL)
+    rater.press(Qt.Key.Key_Return)
+
+
+def test_a_right_click_that_misses_answers_nothing(rater: Rater) -> None:
+    _both_lines(rater)
+    beside = rater.at(ROBOT[1]) + QPoint(0, 14)
+    for _ in range(2):
+        QTest.mouseClick(rater.canvas, Qt.MouseButton.RightButton, pos=beside)
+    assert (drawn(rater).state, rater.desk.index, len(drawn(rater).robot)) == (None, 0, 3)
+
+
+OUTLINE: tuple[Point, ...] = ((300.0, 300.0), (400.0, 300.0), (400.0, 400.0), (300.0, 400.0))
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_4, Qt.Key.Key_N, Qt.Key.Key_B])
+def test_an_outline_is_not_lost_by_what_comes_next(rater: Rater, key: Qt.Key) -> None:
+    rater.press(Qt.Key.Key_3)
+    rater.click(*OUTLINE)
+    rater.press(key)
+    if rater.desk.index:
+        rater.press(Qt.Key.Key_P)
+    (mask,) = drawn(rater).masks
+    assert len(mask.points) == 4
+    rater.press(Qt.Key.Key_3)
+    rater.click(*((x + 150.0, y) for x, y in OUTLINE))
+    assert len(rater.kept()[0].content.masks) == 2, "closing the window completes it, too"
+
+
+def test_undo_takes_back_the_outline_that_is_being_drawn_first(rater: Rater) -> None:
+    _both_lines(rater)
+    rater.press(Qt.Key.Key_3)
+    rater.click(*OUTLINE)
+    rater.press(Qt.Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
+    assert len(rater.canvas._hand.drawing.draft) == 3
+    assert len(drawn(rater).vessel) == len(VESSEL)
+
+
+def test_a_key_while_the_button_is_down_loses_no_point(rater: Rater) -> None:
+    rater.click(*ROBOT[:2])
+    QTest.mouseMove(rater.canvas, rater.at(ROBOT[2]))
+    QTest.mousePress(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at(ROBOT[2]))
+    rater.press(Qt.Key.Key_B)
+    QTest.mouseRelease(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at(ROBOT[2]))
+    assert (len(drawn(rater).robot), drawn(rater).state) == (3, PoseState.B)
+
+
+def test_a_stroke_is_not_lost_by_a_key_or_another_button(rater: Rater) -> None:
+    rater.press(Qt.Key.Key_3, Qt.Key.Key_T)
+    QTest.mousePress(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((300.0, 300.0)))
+    QTest.mouseMove(rater.canvas, rater.at((350.0, 300.0)))
+    QTest.mousePress(rater.canvas, Qt.MouseButton.RightButton, pos=rater.at((350.0, 300.0)))
+    QTest.mouseMove(rater.canvas, rater.at((400.0, 300.0)))
+    rater.press(Qt.Key.Key_N)
+    QTest.mouseRelease(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((400.0, 300.0)))
+    rater.press(Qt.Key.Key_P)
+    (mask,) = drawn(rater).masks
+    xs = [x for x, _ in mask.points]
+    assert max(xs) - min(xs) > 100.0
+
+
 def test_a_double_click_ends_the_line(rater: Rater) -> None:
     rater.click((200.0, 180.0), (320.0, 180.0))
     QTest.mouseDClick(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((320.0, 180.0)))

@@ -322,6 +322,37 @@ def test_a_note_is_kept_in_the_session(open_player: Open, tmp_path: Path, qtbot:
     assert not any("never" in event.text for event in window.events)
 
 
+def test_a_note_stays_at_its_time_and_is_lost_by_nothing(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    window = open_player(folder)
+    until(qtbot, lambda: window.place == 0 and window.rows == COUNT)
+    window.seek(2.0)
+    press(window, Key.Key_M)
+    QTest.keyClicks(window.panels.note, "head touches")
+    window.panels.live.setFocus()
+    press(window, Key.Key_M)
+    QTest.keyClicks(window.panels.note, " the wall")
+    window.seek(4.6)
+    QTest.keyClick(window.panels.note, Key.Key_Return)
+    until(qtbot, lambda: any(event.text == "head touches the wall" for event in window.events))
+    press(window, Key.Key_M)
+    QTest.keyClicks(window.panels.note, "written while closing")
+    window.close()
+    with SessionReader(folder) as reader:
+        kept = {event.text: event.time_s - FIRST_S for event in reader.events if event.kind is EventKind.NOTE}
+    assert kept["head touches the wall"] == pytest.approx(2.0)
+    assert kept["written while closing"] == pytest.approx(4.6)
+
+
+def test_escape_takes_back_a_time_that_was_typed(player: PlayerWindow, qtbot: QtBot) -> None:
+    player.seek(1.0)
+    press(player, Key.Key_T)
+    QTest.keyClicks(player.panels.bar.position, "4500")
+    QTest.keyClick(player.panels.bar.position, Key.Key_Escape)
+    qtbot.wait(50)
+    assert player.time_s == pytest.approx(1.0)
+
+
 def test_notes_that_the_disk_does_not_take_are_not_lost(
     open_player: Open, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -82,6 +82,18 @@ def test_nothing_to_save_is_said(running: OperatorWindow, qtbot: QtBot) -> None:
     assert "Nothing to save yet" in running.panels.toast.text()
 
 
+def test_the_key_of_another_phantom_does_not_end_a_recording(running: OperatorWindow, qtbot: QtBot) -> None:
+    """It lies among those that drive."""
+    before = running.config.twin.phantom
+    qtbot.keyClick(running, Key.Key_F9)
+    until(qtbot, lambda: running.recorder.status.recording)
+    running._choose_phantom("y_branch")
+    assert running.config.twin.phantom == before
+    assert "The phantom stays as it is: a session is being recorded" in running.panels.toast.text()
+    assert running.recorder.status.recording
+    qtbot.keyClick(running, Key.Key_F9)
+
+
 def test_a_folder_that_cannot_be_written_stops_the_recording_visibly(
     running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path
 ) -> None:

@@ -17,7 +17,7 @@ from app.operator_window import OperatorWindow
 from app.settings_desk import SettingsDesk
 from core.config import Config, PerceptionConfig, load_config
 from core.control.modes import Act, Mode
-from core.devices import EndOfStream
+from core.devices import DeviceError, EndOfStream
 from core.profiles import Profiles
 from core.settings_file import read_settings
 from core.types import Frame, Point, Scene
@@ -204,6 +204,26 @@ def test_nobody_arms_while_something_is_tried_out(at: Bench) -> None:
     at.desk.dialog.reject()
     at.window.take(Step.ARM)
     assert Act.ARM in at.engine.pilot.acts
+
+
+def test_after_saving_a_rig_that_stopped_looks_stopped(
+    make_window: MakeWindow, bench: FakeBench, tmp_path: Path, qtbot: QtBot
+) -> None:
+    """What was tried out on its last picture must not stay: it would look alive."""
+    at = Bench(make_window, bench, tmp_path)
+    until(qtbot, lambda: at.window.shown_tick is not None)
+    at.engine.fail_with = DeviceError("camera: cable out")
+    until(qtbot, lambda: at.window._phase is Phase.FAULT)
+    at.engine.set_perception = lambda _config: False  # type: ignore[method-assign]
+    panels = at.window.panels
+    assert panels.notice.isVisible()
+    at.edit(D_ALLOW, "9")
+    until(qtbot, lambda: not panels.notice.isVisible())
+    assert at.desk.dialog is not None
+    at.desk.dialog.save.click()
+    until(qtbot, panels.notice.isVisible)
+    assert panels.live.scene is None
+    at.desk.close()
 
 
 def test_space_stops_the_robot_from_the_dialog_too(at: Bench) -> None:

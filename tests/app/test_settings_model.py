@@ -63,6 +63,18 @@ def test_what_is_allowed_is_taken(draft: SettingsDraft, key: str, entry: object,
     assert draft.config is not None
 
 
+def test_the_field_shows_what_was_typed_to_the_letter(draft: SettingsDraft) -> None:
+    """Taking back the last figure of 12.5 leaves "12.": without the point, a 7 typed next would make 127 of it."""
+    key = "perception.pose.d_allow_px"
+    for typed in ("12.", "12.7"):
+        assert draft.set_entry(key, typed) == ""
+        assert draft.entry(key) == typed
+    assert draft.value(key) == 12.7
+    draft.set_entry(key, "12.")
+    draft.reset([key])
+    assert draft.entry(key) == "6"
+
+
 def test_what_does_not_go_together_is_told_of_the_section(draft: SettingsDraft) -> None:
     draft.set_entry("safety.pose_disarm_s", "0.12")
     assert draft.section_error("safety") == "pose_hold_s must be below pose_disarm_s"
