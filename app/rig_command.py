@@ -13,7 +13,7 @@ from app.window_command import window_config
 from core.calibration.board import BoardError, BoardSpec
 from core.config import Config
 from core.errors import UserError
-from core.rig_file import RESERVED, RigFile, check_rig_name, find_rig, list_rigs, rig_path, rigs_folder, with_rig, write_rig
+from core.rig_file import RESERVED, RigFile, check_rig_name, find_rig, has_rig, list_rigs, rigs_folder, with_rig, write_rig
 
 if TYPE_CHECKING:
     from hardware.calibration_bench import See
@@ -210,7 +210,7 @@ def _start(options: CalibrateOptions) -> tuple[Config, RigFile | None]:
         raise UserError(f"unknown step {sorted(unknown)[0]!r}; known: {', '.join(STEPS)}")
     source = options.source
     if source is None:
-        source = name if rig_path(name).exists() else "twin"
+        source = name if has_rig(name) else "twin"
     if source in RESERVED:
         return window_config(source, options.config_path, None)[0], None
     path, rig = find_rig(source)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,10 +48,17 @@ def _is_file(path: Path) -> bool:
 
 
 def pictures(files: Sequence[Path]) -> Iterator[SourcePicture]:
-    """The pictures of all files, one after another; stems are made unique by a number where two files share one."""
+    """The pictures of all files, one after another; stems are made unique by a number where two files share one.
+
+    A picture that is called like a frame of one of the videos shares its stem, too.
+    """
+    videos = {path.stem for path in files if path.suffix.lower() in VIDEO_ENDINGS}
     used: set[str] = set()
     for path in files:
         stem, count = path.stem, 1
+        frame = re.fullmatch(r"(.+)_\d{6,}", stem)
+        if frame is not None and frame[1] in videos:
+            used.add(stem)
         while stem in used:
             count += 1
             stem = f"{path.stem}_{count}"

@@ -48,7 +48,7 @@ class WizardDesk(QObject):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self.config = config
+        self.config = self._began_with = config
         self._known = known
         self._open_bench, self._make_sight = open_bench, make_sight
         self._see: See | None = None
@@ -83,6 +83,7 @@ class WizardDesk(QObject):
     def open_camera(self, config: Config, then: Callable[[object], None] | None = None) -> None:
         """Open another bench in the place of the one that is open; what was found with that is forgotten."""
         self.config = config
+        known = self._known_of(config)
 
         def job() -> None:
             self._close_bench()
@@ -92,10 +93,23 @@ class WizardDesk(QObject):
             with ExitStack() as undo:
                 undo.callback(self._close_bench)  # a camera that gives no picture is none
                 self._bench.warm_up()
-                self.draft = RigDraft(self._bench, config, self._known, self.said.emit)
+                self.draft = RigDraft(self._bench, config, known, self.said.emit)
                 undo.pop_all()
 
         self.run(tr("opening the camera"), job, then)
+
+    def _known_of(self, config: Config) -> CalibrationConfig | None:
+        """What was calibrated before, as far as it holds good for the bench that is opened now.
+
+        Lens, scale and port are a camera's, with its size of picture; what was learnt of the servos is not another kind of bench's.
+        """
+        before = self._began_with
+        if self._known is None or _camera_of(config) == _camera_of(before):
+            return self._known
+        lost: dict[str, None] = dict.fromkeys(("lens", "scale", "port"))
+        if config.rig.camera != before.rig.camera:
+            lost |= dict.fromkeys(("steering", "zero", "assumed"))
+        return self._known.model_copy(update=lost)
 
     @Slot()
     def stop(self) -> None:
@@ -134,3 +148,11 @@ class WizardDesk(QObject):
         self._then, self.busy = None, ""
         self.failed.emit(line)
         self.changed.emit()
+
+
+def _camera_of(config: Config) -> tuple[object, ...]:
+    """Which camera a configuration has, and the size of its pictures."""
+    rig, camera, twin = config.rig, config.camera, config.twin
+    if rig.camera == "twin":
+        return rig.camera, twin.image_width_px, twin.image_height_px
+    return rig.camera, rig.source, camera.serial, camera.device, camera.width_px, camera.height_px

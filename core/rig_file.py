@@ -114,17 +114,29 @@ def list_rigs(folder: Path | None = None) -> tuple[ListedRig, ...]:
 
 
 def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
-    """The rig of this name, whatever its case. Raises RigFileError, with those that there are."""
-    listed = list_rigs(folder)
-    for rig in listed:
-        if name.strip().casefold() in {rig.name.casefold(), rig.path.stem.casefold()}:
-            if rig.rig is None:
-                raise RigFileError(rig.problem)
-            return rig.path, rig.rig
+    """The rig of this name, whatever its case. Raises RigFileError, with those that there are.
+
+    The file's name goes before the one inside, which a copy of the file keeps, and the exact one before one in other letters.
+    """
+    listed, wanted = list_rigs(folder), name.strip()
+    folded = wanted.casefold()
+    for rank in range(4):
+        for rig in listed:
+            stem = rig.path.stem
+            if (stem == wanted, rig.name == wanted, stem.casefold() == folded, rig.name.casefold() == folded)[rank]:
+                if rig.rig is None:
+                    raise RigFileError(rig.problem)
+                return rig.path, rig.rig
     if name.strip().casefold() in RESERVED:
         raise RigFileError(f"{name}: is built in and has no file; rigs with one: {', '.join(rig.name for rig in listed) or 'none'}")
     known = ", ".join((*RESERVED, *(rig.name for rig in listed)))
     raise RigFileError(f"unknown rig {name!r}; known: {known}")
+
+
+def has_rig(name: str, folder: Path | None = None) -> bool:
+    """Whether there is a file of this name, in order or not, whatever its case."""
+    wanted = name.strip().casefold()
+    return any(wanted in {rig.name.casefold(), rig.path.stem.casefold()} for rig in list_rigs(folder))
 
 
 def read_rig(path: Path) -> RigFile:

@@ -6,18 +6,20 @@ zeroed); both go through driver and gate, and STOP ends every procedure within o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from core.calibration.identify import Assignment, Finding, Wiggle, assign, classify
-from core.calibration.look import Look, head_move
+from core.calibration.look import HeadNotSeen, Look, head_move
 from core.calibration.steering import Pull, learn
 from core.calibration.taut import NeverTaut, Step, is_begun, is_enough, taut_at_mm
 from core.calibration_config import SteeringConfig
+from core.devices import DeviceError
 from core.servo_config import JOINT_NAMES, TENDONS, ServosConfig
 from core.types import Command, Point
+from hardware.servos.errors import ServoError
 from hardware.servos.probe import MAX_CURRENT_MA, ProbeLimits, StopSwitch
 
 _AMPLITUDES_MM = (0.75, 1.5, 3.0)
@@ -90,6 +92,21 @@ def wiggle(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], servo_id: i
             probe.pause(_SETTLE_S / 2)
 
 
+@contextmanager
+def _or_back(back: Callable[[], None]) -> Iterator[None]:
+    """A look that fails, or a camera that is lost, in the middle of a step leaves nothing turned: a retry would go on from there.
+
+    Whatever is wrong with the servos themselves, STOP included, moves nothing more.
+    """
+    try:
+        yield
+    except ServoError:
+        raise
+    except (HeadNotSeen, DeviceError):
+        back()
+        raise
+
+
 def identify_servo(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, say: Say) -> Finding | None:
     """What one servo does; None when nothing clear was seen. It is turned no farther than it needs.
 
@@ -98,7 +115,8 @@ def identify_servo(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], ser
     ServoError, DeviceError, HeadNotSeen
     """
     most_mm = _AMPLITUDES_MM[-1]
-    with bench.hands.probe(servos, servo_id, ProbeLimits(-most_mm, most_mm), 1, ids) as probe:
+    limits = ProbeLimits(-most_mm, most_mm)
+    with bench.hands.probe(servos, servo_id, limits, 1, ids) as probe, _or_back(lambda: probe.move_to(0.0)):
         for amplitude_mm in _AMPLITUDES_MM:
             say(f"servo {servo_id}: {amplitude_mm:g} mm both ways")
             rest = _look(bench, probe)
@@ -145,6 +163,8 @@ def find_zeros(bench: Bench, servos: ServosConfig, say: Say, max_current_ma: flo
     ------
     ServoError
         Strained, stopped, or the bus is not in order: nothing goes on.
+    DeviceError
+        The camera is lost; the pair of tendons in hand is as it was.
     """
     slack: dict[str, float] = dict.fromkeys(TENDONS, 0.0)
     problems = []
@@ -154,7 +174,13 @@ def find_zeros(bench: Bench, servos: ServosConfig, say: Say, max_current_ma: flo
         for name, hangs_mm, then_mm in ((first, 0.0, -_PARK_MM), (second, _PARK_MM, 0.0)):
             try:
                 taut_mm = _find_zero(bench, servos, name, then_mm, max_current_ma)
-            except NeverTaut as error:
+            except ServoError:
+                raise
+            except DeviceError:
+                for hanging in (second, first)[: 1 if name == first else 2]:
+                    _move(bench, servos, hanging, _PARK_MM, max_current_ma)
+                raise
+            except (NeverTaut, HeadNotSeen) as error:
                 problems.append(f"{name}: {error}")
                 say(problems[-1])
                 _move(bench, servos, name, hangs_mm + then_mm, max_current_ma)
@@ -174,10 +200,13 @@ def _move(bench: Bench, servos: ServosConfig, name: str, way_mm: float, max_curr
 
 
 def _find_zero(bench: Bench, servos: ServosConfig, name: str, then_mm: float, max_current_ma: float) -> float:
-    """Where a tendon becomes taut, from where it stands; it is left `then_mm` from there. Raises NeverTaut: it is where it was."""
+    """Where a tendon becomes taut, from where it stands; it is left `then_mm` from there.
+
+    Raises NeverTaut, HeadNotSeen, DeviceError: it is where it was.
+    """
     joint = servos.joints[JOINT_NAMES.index(name)]
     limits = ProbeLimits(-_SLACK_MM - _PARK_MM, _REACH_MM, max_current_ma=max_current_ma)
-    with bench.hands.probe(servos, joint.id, limits, joint.sign) as probe:
+    with bench.hands.probe(servos, joint.id, limits, joint.sign) as probe, _or_back(lambda: probe.move_to(0.0)):
         probe.move_to(-_SLACK_MM)
         rest = _look(bench, probe)
         begun = _steps(bench, probe, rest, -_SLACK_MM, _STEP_MM, is_begun)[-1].position_mm
@@ -226,7 +255,8 @@ class Learnt:
 def learn_steering(bench: Bench, servos: ServosConfig, say: Say) -> Learnt:
     """Pull each tendon a little, as far as the head needs to show its way.
 
-    The tendons must be taut and without tension where they stand: that becomes zero.
+    The tendons must be taut and without tension where they stand: that becomes zero, and there they are in the end. Whoever drives
+    pulls them by their pretension; here that would be kept, and be added once more with each time this is done.
 
     Raises
     ------
@@ -240,7 +270,8 @@ def learn_steering(bench: Bench, servos: ServosConfig, say: Say) -> Learnt:
         "down": lambda share: Command(pitch=-share),
     }
     first: Look | None = None
-    with bench.hands.steered(servos) as robot:
+    slack = servos.model_copy(update={"pretension_mm": 0.0})
+    with bench.hands.steered(slack) as robot, _or_back(lambda: robot.bend_to(Command())):
         ticks = robot.ticks()
         for name in TENDONS:
             for pull_mm in _PULLS_MM:

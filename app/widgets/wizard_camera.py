@@ -126,7 +126,11 @@ class CameraPage(WizardPage):
         config = self.desk.config
         if not _is_of(camera, config):
             config = with_camera(config, camera)
-        wanted = {"width_px": self.sizes[0].value(), "height_px": self.sizes[1].value(), "frames_per_second": self.rate.value()}
+        wanted: dict[str, object] = {"width_px": self.sizes[0].value(), "height_px": self.sizes[1].value()}
+        wanted |= {"frames_per_second": self.rate.value()}
+        # By its own sign: a configuration that names none means any, and another one may be the first tomorrow.
+        wanted |= {"serial": camera.serial} if camera.kind == "realsense" else {}
+        wanted |= {"device": camera.device} if camera.kind == "webcam" else {}
         settings = CameraConfig.model_validate({**config.camera.model_dump(), **wanted})
         self.picture.show_text(tr("Opening the camera. The first time the network is loaded, too."))
         self.desk.open_camera(config.model_copy(update={"camera": settings}))

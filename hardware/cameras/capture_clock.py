@@ -6,6 +6,8 @@ from collections import deque
 
 _BELIEVABLE_S = 0.5
 """A picture that claims to be older than this, or from the future, has a stamp of another clock."""
+_STALLED_S = 10.0
+"""But of a clock that has proved to be ours, a picture may have waited so long, while the computer was busy."""
 _REMEMBERED = 300
 
 
@@ -20,6 +22,7 @@ class CaptureClock:
     def __init__(self) -> None:
         self._offsets: deque[float] = deque(maxlen=_REMEMBERED)
         self._stamp_s: float | None = None
+        self._is_ours = False
         self._newest_s = float("-inf")
 
     def captured_s(self, arrived_s: float, stamp_s: float | None, now_on_its_clock_s: float | None = None) -> float:
@@ -32,8 +35,10 @@ class CaptureClock:
         now_on_its_clock_s : what that clock showed at the arrival; None: only the camera knows.
         """
         captured_s = arrived_s
-        if stamp_s is not None and now_on_its_clock_s is not None and 0.0 <= now_on_its_clock_s - stamp_s <= _BELIEVABLE_S:
-            captured_s = arrived_s - (now_on_its_clock_s - stamp_s)
+        age_s = now_on_its_clock_s - stamp_s if stamp_s is not None and now_on_its_clock_s is not None else -1.0
+        if 0.0 <= age_s <= (_STALLED_S if self._is_ours else _BELIEVABLE_S):
+            self._is_ours = True
+            captured_s = arrived_s - age_s
         elif stamp_s is not None:
             captured_s = stamp_s + self._offset_s(arrived_s, stamp_s)
         self._newest_s = max(self._newest_s, min(captured_s, arrived_s))

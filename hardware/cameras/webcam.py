@@ -19,11 +19,13 @@ from core.camera_config import CameraConfig
 from core.devices import DeviceError
 from hardware.cameras.capture_clock import CaptureClock
 from hardware.cameras.live_camera import LiveCamera, Shot
-from hardware.usb import DEV, SYS, video_devices
+from hardware.usb import DEV, SYS, VideoDevice, video_devices
 
 _log = logging.getLogger(__name__)
 
 _SELECT_TIMEOUT = "OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT"
+_AT_ONCE_S = 0.5
+"""A camera that is gone says so sooner; one that is still starting makes us wait for the time limit."""
 """Seconds that OpenCV waits for a frame; its own 10 would keep a lost camera from being found again."""
 _MANUAL, _AUTOMATIC = 1.0, 3.0
 """Exposure modes of V4L2."""
@@ -35,6 +37,11 @@ _QUEUE_FRAMES = 2
 
 def _open_v4l2(node: str) -> Any:
     return cv2.VideoCapture(node, cv2.CAP_V4L2)
+
+
+def _sign_of(device: VideoDevice) -> tuple[Path | None, str]:
+    """By what a camera is known again: its stable path, or its name where it has none."""
+    return device.stable, device.title
 
 
 class WebcamSensor:
@@ -55,6 +62,8 @@ class WebcamSensor:
         self._capture: Any = None
         self._clock = CaptureClock()
         self._title = config.device or "webcam"
+        self._own: tuple[Path | None, str] | None = None
+        self._is_new = True
 
     @property
     def name(self) -> str:
@@ -75,11 +84,19 @@ class WebcamSensor:
             raise
         self._capture = capture
         self._clock = CaptureClock()
+        self._is_new = True
 
     def shoot(self, timeout_s: float) -> Shot | None:
-        """The next picture; V4L2 has its own time limit of a second, and a queue that ``LiveCamera``'s thread keeps empty."""
+        """The next picture; V4L2 has its own time limit of a second, and a queue that ``LiveCamera``'s thread keeps empty.
+
+        Before the first one a camera may take longer; one that is gone says so at once.
+        """
+        asked_s = time.monotonic()
         if not self._capture.grab():
+            if self._is_new and time.monotonic() - asked_s > _AT_ONCE_S:
+                return None
             raise DeviceError(f"{self.name} is lost: check its cable")
+        self._is_new = False
         arrived_s = time.monotonic()
         # V4L2 stamps frames on the monotonic clock. Some drivers do not, and say 0, or use another one.
         stamp_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
@@ -103,10 +120,16 @@ class WebcamSensor:
     def _find(self) -> Path:
         wanted = self._config.device
         devices = video_devices(self._dev, self._sys)
-        if wanted is None:
+        if wanted is None and self._own is not None:
+            # Another camera's pictures must not take the place of a lost one's: somebody is driving by them.
+            node = next((device.node for device in devices if _sign_of(device) == self._own), None)
+            if node is None:
+                raise DeviceError(f"{self.name} is not there any more: plug it in, or start again with another one")
+        elif wanted is None:
             if not devices:
                 raise DeviceError("no webcam: plug it in; main.py doctor --rig webcam says more")
             node = devices[0].node
+            self._own = _sign_of(devices[0])
         else:
             node = self._dev / f"video{wanted}" if wanted.isdigit() else Path(wanted)
             if not node.exists():

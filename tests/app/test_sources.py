@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import av
+import cv2
 import numpy as np
 import pytest
 
@@ -27,6 +28,15 @@ def video(path: Path, frames: int = 4) -> Path:
 def test_a_video_named_damaged_is_not_damaged(tmp_path: Path) -> None:
     found = list(pictures([video(tmp_path / "damaged_catheter.mp4")]))
     assert [picture.problem for picture in found] == [None] * 4
+
+
+def test_a_picture_that_is_called_like_a_frame_of_a_video_has_a_stem_of_its_own(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "v_000002.png"), np.full((48, 64, 3), 90, np.uint8))
+    cv2.imwrite(str(tmp_path / "w_000002.png"), np.full((48, 64, 3), 90, np.uint8))
+    files = [video(tmp_path / "v.mp4"), tmp_path / "v_000002.png", tmp_path / "w_000002.png"]
+    for order in (files, files[::-1]):
+        stems = sorted(picture.stem for picture in pictures(order))
+        assert stems == ["v_000000", "v_000001", "v_000002", "v_000002_2", "v_000003", "w_000002"]
 
 
 def test_a_video_that_breaks_off_says_so_after_its_last_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ from core.rig_file import (
     calibration_of,
     check_rig_name,
     find_rig,
+    has_rig,
     list_rigs,
     make_rig,
     read_rig,
@@ -62,6 +63,16 @@ def test_a_rig_with_real_servos_keeps_to_the_safety_rules() -> None:
     path.write_text(text.replace("heartbeat_timeout_s = 0.5", "heartbeat_timeout_s = 5.0"))
     with pytest.raises(RigFileError, match=r"servos: heartbeat_timeout_s must be 0\.5 at most"):
         read_rig(path)
+
+
+def test_a_copy_of_a_rig_file_does_not_take_its_place() -> None:
+    path = write_rig(make_rig(REAL, "bench", KNOWN))
+    (path.parent / "a backup of bench.toml").write_text(path.read_text())
+    assert find_rig("bench")[0] == path
+    assert find_rig("BENCH")[0] == path
+    assert find_rig("a backup of bench")[0].stem == "a backup of bench"
+    assert has_rig("Bench")
+    assert not has_rig("bench 2")
 
 
 def test_the_configuration_takes_the_rig_over() -> None:

@@ -86,6 +86,15 @@ def test_a_shared_clock_that_makes_no_sense_is_not_believed(now_s: float) -> Non
     assert CaptureClock().captured_s(100.0, 5000.0, now_s) == 100.0
 
 
+def test_after_a_stall_the_pictures_that_waited_are_as_old_as_they_are() -> None:
+    """What lay in the queue while the computer was busy must not be taken for new: somebody drives by it."""
+    clock = CaptureClock()
+    for k in range(30):
+        clock.captured_s(100.0 + k / 30, 5000.0 + k / 30, 5000.01 + k / 30)
+    assert clock.captured_s(102.0, 5001.22, 5002.0) == pytest.approx(101.22)
+    assert clock.captured_s(102.01, 5001.26, 5002.01) == pytest.approx(101.26)
+
+
 def test_capture_never_goes_back_and_never_lies_in_the_future() -> None:
     clock = CaptureClock()
     assert clock.captured_s(100.0, 50.0, 50.0) == 100.0
@@ -491,6 +500,45 @@ def test_a_webcam_gives_rgb_with_the_kernels_time(webcam: SoftWebcam) -> None:
     assert np.array_equal(shot.image, picture(0))
     assert began_s - 0.025 <= shot.captured_s <= arrived_s - 0.015
     assert sensor.name == "Soft Webcam"
+
+
+def test_another_webcam_does_not_take_the_place_of_a_lost_one(webcam: SoftWebcam) -> None:
+    """No camera is named, so that the first one is meant; later on it is that one."""
+    sensor = _sensor(webcam)
+    sensor.start()
+    assert sensor.shoot(0.1) is not None
+    sensor.stop()
+    webcam.unplug(0)
+    other = webcam.sys / "class" / "video4linux" / "video2"
+    other.mkdir(parents=True)
+    (other / "name").write_text("Laptop Camera\n")
+    (other / "index").write_text("0\n")
+    (webcam.dev / "video2").touch()
+    with pytest.raises(DeviceError, match="Soft Webcam is not there any more: plug it in"):
+        sensor.start()
+    webcam.plug(4)
+    sensor.start()
+    sensor.stop()
+    assert [Path(node).name for node, _ in webcam.captures] == ["video0", "video4"]
+
+
+def test_the_first_picture_may_take_longer_than_the_time_limit(webcam: SoftWebcam, monkeypatch: pytest.MonkeyPatch) -> None:
+    sensor = _sensor(webcam)
+    sensor.start()
+    capture, grab = webcam.captures[0][1], webcam.captures[0][1].grab
+
+    def slow() -> bool:
+        time.sleep(0.6)
+        return False
+
+    monkeypatch.setattr(capture, "grab", slow)
+    assert sensor.shoot(0.1) is None
+    monkeypatch.setattr(capture, "grab", grab)
+    assert sensor.shoot(0.1) is not None
+    monkeypatch.setattr(capture, "grab", slow)
+    with pytest.raises(DeviceError, match="is lost"):
+        sensor.shoot(0.1)
+    sensor.stop()
 
 
 def test_a_webcam_without_stamps_counts_from_the_arrival(webcam: SoftWebcam) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
 from core.calibration.identify import NotIdentified
-from core.calibration.look import HeadNotSeen, angle_deg, turn_deg
+from core.calibration.look import HeadNotSeen, Look, angle_deg, turn_deg
 from core.config import Config
+from core.devices import DeviceError
 from core.servo_config import JOINT_NAMES, ServosConfig
 from core.types import Command
 from hardware import servo_wizard
@@ -123,6 +127,50 @@ def test_a_head_that_is_not_seen_moves_nothing() -> None:
     with pytest.raises(HeadNotSeen):
         servo_wizard.identify_servos(bench, ServosConfig(), IDS, lambda _: None)
     assert twin.moved == []
+
+
+class _TrueEyes:
+    """See the robot as it is, in no time; after `looks` more looks they see nothing."""
+
+    def __init__(self, twin: LockTwin, looks: int = 10_000, error: Exception | None = None) -> None:
+        self._twin, self.looks = twin, looks
+        self._error = error or HeadNotSeen("the robot's head is not seen")
+
+    def look(self, alive: Callable[[], None]) -> Look:
+        alive()
+        self.looks -= 1
+        if self.looks < 0:
+            raise self._error
+        points = np.asarray(self._twin.world.view.project(self._twin.world.physics.robot_points_mm()))
+        return Look((points,) * 3, np.zeros((480, 640, 3), np.uint8))
+
+
+def _bench_that_sees(twin: LockTwin, bench: Bench, looks: int = 10_000, error: Exception | None = None) -> Bench:
+    return Bench(_TrueEyes(twin, looks, error), bench.hands, bench.stop)
+
+
+def test_learning_the_steering_again_and_again_pulls_no_wire() -> None:
+    twin, bench = lock_bench(_config())
+    for _ in range(2):
+        servo_wizard.learn_steering(_bench_that_sees(twin, bench), twin.wiring, lambda _: None)
+        assert _tendon_mm(twin) == pytest.approx([0.0] * 4, abs=0.02)
+
+
+@pytest.mark.parametrize("error", [HeadNotSeen("the robot's head is not seen"), DeviceError("webcam is lost")])
+@pytest.mark.parametrize("looks", [1, 2, 5])
+def test_a_step_that_loses_sight_leaves_nothing_turned(looks: int, error: Exception) -> None:
+    """Otherwise a retry would go on from there."""
+    twin, bench = lock_bench(_config())
+    before = dict(twin.turned_mm)
+    steps = (
+        lambda blind: servo_wizard.identify_servo(blind, ServosConfig(), IDS, 3, lambda _: None),
+        lambda blind: servo_wizard.find_zeros(blind, twin.wiring, lambda _: None),
+        lambda blind: servo_wizard.learn_steering(blind, twin.wiring, lambda _: None),
+    )
+    for step in steps:
+        with suppress(HeadNotSeen, DeviceError):
+            step(_bench_that_sees(twin, bench, looks, error))
+        assert twin.turned_mm == pytest.approx(before, abs=0.05)
 
 
 def test_a_wiggle_goes_both_ways_and_comes_back() -> None:
