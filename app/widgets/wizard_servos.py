@@ -14,6 +14,7 @@ from app.wizard_desk import WizardDesk
 from core.calibration.identify import Assignment
 from core.errors import UserError
 from core.servo_config import JOINT_NAMES, JointName
+from hardware.rig_draft import RigDraft
 from hardware.rig_search import with_port
 from hardware.servos.search import find_ports
 
@@ -69,8 +70,12 @@ class PortPage(WizardPage):
         return self.desk.draft is not None and self.desk.draft.found is not None
 
     def enter(self) -> None:
-        if self.ports.count() == 0:
-            self._fill_ports()
+        # Another bench may have been opened since, or an adapter plugged in.
+        chosen = self.ports.currentData()
+        self.ports.clear()
+        self._fill_ports()
+        if chosen is not None and (place := self.ports.findData(chosen)) >= 0:
+            self.ports.setCurrentIndex(place)
         self.refresh()
 
     def _fill_ports(self) -> None:
@@ -155,6 +160,7 @@ class IdentifyPage(WizardPage):
         self.column.addStretch(1)
         self._shown: tuple[Assignment, ...] | None = None
         self._known_ids: tuple[int, ...] = ()
+        self._draft: RigDraft | None = None
 
     @property
     def is_done(self) -> bool:
@@ -196,8 +202,8 @@ class IdentifyPage(WizardPage):
         if draft is None or found is None:
             tell(self.result, tr("Search the servos first."))
             return
-        if self._known_ids != found.ids:
-            self._known_ids = found.ids
+        if (self._known_ids, self._draft) != (found.ids, draft):
+            self._known_ids, self._draft, self._shown = found.ids, draft, ()
             joints = draft.config.servos.joints
             spare = [servo_id for servo_id in found.ids if servo_id not in {joint.id for joint in joints}]
             for row, (ids, joint) in enumerate(zip(self._ids, joints, strict=True)):
@@ -207,6 +213,7 @@ class IdentifyPage(WizardPage):
                 first = joint.id if joint.id in found.ids or not spare else spare.pop(0)
                 ids.setCurrentIndex(max(0, ids.findData(first)))
                 self._signs[row].setCurrentIndex(self._signs[row].findData(joint.sign))
+                put(self.rows, row, 3, "")
         if draft.assignments != self._shown:
             self._show(draft.assignments)
         text = _UP_OR_DOWN if assumed else ""

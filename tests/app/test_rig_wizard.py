@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from app.rig_command import calibration_lines
 from app.rig_wizard import RigWizard
+from app.widgets import wizard_servos
 from app.wizard_desk import WizardDesk
 from core.calibration.identify import Assignment
 from core.calibration_config import CalibrationConfig, ScaleConfig
@@ -24,7 +25,7 @@ from core.servo_config import JOINT_NAMES
 from core.types import Frame
 from hardware import calibration_bench
 from hardware.calibration_bench import CalibrationBench
-from hardware.servos.search import FoundServo, FoundServos
+from hardware.servos.search import FoundPort, FoundServo, FoundServos
 from tests.app.fakes import make_scene, until
 
 
@@ -342,6 +343,35 @@ def test_a_step_that_is_left_out_keeps_what_was_known(make_wizard: MakeWizard, q
     _to(wizard, wizard.summary_page)
     wizard.next_button.click()
     assert find_rig("bench 1")[1].calibration.scale == scale  # type: ignore[union-attr]
+
+
+def test_another_camera_does_not_inherit_the_calibration(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="board", uncertainty_share=0.01)
+    known = CalibrationConfig.model_validate({"made_utc": "2025-01-01T00:00:00Z", "scale": scale})
+    before = load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}, "camera": {"device": "/dev/v4l/by-id/a"}})
+    wizard = make_wizard("bench 1", before, known)
+    for changes in ({"device": "/dev/v4l/by-id/b"}, {"width_px": 1280, "height_px": 720}):
+        wizard.desk.open_camera(before.model_copy(update={"camera": before.camera.model_copy(update=changes)}))
+        _idle(wizard, qtbot)
+        assert not wizard.scale_page.is_done
+    wizard.desk.open_camera(before)
+    _idle(wizard, qtbot)
+    assert wizard.scale_page.is_done
+
+
+def test_the_ports_are_those_of_the_bench_that_is_open(
+    make_wizard: MakeWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wizard = make_wizard("bench 1")
+    _open_camera(wizard, qtbot)
+    page = wizard.port_page
+    page.enter()
+    assert [page.ports.itemText(k) for k in range(page.ports.count())] == ["the twin's own servos"]
+    wizard.desk.open_camera(load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}}))
+    _idle(wizard, qtbot)
+    monkeypatch.setattr(wizard_servos, "find_ports", lambda: (FoundPort("/dev/serial/by-id/u2d2", "U2D2"),))
+    page.enter()
+    assert [page.ports.itemData(k) for k in range(page.ports.count())] == ["/dev/serial/by-id/u2d2", None]
 
 
 def test_cancel_saves_nothing_and_gives_the_camera_back(opened: RigWizard) -> None:
