@@ -92,7 +92,7 @@ $python main.py train --data "$out/frames21" --data "$out/frames22" --look-share
 # And once more, on three times as many frames, two of three of which nobody has seen: it had begun to know the last ones.
 sets=(--data "$out/frames21" --data "$out/frames22" --data "$out/frames23" --data "$out/frames24" --data "$out/frames25")
 $python main.py train "${sets[@]}" --look-share 0.5 --second-look --init "$out/near13" --focus 0.4 --end-weight 4 --batch 24 --rate 5e-3 \
-    --steps 12500 --seed 35 --out "$out/default"
+    --steps 12500 --stop-after 11704 --seed 35 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 960 --seed 950000 --workers 2
 # The twin's own look is in none of the random families, and has to be known, too.
