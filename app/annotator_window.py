@@ -87,8 +87,7 @@ class AnnotatorWindow(WindowFrame):
 
     def open(self, place: int) -> None:
         """Take an item in hand; it is blank until it is loaded."""
-        self.panels.canvas.complete()
-        self._keep_note()
+        self._keep_all()
         if place != self._desk.index:
             self.panels.canvas.blank()
             self.panels.readout.show_annotation(Annotation(), Readout(missing=tr("loading")))
@@ -233,6 +232,11 @@ class AnnotatorWindow(WindowFrame):
         self.panels.note.setFocus()
         self.panels.note.selectAll()
 
+    def _keep_all(self) -> None:
+        """What is being drawn and written."""
+        self.panels.canvas.complete()
+        self._keep_note()
+
     def _keep_note(self) -> None:
         text = self.panels.note.kept_text
         if self._desk.is_open and text != self._desk.annotation.note:
@@ -350,8 +354,7 @@ class AnnotatorWindow(WindowFrame):
 
     def tell_saved(self) -> None:
         """Where the annotations are."""
-        self.panels.canvas.complete()
-        self._keep_note()
+        self._keep_all()
         self._desk.settle()
         if self._desk.unsaved:
             self.say(tr("{count} edits could not be written.", count=self._desk.unsaved), is_fault=True)
@@ -374,8 +377,7 @@ class AnnotatorWindow(WindowFrame):
 
     def _may_close(self) -> bool:
         """Edits that cannot be written are asked about."""
-        self.panels.canvas.complete()
-        self._keep_note()
+        self._keep_all()
         self._desk.settle()
         return not self._desk.unsaved or self._may_lose()
 

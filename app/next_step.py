@@ -104,11 +104,9 @@ def next_step(view: DriveView) -> NextStep:
     if not view.servos_on:
         faults = tuple(fault.cause for fault in view.active if AREA[fault.cause] is Area.SERVOS and _holds(fault))
         rest = tr("press {key}: they are checked with the torque off, then tighten the wires", key=Step.SERVOS_ON.value.key)
-        return (
-            _refused(Step.SERVOS_ON, faults)
-            if faults
-            else NextStep(Step.SERVOS_ON, True, tr("The servos follow nobody, but may still pull"), rest)
-        )
+        if faults:
+            return _refused(Step.SERVOS_ON, faults)
+        return NextStep(Step.SERVOS_ON, True, tr("The servos follow nobody, but may still pull"), rest)
     if view.mode is Mode.ARMED:
         return _hand_over(view)
     if view.against_arming:

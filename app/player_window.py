@@ -412,9 +412,7 @@ class PlayerWindow(WindowFrame):
         elif panels.note.isVisible():
             self._end_note()
         elif self.focusWidget() is not panels.live:
-            # What was typed there and not confirmed would count when the field is left.
-            position = panels.bar.position
-            position.lineEdit().setText(f"{position.prefix()}{position.textFromValue(position.value())}{position.suffix()}")
+            panels.bar.abandon()
             panels.live.setFocus()
         elif self._keeper.has_clip:
             self._keeper.cancel_clip()

@@ -108,6 +108,11 @@ class PlayerBar(QWidget):
                 self.position.setValue(time_ms)
         self.frame.setText(tr("frame {place} of {count}", place=place + 1, count=self._rows) if self._rows else tr("no frames"))
 
+    def abandon(self) -> None:
+        """Forget a time that was typed and not confirmed; leaving the field would count it otherwise."""
+        field = self.position
+        field.lineEdit().setText(f"{field.prefix()}{field.textFromValue(field.value())}{field.suffix()}")
+
     def show_playing(self, on: bool) -> None:
         self.play.setText("\N{DOUBLE VERTICAL BAR}" if on else "\N{BLACK RIGHT-POINTING TRIANGLE}")
         self.play.setAccessibleName(tr("Pause") if on else tr("Play"))

@@ -2477,6 +2477,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
+        <source>The servos follow nobody, but may still pull</source>
+        <translation>舵机未受控，但可能仍有拉力</translation>
+    </message>
+    <message>
+        <location filename="../../app/next_step.py"/>
         <source>Stopped</source>
         <translation>已停止</translation>
     </message>
@@ -2484,11 +2489,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/next_step.py"/>
         <source>press {key}, then switch the servos on</source>
         <translation>按 {key}，然后开启舵机</translation>
-    </message>
-    <message>
-        <location filename="../../app/next_step.py"/>
-        <source>The servos follow nobody, but may still pull</source>
-        <translation>舵机未受控，但可能仍有拉力</translation>
     </message>
     <message>
         <location filename="../../app/operator_devices.py"/>
