@@ -74,10 +74,8 @@ def tail_first(points: Points, around: Surroundings) -> Points:
 def _entry(points: Points, around: Surroundings) -> float:
     before = around.previous
     arrived = before is not None and float(np.hypot(*(points[0] - before.points[-1]))) <= STILL_HEAD_PX
-    if arrived and around.vessel is not None:
-        distance, radius = _distance_to_vessel_end(points[-1], around.vessel)
-        if distance <= 2.0 * radius + 5.0:
-            return 0.0
+    if arrived and is_at_vessel_end(points[-1], around):
+        return 0.0
     if not is_entry(points[0], around):
         return 0.0
     # An end that stops short of the border, of a robot whose other end comes from outside the vessel, is a head about to leave.
@@ -122,12 +120,20 @@ def _distance_to_vessel_end(place: Points, vessel: VesselGraph) -> tuple[float, 
     return min(found, default=(np.inf, 0.0))
 
 
+def is_at_vessel_end(place: Points, around: Surroundings) -> bool:
+    """Whether a place (2,) lies at an end of the vessel graph."""
+    if around.vessel is None:
+        return False
+    distance, radius = _distance_to_vessel_end(place, around.vessel)
+    return distance <= 2.0 * radius + 5.0
+
+
 def _at_vessel_end(points: Points, around: Surroundings) -> float:
     if around.vessel is None or not around.vessel.edges:
         return 0.0
-    here, radius = _distance_to_vessel_end(points[0], around.vessel)
+    here, _ = _distance_to_vessel_end(points[0], around.vessel)
     there, _ = _distance_to_vessel_end(points[-1], around.vessel)
-    return float(here <= 2.0 * radius + 5.0 and here < NEARER_BY * there)
+    return float(is_at_vessel_end(points[0], around) and here < NEARER_BY * there)
 
 
 def _thickness(points: Points, around: Surroundings) -> float:

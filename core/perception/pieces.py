@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.config import PerceptionConfig
 from core.perception import gaps, polyline
+from core.perception.entry import Surroundings, is_at_vessel_end, is_entry
 from core.perception.pixel_graph import PixelGraph
-from core.types import Mask, Reason, Refusal
+from core.types import Mask, Points, Reason, Refusal
 
 HEADING_PX = 12
 """Pixels behind an end that give its direction."""
@@ -19,6 +21,10 @@ FAR_TURN_SHARE = 0.6
 """Pieces that look straight at each other (a turn of this share of the allowed one) belong together across this many thresholds."""
 NEAR_TURN_FACTOR = 1.5
 """Pieces nearer than the gap threshold belong together even if they turn by this much more than was repaired."""
+COMES_IN_PX = 10
+"""A piece of which more lies outside the vessel comes in from there."""
+SURER_BY = 0.03
+"""A line that comes in from nowhere is none of the robot if the robot's mean probability within the vessel exceeds its by this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +42,71 @@ def find_pieces(graph: PixelGraph, vessel: Mask) -> list[Piece]:
         group[group == group[chain.end]] = group[chain.start]
     length, inside = np.zeros(len(group)), np.zeros(len(group))
     for chain in graph.chains:
-        places = np.rint(chain.points).astype(int)
         chain_px = float(polyline.arc_length(chain.points)[-1])
         length[group[chain.start]] += chain_px
-        inside[group[chain.start]] += chain_px * float(vessel[places[:, 1], places[:, 0]].mean())
+        inside[group[chain.start]] += chain_px * float(_at(vessel, chain.points).mean())
     size = inside if inside.any() else length
     names = {int(group[chain.start]) for chain in graph.chains}
     pieces = [Piece(tuple(np.flatnonzero(group == name).tolist()), float(size[name])) for name in names]
     return sorted(pieces, key=lambda piece: -piece.size_px)
+
+
+def without_reflections(graph: PixelGraph, pieces: list[Piece], around: Surroundings, config: PerceptionConfig) -> list[Piece]:
+    """The pieces (largest first) without long lines that no robot can be: they come in from nowhere, while another piece does.
+
+    A robot comes in at the image border, at the port or from outside the vessel; one whose entry is covered begins at an end of the
+    vessel. What lies elsewhere is a part of it beyond something that hides it, or a reflection, a scratch, the board's grain: of
+    these the network is less sure. One that an end of the robot looks at is kept, for ``check_pieces`` to judge.
+    """
+    large = [piece for piece in pieces if piece.size_px >= config.path.min_length_px]
+    if len(large) < 2 or not config.quality.enabled:
+        return pieces
+    coming = [piece for piece in large if _comes_in(graph, piece, around)]
+    robot = next((piece for piece in large if piece in coming or _begins_at_vessel_end(graph, piece, around)), None)
+    if robot is None:
+        return pieces
+    headings, least = _headings(graph), _sureness(graph, robot, around) - SURER_BY
+    none = [
+        piece
+        for piece in large
+        if piece is not robot
+        and piece not in coming
+        and _sureness(graph, piece, around) < least
+        and _facing_gap(graph, headings, robot, piece, config) is None
+    ]
+    return [piece for piece in pieces if piece not in none]
+
+
+def _comes_in(graph: PixelGraph, piece: Piece, around: Surroundings) -> bool:
+    outside_px = int(np.count_nonzero(~_at(around.masks.vessel, _places(graph, piece))))
+    return outside_px > COMES_IN_PX or any(is_entry(end, around) for end in _ends(graph, piece))
+
+
+def _begins_at_vessel_end(graph: PixelGraph, piece: Piece, around: Surroundings) -> bool:
+    return any(is_at_vessel_end(end, around) for end in _ends(graph, piece))
+
+
+def _sureness(graph: PixelGraph, piece: Piece, around: Surroundings) -> float:
+    """The mean probability of robot along a piece, within the vessel if it is there at all: outside, a robot is seen better."""
+    places = _places(graph, piece)
+    inside = places[_at(around.masks.vessel, places)]
+    return float(_at(around.masks.robot_probability, inside if len(inside) else places).mean())
+
+
+def _ends(graph: PixelGraph, piece: Piece) -> list[Points]:
+    degrees = graph.degrees()
+    return [graph.nodes[node] for node in piece.nodes if degrees[node] == 1]
+
+
+def _places(graph: PixelGraph, piece: Piece) -> Points:
+    """The points (N, 2) of a piece, columns x, y."""
+    return np.vstack([chain.points for chain in graph.chains if chain.start in piece.nodes])
+
+
+def _at(values: NDArray[Any], places: Points) -> NDArray[Any]:
+    """The values (h, w) at places (N, 2)."""
+    columns, rows = np.rint(places).astype(np.intp).T
+    return np.asarray(values[rows, columns])
 
 
 def check_pieces(graph: PixelGraph, pieces: list[Piece], config: PerceptionConfig) -> Refusal | None:

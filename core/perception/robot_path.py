@@ -10,7 +10,7 @@ import numpy as np
 from core.config import PathConfig, PerceptionConfig
 from core.perception import path_shape, polyline, trails
 from core.perception.entry import Surroundings, is_entry, tail_first
-from core.perception.pieces import check_pieces, find_pieces
+from core.perception.pieces import check_pieces, find_pieces, without_reflections
 from core.perception.pixel_graph import Chain, PixelGraph, trace
 from core.perception.trails import Trail
 from core.types import Masks, Point, Points, Reason, Refusal, RobotPath, Skeletons, VesselGraph
@@ -73,10 +73,11 @@ def find(
     pieces = find_pieces(graph, masks.vessel)
     if not pieces:
         return Refusal(Reason.TOO_SHORT, f"{total_px:.0f} px long (at least {config.path.min_length_px:.0f} px)")
+    around = Surroundings(masks, previous, vessel, port, config.path)
+    pieces = without_reflections(graph, pieces, around, config)
     refusal = check_pieces(graph, pieces, config)
     if refusal is not None:
         return refusal
-    around = Surroundings(masks, previous, vessel, port, config.path)
     chosen = [node for piece in pieces if piece.size_px >= config.path.outlier_share * pieces[0].size_px for node in piece.nodes]
     taken = set(chosen)
     chains = sum(chain.start in taken for chain in graph.chains)

@@ -209,6 +209,66 @@ def test_two_robots_are_refused() -> None:
     assert reason_of(probability(depth(S_CURVE, 4.0), depth(second, 4.0))) is Reason.SEVERAL_ROBOTS
 
 
+VESSELS = probability(
+    depth(S_CURVE, 30.0), depth(curve((-60, 390), (330, 420), (700, 380)), 15.0), depth(curve((200, 60), (480, 60)), 30.0)
+)
+"""Three tubes: two that come in from the border, the robot in one of them, and one that begins and ends in the picture."""
+GLINT = curve((80, 402), (330, 420), (400, 420))
+
+
+def with_line(line: Points, sureness: float) -> np.ndarray:
+    """The robot, and a line that the network is less sure of."""
+    return np.maximum(probability(depth(S_CURVE, 4.0)), sureness * probability(depth(line, 3.0)))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [curve((72, 400), (330, 420), (566, 400)), curve((205, 60), (475, 62))],
+    ids=["longer than the robot", "at the ends of its tube"],
+)
+def test_a_doubtful_line_that_comes_in_from_nowhere_is_no_robot_however_long(line: Points) -> None:
+    path = path_of(with_line(line, 0.9), vessel=VESSELS)
+    assert path.head == pytest.approx(HEAD, abs=0.8)
+    assert path.entry_on_border
+
+
+@pytest.mark.parametrize(
+    ("line", "sureness"),
+    [
+        (GLINT, 0.99),  # as sure as of the robot: a part of it that comes out again from behind something
+        (curve((-20, 393), (330, 420), (400, 420)), 0.9),  # comes in at the border
+        (curve((30, 320), (120, 400), (330, 420), (400, 420)), 0.9),  # comes in from outside the tubes
+    ],
+    ids=["sure", "border", "outside"],
+)
+def test_what_may_be_a_robot_too_is_still_several(line: Points, sureness: float) -> None:
+    assert reason_of(with_line(line, sureness), vessel=VESSELS) is Reason.SEVERAL_ROBOTS
+
+
+def test_a_doubtful_line_ahead_of_the_head_may_be_its_end() -> None:
+    ahead = curve((480, 172), (560, 130))
+    vessel = probability(depth(np.vstack([S_CURVE, ahead]), 30.0))
+    assert reason_of(with_line(ahead, 0.9), vessel=vessel) is Reason.GAP_TOO_LONG
+
+
+def test_a_robot_that_is_hardly_seen_in_the_vessel_makes_nothing_else_doubtful() -> None:
+    """Outside the vessel it is seen well, which says nothing of the line."""
+    faint = np.where(VESSELS >= 0.5, 0.85, 1.0) * probability(depth(S_CURVE, 4.0))
+    vessel = np.where(np.arange(SIZE[0]) < 150, probability(depth(GLINT, 30.0)), VESSELS)
+    robot = np.maximum(faint, 0.9 * probability(depth(GLINT, 3.0)))
+    assert reason_of(robot, vessel=vessel) is Reason.SEVERAL_ROBOTS
+
+
+def test_of_lines_that_all_come_in_from_nowhere_none_is_known_to_be_no_robot() -> None:
+    """An opaque fitting hides where the robot comes in: one of them is it."""
+    line, other = curve((160, 240), (300, 250), (420, 215)), curve((150, 410), (330, 420), (560, 395))
+    robot = np.maximum(probability(depth(line, 4.0)), 0.9 * probability(depth(other, 3.0)))
+    vessel = probability(
+        depth(curve((60, 240), (300, 250), (560, 180)), 30.0), depth(curve((60, 400), (330, 420), (630, 390)), 30.0)
+    )
+    assert reason_of(robot, vessel=vessel) is Reason.SEVERAL_ROBOTS
+
+
 def test_a_robot_from_border_to_border_shows_no_head() -> None:
     through = curve((-20, 240), (200, 200), (420, 260), (660, 220))
     robot = probability(depth(through, 4.0))
