@@ -8,26 +8,23 @@ from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QFocusEvent,
-    QImage,
     QKeyEvent,
     QMouseEvent,
     QPainter,
     QPainterPath,
     QPaintEvent,
     QPen,
-    QResizeEvent,
-    QWheelEvent,
 )
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy
 
 from app import theme
 from app.annotation_hand import AnnotationHand, Edit, Ending, Measure, Reach
 from app.annotation_tool import Tool
 from app.language import mark, tr
 from app.palette import ON_PICTURE
-from app.picture_view import PictureView, render
 from app.widgets.annotation_loupe import AnnotationLoupe, paint_cross
 from app.widgets.annotation_paint import draw
+from app.widgets.picture_canvas import PictureCanvas
 from core.study.annotation_edits import Touch, line_of
 from core.study.annotations import Annotation, Readout
 from core.types import Image, Point
@@ -35,7 +32,6 @@ from core.types import Image, Point
 _POINT_REACH = 10.0
 _EDGE_REACH = 6.0
 _CLICK_SLACK = 4.0
-_CLOSE_UP = 5.0
 _LABEL_PX = 15
 _ARROWS = {
     Qt.Key.Key_Left: (-1.0, 0.0),
@@ -56,7 +52,7 @@ CANVAS_KEYS = (
 """The keys that the picture hears itself: all others are in the menus."""
 
 
-class AnnotationCanvas(QWidget):
+class AnnotationCanvas(PictureCanvas):
     """Shows an image with its annotation; all places are pixels of the image as it is shown.
 
     ``edited`` carries what was done, in words, and the new annotation. ``previewed`` carries the annotation and its readout while a
@@ -76,23 +72,15 @@ class AnnotationCanvas(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setCursor(Qt.CursorShape.CrossCursor)
         self.setAccessibleName(tr("Picture to annotate"))
         self.setAccessibleDescription(tr("Click sets points; arrow keys move the selected point or the cross, Insert sets a point"))
         self._hand = AnnotationHand()
         self._loupe = AnnotationLoupe()
-        self._levels: tuple[Image, ...] = ()
-        self._view = PictureView((1, 1), (1, 1), 1.0, (0.0, 0.0))
-        self._picture: QImage | None = None
-        self._light = (1.0, 0.0)
         self._loupe_on = True
         self._brush_on = False
         self._brush_px = 6.0
         self._cursor: Point | None = None
         self._cross_by_key = False
-        self._space_held = False
-        self._pan_from: QPointF | None = None
         self._pressed_at = QPointF()
 
     # ---- what is shown
@@ -100,10 +88,6 @@ class AnnotationCanvas(QWidget):
     @property
     def tool(self) -> Tool:
         return self._hand.tool
-
-    @property
-    def view(self) -> PictureView:
-        return self._view
 
     @property
     def annotation(self) -> Annotation:
@@ -134,18 +118,14 @@ class AnnotationCanvas(QWidget):
     def show_image(self, levels: tuple[Image, ...], annotation: Annotation, measure: Measure) -> None:
         """Another image, the whole of it."""
         size = levels[0].shape[1], levels[0].shape[0]
-        self._view = PictureView.fitted(size, (max(1, self.width()), max(1, self.height())))
-        self._levels = levels
         self._hand.take_image(size, annotation, measure)
-        self._pan_from = None
         self._brush_on = self._cross_by_key = False
-        self._renew_picture()
+        self.show_levels(levels)
 
     def blank(self) -> None:
         """Nothing is shown."""
-        self._levels = ()
-        self._hand.take_image(self._view.size, Annotation(), lambda _annotation: Readout())
-        self._renew_picture()
+        self._hand.take_image(self.view.size, Annotation(), lambda _annotation: Readout())
+        self.show_levels(())
 
     def show_annotation(self, annotation: Annotation) -> None:
         """What is true now, after an edit, undo or redo."""
@@ -183,27 +163,15 @@ class AnnotationCanvas(QWidget):
         self._hand.drawing = replace(self._hand.drawing, masks_shown=on)
         self.update()
 
-    def set_light(self, contrast: float, brightness: float) -> None:
-        """How greys are shown; the image itself is not changed."""
-        self._light = (contrast, brightness)
-        self._renew_picture()
-
-    def fit(self) -> None:
-        """The whole image."""
-        self._set_view(PictureView.fitted(self._view.size, self._view.room))
-
     def zoom(self, factor: float) -> None:
         """Zoom at the cursor, or in the middle when there is none."""
-        at = self._view.to_screen(self._cursor) if self._cursor is not None and self._view.shows(self._cursor, 0.0) else None
-        self._set_view(self._view.zoomed(factor, at or (self.width() / 2, self.height() / 2)))
+        at = self.view.to_screen(self._cursor) if self._cursor is not None and self.view.shows(self._cursor, 0.0) else None
+        self.zoom_at(factor, at or (self.width() / 2, self.height() / 2))
 
     def close_up(self) -> None:
         """The robot's head, or without one what is under the cursor, several times as large; once more: the whole image."""
-        whole = PictureView.fitted(self._view.size, self._view.room)
-        robot = self.annotation.robot
-        middle = robot[-1] if robot else self._cursor or whole.center
-        near = replace(whole, zoom=whole.zoom * _CLOSE_UP, center=middle).inside()
-        self._set_view(whole if self._view == near else near)
+        robot, (width, height) = self.annotation.robot, self.view.size
+        self.close_up_at(robot[-1] if robot else self._cursor or ((width - 1) / 2, (height - 1) / 2))
 
     def complete(self) -> None:
         """Before something else happens to the picture: nothing that was drawn by hand is lost."""
@@ -227,38 +195,36 @@ class AnnotationCanvas(QWidget):
     # ---- mouse
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        if not self._levels:
+        if not self.levels:
             return
         if (self._hand.stroke or self._hand.held is not None) and event.buttons() != event.button():
             return  # another button, by mistake, while one draws
         self._pressed_at = event.position()
         point, button = self._under(event.position()), event.button()
         self._cursor, self._cross_by_key = point, False
-        if button == Qt.MouseButton.MiddleButton or (button == Qt.MouseButton.LeftButton and self._space_held):
-            self._begin_pan(event.position())
+        if button == Qt.MouseButton.MiddleButton or (button == Qt.MouseButton.LeftButton and self.is_pannable):
+            self.begin_pan(event.position())
         elif self.brush_on and button in (Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton):
             shift = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
             self._hand.begin_stroke(point, erase=shift or button == Qt.MouseButton.RightButton)
         elif button == Qt.MouseButton.LeftButton:
             tool = self.tool
             if not self._hand.press(point, self._reach()):
-                self._begin_pan(event.position())
+                self.begin_pan(event.position())
             if self.tool is not tool:
                 self.tool_changed.emit(self.tool)
             self._tell_preview()
         elif button == Qt.MouseButton.RightButton:
-            self._pan_from = event.position()
+            self.begin_pan(event.position())
         self.update()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if not self._levels:
+        if not self.levels:
             return
         point = self._under(event.position())
         self._cursor, self._cross_by_key = point, False
-        if self._pan_from is not None:
-            step = event.position() - self._pan_from
-            self._pan_from = event.position()
-            self._set_view(self._view.panned(step.x(), step.y()))
+        if self.is_panning:
+            self.pan_to(event.position())
         elif self._hand.stroke:
             self._hand.stroke.append(point)
         elif self._hand.held is not None:
@@ -275,26 +241,19 @@ class AnnotationCanvas(QWidget):
             self._tell(self._hand.end_stroke(self._brush_px))
         elif self._hand.held is not None and event.button() == Qt.MouseButton.LeftButton:
             self._tell(self._hand.release())
-        elif self._pan_from is not None:
-            self._pan_from = None
-            self._renew_cursor()
+        elif self.is_panning:
+            self.end_pan()
             if event.button() == Qt.MouseButton.RightButton and is_click:
                 self._tell_ending(self._hand.take_out(self._under(event.position()), self._reach()) or self._hand.end())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         """The first of its clicks has set the last point."""
-        if not self._levels:
+        if not self.levels:
             return
-        if event.button() == Qt.MouseButton.LeftButton and not self.brush_on and not self._space_held:
+        if event.button() == Qt.MouseButton.LeftButton and not self.brush_on and not self.is_pannable:
             self.end_line()
         else:
             self.mousePressEvent(event)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        turns = event.angleDelta().y() / 120.0
-        if turns and self._levels:
-            self._set_view(self._view.zoomed(1.2**turns, (event.position().x(), event.position().y())))
-        event.accept()
 
     def leaveEvent(self, event: QEvent) -> None:
         if not self._cross_by_key:
@@ -334,7 +293,7 @@ class AnnotationCanvas(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key, modifiers = Qt.Key(event.key()), event.modifiers()
-        if not self._levels:
+        if not self.levels:
             super().keyPressEvent(event)
         elif key in _ARROWS:
             step = 0.1 if modifiers & Qt.KeyboardModifier.ControlModifier else 1.0
@@ -348,22 +307,19 @@ class AnnotationCanvas(QWidget):
             else:
                 self._by_key(puts=key == Qt.Key.Key_Insert)
         elif key == Qt.Key.Key_Space:
-            self._space_held = True
-            self._renew_cursor()
+            self.set_pannable(True)
         else:
             super().keyPressEvent(event)
 
     def keyReleaseEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Space:
             if not event.isAutoRepeat():
-                self._space_held = False
-                self._renew_cursor()
+                self.set_pannable(False)
         else:
             super().keyReleaseEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        self._space_held = False
-        self._renew_cursor()
+        self.set_pannable(False)
         super().focusOutEvent(event)
 
     def event(self, event: QEvent) -> bool:
@@ -372,7 +328,7 @@ class AnnotationCanvas(QWidget):
             if event.key() in (Qt.Key.Key_Tab, Qt.Key.Key_Backtab):
                 place = self._hand.select_next(-1 if event.key() == Qt.Key.Key_Backtab else 1)
                 if place is not None:
-                    self._see(place)
+                    self.see(place)
                     self._cursor = None
                     self._tell_preview()
                     self.update()
@@ -385,13 +341,13 @@ class AnnotationCanvas(QWidget):
         edit = self._hand.nudge(dx, dy)
         if edit is not None and selected is not None:
             self._cursor = None  # the loupe shows the point
-            self._see(line_of(edit[1], selected.line)[selected.place])
+            self.see(line_of(edit[1], selected.line)[selected.place])
             self._tell(edit)
             return
-        (x, y), (width, height) = self._cursor or self._view.center, self._view.size
+        (x, y), (width, height) = self._cursor or self.view.center, self.view.size
         self._cursor = min(max(x + dx, 0.0), width - 1.0), min(max(y + dy, 0.0), height - 1.0)
         self._cross_by_key = True
-        self._see(self._cursor)
+        self.see(self._cursor)
         if self._hand.stretch(self._cursor, Reach(0.0, 0.0)):
             self._tell_preview()
         self.update()
@@ -420,69 +376,37 @@ class AnnotationCanvas(QWidget):
         self.previewed.emit(self.annotation, self._hand.drawing.readout)
 
     def _reach(self) -> Reach:
-        return Reach(_POINT_REACH / self._view.zoom, _EDGE_REACH / self._view.zoom)
-
-    def _begin_pan(self, position: QPointF) -> None:
-        self._pan_from = position
-        self._renew_cursor()
-
-    def _renew_cursor(self) -> None:
-        if self._pan_from is not None:
-            self.setCursor(Qt.CursorShape.ClosedHandCursor)
-        else:
-            self.setCursor(Qt.CursorShape.OpenHandCursor if self._space_held else Qt.CursorShape.CrossCursor)
+        return Reach(_POINT_REACH / self.view.zoom, _EDGE_REACH / self.view.zoom)
 
     def _under(self, position: QPointF) -> Point:
-        return self._view.to_image(position.x(), position.y())
-
-    def _see(self, point: Point) -> None:
-        """Bring a place into sight."""
-        if not self._view.shows(point, 20.0):
-            self._set_view(replace(self._view, center=point).inside())
-
-    def _set_view(self, view: PictureView) -> None:
-        if view != self._view:
-            self._view = view
-            self._renew_picture()
-
-    def _renew_picture(self) -> None:
-        self._picture = None
-        self.update()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        self._view = self._view.in_room((max(1, self.width()), max(1, self.height())))
-        self._renew_picture()
+        return self.view.to_image(position.x(), position.y())
 
     # ---- painting
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        if not self._levels:
-            painter.fillRect(self.rect(), QColor(ON_PICTURE.INK))
+        if not self.paint_picture(painter):
             painter.end()
             return
-        if self._picture is None:
-            self._picture = render(self._levels, self._view, self.devicePixelRatioF(), *self._light)
-        painter.drawImage(QPointF(0, 0), self._picture)
         painter.save()
-        draw(painter, self._view.transform, replace(self._hand.drawing, handles_shown=not self.brush_on), _LABEL_PX)
+        draw(painter, self.view.transform, replace(self._hand.drawing, handles_shown=not self.brush_on), _LABEL_PX)
         painter.restore()
         if self.brush_on:
             self._paint_brush(painter)
         if self._cross_by_key and self._cursor is not None:
-            paint_cross(painter, QPointF(*self._view.to_screen(self._cursor)), 16.0)
+            paint_cross(painter, QPointF(*self.view.to_screen(self._cursor)), 16.0)
         focus = self._loupe_point()
         if focus is not None:
-            self._loupe.paint(painter, self._levels, self._view, self._hand.drawing, focus, self._light)
+            self._loupe.paint(painter, self.levels, self.view, self._hand.drawing, focus, self.light)
         painter.end()
 
     def _paint_brush(self, painter: QPainter) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        radius = self._brush_px * self._view.zoom
+        radius = self._brush_px * self.view.zoom
         if self._hand.stroke:
-            path = QPainterPath(QPointF(*self._view.to_screen(self._hand.stroke[0])))
+            path = QPainterPath(QPointF(*self.view.to_screen(self._hand.stroke[0])))
             for point in self._hand.stroke:
-                path.lineTo(QPointF(*self._view.to_screen(point)))
+                path.lineTo(QPointF(*self.view.to_screen(point)))
             path.lineTo(path.currentPosition() + QPointF(0.01, 0.0))
             ink = ON_PICTURE.INK if self._hand.stroke_erases else self.tool.value.colour
             pen = QPen(theme.colour(ink, 0.6), 2 * radius)
@@ -495,7 +419,7 @@ class AnnotationCanvas(QWidget):
             painter.setBrush(Qt.BrushStyle.NoBrush)
             for name, width in ((ON_PICTURE.INK, 3.0), (ON_PICTURE.TEXT, 1.2)):
                 painter.setPen(QPen(QColor(name), width))
-                painter.drawEllipse(QPointF(*self._view.to_screen(self._cursor)), radius, radius)
+                painter.drawEllipse(QPointF(*self.view.to_screen(self._cursor)), radius, radius)
 
     def _loupe_point(self) -> Point | None:
         """What the loupe magnifies: the point in the hand, what lies under the cursor, or the selected point."""
