@@ -322,12 +322,18 @@ def _of_rater(annotations: list[StoredAnnotation], rater: str | None) -> list[St
 
 
 def read_annotated(store_path: Path, paths: Sequence[Path], frames: int = 48) -> tuple[list[StoredAnnotation], list[FoundImage]]:
-    """All annotations of a file and those of its images that are here; nothing is written. Raises AnnotationError."""
-    files = image_files(paths, frames)
+    """All annotations of a file and those of its images that are here; how many are not is told. Raises AnnotationError.
+
+    Of a video those pictures count that were taken from it before; where there are none, `frames` are taken.
+    """
+    files = image_files(paths, frames, taken=True)
     with AnnotationStore(store_path, read_only=True) as store:
         annotations = store.annotations()
         images, problems = known_images(files, store)
         _tell([*store.problems, *problems])
+    annotated, here = {one.key.sha256 for one in annotations}, {image.sha256 for image in images}
+    if here and not annotated <= here:
+        _tell([f"{len(annotated - here)} of {len(annotated)} annotated images are not in {paths[0]}: left out"])
     return annotations, images
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from glob import escape
 from pathlib import Path
 
 import av
@@ -23,8 +24,10 @@ def default_store(paths: Sequence[Path]) -> Path:
     return (first if first.is_dir() else first.parent) / DEFAULT_NAME
 
 
-def image_files(paths: Sequence[Path], frames: int) -> list[Path]:
+def image_files(paths: Sequence[Path], frames: int, *, taken: bool = False) -> list[Path]:
     """All pictures among `paths`, in name order; of each video `frames` pictures, which lie in a folder beside it afterwards.
+
+    With `taken` those that lie there already, however many they are, and only without any `frames` new ones.
 
     Raises AnnotationError when a path is not there, a video cannot be read, or there is no picture at all.
     """
@@ -36,7 +39,10 @@ def image_files(paths: Sequence[Path], frames: int) -> list[Path]:
         if path.is_dir() and not found and (path / "images").is_dir():  # a labelled set
             found = _whole(path / "images")
         for file in found:
-            files += _frames_of(file, frames) if file.suffix.lower() in VIDEO_ENDINGS else [file]
+            if file.suffix.lower() in VIDEO_ENDINGS:
+                files += (_taken_of(file) if taken else []) or _frames_of(file, frames)
+            else:
+                files.append(file)
     if not files:
         raise AnnotationError(f"{paths[0]}: no picture or video in it")
     return files
@@ -47,9 +53,17 @@ def _whole(path: Path) -> list[Path]:
     return [file for file in expand([path]) if file.exists()]
 
 
+def _taken_of(video: Path) -> list[Path]:
+    return sorted(_folder_of(video).glob(f"{escape(video.stem)}_*.png"))
+
+
+def _folder_of(video: Path) -> Path:
+    return video.with_name(f"{video.stem}_frames")
+
+
 def _frames_of(video: Path, count: int) -> list[Path]:
     """Pictures of a video, written once: the same frames are the same files, so that their annotations are found again."""
-    folder = video.with_name(f"{video.stem}_frames")
+    folder = _folder_of(video)
     try:
         with open_video(video) as container:
             if not container.streams.video:

@@ -143,6 +143,13 @@ def test_an_annotated_folder_is_evaluated_as_its_table_is(folder: Path, tmp_path
     assert second["source"]["kind"] == "annotated by hand"
 
 
+def test_annotated_images_that_are_elsewhere_are_counted(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    annotate(folder)
+    (folder / "2.png").unlink()
+    run(folder, export="csv", out=tmp_path / "table.csv")
+    assert f"1 of 3 annotated images are not in {folder}: left out" in capsys.readouterr().err
+
+
 def test_a_study_is_gone_on_with_as_it_was_begun(folder: Path) -> None:
     first = queue(folder, name="pilot", turn=True, seed=4)
     assert len(first) == 6
@@ -221,6 +228,10 @@ def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
 
     assert [round(float(cv2.imread(str(path)).mean()) / 8) for path in files] == [0, 10, 20, 30]
     assert default_store([video]) == tmp_path / DEFAULT_NAME
+    assert image_files([video], 48, taken=True) == files, "who evaluates finds what was annotated, however many those are"
+    for path in files:
+        path.unlink()
+    assert image_files([video], 4, taken=True) == files
 
 
 @pytest.mark.parametrize(
