@@ -121,6 +121,7 @@ FIXED = (
     "foot pedal",
     "gamepad",
     "not configured",
+    "the rig has servos, but no port",
     "the bench twin needs none",
     "only real cameras are tried",
     "no RealSense camera",

@@ -153,7 +153,8 @@ def run_train(
     samples = [sample for folder in folders for sample in _samples_of(folder, inputs.without)]
     if inputs.synthetic:
         folder = out.with_name(out.name + "_frames")
-        run_synth(folder, inputs.synthetic, 1_000_000 + plan.seed * 100_000, (640, 480), looks, None, 1)
+        first = 1_000_000 + plan.seed % 10 * 100_000  # trials have the seeds from 2000000 on
+        run_synth(folder, inputs.synthetic, first, (640, 480), looks, None, 1)
         folders.append(folder)
         if plan.keeps_statistics:  # few frames of a new look, shown as often as all that is to be remembered
             samples *= max(1, round(inputs.synthetic / len(samples)))

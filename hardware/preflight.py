@@ -35,7 +35,7 @@ def run_checks(config: Config, environ: Mapping[str, str] | None = None) -> Iter
         cameras.list_cameras,
         lambda: cameras.check_camera(config),
         lambda: cameras.check_picture(config),
-        lambda: servos.check_servo_port(config.servos.port),
+        lambda: servos.check_servo_port(config.servos.port, wanted=config.rig.robot == "servos"),
         lambda: servos.check_servos(config.servos),
         lambda: servos.check_latency(config.servos.port),  # after the driver has had the port open
         lambda: controls.check_pedal(config.pedal),

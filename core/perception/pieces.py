@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,8 +24,10 @@ NEAR_TURN_FACTOR = 1.5
 """Pieces nearer than the gap threshold belong together even if they turn by this much more than was repaired."""
 COMES_IN_PX = 10
 """A piece of which more lies outside the vessel comes in from there."""
-SURER_BY = 0.03
+SURER_BY = 0.05
 """A line that comes in from nowhere is none of the robot if the robot's mean probability within the vessel exceeds its by this."""
+PREVIOUS_PX = 5
+"""A piece this near to the last frame's path lies on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +59,8 @@ def without_reflections(graph: PixelGraph, pieces: list[Piece], around: Surround
 
     A robot comes in at the image border, at the port or from outside the vessel; one whose entry is covered begins at an end of the
     vessel. What lies elsewhere is a part of it beyond something that hides it, or a reflection, a scratch, the board's grain: of
-    these the network is less sure. One that an end of the robot looks at is kept, for ``check_pieces`` to judge.
+    these the network is less sure. One that an end of the robot looks at is kept, for ``check_pieces`` to judge, and so are those
+    beside which what comes in is but a bit, and what was the robot in the last frame.
     """
     large = [piece for piece in pieces if piece.size_px >= config.path.min_length_px]
     if len(large) < 2 or not config.quality.enabled:
@@ -71,6 +75,8 @@ def without_reflections(graph: PixelGraph, pieces: list[Piece], around: Surround
         for piece in large
         if piece is not robot
         and piece not in coming
+        and robot.size_px >= config.path.outlier_share * piece.size_px
+        and not _is_previous(graph, piece, around)
         and _sureness(graph, piece, around) < least
         and _facing_gap(graph, headings, robot, piece, config) is None
     ]
@@ -84,6 +90,16 @@ def _comes_in(graph: PixelGraph, piece: Piece, around: Surroundings) -> bool:
 
 def _begins_at_vessel_end(graph: PixelGraph, piece: Piece, around: Surroundings) -> bool:
     return any(is_at_vessel_end(end, around) for end in _ends(graph, piece))
+
+
+def _is_previous(graph: PixelGraph, piece: Piece, around: Surroundings) -> bool:
+    """Whether most of a piece lies where the robot of the last frame lay."""
+    if around.previous is None:
+        return False
+    before = np.zeros(around.masks.robot.shape, np.uint8)
+    line = np.rint(around.previous.points).astype(np.int32).reshape(-1, 1, 2)
+    cv2.polylines(before, [line], False, 1, 2 * PREVIOUS_PX + 1)
+    return bool(_at(before, _places(graph, piece)).mean() > 0.5)
 
 
 def _sureness(graph: PixelGraph, piece: Piece, around: Surroundings) -> float:

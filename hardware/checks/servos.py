@@ -18,9 +18,11 @@ _MAX_LATENCY_MS = 2
 _TORQUE, _ERROR, _VOLTAGE = 64, 70, 144
 
 
-def check_servo_port(port: str | None) -> Check:
-    """There, permitted, a serial port, and no other program on it."""
+def check_servo_port(port: str | None, *, wanted: bool = False) -> Check:
+    """There, permitted, a serial port, and no other program on it; `wanted` by a rig with servos."""
     name = "servo port"
+    if port is None and wanted:
+        return Check(name, False, "the rig has servos, but no port", "set servos.port (ls /dev/serial/by-id)")
     if port is None:
         return Check(name, True, NOT_CONFIGURED)
     path = Path(port)

@@ -1082,6 +1082,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the rig has servos, but no port</source>
+        <translation>台架有舵机，但没有设置端口</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>the bench twin needs none</source>
         <translation>数字孪生台架不需要</translation>
     </message>

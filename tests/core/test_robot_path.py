@@ -245,6 +245,25 @@ def test_what_may_be_a_robot_too_is_still_several(line: Points, sureness: float)
     assert reason_of(with_line(line, sureness), vessel=VESSELS) is Reason.SEVERAL_ROBOTS
 
 
+def test_a_bit_at_the_border_does_not_depose_a_robot_whose_entry_is_hidden() -> None:
+    """The end of a cable, or a reflection, of which the network is surer than of a robot in a milky tube."""
+    line = curve((150, 410), (330, 420), (560, 395))
+    vessel = probability(depth(curve((40, 400), (330, 420), (700, 380)), 30.0), depth(curve((-60, 100), (300, 100)), 20.0))
+    bit = probability(depth(np.array([[-20.0, 100.0], [30.0, 100.0]]), 3.0))
+    robot = np.maximum(0.93 * probability(depth(line, 4.0)), bit)
+    path = path_of(robot, vessel=vessel)
+    assert {round(path.head[0], -1), round(path.tail[0], -1)} == {150.0, 560.0}
+
+
+def test_what_was_the_robot_in_the_last_frame_is_no_reflection() -> None:
+    line = GLINT
+    before = RobotPath(line, 1.0, None, False, 0.0, 3.0)
+    assert isinstance(perceive(with_line(line, 0.9), vessel=VESSELS), RobotPath)
+    refusal = perceive(with_line(line, 0.9), vessel=VESSELS, previous=before)
+    assert isinstance(refusal, Refusal)
+    assert refusal.reason is Reason.SEVERAL_ROBOTS
+
+
 def test_a_doubtful_line_ahead_of_the_head_may_be_its_end() -> None:
     ahead = curve((480, 172), (560, 130))
     vessel = probability(depth(np.vstack([S_CURVE, ahead]), 30.0))

@@ -374,6 +374,7 @@ def test_without_a_port_nothing_is_wrong(sys_: Path) -> None:
 
 def test_the_servo_port(line: str, tmp_path: Path) -> None:
     _good(servos.check_servo_port(line), "is free")
+    _bad(servos.check_servo_port(None, wanted=True), "the rig has servos, but no port", "servos.port")
     stable = tmp_path / "usb-U2D2"
     stable.symlink_to(line)
     _good(servos.check_servo_port(str(stable)), re.escape(line))
