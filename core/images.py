@@ -144,7 +144,7 @@ def to_rgb8(pixels: NDArray[np.generic], *, blue_first: bool = False) -> Image:
 
 
 def _from_16_bit(array: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    """A fixed range and not the picture's own brightest value: a dark picture stays dark, and a video does not flicker."""
+    """The smallest usual range (10, 12 or 16 bit) that holds the picture, not its own brightest value: a dark one stays dark."""
     if array.size == 0:
         return array.astype(np.uint8)
     step = max(1, math.isqrt(array.shape[0] * array.shape[1] // 250_000))

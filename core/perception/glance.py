@@ -1,9 +1,9 @@
 """Streams: between two looks at the whole picture only the window around the robot's head is looked at anew.
 
 A phantom stands still under a camera that stands still. Vessel mask, skeleton and graph of the last whole look therefore stay
-true, and so does what it saw of the robot's body outside the window. Three things end that: time (``tracking.refresh_s``), a
-picture that has changed elsewhere (a moved phantom, another light, a hand), and a frame without an answer. Then the next look is a
-whole one.
+true, and so does what it saw of the robot's body outside the window. Four things end that: time (``tracking.refresh_s``), a pause
+in which the head may have left the window, a picture that has changed elsewhere (a moved phantom, another light, a hand), and a
+frame without an answer. Then the next look is a whole one.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from core.config import TrackingConfig
 from core.perception.segmentation import Segmenter
-from core.perception.windows import inner_area, window_around
+from core.perception.windows import MARGIN_PX, inner_area, window_around
 from core.types import Image, Mask, Point, Scene, VesselGraph, Window
 
 CELL_PX = 8
@@ -29,9 +29,13 @@ CHANGED_SHARE = 0.03
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Background:
-    """What the last whole look at (h, w) working pixels saw. ``robot_probability`` also holds what the windows since then saw."""
+    """What the last whole look at (h, w) working pixels saw. ``robot_probability`` also holds what the windows since then saw.
+
+    ``captured_s`` is when it was seen, ``head_s`` when the head was seen at ``head``: in the last frame.
+    """
 
     captured_s: float
+    head_s: float
     cells: NDArray[np.float32]
     head: Point
     vessel: Mask
@@ -62,6 +66,8 @@ class Glances:
             return None
         if not 0.0 <= captured_s - before.captured_s <= self._config.refresh_s:
             return None
+        if captured_s - before.head_s > (side / 2 - MARGIN_PX) / self._config.max_head_speed_px_s:
+            return None
         window = window_around(before.head, (width, height), side)
         return None if has_changed(before.cells, self._cells, window) else (before, window)
 
@@ -74,6 +80,7 @@ class Glances:
             masks, graph = scene.masks, scene.vessel_graph
             self._background = Background(
                 scene.captured_s,
+                scene.captured_s,
                 self._cells,
                 scene.path.head,
                 masks.vessel,
@@ -84,7 +91,9 @@ class Glances:
             )
         elif self._background is not None:
             robot_probability = scene.masks.robot_probability
-            self._background = replace(self._background, head=scene.path.head, robot_probability=robot_probability)
+            self._background = replace(
+                self._background, head_s=scene.captured_s, head=scene.path.head, robot_probability=robot_probability
+            )
 
 
 def cells_of(image: Image) -> NDArray[np.float32]:

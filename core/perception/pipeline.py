@@ -96,8 +96,10 @@ class Pipeline:
         single: Sight | None = None,
         glance: Sight | None = None,
         familiarity: Familiarity | None = None,
+        *,
+        swings: bool = False,
     ) -> None:
-        self._stream = Sight(segmenter, calibration, familiarity=familiarity)
+        self._stream = Sight(segmenter, calibration, swings, familiarity)
         self._single = single or self._stream
         self._offered = glance
         self._glance = glance if config.tracking.window_px else None
@@ -121,6 +123,7 @@ class Pipeline:
             single=self._single,
             glance=self._offered,
             familiarity=stream.familiarity,
+            swings=stream.swings,
         )
 
     def warm_up(self) -> None:
@@ -154,6 +157,8 @@ class Pipeline:
             self._shape = frame.image.shape
         watch = _Stopwatch()
         scene = self._perceive(frame, target, watch, self._stream, past)
+        if recall(past.memory, frame.captured_s, tracking) is None:
+            self._states.update(None)  # after a pause, or wound back: the state of then says nothing of now
         if scene.pose is not None and scene.path is not None:
             jump = check_jump(scene.path, past.memory, frame.captured_s, tracking)
             if jump is None:
@@ -341,7 +346,7 @@ def _with_route(scene: Scene, graph: VesselGraph, head: Point, target: Point, ve
     """The way to the target in working px, or why there is none; in a stream `routes` remembers what was found before."""
     way = route_or_reason(graph, head, target)
     if routes is not None:
-        way = routes.follow(way, head, target, vessel)
+        way = routes.follow(way, head, target, vessel, scene.captured_s)
     return replace(scene, route_problem=way) if isinstance(way, str) else replace(scene, route=way)
 
 
@@ -358,7 +363,7 @@ def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False) -> P
     plain, turned = open_sights(config, recalibrating=recalibrating)
     stream = turned if config.segmentation.mirrored == "always" else plain
     single = plain if config.segmentation.mirrored == "never" else turned
-    return Pipeline(stream.segment, config, stream.calibration, single=single, glance=stream, familiarity=stream.familiarity)
+    return Pipeline(stream.segment, config, stream.calibration, single, stream, stream.familiarity, swings=stream.swings)
 
 
 def open_sights(config: PerceptionConfig, *, recalibrating: bool = False) -> tuple[Sight, Sight]:

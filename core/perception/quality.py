@@ -156,7 +156,7 @@ def check_centerline(centerline: Centerline | None, config: QualityConfig) -> Re
 
 def check_confidence(confidence: float, config: QualityConfig) -> Refusal | None:
     """LOW_CONFIDENCE."""
-    if config.enabled and confidence < config.min_confidence:
+    if config.enabled and not confidence >= config.min_confidence:  # nor what is no number
         return Refusal(Reason.LOW_CONFIDENCE, f"{100 * confidence:.0f} % (at least {100 * config.min_confidence:.0f} %)")
     return None
 

@@ -23,27 +23,37 @@ class RouteMemory:
     def __init__(self, config: TrackingConfig) -> None:
         self._config = config
         self._route: Route | None = None
+        self._seen_s = -math.inf
 
     def forget(self) -> None:
         """Another stream, or no destination any more."""
         self._route = None
 
-    def follow(self, found: Route | str, head: Point, target: Point, vessel: Mask) -> Route | str:
+    def follow(self, found: Route | str, head: Point, target: Point, vessel: Mask, captured_s: float) -> Route | str:
         """The route that was found, or what is left of the one remembered, or why there is none.
 
         `found` is what ``route_or_reason`` says of this frame, `vessel` the mask (h, w), all in working px.
         """
-        if isinstance(found, Route):
-            self._route = found
-            return found
+        left = self._left(head, target, vessel)
+        if not isinstance(found, Route):
+            return left or found
+        # Round a loop there is another way when this one is cut: a detour of a moment is not taken.
+        is_detour = left is not None and found.length_px > left.length_px + self._config.route_gap_px
+        if left is not None and is_detour and 0.0 <= captured_s - self._seen_s <= self._config.memory_s:
+            return left
+        self._route, self._seen_s = found, captured_s
+        return found
+
+    def _left(self, head: Point, target: Point, vessel: Mask) -> Route | None:
+        """What is left of the route remembered, if it still holds."""
         known = self._route
         if known is None or known.target != target:
             self._route = None
-            return found
+            return None
         away_px, position, _ = polyline.nearest(known.points, head)
         rest = polyline.cut(known.points, position, math.inf)
         if away_px > self._config.route_reach_px or _outside_px(rest, vessel) > self._config.route_gap_px:
-            return found
+            return None
         distinct = np.concatenate([[True], np.any(np.diff(rest, axis=0) != 0.0, axis=1)])
         return Route(rest[distinct], float(polyline.arc_length(rest)[-1]), target)
 

@@ -30,7 +30,7 @@ def polygons_of(
     ----------
     mask : binary mask.
     target : what it covers.
-    tolerance_px : how far an outline may be off; 0 keeps the mask exactly.
+    tolerance_px : how far an outline may be off; 0 keeps the mask, but for pieces of one or two pixels.
     offset : added to all points, (x, y).
     """
     contours, hierarchy = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE, offset=offset)

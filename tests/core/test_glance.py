@@ -88,9 +88,18 @@ def test_a_window_tells_the_same_pose_as_the_whole_picture(pipeline: Pipeline) -
 
 
 def test_after_refresh_s_all_of_it_is_looked_at_again(pipeline: Pipeline, network: Colours) -> None:
-    for time_s in (0.0, 0.5, 0.95, 1.05, 1.1):
-        see(pipeline, time_s, picture(300))
-    assert network.shown == [WHOLE, WINDOW, WINDOW, WHOLE, WINDOW]
+    for index in range(12):
+        see(pipeline, 0.1 * index, picture(300))
+    assert network.shown == [WHOLE, *[WINDOW] * 10, WHOLE]
+
+
+def test_after_a_pause_in_which_the_head_may_have_left_the_window_all_of_it_is_looked_at(pipeline: Pipeline) -> None:
+    see(pipeline, 0.0, picture(200))
+    see(pipeline, 0.1, picture(200))
+    scene = see(pipeline, 0.5, picture(400))
+    assert scene.window is None
+    assert scene.path is not None
+    assert scene.path.head[0] == pytest.approx(404, abs=2.0)
 
 
 def test_a_phantom_that_moves_is_looked_at_whole(pipeline: Pipeline, network: Colours) -> None:

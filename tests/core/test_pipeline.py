@@ -395,6 +395,31 @@ def test_the_configuration_says_what_is_seen_in_all_orientations(
     assert len(seen) - stream == single
 
 
+def test_a_stream_that_is_seen_in_all_orientations_tells_what_its_confidence_needs() -> None:
+    """The calibration of all orientations asks for swings; without them the confidence is no number, and refuses nothing."""
+    config = PerceptionConfig.model_validate({"segmentation": {"mirrored": "always"}, "tracking": {"window_px": 0}})
+    world = TwinWorld(Config().twin)
+    world.insert(40.0)
+    pipeline = open_pipeline(config)
+    for same in (pipeline, pipeline.with_config(config)):
+        scene = same(world.frame())
+        assert scene.pose is not None
+        assert 0.0 <= scene.pose.confidence <= 1.0
+
+
+@pytest.mark.parametrize("later_s", [-2.0, 2.0])
+def test_after_a_pause_the_state_of_before_is_not_shown(pipeline: Pipeline, network: DrawnNetwork, later_s: float) -> None:
+    for index in range(4):
+        before = pipeline(frame(5.0 + index * FRAME_S))
+    assert before.pose is not None
+    assert before.pose.state is PoseState.A
+    network.draw(curve((-20, 240), (150, 235), (240, 225), (280, 216)))
+    after, alone = pipeline(frame(5.0 + later_s)), pipeline.perceive_single(frame(5.0 + later_s))
+    assert after.pose is not None
+    assert alone.pose is not None
+    assert after.pose.state is alone.pose.state is not PoseState.A
+
+
 def test_after_the_warm_up_a_stream_meets_no_size_for_the_first_time() -> None:
     """Every size that is met for the first time costs a compilation, in the middle of a stream."""
     pipeline = open_pipeline(CONFIG)
