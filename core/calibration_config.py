@@ -54,8 +54,8 @@ class TendonConfig(_Section):
 
     name: Literal["right", "left", "up", "down"]
     direction_deg: float | None = Field(None, ge=-360.0, le=360.0, description="None: out of the image plane")
-    moved_px: float = Field(ge=0.0, description="way of the head when it was learnt")
-    px_per_mm: float = Field(ge=0.0, description="way of the head per millimetre of pull")
+    moved_px: float = Field(ge=0.0, description="way of the head when it was learnt, in working pixels")
+    px_per_mm: float = Field(ge=0.0, description="way of the head per millimetre of pull, in working pixels")
 
 
 class SteeringConfig(_Section):

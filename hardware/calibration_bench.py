@@ -186,16 +186,17 @@ class LiveEyes:
     def look(self, alive: Callable[[], None]) -> Look:
         """Some frames of a robot that stands still; raises HeadNotSeen, with perception's reason, and DeviceError."""
         frames = self._feed.take(_LOOKS, _LOOK_WITHIN_S, alive)
-        paths, why = [], ""
+        paths, why, scale = [], "", 1.0
         for scene in self._perceived(frames, alive):
             # What is measured here moves the robot later: a picture of a kind that nobody answers for says nothing.
             unknown = scene.refusal is not None and scene.refusal.reason is Reason.UNLIKE_TRAINING
             if scene.path is not None and not unknown:
                 paths.append(scene.points_to_source(scene.path.points))
+                scale = scene.scale
             elif scene.refusal is not None:
                 why = str(scene.refusal)
         try:
-            return Look(tuple(paths), _mean([frame.image for frame in frames]))
+            return Look(tuple(paths), _mean([frame.image for frame in frames]), scale)
         except HeadNotSeen as error:
             raise HeadNotSeen(f"{error} ({why})" if why else str(error)) from None
 

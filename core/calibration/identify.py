@@ -88,7 +88,7 @@ def classify(wiggle: Wiggle) -> Finding | None:
         return Finding(Function.PITCH, sign, f"{max(shorter):.1f} px less of the robot seen")
     if max(abs(value) for value in (*longer, *sides)) > _STILL_PX or wiggle.amplitude_mm < _SHEATH_FROM_MM:
         return None  # a wire out of the picture's plane may just begin to show
-    grown_px = sheath_growth(wiggle.rest.path, wiggle.minus.image, wiggle.plus.image)
+    grown_px = wiggle.rest.scale * sheath_growth(wiggle.rest.path, wiggle.minus.image, wiggle.plus.image)
     if abs(grown_px) >= _CLEAR_SHEATH_PX:
         return Finding(Function.DELIVERY, 1 if grown_px > 0 else -1, f"sheath {abs(grown_px):.0f} px farther")
     return None

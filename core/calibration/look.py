@@ -30,6 +30,9 @@ class HeadNotSeen(UserError):
 class Look:
     """Some frames of a robot that stands still: its paths (each (N, 2), source px, tail -> head) and their mean picture.
 
+    ``scale`` is working pixels per source pixel: what is measured is told in working pixels, in which the network's noise is always
+    the same, however fine the camera's picture is.
+
     Raises
     ------
     HeadNotSeen
@@ -38,28 +41,34 @@ class Look:
 
     paths: tuple[Points, ...]
     image: Image
+    scale: float = 1.0
 
     def __post_init__(self) -> None:
         if len(self.paths) < _LEAST_LOOKS:
             raise HeadNotSeen("the robot's head is not seen: move the robot until all of its last centimetres are in the picture")
-        if min(float(polyline.arc_length(path)[-1]) for path in self.paths) < _LEAST_ANCHOR_PX + _TANGENT_PX:
+        if min(float(polyline.arc_length(path)[-1]) for path in self.working_paths) < _LEAST_ANCHOR_PX + _TANGENT_PX:
             raise HeadNotSeen("too little of the robot is seen: feed it farther into the vessel")
 
     @cached_property
+    def working_paths(self) -> tuple[Points, ...]:
+        """The paths in working px, but for the half pixel that lies between the two."""
+        return tuple(path * self.scale for path in self.paths)
+
+    @cached_property
     def head(self) -> Point:
-        """Median over the frames."""
+        """Median over the frames, in source px."""
         x, y = np.median([path[-1] for path in self.paths], axis=0).tolist()
         return float(x), float(y)
 
     @cached_property
     def path(self) -> Points:
-        """The path whose head lies nearest to the median."""
+        """The path whose head lies nearest to the median, in source px."""
         return min(self.paths, key=lambda path: float(np.hypot(*(path[-1] - np.array(self.head)))))
 
     @cached_property
     def heading(self) -> Points:
         """Unit vector in which the robot's end points."""
-        found = [vector.direction for path in self.paths if (vector := fit_robot_vector(path, _LINE_PX)) is not None]
+        found = [vector.direction for path in self.working_paths if (vector := fit_robot_vector(path, _LINE_PX)) is not None]
         if not found:
             raise HeadNotSeen("the robot's end has no direction: feed it farther into the vessel")
         mean = np.median(np.array(found), axis=0)
@@ -68,7 +77,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeadMove:
-    """How the head moved, in source px.
+    """How the head moved, in working px.
 
     ``vector`` (2,) is the way of the head at the length of robot that it had; ``lateral_px`` its part to the right of the heading;
     ``longer_px`` how much more of the robot is seen (fed forward), or less (drawn back, or bent out of the picture).
@@ -90,8 +99,9 @@ def head_move(rest: Look, moved: Look) -> HeadMove:
     degrees. So the end of the mask is not believed: the robot is as long as it was, and the head is where that length ends,
     measured along the path from where both paths still lie on each other.
     """
-    pairs = [(one, other) for one in rest.paths for other in moved.paths]
-    anchor_px = min(_ANCHOR_PX, min(float(polyline.arc_length(path)[-1]) for path in (*rest.paths, *moved.paths)) - _TANGENT_PX)
+    before, after = rest.working_paths, moved.working_paths
+    pairs = [(one, other) for one in before for other in after]
+    anchor_px = min(_ANCHOR_PX, min(float(polyline.arc_length(path)[-1]) for path in (*before, *after)) - _TANGENT_PX)
     found = np.array([_one_move(one, other, anchor_px) for one, other in pairs])
     x, y, longer = np.median(found, axis=0).tolist()
     along, vector = rest.heading, np.array([x, y])

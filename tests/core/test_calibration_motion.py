@@ -74,6 +74,16 @@ def test_turns_go_the_short_way(first: float, second: float, turn: float) -> Non
     assert turn_deg(first, second) == pytest.approx(turn)
 
 
+def test_a_finer_camera_sees_the_same_motion() -> None:
+    """Thresholds stand for the network's noise, which is one of working pixels."""
+    coarse = head_move(look(path()), look(path(20.0)))
+    fine = head_move(*(Look((3.0 * points,) * 3, BLANK, 1 / 3) for points in (path(), path(20.0))))
+    assert fine.lateral_px == pytest.approx(coarse.lateral_px, abs=0.1)
+    assert fine.longer_px == pytest.approx(coarse.longer_px, abs=0.1)
+    twitch = [Look((3.0 * points,) * 3, BLANK, 1 / 3) for points in (path(), path(5.0), path())]
+    assert classify(Wiggle(0.75, *twitch)) is None, "two working pixels, whatever the camera makes of them"
+
+
 # ---- who is who
 
 

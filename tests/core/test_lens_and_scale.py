@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -162,3 +164,5 @@ def test_working_pixels_are_scaled_too() -> None:
     assert mm_per_working_px(scale, scene) == pytest.approx(0.4)
     assert mm_per_px_at(scale, None, (640, 480)) == pytest.approx(0.4)  # the same picture at half the size
     assert mm_per_working_px(None, scene) is None
+    width, height = scene.source_size
+    assert mm_per_working_px(scale, replace(scene, source_size=(width, height * 3 // 4))) is None, "the camera shows another part"

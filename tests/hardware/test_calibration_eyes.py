@@ -38,6 +38,15 @@ def test_a_path_that_was_found_counts(reason: Reason | None) -> None:
     assert _eyes(reason).look(lambda: None).head == pytest.approx((49.0, 32.0), abs=1.0)
 
 
+def test_what_is_measured_is_told_in_working_pixels() -> None:
+    def fine(frame: Frame) -> Scene:
+        return replace(full_scene(frame.index, 0.0), source_size=(192, 128), scale=0.5, scale_xy=(0.5, 0.5))
+
+    look = LiveEyes(cast(CameraFeed, _Feed()), fine).look(lambda: None)
+    assert look.scale == 0.5
+    assert look.head == pytest.approx((98.5, 64.5), abs=2.0)
+
+
 def test_a_picture_of_an_unknown_kind_calibrates_nothing_and_says_why() -> None:
     with pytest.raises(HeadNotSeen, match=r"head is not seen.*\(unlike the training data: 1.30"):
         _eyes(Reason.UNLIKE_TRAINING).look(lambda: None)
