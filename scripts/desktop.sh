@@ -40,6 +40,7 @@ if [[ ! -x \$checkout/.venv/bin/python ]]; then
     echo "lumenpilot: \$checkout is not set up (or was moved): run make install there again" >&2
     exit 1
 fi
+unset PYTHONPATH PYTHONHOME # of a ROS set-up, say: its packages would hide those of .venv
 exec "\$checkout/.venv/bin/python" "\$checkout/main.py" "\$@"
 LAUNCHER
 }

@@ -6,6 +6,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 venv=.venv
 stamp=$venv/.ready # holds what .venv was made from; written last, so an interrupted set-up leaves none
+half=$venv/.half # there from the beginning of a .venv until its packages are in: only such a one is thrown away
+unset PYTHONPATH PYTHONHOME # of a ROS set-up, say: its packages would hide those of .venv
 
 # Shared library that is missing on a bare Debian 12 -> the package that has it.
 libraries="
@@ -33,8 +35,9 @@ stop() {
 is_python_311() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; }
 
 find_python() {
-    local candidate
-    for candidate in ${PYTHON:-python3.11 python3}; do
+    local candidate candidates=(python3.11 python3)
+    [[ -z ${PYTHON:-} ]] || candidates=("$PYTHON")
+    for candidate in "${candidates[@]}"; do
         if is_python_311 "$candidate"; then
             command -v "$candidate"
             return
@@ -89,13 +92,17 @@ and run make again."
 
 install_python_packages() {
     local python=$1
-    if [[ ! -f $stamp ]]; then
+    if [[ -f $half ]] || ! is_python_311 "$venv/bin/python"; then
         say "set-up: making $venv with $python (the first time takes some minutes)"
-        "$python" -m venv --clear "$venv"
+        rm -rf "$venv"
+        mkdir "$venv"
+        : >"$half"
+        "$python" -m venv "$venv"
     fi
     rm -f "$stamp"
     # Wheels only: nothing is compiled here, and a machine that has no wheel is told so at once.
     "$venv/bin/python" -m pip install --no-input --disable-pip-version-check --only-binary :all: --requirement requirements.lock
+    rm -f "$half"
     # openvino brings this package and reports every import with it; without it, openvino falls back to its own silent stub.
     "$venv/bin/python" -m pip uninstall --quiet --yes --disable-pip-version-check openvino-telemetry
 }
@@ -114,7 +121,6 @@ main() {
     local python
     python=$(find_python)
     install_system_packages "$python"
-    is_python_311 "$venv/bin/python" || rm -f "$stamp" # its Python is gone: make it anew
     install_python_packages "$python"
     echo "$wanted" >"$stamp"
     say "set-up: done"

@@ -88,10 +88,11 @@ def test_the_launcher_starts_this_checkout_with_what_it_is_given(home: Path) -> 
     checkout = home / "moved"
     (checkout / ".venv" / "bin").mkdir(parents=True)
     fake = checkout / ".venv" / "bin" / "python"
-    fake.write_text('#!/bin/sh\nprintf "%s\\n" "$@"\n')
+    fake.write_text('#!/bin/sh\nprintf "%s\\n" "$@" $PYTHONPATH $PYTHONHOME\n')
     fake.chmod(0o755)
     launcher.write_text(re.sub(r"^checkout=.*$", lambda _found: f"checkout={shlex.quote(str(checkout))}", text, flags=re.MULTILINE))
-    done = subprocess.run([launcher, "perceive", "my picture.png"], capture_output=True, text=True, check=True)
+    ros = {**os.environ, "PYTHONPATH": "/opt/ros/lib", "PYTHONHOME": "/opt/ros"}
+    done = subprocess.run([launcher, "perceive", "my picture.png"], env=ros, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == [str(checkout / "main.py"), "perceive", "my picture.png"]
     fake.unlink()
     lost = subprocess.run([launcher], capture_output=True, text=True, check=False)
