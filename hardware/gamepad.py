@@ -16,7 +16,7 @@ from pathlib import Path
 from core.devices import DeviceError
 from core.gamepad_config import GamepadConfig
 from hardware.device_thread import DeviceThread
-from hardware.gamepad_controls import EVENT, GAMEPAD_BUTTON, GamepadControls, GamepadState, Layout, at_rest
+from hardware.gamepad_controls import EVENT, GAMEPAD_BUTTON, RIGHT_STICK, GamepadControls, GamepadState, Layout, at_rest
 
 __all__ = ["Gamepad", "GamepadError", "GamepadState"]
 
@@ -29,6 +29,10 @@ _FOLDER = Path("/dev/input")
 
 class GamepadError(DeviceError):
     """A gamepad cannot be used."""
+
+
+class GamepadRefused(GamepadError):
+    """A gamepad is there, and people must be told why it does nothing: its STOP does nothing either."""
 
 
 class _Lost(Exception):
@@ -83,6 +87,8 @@ class Gamepad:
         while not self._thread.stopping:
             try:
                 found = find_gamepad(self._config)
+                if found is not None:
+                    _take(*found[:2])
             except GamepadError as error:
                 self._tell(None, error)
             else:
@@ -130,17 +136,18 @@ def find_gamepad(config: GamepadConfig) -> tuple[int, str, Layout] | None:
     Raises
     ------
     GamepadError
-        The configured one is missing, not permitted or no gamepad; or there are some, and none is permitted.
+        The configured one is missing or no gamepad; ``GamepadRefused`` when it, or all that there are, is not permitted or has
+        its controls elsewhere.
     """
     if config.device is not None:
         return _open(config.device)
-    refused: GamepadError | None = None
+    refused: GamepadRefused | None = None
     for path in sorted(_FOLDER.glob("js*"), key=lambda path: (len(path.name), path.name)):  # js2 before js10
         try:
             return _open(str(path))
         except GamepadError as error:
             # wheels and motion sensors are joysticks, too: nothing to complain about
-            refused = refused or (error if isinstance(error.__cause__, PermissionError) else None)
+            refused = refused or (error if isinstance(error, GamepadRefused) else None)
     if refused is not None:
         raise refused
     return None
@@ -150,7 +157,7 @@ def _open(path: str) -> tuple[int, str, Layout]:
     try:
         device = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except PermissionError as error:
-        raise GamepadError(f"no permission for gamepad {path}: add your user to the group input, then log in again") from error
+        raise GamepadRefused(f"no permission for gamepad {path}: add your user to the group input, then log in again") from error
     except (OSError, ValueError) as error:
         missing = isinstance(error, OSError) and error.errno in {errno.ENOENT, errno.ENODEV, errno.ENXIO}
         reason = "is not there" if missing else "cannot be opened"
@@ -162,7 +169,22 @@ def _open(path: str) -> tuple[int, str, Layout]:
     if layout is None or GAMEPAD_BUTTON not in layout.buttons:
         os.close(device)
         raise GamepadError(f"{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is")
-    return device, _read_name(device) or Path(path).name, layout
+    name = _read_name(device) or Path(path).name
+    if not RIGHT_STICK.issubset(layout.axes):
+        os.close(device)
+        raise GamepadRefused(f"gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one")
+    return device, name, layout
+
+
+def _take(device: int, name: str) -> None:
+    """Lock it: one gamepad must not drive the robots of two windows. A check that only looks at it takes no lock."""
+    try:
+        fcntl.flock(device, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(device)
+        raise GamepadRefused(
+            f"gamepad {name} is in use by another window, so its STOP does nothing here: close that window, or set gamepad.device"
+        ) from error
 
 
 def _request(number: int, size: int) -> int:

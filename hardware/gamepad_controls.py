@@ -37,6 +37,8 @@ class Button(Enum):
 
 GAMEPAD_BUTTON = 0x130
 """BTN_GAMEPAD, the lower one of the four (A, cross): whoever has it is a gamepad, not a wheel or a motion sensor."""
+RIGHT_STICK = frozenset({0x03, 0x04})
+"""ABS_RX and ABS_RY. Whoever has its right stick elsewhere has it where the triggers are here, and its buttons are others."""
 _TRIGGERS = (Axis.LEFT_TRIGGER, Axis.RIGHT_TRIGGER)
 
 

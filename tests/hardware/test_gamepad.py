@@ -435,6 +435,42 @@ def test_wheels_and_motion_sensors_are_passed_over(monkeypatch: pytest.MonkeyPat
     device.unplug()
 
 
+@pytest.mark.parametrize("axes", [[0, 1, 2, 5, 0x0A, 0x09, 0x10, 0x11], [0, 1, 2, 5, 0x10, 0x11], [0, 1, 3, 5]])
+def test_one_with_its_right_stick_elsewhere_is_refused_by_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, axes: list[int]
+) -> None:
+    """Where the triggers are here: the sheath would run on by itself, and STOP would be another button."""
+    device = FakeDevice(tmp_path / "js0")
+    monkeypatch.setattr(driver.fcntl, "ioctl", _kernel(axes, [*range(0x130, 0x13D)], b"EX10"))
+    for config in (GamepadConfig(), GamepadConfig(device=str(tmp_path / "js0"))):
+        with pytest.raises(GamepadError, match=r"gamepad EX10 has its right stick and buttons elsewhere: switch it to XInput"):
+            find_gamepad(config)
+    device.unplug()
+
+
+@pytest.mark.real_time
+def test_a_second_window_says_that_the_gamepad_is_not_its_own_and_gets_it_when_the_first_closes(
+    gamepad: Gamepad, listener: Listener, tmp_path: Path
+) -> None:
+    device, second = FakeDevice(tmp_path / "js0"), Listener()
+    listener.until(lambda: gamepad.name == "js0")
+    other = Gamepad(LINEAR, second.state, second.device)
+    other.start()
+    second.until(lambda: other.problem is not None)
+    assert str(other.problem).startswith(
+        "gamepad js0 is in use by another window, so its STOP does nothing here: close that window"
+    )
+    assert (other.name, second.states) == (None, [])
+    found = find_gamepad(GamepadConfig())  # who only looks, as a check does, is not refused
+    assert found is not None
+    os.close(found[0])
+    gamepad.close()
+    second.until(lambda: other.name == "js0")
+    assert other.problem is None
+    other.close()
+    device.unplug()
+
+
 @pytest.mark.parametrize("text", ["dead_zone = 0", "dead_zone = nan", "expo = 1.5", "device = ''", "invert = true"])
 def test_bad_settings_are_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "mine.toml"
