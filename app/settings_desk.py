@@ -235,6 +235,7 @@ class SettingsDesk(QObject):
         why = self._why_locked()
         if self.dialog is not None:
             self.dialog.lock(why)
+            self.dialog.show_rig(self._window.config)
         elif self._wants_back and not why:
             self._put_back()
             self._timer.stop()

@@ -27,6 +27,7 @@ from app.settings_model import SettingsDraft, search
 from app.widgets.enter_key import takes_enter
 from app.widgets.profile_row import ProfileRow
 from app.widgets.setting_page import SettingPage
+from core.config import Config
 from core.config_schema import Effect, Section, schema, settings_by_key
 from core.profiles import Profile, ProfileError, Profiles
 
@@ -67,6 +68,7 @@ class SettingsDialog(QDialog):
         super().__init__(parent)
         self.draft, self._path, self._profiles = draft, path, profiles
         self._locked = ""
+        self._running: Config | None = None
         self._section: Section = schema().sections[0]
         self.search = QLineEdit()
         self.tree = QTreeWidget()
@@ -145,6 +147,13 @@ class SettingsDialog(QDialog):
                 widget.setEnabled(not why)
             self._renew()
 
+    def show_rig(self, running: Config) -> None:
+        """What the rig file of the running configuration keeps is shown as it is in force, and is not changed here."""
+        if running is not self._running:
+            self._running = running
+            self.draft.show_rig(running)
+            self._renew()
+
     # ---- edits
 
     def _on_edited(self, key: str, entry: object) -> None:
@@ -197,8 +206,11 @@ class SettingsDialog(QDialog):
         self.save.setEnabled(may_save)
         self.save_and_restart.setVisible(Effect.RIG in effects)
         self.save_and_restart.setEnabled(may_save)
-        self.reset_all.setEnabled(not self._locked and any(self.draft.is_changed(key) for key in settings_by_key()))
+        self.reset_all.setEnabled(not self._locked and any(map(self._can_reset, settings_by_key())))
         self.status.setText(self._status(effects))
+
+    def _can_reset(self, key: str) -> bool:
+        return self.draft.is_changed(key) and not self.draft.is_kept(key)
 
     def _status(self, effects: set[Effect]) -> str:
         if self._locked:

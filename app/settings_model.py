@@ -13,12 +13,13 @@ from app.language import tr, tr_text
 from core.config import Config, load_config
 from core.config_schema import Effect, Kind, Section, Setting, schema, settings_by_key, value_at, with_value
 from core.config_write import changed_keys
+from core.rig_file import sections_of_rig
 
 _SEPARATORS = re.compile(r"[\s_.,]+")
 
 
 class SettingsDraft:
-    """A configuration under edit.
+    """A configuration under edit. What the running rig keeps in a file of its own is shown as it is there, and not edited.
 
     Parameters
     ----------
@@ -35,6 +36,18 @@ class SettingsDraft:
         self._entries: dict[str, str] = {}
         self._errors: dict[str, str] = {}
         self._section_errors: dict[str, str] = {}
+        self.rig_file = ""
+        self._kept: frozenset[str] = frozenset()
+        self._in_force: dict[str, Any] = {}
+
+    def show_rig(self, running: Config) -> None:
+        """Say what is in force where the rig file of the running configuration keeps it; edits there are dropped."""
+        self.rig_file = running.rig.file or ""
+        self._kept = sections_of_rig(running, self.saved)
+        self._in_force = {key: value for key, value in _flat(running.model_dump(mode="json")).items() if self.is_kept(key)}
+        for key in self._in_force:
+            self._forget_entry(key)
+        self._take(self._data, kept=self.saved.model_dump(mode="json"))
 
     # ---- what is there
 
@@ -44,8 +57,12 @@ class SettingsDraft:
         return self._config if not self._errors and not self._section_errors else None
 
     def value(self, key: str) -> Any:
-        """The last allowed value of a setting."""
-        return self._values[key]
+        """The last allowed value of a setting; of one that the rig file keeps, the one in force."""
+        return self._in_force[key] if key in self._in_force else self._values[key]
+
+    def is_kept(self, key: str) -> bool:
+        """Whether the rig file keeps a setting, or a section."""
+        return key.partition(".")[0] in self._kept
 
     def default_value(self, key: str) -> Any:
         return self._defaults[key]
@@ -121,6 +138,8 @@ class SettingsDraft:
     def reset(self, keys: Iterable[str]) -> None:
         """Put settings back to their defaults, together: half of them might not go with the other half."""
         for key in keys:
+            if self.is_kept(key):
+                continue
             self._forget_entry(key)
             self._data = with_value(self._data, key, self.default_value(key))
         self._check_sections()
@@ -133,13 +152,17 @@ class SettingsDraft:
         """Take a whole configuration, of a profile."""
         self._entries.clear()
         self._errors.clear()
-        self._data = config.model_dump(mode="json")
-        self._check_sections()
+        self._take(config.model_dump(mode="json"), kept=self._data)
 
     def mark_saved(self) -> None:
         """What is edited is what the file says now."""
         if self.config is not None:
             self.saved, self._saved_values = self.config, self._values
+
+    def _take(self, data: dict[str, Any], kept: dict[str, Any]) -> None:
+        """All of `data` but for what the rig file keeps: of that, what the settings file says stays in it."""
+        self._data = {**data, **{name: kept[name] for name in self._kept}}
+        self._check_sections()
 
     def _forget_entry(self, key: str) -> None:
         self._entries.pop(key, None)
@@ -244,12 +267,13 @@ def _haystack(section: Section, setting: Setting) -> str:
 def with_changes(running: Config, before: Config, after: Config, effects: frozenset[Effect]) -> Config:
     """`running` with those differences of two others that act then: what it has from elsewhere (a command line, a picker) stays.
 
+    What its rig file keeps stays, too: it would be gone at the next start of that rig.
     Where that does not go together it is `running` as it was; the settings then act at the next start of the program.
     """
     data, new = running.model_dump(mode="json"), after.model_dump(mode="json")
-    settings = settings_by_key()
+    settings, kept = settings_by_key(), sections_of_rig(running, after)
     for key in changed_keys(before, after):
-        if settings[key].effect in effects:
+        if settings[key].effect in effects and key.partition(".")[0] not in kept:
             data = with_value(data, key, value_at(new, key))
     try:
         return Config.model_validate(data)

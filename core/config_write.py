@@ -115,7 +115,7 @@ def _old_text(path: Path, seen: str | None) -> tuple[str, str]:
     try:
         text = data.decode("utf-8-sig")
         tomllib.loads(text)
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError):
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
         return "", _kept(path, "was no TOML")
     note = _kept(path, "was changed meanwhile") if seen is not None and text != seen else ""
     return text, note

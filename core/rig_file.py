@@ -9,6 +9,7 @@ import contextlib
 import os
 import re
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -118,19 +119,27 @@ def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
 
     The file's name goes before the one inside, which a copy of the file keeps, and the exact one before one in other letters.
     """
-    listed, wanted = list_rigs(folder), name.strip()
+    listed = list_rigs(folder)
+    found = _called(name, listed)
+    if found is not None:
+        if found.rig is None:
+            raise RigFileError(found.problem)
+        return found.path, found.rig
+    if name.strip().casefold() in RESERVED:
+        raise RigFileError(f"{name}: is built in and has no file; rigs with one: {', '.join(rig.name for rig in listed) or 'none'}")
+    known = ", ".join((*RESERVED, *(rig.name for rig in listed)))
+    raise RigFileError(f"unknown rig {name!r}; known: {known}")
+
+
+def _called(name: str, listed: Sequence[ListedRig]) -> ListedRig | None:
+    wanted = name.strip()
     folded = wanted.casefold()
     for rank in range(4):
         for rig in listed:
             stem = rig.path.stem
             if (stem == wanted, rig.name == wanted, stem.casefold() == folded, rig.name.casefold() == folded)[rank]:
-                if rig.rig is None:
-                    raise RigFileError(rig.problem)
-                return rig.path, rig.rig
-    if name.strip().casefold() in RESERVED:
-        raise RigFileError(f"{name}: is built in and has no file; rigs with one: {', '.join(rig.name for rig in listed) or 'none'}")
-    known = ", ".join((*RESERVED, *(rig.name for rig in listed)))
-    raise RigFileError(f"unknown rig {name!r}; known: {known}")
+                return rig
+    return None
 
 
 def has_rig(name: str, folder: Path | None = None) -> bool:
@@ -151,7 +160,7 @@ def read_rig(path: Path) -> RigFile:
         raise RigFileError(f"{path}: too large for a rig file")
     try:
         content = tomllib.loads(data.decode("utf-8-sig"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise RigFileError(
             f"{path}: no TOML ({' '.join(str(error).split())}); the file is kept: mend it, or calibrate anew"
         ) from None
@@ -165,14 +174,17 @@ def read_rig(path: Path) -> RigFile:
 
 
 def write_rig(rig: RigFile, path: Path | None = None) -> Path:
-    """Save a rig atomically; an older file of that name stays beside it as NAME.older.toml.
+    """Save a rig atomically; an older file of that name, whatever its case, stays beside it as NAME.older.toml.
 
     Raises
     ------
     RigFileError
         The disk does not take it.
     """
-    target = path if path is not None else rig_path(rig.name)
+    if path is None:
+        earlier = _called(rig.name, list_rigs())
+        path = earlier.path if earlier is not None else rig_path(rig.name)
+    target = path
     document = tomlkit.document()
     document.add(tomlkit.comment(_HEADER))
     document.update(rig.model_dump(mode="json", exclude_none=True))
@@ -229,6 +241,16 @@ def with_rig(base: Config, rig: RigFile, path: Path) -> Config:
     if rig.twin is not None:
         update["twin"] = rig.twin
     return base.model_copy(update=update)
+
+
+def sections_of_rig(running: Config, settings: Config) -> frozenset[str]:
+    """The sections of `running` that its rig file keeps: what the settings say there is not in force.
+
+    Settings that name the file themselves (`rig.file`) take its calibration only.
+    """
+    if running.rig.file is None or running.rig == settings.rig:
+        return frozenset()
+    return frozenset({"camera", "servos", "twin"} if running.rig.camera == "twin" else {"camera", "servos"})
 
 
 def calibration_of(config: Config) -> CalibrationConfig | None:

@@ -31,6 +31,7 @@ class SettingPage(QScrollArea):
         self._draft = draft
         self.fields: dict[str, SettingField] = {}
         self._section_errors: dict[str, QLabel] = {}
+        self._section_notes: dict[str, QLabel] = {}
         self._section_buttons: dict[str, tuple[Section, QPushButton]] = {}
         self._column: QVBoxLayout | None = None
         self._waiting: list[Section | Setting | str] = []
@@ -48,7 +49,7 @@ class SettingPage(QScrollArea):
 
         What is in sight is there at once, the rest comes bit by bit: a long section would keep the window busy for too long.
         """
-        self.fields, self._section_errors, self._section_buttons = {}, {}, {}
+        self.fields, self._section_errors, self._section_notes, self._section_buttons = {}, {}, {}, {}
         page = QWidget()
         page.setObjectName("setting_page")
         column = QVBoxLayout(page)
@@ -66,13 +67,17 @@ class SettingPage(QScrollArea):
         draft = self._draft
         for key, field in self.fields.items():
             field.show_state(draft.entry(key), draft.value(key), is_changed=draft.is_changed(key), error=draft.error(key))
+            field.setEnabled(not draft.is_kept(key))
+        for key, label in self._section_notes.items():
+            label.setText(tr("Kept in the rig file {path}: change it there, or by menu Rig, Calibrate", path=draft.rig_file))
+            label.setVisible(draft.is_kept(key))
         for key, label in self._section_errors.items():
             error = draft.section_error(key)
             label.setText(f"\N{WARNING SIGN}  {error}" if error else "")
             label.setVisible(bool(error))
         for section, button in self._section_buttons.values():
             count = draft.changed_in(section)
-            button.setEnabled(count > 0)
+            button.setEnabled(count > 0 and not draft.is_kept(section.key))
             button.setText(tr("Reset section ({count})", count=count) if count else tr("Reset section"))
 
     def add_all(self) -> None:
@@ -124,12 +129,12 @@ class SettingPage(QScrollArea):
         part.show()  # Qt does it later, and until then the column has no room for it
 
     def _add_head(self, section: Section) -> None:
-        title, meaning, error = QLabel(tr(section.title)), QLabel(tr(section.description).replace("``", "")), QLabel()
+        title, meaning = QLabel(tr(section.title)), QLabel(tr(section.description).replace("``", ""))
+        note, error = QLabel(), QLabel()
         title.setObjectName("section_title")
         title.setIndent(0)
-        meaning.setObjectName("setting_meaning")
-        error.setObjectName("setting_error")
-        for label in (meaning, error):
+        for label, name in ((meaning, "setting_meaning"), (note, "setting_meaning"), (error, "setting_error")):
+            label.setObjectName(name)
             label.setWordWrap(True)
         button = QPushButton(tr("Reset section"))
         button.setAccessibleName(tr("Reset section {title}", title=tr(section.title)))
@@ -140,9 +145,11 @@ class SettingPage(QScrollArea):
         row.addWidget(title)
         row.addStretch(1)
         row.addWidget(button)
-        for widget in (head, meaning, error):
+        for widget in (head, meaning, note, error):
             self._add(widget)
+        note.hide()
         error.hide()
+        self._section_notes[section.key] = note
         self._section_errors[section.key] = error
         self._section_buttons[section.key] = (section, button)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from app import palette, theme
@@ -19,6 +19,7 @@ from core.config import Config, PerceptionConfig, load_config
 from core.control.modes import Act, Mode
 from core.devices import DeviceError, EndOfStream
 from core.profiles import Profiles
+from core.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.settings_file import read_settings
 from core.types import Frame, Point, Scene
 from tests.app.conftest import MakeWindow
@@ -322,6 +323,48 @@ def test_the_theme_is_shown_at_once_and_put_back(at: Bench, qapp: QApplication) 
     at.desk.dialog.reject()
     assert palette.current() is palette.DARK
     assert theme.chosen(qapp) == "dark"
+
+
+def test_what_the_rig_file_keeps_is_shown_as_it_is_in_force_and_not_edited(
+    make_window: MakeWindow, bench: FakeBench, tmp_path: Path, qtbot: QtBot, themed: None
+) -> None:
+    """A limit that is set here would act today and be gone at the next `gui --rig`."""
+    text = "[servos]\nmax_pull_mm = 7.0\n[advice]\nfast_mm_s = 9.0\n"
+    at = Bench(make_window, bench, tmp_path, text)
+    until(qtbot, lambda: at.window.shown_tick is not None)
+    at.edit("servos.max_pull_mm", "3")
+    dialog = at.desk.dialog
+    assert dialog is not None
+    path = write_rig(make_rig(load_config(overrides={"servos": {"max_pull_mm": 5.0}}), "bench 1", None), tmp_path / "bench 1.toml")
+    at.window.use_config(with_rig(at.window.config, read_rig(path), path))
+    until(qtbot, lambda: dialog.draft.value("servos.max_pull_mm") == 5.0)
+    dialog.go_to("servos.max_pull_mm")
+    pull = dialog.page.fields["servos.max_pull_mm"]
+    assert (pull.editor.text(), pull.isEnabled()) == ("5", False)  # type: ignore[union-attr]
+    said = [label.text() for label in dialog.page.findChildren(QLabel) if label.isVisible()]
+    assert f"Kept in the rig file {path}: change it there, or by menu Rig, Calibrate" in said
+    assert dialog.draft.changed_in(dialog._section) == 1
+    assert not dialog.page._section_buttons["servos"][1].isEnabled()
+    assert not dialog.draft.is_dirty, "what was typed before is dropped"
+    dialog._reset_everything()
+    assert not dialog.reset_all.isEnabled()
+    dialog.save_and_restart.click()
+    assert at.path.read_text(encoding="utf-8") == "[servos]\nmax_pull_mm = 7.0\n"
+    until(qtbot, lambda: len(at.configs) == 3)
+    assert (at.configs[-1].servos.max_pull_mm, at.configs[-1].advice.fast_mm_s) == (5.0, 8.0)
+    at.desk.close()
+
+
+def test_what_was_saved_before_a_rig_file_was_chosen_does_not_reach_it(at: Bench, tmp_path: Path, qtbot: QtBot) -> None:
+    at.edit("servos.max_pull_mm", "3")
+    at.edit("advice.fast_mm_s", "9")
+    assert at.desk.dialog is not None
+    at.desk.dialog.save.click()
+    path = write_rig(make_rig(load_config(), "bench 1", None), tmp_path / "bench 1.toml")
+    rig = read_rig(path)
+    at.window.use_config(with_rig(at.window.config, rig, path))
+    until(qtbot, lambda: len(at.configs) == 2)
+    assert (at.configs[1].servos, at.configs[1].advice.fast_mm_s) == (rig.servos, 9.0)
 
 
 def test_closing_the_window_closes_the_dialog(at: Bench) -> None:

@@ -48,6 +48,7 @@ def test_a_users_file_wins_over_the_preset_and_keeps_the_rest(tmp_path: Path) ->
             ["bus_hz must be 20 at least with real servos"],
         ),
         ("perception = 3\n", ["perception"]),
+        ("[[servos.joints]]\nname = 'right'\nid = 999\n", ["servos.joints.0.id: must be >= 0 and <= 252, got 999"]),
     ],
 )
 def test_a_bad_file_is_one_line_with_file_key_and_range(tmp_path: Path, text: str, words: list[str]) -> None:

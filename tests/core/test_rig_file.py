@@ -22,6 +22,7 @@ from core.rig_file import (
     rig_path,
     rigs_folder,
     scaled,
+    sections_of_rig,
     set_port,
     with_rig,
     write_rig,
@@ -84,6 +85,9 @@ def test_the_configuration_takes_the_rig_over() -> None:
     assert config.servos == REAL.servos
     assert config.advice.slow_mm_s == 2.0
     assert calibration_of(config) == KNOWN
+    assert sections_of_rig(config, load_config()) == {"camera", "servos"}
+    named = load_config(overrides={"rig": {"file": str(path)}})  # its calibration only
+    assert sections_of_rig(named, named) == sections_of_rig(REAL, load_config()) == frozenset()
 
 
 @pytest.mark.parametrize(
@@ -176,6 +180,7 @@ BROKEN = (
     ("format = 99", "newer version"),
     ('name = "b"', "made_utc: Field required"),
     ("\x00", "no TOML"),
+    ("a = " + "[" * 5000 + "]" * 5000, "no TOML"),
 )
 
 
@@ -225,3 +230,11 @@ def test_a_recording_is_no_rig() -> None:
     config = load_config(overrides={"rig": {"camera": "video_file", "source": "a.mp4", "robot": "none"}})
     with pytest.raises(RigFileError, match="plays a recording"):
         make_rig(config, "bench 1", None)
+
+
+def test_a_rig_that_is_saved_again_in_other_letters_stays_one_file() -> None:
+    path = write_rig(make_rig(REAL, "empt", None))
+    assert write_rig(make_rig(REAL, "EMPT", KNOWN)) == path
+    assert [one.path for one in list_rigs()] == [path]
+    assert find_rig("empt")[1].calibration == KNOWN
+    assert read_rig(path.with_name("empt.older.toml")).calibration is None
