@@ -60,6 +60,7 @@ class DriveDesk(QObject):
         self.deadman = DeadmanKey(window)
         self.sounds = AlertSounds(self)
         self._shown: DriveView | None = None
+        self._speed = 1.0
         self.has_rig = False
         """Whether a rig runs: before, nobody knows whether there is something to drive."""
         self._timer = QTimer(self)
@@ -168,6 +169,14 @@ class DriveDesk(QObject):
         """Move the robot as held keys do; to be repeated."""
         self._on_jog(jog)
 
+    @Slot(float)
+    def set_speed(self, share: float) -> None:
+        """Move at a share of full speed, 0..1, by whatever control; the next rig keeps it."""
+        self._speed = share
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.hand_speed(share)
+
     def log_target(self, target: Point | None) -> None:
         self._recorder.target(target)
         self._panels.log(
@@ -211,6 +220,7 @@ class DriveDesk(QObject):
                 self._panels.show_drive(None, None)
             return
         pilot.window_alive()
+        pilot.hand_speed(self._speed)
         if not self.deadman.is_held:
             pilot.deadman("window", False)
         news = pilot.news()

@@ -63,7 +63,6 @@ class JogKeys(HeldInput):
         super().__init__(window, PERIOD_MS)
         self._can_move = can_move
         self._held: dict[object, Motion] = {}
-        self._speed = 1.0
 
     @property
     def held(self) -> frozenset[Motion]:
@@ -72,18 +71,14 @@ class JogKeys(HeldInput):
     @property
     def jog(self) -> Jog:
         """How the controls are held now."""
-        held, speed = self.held, self._speed
+        held = self.held
         return Jog(
-            bend=speed * _sign(held, Motion.STEER_RIGHT, Motion.STEER_LEFT),
-            pitch=speed * _sign(held, Motion.PITCH_UP, Motion.PITCH_DOWN),
-            advance=speed * _sign(held, Motion.ADVANCE, Motion.RETRACT),
-            delivery=speed * _sign(held, Motion.DELIVER, Motion.WITHDRAW),
+            bend=_sign(held, Motion.STEER_RIGHT, Motion.STEER_LEFT),
+            pitch=_sign(held, Motion.PITCH_UP, Motion.PITCH_DOWN),
+            advance=_sign(held, Motion.ADVANCE, Motion.RETRACT),
+            delivery=_sign(held, Motion.DELIVER, Motion.WITHDRAW),
             straighten=Motion.STRAIGHTEN in held,
         )
-
-    def set_speed(self, share: float) -> None:
-        """Scale all motions by `share`, 0..1."""
-        self._speed = max(0.0, min(1.0, share))
 
     def press(self, source: object, motion: Motion) -> None:
         """`source` (a key, a button) starts to hold `motion`."""

@@ -40,6 +40,7 @@ class _InUse:
 
 
 _IN_USE = _InUse()
+_VALUE = re.compile(r"\{(\w+)\}")
 _AS_WRITTEN: ContextVar[bool] = ContextVar("texts as written", default=False)
 
 
@@ -75,11 +76,13 @@ def _finished(text: str) -> str:
 
 @cache
 def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    return tuple((template, _pattern(template)) for template in (*TEMPLATES, *COMPOSED))
+    """The more words of its own a template has, the earlier it is tried: a short one would fit the texts of longer ones."""
+    templates = sorted((*TEMPLATES, *COMPOSED), key=lambda template: len(_VALUE.sub("", template)), reverse=True)
+    return tuple((template, _pattern(template)) for template in templates)
 
 
 def _pattern(template: str) -> re.Pattern[str]:
-    parts = re.split(r"\{(\w+)\}", template)
+    parts = _VALUE.split(template)
     made = (re.escape(part) if k % 2 == 0 else f"(?P<{part}>{_value(part)})" for k, part in enumerate(parts))
     return re.compile("".join(made), re.DOTALL)
 

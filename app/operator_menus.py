@@ -38,7 +38,7 @@ def add_operator_menus(window: OperatorWindow) -> None:
             MenuEntry(tr("&Clear destination"), window.clear_target, hint="Esc"),
             None,
             *(panels.picker.menu_entries() if panels.picker is not None else ()),
-            MenuEntry(tr("Start the &rig again"), window.restart, ("F5",)),
+            MenuEntry(tr("Start the &rig again"), window.ask_restart, ("F5",)),
         ],
     )
     add_help_menu(window, panels.help.toggle, [MenuEntry(tr("&Tour"), window.show_tour)])

@@ -158,7 +158,7 @@ class OperatorWindow(WindowFrame):
         desk.jog.held_changed.connect(panels.jog.show_held)
         panels.jog.pressed.connect(desk.press)
         panels.jog.released.connect(desk.release)
-        panels.jog.speed_changed.connect(desk.jog.set_speed)
+        panels.jog.speed_changed.connect(desk.set_speed)
         bar = panels.mode_bar
         bar.stop_asked.connect(desk.stop)
         bar.deadman_changed.connect(desk.hold_deadman)
@@ -300,13 +300,27 @@ class OperatorWindow(WindowFrame):
         if not self._is_shut:
             self._start_rig()
 
+    @Slot()
+    def ask_restart(self) -> None:
+        """Open the rig anew, unless that would break something off; a rig that shows no new picture has nothing to lose."""
+        why = self._at_work() if self._phase is Phase.RUNNING and not self._is_stale else ""
+        if why:
+            self.say(tr("The rig stays as it is: {why}", why=why), is_fault=True)
+        else:
+            self.restart()
+
+    def _at_work(self) -> str:
+        """What opening the rig anew would break off; empty: nothing."""
+        view = self._desk.view
+        if view is not None and view.mode in ARMED_MODES:
+            return tr("the robot is armed: disarm it first")
+        return tr("a session is being recorded: end it first") if self._recorder.status.recording else ""
+
     @Slot(str)
     def _choose_phantom(self, name: str) -> None:
         """Unless that would break something off: its key lies among those that drive."""
-        view = self._desk.view
-        is_armed = view is not None and view.mode in ARMED_MODES
-        if is_armed or self._recorder.status.recording:
-            why = tr("the robot is armed: disarm it first") if is_armed else tr("a session is being recorded: end it first")
+        why = self._at_work()
+        if why:
             self.say(tr("The phantom stays as it is: {why}", why=why), is_fault=True)
             if self._panels.picker is not None:
                 self._panels.picker.show_name(self._config.twin.phantom)

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from core.study.own_frames import OwnFrames
 
 STEPS = 400
+_INTERRUPTED = 130
+"""Exit code of ``train`` that was stopped before its first step."""
 _BATCH, _RATE, _CROP, _LOOK_SHARE = 8, 2e-3, 256, 0.7
 """For a network that can see already: a fifth of the rate with which it was taught, so that it does not forget."""
 REMEMBER = 80
@@ -222,6 +224,9 @@ class TrainingJob(QObject):
         if code == 0 and "model" in self._told.records:
             self._show(replace(self.state, phase=Phase.DONE, line=self._outcome(), left_s=None))
             self.installed.emit(self._wish.name)
+        elif code == _INTERRUPTED:  # later it keeps what it has, and ends well
+            line = tr("Stopped before the first step; there is no new model")
+            self._show(replace(self.state, phase=Phase.FAILED, line=line, left_s=None))
         else:
             why = line or (tr("it was ended by signal {number}", number=-code) if code < 0 else tr("exit code {code}", code=code))
             self._show(replace(self.state, phase=Phase.FAILED, line=tr("Training failed: {why}", why=why), left_s=None))

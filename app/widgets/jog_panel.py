@@ -86,7 +86,7 @@ class JogPanel(QWidget):
 
     def _speed_choice(self) -> QComboBox:
         """Full speed, or a share of it for fine work."""
-        choice = QuietCombo(tr("Speed of the keys"))
+        choice = QuietCombo(tr("Speed by hand"))
         choice.setToolTip(tr("Speed of all motions by hand, of the configured full speed"))
         for share in (1.0, 0.5, 0.2):
             choice.addItem(f"{100 * share:.0f} %", share)

@@ -62,12 +62,15 @@ class Hand:
         self._bend, self._pitch = _limited(bend, 1.0), _limited(pitch, 1.0)
         self._last_s: float | None = None
 
-    def command(self, jog: Jog, now_s: float, at: Command | None = None) -> Command:
-        """The motion for this moment; `now_s` is monotonic, `at` where the robot was told to be last (None: not known)."""
+    def command(self, jog: Jog, now_s: float, at: Command | None = None, speed: float = 1.0) -> Command:
+        """The motion for this moment; `now_s` is monotonic, `at` where the robot was told to be last (None: not known).
+
+        `speed` is the share of full speed, 0..1, of whatever is held.
+        """
         config = self._config
         elapsed_s = 0.0 if self._last_s is None else min(max(0.0, now_s - self._last_s), _LONGEST_STEP_S)
         self._last_s = now_s
-        step = config.bend_rate_per_s * elapsed_s
+        step = speed * config.bend_rate_per_s * elapsed_s
         if jog.straighten:
             self._bend -= _limited(self._bend, step)
             self._pitch -= _limited(self._pitch, step)
@@ -80,8 +83,8 @@ class Hand:
         return Command(
             bend=self._bend,
             pitch=self._pitch,
-            advance_mm_s=config.advance_mm_s * _limited(jog.advance, 1.0),
-            delivery_mm_s=config.delivery_mm_s * _limited(jog.delivery, 1.0),
+            advance_mm_s=speed * config.advance_mm_s * _limited(jog.advance, 1.0),
+            delivery_mm_s=speed * config.delivery_mm_s * _limited(jog.delivery, 1.0),
         )
 
 

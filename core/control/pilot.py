@@ -91,6 +91,7 @@ class Pilot:
         self._alerts: list[Alert] = []
         self._changes: list[DriveView] = []
         self._stop_asked = False
+        self._hand_speed = 1.0
         self._view = DriveView(clock(), mode=self._state.mode, latched=left_over.fault if left_over is not None else None)
         if left_over is not None and left_over.stopped:
             self._requests.stopped()
@@ -158,6 +159,10 @@ class Pilot:
     def jog(self, source: Hashable, jog: Jog) -> None:
         """How a control is held; to be repeated while it is, since its silence counts as let go."""
         self._inbox.jog(source, jog, self._clock())
+
+    def hand_speed(self, share: float) -> None:
+        """The share of full speed, 0..1, at which all controls together move the robot."""
+        self._hand_speed = max(0.0, min(1.0, share))
 
     def deadman(self, source: Hashable, pressed: bool) -> None:
         """A deadman as it is now; to be repeated many times a second."""
@@ -317,7 +322,8 @@ class Pilot:
         self._asked, commanded = Command(), None
         try:
             if permitted is Source.OPERATOR:
-                self._asked = self._hand.command(self._by_hand(decision, jog), now_s, sent.motion if sent is not None else None)
+                at = sent.motion if sent is not None else None
+                self._asked = self._hand.command(self._by_hand(decision, jog), now_s, at, self._hand_speed)
                 robot.send(self._asked, source=Source.OPERATOR)
             elif permitted is Source.PROGRAM and seen is not None:
                 commanded = self._drive.command(seen.advice, now_s)

@@ -1377,6 +1377,31 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>{path}: end of the video</source>
+        <translation>{path}：视频结束</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: cut short: {a} of {b} pictures</source>
+        <translation>{path}：视频不完整：{b} 帧中只有 {a} 帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: cut short: {a} of {b} s</source>
+        <translation>{path}：视频不完整：{b} 秒中只有 {a} 秒</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: damaged after frame {a} ({why})</source>
+        <translation>{path}：第 {a} 帧之后损坏（{why}）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: damaged before its first frame ({why})</source>
+        <translation>{path}：第一帧之前已损坏（{why}）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>99 % of it is darker than {a} (black below {b} of 255)</source>
         <translation>99 % 的像素暗于 {a}（255 级中低于 {b} 视为全黑）</translation>
     </message>
@@ -1567,6 +1592,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the computer slept for {a} s</source>
+        <translation>计算机休眠了 {a} s</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>measured position: {what}</source>
         <translation>测得位置：{what}</translation>
     </message>
@@ -1687,6 +1717,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>what comes from {port} is no pedal's report</source>
+        <translation>{port} 传来的不是脚踏板的报告</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>{a} frames in {b} s</source>
         <translation>{b} s 内 {a} 帧</translation>
     </message>
@@ -1744,6 +1779,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>board {a}: {b} of {c} corners</source>
         <translation>标定板 {a}：{c} 个角点中的 {b} 个</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>a board of {a} x {b} squares needs {c} markers, and there are {count}: take fewer squares</source>
+        <translation>{a} x {b} 格的标定板需要 {c} 个标记，但只有 {count} 个：请减少格数</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -1877,6 +1917,31 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the pedal at {port} is gone ({why}): plug its USB cable in</source>
+        <translation>脚踏板 {port} 断开（{why}）：插好其 USB 线</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the pedal at {port} has not reported yet</source>
+        <translation>脚踏板 {port} 尚未报告</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the pedal at {port} is silent: check its power and firmware, then plug it in again</source>
+        <translation>脚踏板 {port} 没有响应：检查其电源和固件，然后重新插入</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>what comes from {port} is no pedal's report: check pedal.baud, the cable, and that it is the pedal</source>
+        <translation>{port} 传来的不是脚踏板的报告：检查 pedal.baud 和线缆，并确认它是脚踏板</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the pedal is no longer read ({kind}: {why}): start the program again</source>
+        <translation>不再读取脚踏板（{kind}：{why}）：请重新启动程序</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>pedal port {port} does not exist: plug the pedal in, or set pedal.port</source>
         <translation>脚踏板端口 {port} 不存在：插入脚踏板，或设置 pedal.port</translation>
     </message>
@@ -1884,6 +1949,51 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>no permission for pedal port {port}: add your user to the group dialout, then log in again</source>
         <translation>没有脚踏板端口 {port} 的权限：把您的用户加入 dialout 组，然后重新登录</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>pedal port {port} is in use by another program, or by the servos: close it there, or set pedal.port</source>
+        <translation>脚踏板端口 {port} 正被另一个程序或舵机使用：在那里关闭它，或设置 pedal.port</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>pedal port {port} has no device behind it: unplug the pedal and plug it in again</source>
+        <translation>脚踏板端口 {port} 后面没有设备：拔下脚踏板并重新插入</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>gamepad {path} is not there: plug it in, or leave gamepad.device out to take the first</source>
+        <translation>手柄 {path} 不存在：插入手柄，或不设 gamepad.device 以使用第一个手柄</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>gamepad {path} cannot be opened: plug it in, or leave gamepad.device out to take the first</source>
+        <translation>手柄 {path} 无法打开：插入手柄，或不设 gamepad.device 以使用第一个手柄</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>no permission for gamepad {path}: add your user to the group input, then log in again</source>
+        <translation>没有手柄 {path} 的权限：把您的用户加入 input 组，然后重新登录</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is</source>
+        <translation>{path} 不是双摇杆手柄：不设 gamepad.device 以使用第一个手柄</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one</source>
+        <translation>手柄 {name} 的右摇杆和按键布局不同：把它切换到 XInput，或换一个手柄</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>gamepad {name} is in use by another window, so its STOP does nothing here: close that window, or set gamepad.device</source>
+        <translation>手柄 {name} 正被另一个窗口使用，因此它的停止键在此不起作用：关闭那个窗口，或设置 gamepad.device</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the gamepad is no longer read ({kind}: {why}): start the program again</source>
+        <translation>不再读取手柄（{kind}：{why}）：请重新启动程序</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -2674,6 +2784,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/operator_window.py"/>
         <source>a session is being recorded: end it first</source>
         <translation>正在录制会话：请先结束录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_window.py"/>
+        <source>The rig stays as it is: {why}</source>
+        <translation>装置保持不变：{why}</translation>
     </message>
     <message>
         <location filename="../../app/operator_window.py"/>
@@ -3479,11 +3594,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/rig_desk.py"/>
         <source>wait: {what}</source>
         <translation>请稍候：{what}</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_desk.py"/>
-        <source>The rig stays as it is: {why}</source>
-        <translation>装置保持不变：{why}</translation>
     </message>
     <message>
         <location filename="../../app/rig_desk.py"/>
@@ -4830,6 +4940,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/training_job.py"/>
+        <source>Stopped before the first step; there is no new model</source>
+        <translation>在第一步之前已停止；没有新模型</translation>
+    </message>
+    <message>
+        <location filename="../../app/training_job.py"/>
         <source>it was ended by signal {number}</source>
         <translation>被信号 {number} 终止</translation>
     </message>
@@ -5530,8 +5645,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
-        <source>Speed of the keys</source>
-        <translation>按键的速度</translation>
+        <source>Speed by hand</source>
+        <translation>手动速度</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
@@ -6352,6 +6467,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/setting_page.py"/>
         <source>{count} more: add a word</source>
         <translation>还有 {count} 项：请再加一个词</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/setting_page.py"/>
+        <source>Kept in the rig file {path}: change it there, or by menu Rig, Calibrate</source>
+        <translation>保存在装置文件 {path} 中：请在该文件中修改，或用菜单“装置”中的“标定”</translation>
     </message>
     <message>
         <location filename="../../app/widgets/setting_page.py"/>

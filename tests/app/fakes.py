@@ -215,6 +215,7 @@ class FakePilot:
         self.acts: list[Act] = []
         self.deadman_said: list[bool] = []
         self.beats = 0
+        self.speed = 0.0
         self.asked: list[str] = []
         self.halted = False
         self.faults: list[Fault] = []
@@ -227,6 +228,9 @@ class FakePilot:
 
     def jog(self, source: object, jog: Jog) -> None:
         self.jogs.append(jog)
+
+    def hand_speed(self, share: float) -> None:
+        self.speed = share
 
     def switch_on(self) -> None:
         self.asked.append("switch on")

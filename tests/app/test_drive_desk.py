@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.operator_window import OperatorWindow
+from core.config import Config
 from core.control.alerts import ALERTS, Alert
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
@@ -69,6 +70,24 @@ def test_alerts_are_shown_logged_and_heard(
     assert running.panels.alerts.isVisible()
     assert running.panels.mode.accessibleName() == "Mode: STOPPED"
     assert any("does not follow" in line for line in running.panels.events.lines)
+
+
+def test_the_speed_by_hand_reaches_the_pilot_and_that_of_the_next_rig(
+    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot
+) -> None:
+    engines: list[FakeEngine] = []
+
+    def open_engine(_config: Config) -> FakeEngine:
+        engines.append(FakeEngine(bench))
+        return engines[-1]
+
+    window = make_window(open_engine)
+    window.start()
+    until(qtbot, lambda: len(engines) == 1 and engines[0].pilot.speed == 1.0)
+    window.panels.jog.speed_changed.emit(0.2)
+    assert engines[0].pilot.speed == 0.2
+    window.restart()
+    until(qtbot, lambda: len(engines) == 2 and engines[1].pilot.speed == 0.2)
 
 
 def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:

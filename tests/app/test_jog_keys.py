@@ -87,11 +87,10 @@ def test_a_motion_is_there_while_held_and_gone_after(bench: Bench, key: Qt.Key, 
     assert bench.jogs[-1] == AT_REST
 
 
-def test_the_speed_scales_every_motion(bench: Bench) -> None:
-    bench.jog.set_speed(0.2)
+def test_motions_that_are_held_together_are_one_jog(bench: Bench) -> None:
     bench.press(Key.Key_W)
     bench.press(Key.Key_D)
-    assert bench.jogs[-1] == Jog(bend=0.2, advance=0.2)
+    assert bench.jogs[-1] == Jog(bend=1.0, advance=1.0)
 
 
 def test_holding_sends_again_and_again(bench: Bench, qtbot: QtBot) -> None:

@@ -15,8 +15,9 @@ from app.engine_thread import EngineThread, Phase
 from app.operator_window import OperatorWindow
 from core.calibration_config import CalibrationConfig, ScaleConfig
 from core.config import Config
+from core.control.drive_view import DriveView
 from core.control.hand import AT_REST
-from core.control.modes import Act
+from core.control.modes import Act, Mode
 from core.devices import DeviceError, EndOfStream
 from core.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.types import Reason, Refusal
@@ -165,6 +166,21 @@ def test_fault_is_one_visible_line_and_f5_starts_again(make_window: MakeWindow, 
     working.append(True)
     qtbot.keyClick(window, Key.Key_F5)
     until(qtbot, lambda: window.shown_tick is not None)
+
+
+@pytest.mark.parametrize("mode", [Mode.ARMED, Mode.AUTONOMOUS, Mode.HOLD])
+def test_f5_breaks_no_armed_rig_off(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, mode: Mode) -> None:
+    """Once more it is free as soon as the rig shows nothing new: F5 is the way out then."""
+    engine.pilot.view = DriveView(0.0, mode=mode)
+    until(qtbot, lambda: running.desk.view is not None and running.desk.view.mode is mode)
+    orders = running.orders
+    qtbot.keyClick(running, Key.Key_F5)
+    assert "The rig stays as it is: the robot is armed: disarm it first" in running.panels.toast.text()
+    assert (running.orders, running.phase) == (orders, Phase.RUNNING)
+    engine.silent = True
+    until(qtbot, lambda: running.panels.badge.title == "No new picture")
+    qtbot.keyClick(running, Key.Key_F5)
+    assert running.orders == orders + 1
 
 
 def test_fault_while_running_blanks_everything(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:

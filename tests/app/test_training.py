@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import shutil
+import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
@@ -149,6 +150,16 @@ def test_too_few_masks_are_one_clear_line(qtbot: QtBot, tmp_path: Path) -> None:
     ended(job, qtbot)
     assert job.state.line.startswith("Not started: 5 images have both a vessel and a robot mask, and training needs 6")
     assert not list((tmp_path / "training").glob("*"))
+    job.close()
+
+
+def test_one_that_is_stopped_before_its_first_step_is_said(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped = [sys.executable, "-c", "import sys; sys.stderr.write('interrupted\\n'); sys.exit(130)"]
+    monkeypatch.setattr("app.training_job.command_of", lambda *_: stopped)
+    job = job_on(annotate_masks(tmp_path / "images", FEWEST), tmp_path)
+    job.start(Wish("own_1"))
+    ended(job, qtbot)
+    assert job.state.line == "Stopped before the first step; there is no new model"
     job.close()
 
 

@@ -371,5 +371,5 @@ def test_tab_reaches_every_button_list_and_field_of_the_drive_page(make_window: 
         place = place.nextInFocusChain()
         if place.isVisibleTo(window) and place.focusPolicy() & Qt.FocusPolicy.TabFocus:
             reached.add(_named(place))
-    assert {"Phantom", "Speed of the keys", "Another random phantom", "STOP"} <= reached
+    assert {"Phantom", "Speed by hand", "Another random phantom", "STOP"} <= reached
     assert any(name.startswith("Servos on") or name.startswith("Arm") for name in reached)

@@ -90,6 +90,28 @@ def test_held_keys_are_rates_of_bend_and_speeds_of_feed(bench: Bench) -> None:
     assert (rest.bend, rest.advance_mm_s) == (command.bend, 0.0)
 
 
+def test_a_share_of_full_speed_holds_for_all_controls_together(bench: Bench) -> None:
+    bench.pilot.hand_speed(0.2)
+    bench.on().jog = Jog(bend=1.0, advance=1.0, delivery=-1.0)
+    for _ in range(25):
+        bench.pilot.jog("pad", Jog(bend=1.0, advance=1.0))
+        bench.turn()
+    bent = bench.robot.sent[-1][1]
+    assert bent.bend == pytest.approx(0.2 * 0.5 * 1.2, abs=0.01)
+    assert (bent.advance_mm_s, bent.delivery_mm_s) == (2.0, -2.0)
+    bench.jog = Jog(straighten=True)
+    bench.pilot.jog("pad", AT_REST)
+    bench.turn()
+    assert bent.bend - bench.robot.sent[-1][1].bend == pytest.approx(0.2 * 1.2 * PERIOD_S)
+
+
+def test_a_slow_touch_ends_autonomy_as_any_other(bench: Bench) -> None:
+    bench.pilot.hand_speed(0.0)
+    bench.handed_over().turn(10).jog = Jog(advance=1.0)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+
+
 def test_a_window_that_says_no_more_lets_go(bench: Bench) -> None:
     bench.on().jog = Jog(advance=1.0)
     bench.seconds(0.2)
