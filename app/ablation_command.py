@@ -17,6 +17,7 @@ from app.ablation_streams import measure_streams
 from app.ablation_tables import difference_table, markdown, stream_table, value_table
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
+from app.outputs import name_as_text
 from core.config import PerceptionConfig, choose_model, load_config
 from core.errors import UserError
 from core.study.ablation import OURS, PAPER, STEPS, TRACKING, SameMasks, Variant, make_variants
@@ -65,7 +66,7 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
     _make_folder(plan.out)
     masks, pipeline_of = _open_masks(ours, plan.true_masks)
     source = "true masks" if plan.true_masks else f"model {ours.segmentation.model}, {masks.engine}"
-    result: dict[str, Any] = {"set": str(plan.folder) if plan.folder else None, "masks": source, "seed": plan.seed}
+    result: dict[str, Any] = {"set": name_as_text(plan.folder) if plan.folder else None, "masks": source, "seed": plan.seed}
     interrupted, frames = False, []
     if samples:
         variants = make_variants(paper, ours, [step for step in STEPS if step.name != TRACKING])
@@ -216,6 +217,6 @@ def _write_frames(path: Path, rows: list[dict[str, Any]]) -> None:
         with path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, list(rows[0]))
             writer.writeheader()
-            writer.writerows(rows)
+            writer.writerows(row | {"stem": name_as_text(row["stem"])} for row in rows)
     except OSError as error:
         raise AblationError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None

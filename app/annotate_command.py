@@ -361,10 +361,13 @@ def _import(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     sources = [file for path in options.imports for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]
     if not sources:
         raise AnnotationError(f"{options.imports[0]}: no .json file in it")
+    if not any(source.is_file() for source in sources):  # before an annotation file is made for them
+        raise AnnotationError(f"{sources[0]}: no such file; nothing was imported")
+    files = image_files(paths, options.frames)
     rater = options.study.rater or _user()
     counts: Counter[str] = Counter()
     with AnnotationStore(store_path) as store:
-        images = _listed(image_files(paths, options.frames), store)
+        images = _listed(files, store)
         imported, problems = read_files(sources, images)
         existing = {one.key: one.content for one in store.annotations(options.study.name, rater)}
         for one in imported:

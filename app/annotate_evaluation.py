@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from app.learning_commands import progress_bar
+from app.outputs import name_as_text
 from core.config import Config
 from core.study.annotation_images import FoundImage
 from core.study.annotation_records import StoredAnnotation
@@ -49,7 +50,9 @@ def compared_rows(
                 scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(image.path)))
                 angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
                 group = folders[image.path.parent] if len(folders) > 1 else None  # pictures of one session are alike
-                rows.append(replace(row, image=image.path.name, algorithm_angle=angle, algorithm_state=state, group=group))
+                rows.append(
+                    replace(row, image=name_as_text(image.path.name), algorithm_angle=angle, algorithm_state=state, group=group)
+                )
                 if scene.refusal is not None and row.state is not None:
                     reasons[scene.refusal.reason.value] += 1
         except KeyboardInterrupt:
@@ -61,7 +64,7 @@ def compared_rows(
 def _names_of(folders: set[Path]) -> dict[Path, str]:
     """Each folder from the one on that they have in common: sessions may all be called alike inside."""
     common = Path(os.path.commonpath([folder.absolute() for folder in folders]))
-    return {folder: folder.absolute().relative_to(common).as_posix() for folder in folders}
+    return {folder: name_as_text(folder.absolute().relative_to(common).as_posix()) for folder in folders}
 
 
 def raters_agreement(
@@ -72,5 +75,5 @@ def raters_agreement(
     raters = {one.key.rater for one in done}
     if len(raters) < 2 and all(one.key.repeat == 1 for one in done):
         return None
-    report = agreement_report(done, {image.sha256: image.path.name for image in images}, seed)
+    report = agreement_report(done, {image.sha256: name_as_text(image.path.name) for image in images}, seed)
     return {"study": done[0].key.study} | report

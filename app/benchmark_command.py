@@ -19,6 +19,7 @@ from rich.table import Table
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
 from core.config import Config, TwinConfig, choose_model, load_config
+from core.errors import UserError
 from core.types import Frame, Image, Scene
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def quantiles(values: Sequence[float]) -> dict[str, float]:
 
 
 def run_speed(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
-    """Time perception frame by frame on twin pictures, with a baseline frame in between every eighth."""
+    """Time perception frame by frame on twin pictures, with a baseline frame in between every eighth; raises UserError."""
     from core.perception.pipeline import open_pipeline
 
     config = _as_in_a_stream(_config(model, preset, config_path))
@@ -70,6 +71,9 @@ def run_speed(frames: int, *, model: str | None, preset: str | None, config_path
             if (index - _WARM_UP) % _BASELINE_EVERY == 0 and scene.masks is not None:
                 baseline_ms.append(baseline.time(image, scene.masks.vessel, scene.masks.robot).total_ms)
             bar.advance(task)
+    if not baseline_ms:
+        reason = next((scene.refusal.reason.value for scene in scenes if scene.refusal is not None), "no masks")
+        raise UserError(f"the pictures are refused before there are masks to compare ({reason}); change [perception.quality]")
     stages = sorted({stage for scene in scenes for stage in scene.latency_ms} - {"total"})
     totals = [scene.latency_ms["total"] for scene in scenes]
     until_seen = [scene.latency_ms.get("prepare", 0.0) + scene.latency_ms.get("network", 0.0) for scene in scenes]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 from core.calibration.board import BoardSpec, board_bitmap
 from core.errors import UserError
+from core.whole_file import write_whole
 
 _PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0)}
 _MARGIN_MM, _FOOT_MM = 8.0, 16.0
@@ -36,6 +38,8 @@ def print_board(path: Path, spec: BoardSpec) -> str:
     ------
     BoardPrintError
         Another ending, a board that fits on no paper, or a disk that does not take it.
+    BoardError
+        More squares than there are markers.
     """
     if path.suffix.lower() not in {".pdf", ".png"}:
         raise BoardPrintError(f"{path}: a board is written as .pdf or .png")
@@ -62,8 +66,11 @@ def print_board(path: Path, spec: BoardSpec) -> str:
         f"LumenPilot board, {spec.columns} x {spec.rows} squares of {spec.square_mm:g} mm. Lay it flat at the height of the robot."
     )
     axes.text(left, below + 3.0, text, fontsize=7, va="top")
+    printed = BytesIO()  # on a full disk, the PDF writer ends in an error of its compressor, and leaves an empty file
+    kind = path.suffix.lower().removeprefix(".")
+    figure.savefig(printed, format=kind, dpi=_PNG_DPI, metadata={"Title": "LumenPilot calibration board"})
     try:
-        figure.savefig(path, dpi=_PNG_DPI, metadata={"Title": "LumenPilot calibration board"})
+        write_whole(path, printed.getvalue())
     except OSError as error:
         raise BoardPrintError(f"{path}: cannot be written ({error.strerror})") from None
     return paper

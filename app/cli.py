@@ -11,7 +11,7 @@ import os
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import typer
 
@@ -49,36 +49,52 @@ def main() -> None:
     limit_pictures()
     if sys.stdout is None:  # started with a closed one: what is told there is told to nobody
         sys.stdout = open(os.devnull, "w")
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")
     try:
         try:
             code = app(prog_name="main.py", standalone_mode=False)
         finally:
             _finish_output()
     except UserError as error:
-        sys.stderr.write(f"error: {error}\n")
+        _tell(f"error: {error}")
         sys.exit(2)
     except typer.TyperException as error:  # a command line that makes no sense
         if error.format_message().startswith("Usage:"):  # a group by itself: its help is the answer
-            sys.stderr.write(f"{error.format_message()}\n")
+            _tell(error.format_message())
             sys.exit(2)
         context = getattr(error, "ctx", None)
         told = " ".join(error.format_message().split()).rstrip(".")
-        sys.stderr.write(f"error: {told}; see {context.command_path + ' ' if context is not None else ''}--help\n")
+        _tell(f"error: {told}; see {context.command_path + ' ' if context is not None else ''}--help")
         sys.exit(2)
     except OSError as error:
         if error.errno == errno.ENOSPC:
-            sys.stderr.write(f"error: {error.filename or 'output'}: the disk is full; make room, or write to another one\n")
+            _tell(f"error: {error.filename or 'output'}: the disk is full; make room, or write to another one")
         elif error.filename is not None and error.strerror:
-            sys.stderr.write(f"error: {error.filename}: {error.strerror}\n")
+            _tell(f"error: {error.filename}: {error.strerror}")
         else:
             raise
         sys.exit(2)
     except (KeyboardInterrupt, typer.Abort):
         code = _INTERRUPTED
     if code == _INTERRUPTED:  # Typer gives it back instead of raising
-        sys.stderr.write("interrupted\n")
+        _tell("interrupted")
     if isinstance(code, int) and code:
         sys.exit(code)
+
+
+def _tell(line: str) -> None:
+    """On standard error; where that cannot be written, the exit code says it alone."""
+    try:
+        sys.stderr.write(line + "\n")
+        sys.stderr.flush()
+    except OSError:
+        _let_go(sys.stderr)
+
+
+def _let_go(stream: TextIO) -> None:
+    """What it still holds goes nowhere: the interpreter would try again at its end, and change the exit code."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _finish_output() -> None:
@@ -88,7 +104,7 @@ def _finish_output() -> None:
     try:
         sys.stdout.flush()
     except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter tries again
+        _let_go(sys.stdout)
         if error.errno != errno.EPIPE:
             raise
 

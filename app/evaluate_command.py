@@ -14,7 +14,7 @@ from app.annotate_tables import print_agreement
 from app.evaluation_report import print_tables, render_report
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
-from app.outputs import check_no_input
+from app.outputs import check_no_input, name_as_text
 from app.progress_lines import asked_teller
 from core.config import Config, choose_model, load_config
 from core.study.annotation_report import write_measures
@@ -76,12 +76,13 @@ def run_evaluate(
     if csv is not None:
         if like_paper is not None or model is not None or preset is not None or config_path is not None:
             raise EvaluationError("--like-paper, --model, --preset and --config need a labelled set (evaluate DIR), not --csv")
-        check_no_input(out / "measurements.csv", [csv], "--out")
-        study = _Study(read_measurements(csv), {"kind": "table of measures", "name": csv.name}, [])
+        for name in _written_names():
+            check_no_input(out / name, [csv], "--out")
+        study = _Study(read_measurements(csv), {"kind": "table of measures", "name": name_as_text(csv.name)}, [])
         _make_folder(out)
     else:
         assert folder is not None
-        annotations = _annotation_file(folder)
+        annotations = _annotation_file(folder, study_name)
         if annotations is not None and like_paper is not None:
             raise EvaluationError("--like-paper needs a labelled set with its truth, not annotations by hand")
         if annotations is None and study_name is not None:
@@ -132,6 +133,14 @@ def _make_folder(out: Path) -> None:
         raise EvaluationError(f"{out}: cannot be written to; choose another --out")
 
 
+def _written_names() -> list[str]:
+    """All that ``--out`` gets, or loses because an earlier evaluation wrote it."""
+    from app.evaluation_figures import ENDINGS, FIGURES
+
+    drawn = [f"{name}{ending}" for name in FIGURES for ending in ENDINGS]
+    return ["metrics.json", "measurements.csv", "raters.csv", "report.html", *drawn]
+
+
 def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
     from app.evaluation_figures import ENDINGS, FIGURES, draw_figures, save_figure
 
@@ -148,14 +157,14 @@ def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
     (out / "report.html").write_text(render_report(metrics, figures), encoding="utf-8")
 
 
-def _annotation_file(given: Path) -> Path | None:
-    """The annotation file that is given, or that of a folder without a truth of its own."""
+def _annotation_file(given: Path, study: str | None) -> Path | None:
+    """The annotation file that is given, or that of a folder without a truth of its own, or whose `study` is asked for."""
     from core.study.annotation_store import DEFAULT_NAME
 
     if given.suffix == ".sqlite" and given.is_file():
         return given
     own = given / DEFAULT_NAME
-    return own if own.is_file() and not (given / "truth.jsonl").is_file() else None
+    return own if own.is_file() and (study is not None or not (given / "truth.jsonl").is_file()) else None
 
 
 def _perceive_annotated(
@@ -174,7 +183,7 @@ def _perceive_annotated(
     rows, reasons, engine, missed = compared_rows(answers, images, config, study, str(annotations))
     source: dict[str, Any] = {
         "kind": "annotated by hand",
-        "name": annotations.parent.name,
+        "name": name_as_text(annotations.parent.name),
         "model": config.perception.segmentation.model,
     }
     unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
@@ -239,7 +248,7 @@ def _perceive_set(
 ) -> _Study:
     """Perceive each image by itself; the truth (or two noisy measures of it) stands for the manual measure."""
     notes: list[str] = []
-    source: dict[str, Any] = {"kind": "labelled set", "name": folder.name}
+    source: dict[str, Any] = {"kind": "labelled set", "name": name_as_text(folder.name)}
     measured: dict[str, tuple[float, float | None]] = {t.stem: (t.theta_deg, None) for t in truth if t.theta_deg is not None}
     if like_paper is not None:
         states = {t.stem: t.state for t in truth if t.state is not None}
@@ -288,7 +297,7 @@ def _perceive(truth: list[_Truth], measured: dict[str, tuple[float, float | None
                 scene = pipeline.perceive_single(Frame(len(done.rows), 0.0, image))
                 angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
                 first, second = measured.get(one.stem, (None, None))
-                done.rows.append(Measurement(one.stem, first, second, one.state, angle, state, one.group))
+                done.rows.append(Measurement(name_as_text(one.stem), first, second, one.state, angle, state, one.group))
                 if scene.refusal is not None and one.state is not None:
                     done.reasons[scene.refusal.reason.value] += 1
         except KeyboardInterrupt:

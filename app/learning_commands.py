@@ -182,7 +182,7 @@ def run_train(
             done = room.teach(lesson, plan)
             if done is None:
                 _console.print(f"interrupted before the first step; nothing was written to {out}", soft_wrap=True)
-                return
+                raise KeyboardInterrupt
             if then is not None and done == plan.steps:
                 teach_second_look(room, samples, then)
         except DatasetError as error:

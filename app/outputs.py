@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -14,13 +15,24 @@ def is_same(first: Path, second: Path) -> bool:
     try:
         return first.samefile(second)
     except OSError:
-        return first.resolve() == second.resolve()
+        return os.path.realpath(first) == os.path.realpath(second)  # Path.resolve raises on links in a loop
+
+
+def name_as_text(name: str | Path) -> str:
+    """A name as files, figures and terminals can hold it: what is no UTF-8 in it, as in old archives, is shown as bytes."""
+    return os.fsencode(name).decode("utf-8", "backslashreplace")
 
 
 def check_no_input(output: Path, inputs: Iterable[Path], option: str) -> None:
     """Raise UserError when `output`, given by `option`, is one of the `inputs`."""
     if any(is_same(output, path) for path in inputs):
         raise UserError(f"{output}: is an input, which {option} would overwrite; choose another one")
+
+
+def check_apart(output: Path, others: Iterable[Path], option: str, writer: str) -> None:
+    """Raise UserError when `output`, given by `option`, is one of the files that the option `writer` writes, too."""
+    if any(is_same(output, path) for path in others):
+        raise UserError(f"{output}: is written by {writer}, too; choose another file for {option}")
 
 
 def check_no_session(folder: Path, option: str) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,10 @@ import cv2
 import numpy as np
 
 from app.line_output import LineOutput
-from app.outputs import check_no_input, is_same
+from app.outputs import check_apart, check_no_input, is_same
 from app.overlay_picture import draw_overlay
 from app.scene_json import scene_to_json, unread_to_json
-from app.sources import SourcePicture, expand, pictures
+from app.sources import SourcePicture, expand, frame_of, is_video, own_stems, pictures
 from core.config import choose_model, load_config
 from core.control.policy import table_policy
 from core.errors import UserError
@@ -55,18 +56,22 @@ def run_perceive(
     if not files:
         raise UserError(f"{', '.join(map(str, paths))}: no pictures or videos there")
     if outputs.jsonl is not None:
-        check_no_input(outputs.jsonl, files if targets_path is None else [*files, targets_path], "--jsonl")
+        read = (path for path in (*files, targets_path, config_path) if path is not None)
+        check_no_input(outputs.jsonl, read, "--jsonl")
     for folder, option, endings in (
         (outputs.masks, "--masks", ("_vessel.png", "_robot.png")),
         (outputs.overlay, "--overlay", ("_overlay.png",)),
     ):
         if folder is not None:
-            _check_keeps_inputs(folder, files, option, endings)
+            is_written = _written_names(files, endings)
+            _check_keeps_inputs(folder, files, option, is_written)
+            if outputs.jsonl is not None and is_written(outputs.jsonl.name):
+                check_apart(outputs.jsonl, [folder / outputs.jsonl.name], "--jsonl", option)
             _make_folder(folder)
     pipeline = open_pipeline(config.perception)
     tally = _Tally()
     with LineOutput(outputs.jsonl) as lines, progress_bar() as bar:
-        task = bar.add_task("pictures", total=None if any(_is_video(f) for f in files) else len(files))
+        task = bar.add_task("pictures", total=None if any(is_video(f) for f in files) else len(files))
         for picture in pictures(files):
             if picture.image is None:
                 tally.problem(picture.problem or f"{picture.name}: cannot be read")
@@ -122,7 +127,7 @@ class _Targets(dict[str, Point]):
         self.used: set[str] = set()
 
     def of(self, picture: SourcePicture) -> Point | None:
-        for stem in (picture.stem, Path(picture.name.rpartition("#")[0] or picture.name).stem):
+        for stem in picture.real_stems:
             if stem in self:
                 self.used.add(stem)
                 return self[stem]
@@ -135,12 +140,6 @@ def _perceive_one(pipeline: Any, picture: SourcePicture, image: Any, index: int,
     if picture.first_of_stream:
         pipeline.reset()
     return pipeline(Frame(index, picture.time_s, image), targets.of(picture))  # type: ignore[no-any-return]
-
-
-def _is_video(path: Path) -> bool:
-    from app.sources import VIDEO_ENDINGS
-
-    return path.suffix.lower() in VIDEO_ENDINGS
 
 
 def _write_pictures(outputs: Outputs, stem: str, image: np.ndarray, scene: Scene, advice_config: Any) -> None:
@@ -160,16 +159,35 @@ def _source_sized(mask: Mask, size: tuple[int, int]) -> Mask:
     return np.asarray(cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_LINEAR) > 127)
 
 
-def _check_keeps_inputs(folder: Path, files: Sequence[Path], option: str, endings: Sequence[str]) -> None:
+def _written_names(files: Sequence[Path], endings: Sequence[str]) -> Callable[[str], bool]:
+    """Whether a file of this name is written for one of the inputs."""
+    stems = own_stems(files)
+    filmed = {stem for file, stem in zip(files, stems, strict=True) if is_video(file)}
+    shot = set(stems) - filmed
+
+    def is_written(name: str) -> bool:
+        found = [name.removesuffix(ending) for ending in endings if name.endswith(ending)]
+        return any(stem in shot or frame_of(stem, filmed) for stem in found)
+
+    return is_written
+
+
+def _check_keeps_inputs(folder: Path, files: Sequence[Path], option: str, is_written: Callable[[str], bool]) -> None:
     """Refuse a folder in which what is written would have the name of an input, or of the masks that belong to one."""
-    written = {f"{file.stem}{ending}" for file in files for ending in endings}
     for file in files:
-        if file.name in written and is_same(folder, file.parent):
+        if is_written(file.name) and is_same(folder, file.parent):
             raise UserError(f"{file}: is an input, which {option} {folder} would overwrite; choose another folder")
-        if file.parent.name == "images" and is_same(folder, file.parent.parent / "masks"):
-            drawn = next((name for name in (f"{file.stem}{ending}" for ending in endings) if (folder / name).exists()), None)
-            if drawn is not None:
-                raise UserError(f"{folder / drawn}: is a mask of the set, which {option} would overwrite; choose another folder")
+    # An input may be given as ".", and it or its folder may be a link into the set.
+    places = {path for file in files for path in (os.path.abspath(file.parent), os.path.realpath(file.parent), _real_folder(file))}
+    sets = [Path(place).parent for place in places if Path(place).name == "images"]
+    if folder.is_dir() and any(is_same(folder, one / "masks") for one in sets):
+        drawn = next((path for path in sorted(folder.iterdir()) if is_written(path.name)), None)
+        if drawn is not None:
+            raise UserError(f"{drawn}: is a mask of the set, which {option} would overwrite; choose another folder")
+
+
+def _real_folder(file: Path) -> str:
+    return os.path.dirname(os.path.realpath(file))
 
 
 def _make_folder(folder: Path) -> None:

@@ -14,6 +14,7 @@ from app.rig_engine import EngineMaker
 from app.window_command import window_config
 from core.config import Config
 from core.devices import DeviceError, EndOfStream
+from core.learning.model_file import check_model
 from core.record_config import sessions_folder
 from core.session.events import event_of_alert
 from core.session.files import check_parent
@@ -44,12 +45,13 @@ class _Progress:
 def run_record(
     seconds: float, out: Path | None, *, rig: str | None, config_path: Path | None, lossless: bool, as_json: bool
 ) -> None:
-    """Record so many seconds into a new session in `out`; raises SessionError, DeviceError, ConfigError."""
+    """Record so many seconds into a new session in `out`; raises SessionError, DeviceError, ConfigError, ModelError."""
     config, kind = window_config(rig, config_path, None)
     settings = config.record.model_copy(update={"ring_s": 0.0} | ({"codec": "lossless"} if lossless else {}))
     config = config.model_copy(update={"record": settings})
     folder = out if out is not None else sessions_folder(settings.folder)
     check_parent(folder)
+    check_model(config.perception.segmentation.model)  # the window goes on without a pose and says so; here nobody would see it
     engine = EngineMaker()(config)
     writer: SessionWriter | None = None
     try:

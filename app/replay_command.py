@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from app.learning_commands import Interrupt, progress_bar
 from app.line_output import LineOutput
-from app.outputs import check_no_input, check_no_session
+from app.outputs import check_apart, check_no_input, check_no_session, name_as_text
 from app.perceive_command import _make_folder
 from app.scene_json import scene_to_json, unread_to_json
 from core.config import Config, choose_model, load_config, merge
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from core.perception.pipeline import Pipeline
 
 MOST_SHOWN = 20
+_WRITTEN = ("replay.json", "frames.jsonl", "replay.svg", "replay.pdf")
+"""What ``--out`` gets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +53,11 @@ class _Replayed:
     no_row: int = 0
     no_picture: int = 0
     ended: str = "all frames"
+    interrupted: bool = False
 
 
 def run_replay(options: ReplayOptions) -> None:
-    """Replay and tell; raises SessionError, ConfigError, ModelError, UserError."""
+    """Replay and tell; raises SessionError, ConfigError, ModelError, UserError, and KeyboardInterrupt once all is told."""
     from core.perception.pipeline import open_pipeline
 
     with SessionReader(options.session) as reader, ExitStack() as stack:
@@ -63,7 +66,10 @@ def run_replay(options: ReplayOptions) -> None:
             check_no_session(options.out, "--out")
             _make_folder(options.out)
         if options.jsonl is not None:
-            check_no_input(options.jsonl, options.session.iterdir(), "--jsonl")
+            own = [options.config_path] if options.config_path is not None else []
+            check_no_input(options.jsonl, [*options.session.iterdir(), *own], "--jsonl")
+            if options.out is not None:
+                check_apart(options.jsonl, [options.out / name for name in _WRITTEN], "--jsonl", "--out")
         pipeline = open_pipeline(config.perception)
         after = _model_of(config) | {"engine": pipeline.engine}
         notes += model_note(reader.manifest, config, after)
@@ -71,14 +77,18 @@ def run_replay(options: ReplayOptions) -> None:
         lines = stack.enter_context(LineOutput(options.jsonl)) if options.jsonl is not None else None
         done = replay(reader, pipeline, lines)
         problems = list(reader.problems)
+    if done.interrupted and not done.changes:
+        raise KeyboardInterrupt
     if not done.changes:
         first = f"; the first: {problems[0]}" if problems else ""
         raise SessionError(f"{options.session}: no frame that could be perceived again{first}")
     before = dict(reader.manifest.model) if reader.manifest is not None else {}
     result = _result(options, done, before, after, notes, problems)
     if options.out is not None:
-        _write(options.out, options.session.name, done.changes, result)
+        _write(options.out, name_as_text(options.session.name), done.changes, result)
     _tell(options, result, done.changes)
+    if done.interrupted:
+        raise KeyboardInterrupt
 
 
 def replay_config(manifest: Manifest | None, options: ReplayOptions) -> tuple[Config, list[str]]:
@@ -134,7 +144,7 @@ def replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None =
         task = bar.add_task("frames", total=len(reader))
         for place in range(len(reader)):
             if interrupt.asked:
-                done.ended = f"interrupted after {place} of {len(reader)} frames"
+                done.interrupted, done.ended = True, f"interrupted after {place} of {len(reader)} frames"
                 break
             bar.advance(task)
             row = reader.row(place)
@@ -203,10 +213,10 @@ def _result(
     problems: list[str],
 ) -> dict[str, Any]:
     result = {
-        "session": str(options.session),
+        "session": name_as_text(options.session),
         "ended": done.ended,
         "before": {"name": before.get("name"), "sha256": before.get("sha256")},
-        "after": after | {"preset": options.preset, "config": str(options.config_path) if options.config_path else None},
+        "after": after | {"preset": options.preset, "config": name_as_text(options.config_path) if options.config_path else None},
         **summarise(done.changes),
         "without_picture": done.no_picture,
         "without_row": done.no_row,

@@ -206,6 +206,8 @@ def _start(options: CalibrateOptions) -> tuple[Config, RigFile | None]:
         name = check_rig_name(options.name)
     except ValueError as error:
         raise UserError(str(error)) from None
+    if not options.steps:
+        raise UserError(f"--steps names no step; known: {', '.join(STEPS)}")
     if unknown := set(options.steps) - set(STEPS):
         raise UserError(f"unknown step {sorted(unknown)[0]!r}; known: {', '.join(STEPS)}")
     source = options.source

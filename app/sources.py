@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,14 +18,23 @@ VIDEO_ENDINGS = (".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SourcePicture:
-    """One picture of the input; unreadable: ``image`` is None and ``problem`` says why. ``time_s`` is set in videos."""
+    """One picture of the input; unreadable: ``image`` is None and ``problem`` says why. ``time_s`` is set in videos.
+
+    ``stem`` is its own alone; ``real_stems`` are what the user may call it by, the nearest first.
+    """
 
     name: str
     stem: str
+    real_stems: tuple[str, ...]
     image: Image | None
     problem: str | None = None
     time_s: float | None = None
     first_of_stream: bool = True
+
+
+def is_video(path: Path) -> bool:
+    """Whether its name is that of a video."""
+    return path.suffix.lower() in VIDEO_ENDINGS
 
 
 def expand(paths: Sequence[Path]) -> list[Path]:
@@ -48,28 +57,45 @@ def _is_file(path: Path) -> bool:
 
 
 def pictures(files: Sequence[Path]) -> Iterator[SourcePicture]:
-    """The pictures of all files, one after another; stems are made unique by a number where two files share one.
-
-    A picture that is called like a frame of one of the videos shares its stem, too.
-    """
-    videos = {path.stem for path in files if path.suffix.lower() in VIDEO_ENDINGS}
-    used: set[str] = set()
-    for path in files:
-        stem, count = path.stem, 1
-        frame = re.fullmatch(r"(.+)_\d{6,}", stem)
-        if frame is not None and frame[1] in videos:
-            used.add(stem)
-        while stem in used:
-            count += 1
-            stem = f"{path.stem}_{count}"
-        used.add(stem)
-        if path.suffix.lower() in VIDEO_ENDINGS:
+    """The pictures of all files, one after another."""
+    for path, stem in zip(files, own_stems(files), strict=True):
+        if is_video(path):
             yield from _video(path, stem)
         else:
             try:
-                yield SourcePicture(str(path), stem, read_image(path))
+                yield SourcePicture(str(path), stem, (path.stem,), read_image(path))
             except ImageError as error:
-                yield SourcePicture(str(path), stem, None, str(error))
+                yield SourcePicture(str(path), stem, (path.stem,), None, str(error))
+
+
+def own_stems(files: Sequence[Path]) -> list[str]:
+    """A stem for each file that no other one has: its real one, with a number where an earlier file has it already.
+
+    A picture that is called like a frame of one of the videos gets a number, too; a number never makes another file's real stem.
+    """
+    real, used = {path.stem for path in files}, set[str]()
+    videos: set[str] = set()
+    stems = [""] * len(files)
+    # Videos first: what a picture must not be called is known once they have their stems.
+    for place in sorted(range(len(files)), key=lambda place: not is_video(files[place])):
+        path = files[place]
+        stem, count = path.stem, 1
+        is_taken = stem in used or frame_of(stem, videos)
+        while is_taken:
+            count += 1
+            stem = f"{path.stem}_{count}"
+            is_taken = stem in used or stem in real
+        used.add(stem)
+        if is_video(path):
+            videos.add(stem)
+        stems[place] = stem
+    return stems
+
+
+def frame_of(stem: str, videos: Collection[str]) -> bool:
+    """Whether a frame of one of these videos (given by their stems) has this stem."""
+    frame = re.fullmatch(r"(.+)_\d{6,}", stem)
+    return frame is not None and frame[1] in videos
 
 
 def _video(path: Path, stem: str) -> Iterator[SourcePicture]:
@@ -82,12 +108,17 @@ def _video(path: Path, stem: str) -> Iterator[SourcePicture]:
         while True:
             frame = video.read(0.0)
             if frame is not None:
-                yield SourcePicture(f"{path}#{index}", f"{stem}_{index:06d}", frame.image, None, frame.captured_s, index == 0)
+                yield SourcePicture(*_named(path, stem, index), frame.image, None, frame.captured_s, index == 0)
                 index += 1
     except EndOfStream as end:
         if index == 0 or isinstance(end, DamagedStream):
-            yield SourcePicture(f"{path}#{index}", f"{stem}_{index:06d}", None, str(end))
+            yield SourcePicture(*_named(path, stem, index), None, str(end))
     except DeviceError as error:
-        yield SourcePicture(str(path), stem, None, str(error))
+        yield SourcePicture(str(path), stem, (path.stem,), None, str(error))
     finally:
         video.close()
+
+
+def _named(path: Path, stem: str, index: int) -> tuple[str, str, tuple[str, ...]]:
+    """Name and stems of a video's frame."""
+    return f"{path}#{index}", f"{stem}_{index:06d}", (f"{path.stem}_{index:06d}", path.stem)

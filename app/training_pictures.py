@@ -40,8 +40,6 @@ def write_pictures(held_out: HeldOut, folder: Path, when: str) -> list[str]:
     paths = []
     for frame in held_out.frames[:SHOWN]:
         path = folder / f"{frame.stem}_{when}.png"
-        temporary = path.with_name(f".{path.name}")
-        write_png(temporary, draw_found(frame))
-        temporary.replace(path)  # the window may be reading the older one
+        write_png(path, draw_found(frame))  # as a whole: the window may be reading the older one
         paths.append(str(path))
     return paths

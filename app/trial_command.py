@@ -129,11 +129,9 @@ def _run(campaign: Campaign) -> tuple[list[Row], bool]:
 def _check(plan: TrialPlan) -> None:
     """A model that cannot be used is told before anything starts, not by a worker."""
     if not plan.true_masks:
-        from core.learning.model_file import model_folder, read_model_info, second_look_of
+        from core.learning.model_file import check_model
 
-        folder = model_folder(plan.config.perception.segmentation.model)
-        read_model_info(folder)
-        second_look_of(folder)
+        check_model(plan.config.perception.segmentation.model)
 
 
 def _results(campaign: Campaign, jobs: list[Job]) -> Iterator[Row]:

@@ -10,11 +10,14 @@ from typing import Any
 
 from core.errors import UserError
 from core.policy_config import PolicyName
-from core.study.trial import Row
+from core.study.trial import Row, TrialLog, trial_row
+from core.whole_file import write_whole
 from hardware.twin.trial import TrialPlan
 
 Job = tuple[PolicyName, int]
 """A policy and a seed."""
+_KEYS = trial_row(TrialLog(), seed=0, policy="", phantom="", outcome="", way_mm=0.0, target_mm=(0.0, 0.0)).keys()
+"""What every row has, whatever came of its trial."""
 
 
 class TrialError(UserError):
@@ -48,13 +51,13 @@ class KeptTrials:
         try:
             out.mkdir(parents=True, exist_ok=True)
             if not path.is_file():
-                path.write_text(json.dumps(described, indent=1) + "\n", encoding="utf-8")
+                write_whole(path, f"{json.dumps(described, indent=1)}\n".encode())
             elif json.loads(path.read_text(encoding="utf-8")) != described:
                 raise TrialError(f"{out}: holds trials with other settings ({path.name}); choose another --out")
             self._read()
         except OSError as error:
             raise TrialError(f"{out}: cannot be used ({error.strerror}); choose another --out") from None
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, AttributeError):
             raise TrialError(f"{out}: plan.json or trials.jsonl is damaged; choose another --out") from None
 
     def _read(self) -> None:
@@ -68,6 +71,8 @@ class KeptTrials:
             self._file.write_text(text, encoding="utf-8")
         for line in text.splitlines():
             row = json.loads(line)
+            if not row.keys() >= _KEYS:
+                raise KeyError
             if (row["policy"], row["seed"]) in self._wanted:
                 self.rows[row["policy"], row["seed"]] = row
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
@@ -301,10 +301,14 @@ def _field_range(location: tuple[Any, ...]) -> str:
     """The allowed range of a setting as text, read from the model, so that one error line shows both ends."""
     model: Any = Config
     for part in location[:-1]:
-        model = model.model_fields[part].annotation if part in model.model_fields else None
-        if model is None:
+        fields = getattr(model, "model_fields", {})
+        if isinstance(part, int):  # of a list, all of whose items are alike
+            model = get_args(model)[0]
+        elif part in fields:
+            model = fields[part].annotation
+        else:
             return ""
-    info = model.model_fields.get(location[-1]) if hasattr(model, "model_fields") else None
+    info = getattr(model, "model_fields", {}).get(location[-1])
     if info is None:
         return ""
     bounds = []

@@ -16,10 +16,12 @@ from core.types import Image
 
 _MARKER_SHARE = 0.75
 _MIN_CORNERS = 12
+_DICTIONARY, _MARKERS = cv2.aruco.DICT_4X4_50, 50
+"""All markers that there are; every white square of a board has one of its own."""
 
 
 class BoardError(UserError):
-    """The board is not in the picture, or too little of it."""
+    """The board is not in the picture, or too little of it; or there can be no such board."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +72,12 @@ def find_board(image: Image, spec: BoardSpec) -> BoardView:
 
 @cache
 def _board(spec: BoardSpec) -> Any:
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    needed = spec.columns * spec.rows // 2
+    if needed > _MARKERS:
+        raise BoardError(
+            f"a board of {spec.columns} x {spec.rows} squares needs {needed} markers, and there are {_MARKERS}: take fewer squares"
+        )
+    dictionary = cv2.aruco.getPredefinedDictionary(_DICTIONARY)
     return cv2.aruco.CharucoBoard((spec.columns, spec.rows), spec.square_mm, spec.marker_mm, dictionary)
 
 

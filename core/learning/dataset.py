@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,6 +19,7 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_va
 from core.errors import UserError
 from core.images import ImageError, read_image
 from core.types import Image, Mask
+from core.whole_file import write_whole
 
 WORKING_SIZE_PX = 640
 """Longer side at which networks are trained: the default of ``perception.working_size_px``."""
@@ -61,13 +63,20 @@ def _resized(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def find_samples(folders: Sequence[Path]) -> list[Sample]:
-    """All images with both masks below the folders' ``images/``, sorted; raises DatasetError when a folder has none."""
+    """All images with both masks below the folders' ``images/``, sorted.
+
+    Raises DatasetError when a folder has none, or two images of one stem: they would count twice.
+    """
     samples: list[Sample] = []
     for folder in folders:
         images = sorted(p for p in (folder / "images").glob("*") if p.suffix.lower() in IMAGE_ENDINGS)
         masks = folder / "masks"
         found = [Sample(p.stem, p, masks / f"{p.stem}_vessel.png", masks / f"{p.stem}_robot.png") for p in images]
         complete = [s for s in found if s.vessel.is_file() and s.robot.is_file()]
+        for first, second in pairwise(sorted(complete, key=lambda sample: sample.stem)):
+            if first.stem == second.stem:
+                both = f"{first.image.name} and {second.image.name}"
+                raise DatasetError(f"{folder}: {both} have the same masks; remove one of them, or rename it with masks of its own")
         if not complete:
             raise DatasetError(
                 f"{folder}: no labelled frames; needs images/NAME.png with masks/NAME_vessel.png and masks/NAME_robot.png"
@@ -184,10 +193,10 @@ def write_mask(path: Path, mask: Mask) -> None:
 
 
 def write_png(path: Path, image: np.ndarray) -> None:
-    """RGB or grey uint8 as PNG; raises OSError."""
+    """RGB or grey uint8 as PNG, never half a file; raises OSError."""
     ok, data = cv2.imencode(
         ".png", image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 1]
     )
     if not ok:
         raise OSError(f"{path}: cannot be encoded")
-    path.write_bytes(data.tobytes())
+    write_whole(path, data.tobytes())

@@ -160,6 +160,13 @@ def second_look_of(folder: Path) -> Path | None:
     return near
 
 
+def check_model(name: str) -> None:
+    """Raise ModelError when the model of this name is gone or damaged, before anything begins that needs it."""
+    folder = model_folder(name)
+    read_model_info(folder)
+    second_look_of(folder)
+
+
 def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
     """The torch network in evaluation mode with its weights; raises ModelError."""
     from safetensors import SafetensorError

@@ -14,6 +14,9 @@ from core.session.video_in import open_video
 from core.types import Frame, Image
 from hardware.cameras.pacing import Pacer
 
+_MAY_LACK_S = 1.0
+"""A video that does not say how many pictures it has may end so much before its time: the last one may stay for a while."""
+
 
 def _rgb(frame: av.VideoFrame) -> Image:
     return np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
@@ -33,7 +36,9 @@ class VideoFile:
         self._frames: Iterator[av.VideoFrame] | None = None
         self._container: av.container.InputContainer | None = None
         self._index = -1
+        self._count = 0
         self._first_s: float | None = None
+        self._end_s = 0.0
         self._pacer: Pacer[av.VideoFrame] = Pacer()
 
     @property
@@ -45,7 +50,7 @@ class VideoFile:
         return False
 
     def open(self) -> None:
-        self._first_s, self._pacer = None, Pacer()
+        self._count, self._first_s, self._end_s, self._pacer = 0, None, 0.0, Pacer()
         try:
             container = open_video(self._path)
         except (av.error.FFmpegError, OSError) as error:
@@ -70,14 +75,37 @@ class VideoFile:
         try:
             frame = next(self._frames)
             self._index += 1
+            self._count += 1
         except StopIteration:
+            if lack := self._lack():
+                raise DamagedStream(f"{self._path}: cut short: {lack}") from None
             raise EndOfStream(f"{self._path}: end of the video") from None
         except av.error.FFmpegError as error:
-            raise DamagedStream(f"{self._path}: damaged after frame {self._index} ({error.strerror or error})") from None
+            where = f"after frame {self._index}" if self._count else "before its first frame"
+            raise DamagedStream(f"{self._path}: damaged {where} ({error.strerror or error})") from None
         at = frame.time if frame.time is not None and np.isfinite(frame.time) else self._index / 30.0
         if self._first_s is None:
             self._first_s = at
+        self._end_s = at + float((frame.duration or 0) * (frame.time_base or 0))
         return frame, at - self._first_s
+
+    def _lack(self) -> str:
+        """How much came of what the file says that it holds; empty where all came, or where it says nothing of it.
+
+        A trimmed file still counts the pictures that are not to be shown, but knows its length; of several streams any may be the
+        longest.
+        """
+        assert self._container is not None
+        stream = self._container.streams.video[0]
+        if stream.duration is not None and stream.time_base is not None:
+            length_s, end_s = float(stream.duration * stream.time_base), self._end_s - (self._first_s or 0.0)
+        elif self._container.duration is not None and len(self._container.streams) == 1:
+            length_s, end_s = self._container.duration / av.time_base, self._end_s
+        else:
+            return ""
+        if self._count < stream.frames and length_s - end_s > length_s / stream.frames:
+            return f"{self._count} of {stream.frames} pictures"
+        return f"{end_s:.1f} of {length_s:.1f} s" if not stream.frames and length_s - end_s > _MAY_LACK_S else ""
 
     def close(self) -> None:
         self._frames, self._pacer = None, Pacer()

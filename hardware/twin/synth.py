@@ -23,6 +23,7 @@ from core.config import PerceptionConfig
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.types import Points
+from core.whole_file import write_whole
 from hardware.twin.appearance import LOOK_FAMILIES, Appearance, default_appearance, make_view, random_appearance
 from hardware.twin.autopilot import RouteFollower
 from hardware.twin.phantom import Phantom
@@ -220,13 +221,13 @@ def _prepare(plan: SynthPlan) -> None:
         if not path.is_file() and plan.out.is_dir() and any(plan.out.iterdir()):
             raise SynthError(f"{plan.out}: holds something that synth did not write; choose another folder")
         plan.out.mkdir(parents=True, exist_ok=True)
-        if (plan.out / "images" / f"{plan.count:06d}.png").exists():
+        if any(int(image.stem) >= plan.count for image in (plan.out / "images").glob("*.png") if image.stem.isdecimal()):
             raise SynthError(f"{plan.out}: holds more than {plan.count} frames; ask for as many, or choose another folder")
         if path.is_file():
             if json.loads(path.read_text(encoding="utf-8")) != described:
                 raise SynthError(f"{plan.out}: holds a set with other settings ({path.name}); choose another folder")
         else:
-            path.write_text(json.dumps(described) + "\n", encoding="utf-8")  # first: it says whose folder this is
+            write_whole(path, f"{json.dumps(described)}\n".encode())  # first: it says whose folder this is
         for name in ("images", "masks", "episodes"):
             (plan.out / name).mkdir(exist_ok=True)
     except OSError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -171,3 +172,15 @@ def test_bad_input_is_one_clear_line(frames: Path, tmp_path: Path) -> None:
     assert ended.returncode == 2
     assert ended.stderr.startswith("error: ")
     assert (ended.stderr.count("\n"), ended.stdout) == (1, "")
+
+
+def test_names_that_are_no_utf8_are_shown_as_bytes(frames: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name = os.fsdecode(b"caf\xe9")
+    folder = Path(shutil.copytree(frames, tmp_path / name))
+    for path in (*folder.glob("*/000000*.png"),):
+        path.rename(path.with_name(path.name.replace("000000", name)))
+    truth = folder / "truth.jsonl"
+    truth.write_text(truth.read_text().replace('"000000"', json.dumps(name)))
+    run_ablation(Plan(folder, true_masks=True, out=tmp_path / "out"), as_json=False)
+    assert r"caf\xe9" in (tmp_path / "out" / "ablation.md").read_text()
+    assert r"caf\xe9" in (tmp_path / "out" / "ablation_frames.csv").read_text()

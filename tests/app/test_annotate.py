@@ -248,6 +248,7 @@ def test_wrong_calls_end_in_one_line(folder: Path, options: dict[str, object], m
     with pytest.raises(UserError, match=message) as raised:
         run(folder, **options)
     assert "\n" not in str(raised.value)
+    assert not (folder / DEFAULT_NAME).exists(), "what was refused leaves nothing behind"
 
 
 def test_the_command_ends_with_one_line_and_code_2(tmp_path: Path) -> None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from app.benchmark_command import _as_in_a_stream
+from app import benchmark_command
+from app.benchmark_command import _as_in_a_stream, run_speed
 from core.config import load_config
+from core.errors import UserError
 
 
 @pytest.mark.parametrize(("configured", "timed"), [("pictures", "never"), ("always", "always"), ("never", "never")])
@@ -13,3 +17,12 @@ def test_frames_are_timed_as_often_seen_as_in_a_stream(configured: str, timed: s
     config = load_config(None, None, {"perception": {"segmentation": {"mirrored": configured, "threads": 1}}})
     segmentation = _as_in_a_stream(config).perception.segmentation
     assert (segmentation.mirrored, segmentation.threads) == (timed, 1)
+
+
+def test_pictures_that_are_all_refused_cannot_be_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(benchmark_command, "_first_frame_s", lambda: None)
+    (tmp_path / "dark.toml").write_text("[perception.quality]\nblack_level = 255.0\n")
+    with pytest.raises(
+        UserError, match=r"refused before there are masks to compare \(image black\); change \[perception.quality\]"
+    ):
+        run_speed(2, model=None, preset=None, config_path=tmp_path / "dark.toml", as_json=True)

@@ -99,3 +99,9 @@ def test_a_memory_fault_says_where() -> None:
     assert done.returncode < 0
     assert "Segmentation fault" in done.stderr
     assert "string_at" in done.stderr
+
+
+@pytest.mark.parametrize("errors", ["2>&-", "2>/dev/full"])
+def test_without_a_standard_error_the_exit_code_is_the_same(tmp_path: Path, errors: str) -> None:
+    command = f'exec "{sys.executable}" "{ROOT / "main.py"}" session info "{tmp_path / "nothing"}" {errors}'
+    assert subprocess.run(["sh", "-c", command], check=False).returncode == 2

@@ -431,3 +431,29 @@ def test_a_study_needs_images_annotated_by_hand(paper_csv: Path, tmp_path: Path)
     (tmp_path / "empty").mkdir()
     with pytest.raises(UserError, match="begin the study with: annotate"):
         evaluate(tmp_path / "empty", out=tmp_path / "out", study_name="main")
+
+
+def test_a_study_goes_before_the_truth_of_its_set(tmp_path: Path) -> None:
+    images = [tmp_path / f"frame_{index}.png" for index in range(2)]
+    for index, image in enumerate(images):
+        write_png(image, tube(index)[0])
+    measure(tmp_path / "annotations.lumenpilot.sqlite", images, [0.0, 10.0], study="main")
+    (tmp_path / "truth.jsonl").write_text("")
+    assert evaluate(tmp_path, out=tmp_path / "out", study_name="main")["source"]["kind"] == "annotated by hand"
+    with pytest.raises(UserError, match="not a labelled set"):
+        evaluate(tmp_path, out=tmp_path / "out")
+
+
+def test_names_that_are_no_utf8_are_shown_as_bytes(paper_csv: Path, labelled: Path, tmp_path: Path) -> None:
+    """As archives from old systems have them."""
+    name = os.fsdecode(b"caf\xe9")
+    table = tmp_path / f"{name}.csv"
+    shutil.copy(paper_csv, table)
+    assert evaluate(csv=table, out=tmp_path / "out")["source"]["name"] == r"caf\xe9.csv"
+    folder = Path(shutil.copytree(labelled, tmp_path / name))
+    for path in (*folder.glob("*/000000*.png"),):
+        path.rename(path.with_name(path.name.replace("000000", name)))
+    truth = folder / "truth.jsonl"
+    truth.write_text(truth.read_text().replace('"000000"', json.dumps(name)))
+    assert evaluate(folder, out=tmp_path / "of_set")["source"]["name"] == r"caf\xe9"
+    assert read_measurements(tmp_path / "of_set" / "measurements.csv")[-1].image == r"caf\xe9"

@@ -158,12 +158,25 @@ def test_texts_with_values_are_translated_and_filled(chinese: None) -> None:
         ("30 % (at least 60 %)", "30 %（至少 60 %）"),
         ("sharpness 0.031 (at least 0.045)", "清晰度 0.031（至少 0.045）"),
         ("advance to 12.25 mm (0 to 12 mm)", "前进到 12.25 mm（0 至 12 mm）"),
+        ("the computer slept for 12 s", "计算机休眠了 12 s"),
+        ("the pedal at /dev/x is gone (EIO): plug its USB cable in", "脚踏板 /dev/x 断开（EIO）：插好其 USB 线"),
+        (
+            "no permission for servo port /dev/x: add your user to the group dialout, then log in again",
+            "没有舵机端口 /dev/x 的权限：把您的用户加入 dialout 组，然后重新登录",
+        ),
         ("something that nobody has listed", "something that nobody has listed"),
         ("", ""),
     ],
 )
 def test_texts_of_the_layers_below_are_translated_where_they_are_known(chinese: None, text: str, translated: str) -> None:
     assert tr_text(text) == translated
+
+
+@pytest.mark.parametrize("template", [*core_texts.TEMPLATES, *core_texts.COMPOSED])
+def test_a_text_is_taken_by_the_template_that_made_it(template: str) -> None:
+    """And not by a shorter one, which would leave half of it in English."""
+    text = re.sub(r"\{(\w+)\}", lambda found: "5" if len(found[1]) == 1 else "/dev/ttyUSB0", template)
+    assert next(one for one, pattern in language._patterns() if pattern.fullmatch(text)) == template
 
 
 @pytest.mark.parametrize(

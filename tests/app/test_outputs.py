@@ -11,7 +11,8 @@ import pytest
 
 from app.cli import app
 from app.learning_commands import TrainInputs, TrainOutputs, run_train
-from app.perceive_command import Outputs, _check_keeps_inputs, run_perceive
+from app.outputs import check_no_input, is_same
+from app.perceive_command import Outputs, _check_keeps_inputs, _written_names, run_perceive
 from app.session_command import run_export, run_info
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
@@ -67,7 +68,43 @@ def test_perceive_does_not_write_over_its_pictures(
 
 def test_first_masks_may_lie_beside_their_pictures(labelled: Path) -> None:
     shutil.rmtree(labelled / "masks")
-    _check_keeps_inputs(labelled / "masks", [labelled / "images" / "a.png"], "--masks", ("_vessel.png", "_robot.png"))
+    files = [labelled / "images" / "a.png"]
+    _check_keeps_inputs(labelled / "masks", files, "--masks", _written_names(files, ("_vessel.png", "_robot.png")))
+
+
+@pytest.mark.parametrize("given", [".", "a.png", "{tmp}/linked", "{tmp}/linked/a.png", "{tmp}/a.png"])
+def test_the_masks_of_a_set_are_known_however_its_pictures_are_given(
+    labelled: Path, tmp_path: Path, given: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "linked").symlink_to(labelled / "images")
+    (tmp_path / "a.png").symlink_to(labelled / "images" / "a.png")
+    monkeypatch.chdir(labelled / "images")
+    before = contents(labelled)
+    with pytest.raises(UserError, match="is a mask of the set, which --masks would overwrite"):
+        call("perceive", given.format(tmp=tmp_path), "--jsonl", tmp_path / "o.jsonl", "--masks", "../masks")
+    assert contents(labelled) == before
+
+
+@pytest.mark.parametrize(
+    ("jsonl", "why"),
+    [
+        ("own.toml", "own.toml: is an input, which --jsonl would overwrite"),
+        ("m/a_vessel.png", "a_vessel.png: is written by --masks, too; choose another file for --jsonl"),
+        ("s/a_overlay.png", "a_overlay.png: is written by --overlay, too"),
+    ],
+)
+def test_the_lines_of_perceive_stay_apart_from_its_other_files(labelled: Path, tmp_path: Path, jsonl: str, why: str) -> None:
+    (tmp_path / "own.toml").write_text("")
+    folders = ("--masks", tmp_path / "m", "--overlay", tmp_path / "s")
+    with pytest.raises(UserError, match=why):
+        call("perceive", labelled / "images", "--config", tmp_path / "own.toml", "--jsonl", tmp_path / jsonl, *folders)
+    assert (tmp_path / "own.toml").read_text() == ""
+
+
+def test_links_in_a_loop_are_no_input(tmp_path: Path) -> None:
+    (tmp_path / "loop.png").symlink_to("loop.png")
+    assert not is_same(tmp_path / "loop.png", tmp_path / "other.png")
+    check_no_input(tmp_path / "o.jsonl", [tmp_path / "loop.png"], "--jsonl")
 
 
 def test_a_session_is_not_replayed_into_itself(tmp_path: Path) -> None:
@@ -80,10 +117,20 @@ def test_a_session_is_not_replayed_into_itself(tmp_path: Path) -> None:
     assert contents(session) == before
 
 
-def test_a_table_is_not_evaluated_into_itself(tmp_path: Path) -> None:
-    table = tmp_path / "measurements.csv"
+def test_a_replay_writes_no_file_twice_and_none_over_its_configuration(tmp_path: Path) -> None:
+    for name in ("replay.json", "frames.jsonl", "replay.svg", "replay.pdf"):
+        with pytest.raises(UserError, match=f"{name}: is written by --out, too; choose another file for --jsonl"):
+            call("replay", GOLDEN, "--out", tmp_path / "new", "--jsonl", tmp_path / "new" / name)
+    (tmp_path / "own.toml").write_text("")
+    with pytest.raises(UserError, match=r"own.toml: is an input, which --jsonl would overwrite"):
+        call("replay", GOLDEN, "--config", tmp_path / "own.toml", "--jsonl", tmp_path / "own.toml")
+
+
+@pytest.mark.parametrize("name", ["measurements.csv", "metrics.json", "raters.csv", "report.html", "scatter.svg"])
+def test_a_table_is_not_evaluated_into_itself(tmp_path: Path, name: str) -> None:
+    table = tmp_path / name
     table.write_text("image,angle_1,angle_2,state,algorithm_angle,algorithm_state,mine\na,1,,A,2,A,x\n")
-    with pytest.raises(UserError, match=r"measurements.csv: is an input, which --out would overwrite"):
+    with pytest.raises(UserError, match=f"{name}: is an input, which --out would overwrite"):
         call("evaluate", "--csv", table, "--out", tmp_path)
     assert table.read_text().endswith(",x\n")
 
@@ -134,6 +181,7 @@ def test_training_refuses_what_could_have_no_effect(labelled: Path, tmp_path: Pa
         (("benchmark", "--window", "5", "--model", "x"), "leave --model and --preset out"),
         (("evaluate", "set", "--out", "out", "--manual-sd", "3"), "--manual-sd is for --like-paper"),
         (("evaluate", "set", "--out", "out", "--json", "--progress-json"), "both write to standard output"),
+        (("session", "recover", "session", "--json", "--progress-json"), "both write to standard output"),
         (("faults", "--only", "40", "--quick"), "fault 40 needs a line, a process or a window"),
         (("faults", "--out", "/nowhere/at/all.md"), "/nowhere/at/all.md: cannot be written"),
         (("annotate", "set", "--export", "csv", "--out", "o.csv", "--json"), "--json is for --report"),

@@ -212,7 +212,7 @@ def test_pictures_of_the_same_name_do_not_overwrite_each_other(picture: Path, tm
         (tmp_path / name).write_bytes(picture.read_bytes())
     arguments = [tmp_path / name for name in ("x/a.png", "y/a.png", "y/a_2.png")]
     assert run("perceive", *arguments, "--jsonl", tmp_path / "o.jsonl", "--masks", tmp_path / "m").returncode == 0
-    assert sorted(p.name for p in (tmp_path / "m").glob("*_robot.png")) == ["a_2_2_robot.png", "a_2_robot.png", "a_robot.png"]
+    assert sorted(p.name for p in (tmp_path / "m").glob("*_robot.png")) == ["a_2_robot.png", "a_3_robot.png", "a_robot.png"]
 
 
 def test_what_cannot_be_written_is_told_and_the_rest_goes_on(picture: Path, tmp_path: Path) -> None:

@@ -150,6 +150,7 @@ def test_a_killed_recording_is_recovered_by_the_command(config: Path, tmp_path: 
         (("record", "--seconds", 1, "--out", "{folder}", "--rig", "moon"), "unknown rig 'moon'"),
         (("record", "--seconds", 1, "--out", "{folder}", "--config", "{file}"), "not valid TOML"),
         (("record", "--seconds", 0, "--out", "{folder}"), "seconds"),
+        (("record", "--seconds", 1, "--out", "{folder}", "--config", "{no_model}"), "no model 'nope'"),
         (("session", "info", "{folder}"), "not a session"),
         (("session", "info", "{file}"), "not a file"),
         (("session", "recover", "{folder}/nothing"), "no such session"),
@@ -157,10 +158,11 @@ def test_a_killed_recording_is_recovered_by_the_command(config: Path, tmp_path: 
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(tmp_path: Path, arguments: tuple[object, ...], why: str) -> None:
-    folder, file = tmp_path / "folder", tmp_path / "file"
+    folder, file, no_model = tmp_path / "folder", tmp_path / "file", tmp_path / "no_model.toml"
     folder.mkdir()
     file.write_text("= not toml")
-    done = run(*(str(word).format(folder=folder, file=file) for word in arguments))
+    no_model.write_text('[perception.segmentation]\nmodel = "nope"\n')
+    done = run(*(str(word).format(folder=folder, file=file, no_model=no_model) for word in arguments))
     assert done.returncode == 2
     assert why in done.stderr
     assert "Traceback" not in done.stderr

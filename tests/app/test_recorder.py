@@ -94,6 +94,17 @@ def test_the_key_of_another_phantom_does_not_end_a_recording(running: OperatorWi
     qtbot.keyClick(running, Key.Key_F9)
 
 
+def test_nor_does_f5(running: OperatorWindow, qtbot: QtBot) -> None:
+    qtbot.keyClick(running, Key.Key_F9)
+    until(qtbot, lambda: running.recorder.status.recording)
+    orders = running.orders
+    qtbot.keyClick(running, Key.Key_F5)
+    assert "The rig stays as it is: a session is being recorded" in running.panels.toast.text()
+    assert running.recorder.status.recording
+    assert running.orders == orders
+    qtbot.keyClick(running, Key.Key_F9)
+
+
 def test_a_folder_that_cannot_be_written_stops_the_recording_visibly(
     running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path
 ) -> None:

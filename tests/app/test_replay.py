@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import signal
 import subprocess
@@ -172,11 +173,18 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
         time.sleep(0.005)
     process.send_signal(signal.SIGINT)
     said, errors = process.communicate(timeout=60.0)
-    assert process.returncode == 0, errors
+    assert (process.returncode, errors.splitlines()[-1]) == (130, "interrupted")
     result = json.loads(said)
     assert result["ended"].startswith("interrupted after")
     assert 0 < result["frames"] < 900
     assert len(out.read_text().splitlines()) == result["frames"]
+
+
+def test_a_session_whose_name_is_no_utf8_is_replayed(tmp_path: Path) -> None:
+    session = tmp_path / os.fsdecode(b"caf\xe9")
+    record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(2)]).rename(session)
+    run_replay(options(session, out=tmp_path / "new"))
+    assert "caf\\xe9" in json.loads((tmp_path / "new" / "replay.json").read_text())["session"]
 
 
 def test_one_frame_can_be_drawn_and_written() -> None:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from app import cli
 from app.board_print import BoardPrintError, paper_for
-from core.calibration.board import BoardSpec, find_board
+from core.calibration.board import BoardError, BoardSpec, find_board
 from core.calibration_config import CalibrationConfig
 from core.config import load_config
 from core.errors import UserError
@@ -84,6 +84,17 @@ def test_boards_that_cannot_be_printed(tmp_path: Path) -> None:
         _run("board", "--out", str(tmp_path / "b.jpg"))
     with pytest.raises(BoardPrintError, match="cannot be written"):
         _run("board", "--out", str(tmp_path / "none" / "b.pdf"))
+    with pytest.raises(BoardError, match="40 x 4 squares needs 80 markers, and there are 50: take fewer squares"):
+        _run("board", "--out", str(tmp_path / "b.pdf"), "--columns", "40", "--rows", "4", "--square-mm", "5")
+    assert not (tmp_path / "b.pdf").exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's full device")
+@pytest.mark.parametrize("ending", [".pdf", ".png"])
+def test_a_full_disk_is_one_line(tmp_path: Path, ending: str) -> None:
+    (tmp_path / f"b{ending}").symlink_to("/dev/full")
+    with pytest.raises(BoardPrintError, match=r"cannot be written \(No space left on device\)"):
+        _run("board", "--out", str(tmp_path / f"b{ending}"))
 
 
 def test_a_calibration_without_servos_finds_the_scale() -> None:
@@ -102,6 +113,7 @@ def test_a_calibration_without_servos_finds_the_scale() -> None:
         (("bench 1",), "say --auto"),
         (("twin", "--auto"), "cannot be called twin"),
         (("bench 1", "--auto", "--steps", "board,dance"), "unknown step 'dance'"),
+        (("bench 1", "--auto", "--steps", ","), "--steps names no step; known: board, servos, zero, steering"),
         (("bench 1", "--auto", "--from", "bench 9"), "unknown rig 'bench 9'"),
         (("bench 1", "--auto", "--from", "webcam", "--steps", "board"), "webcam"),
     ],

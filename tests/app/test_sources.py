@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.sources import pictures
+from app.sources import own_stems, pictures
 from core.devices import DamagedStream
 from core.types import Frame
 from hardware.cameras.video_file import VideoFile
@@ -37,6 +37,31 @@ def test_a_picture_that_is_called_like_a_frame_of_a_video_has_a_stem_of_its_own(
     for order in (files, files[::-1]):
         stems = sorted(picture.stem for picture in pictures(order))
         assert stems == ["v_000000", "v_000001", "v_000002", "v_000002_2", "v_000003", "w_000002"]
+
+
+def test_a_number_makes_no_other_files_stem() -> None:
+    assert own_stems([Path("a.jpg"), Path("a.png"), Path("a_2.png")]) == ["a", "a_3", "a_2"]
+    assert own_stems([Path("x/a.png"), Path("y/a_2.png"), Path("y/a.png")]) == ["a", "a_2", "a_3"]
+
+
+def test_a_picture_that_is_called_like_a_frame_of_a_numbered_video_is_numbered_too() -> None:
+    files = [Path("clip_2_000000.png"), Path("clip.mkv"), Path("clip.mp4")]
+    for order in (files, files[::-1]):
+        stems = dict(zip(order, own_stems(order), strict=True))
+        assert stems[files[0]] == "clip_2_000000_2"
+        assert {stems[files[1]], stems[files[2]]} == {"clip", "clip_2"}
+
+
+def test_a_picture_is_called_by_its_real_stem(tmp_path: Path) -> None:
+    for name in ("a.jpg", "a.png", "b#1.png"):
+        cv2.imwrite(str(tmp_path / name), np.full((48, 64, 3), 90, np.uint8))
+    files = [tmp_path / "a.jpg", tmp_path / "a.png", tmp_path / "b#1.png", video(tmp_path / "v.mp4", 1)]
+    assert [(one.stem, one.real_stems) for one in pictures(files)] == [
+        ("a", ("a",)),
+        ("a_2", ("a",)),
+        ("b#1", ("b#1",)),
+        ("v_000000", ("v_000000", "v")),
+    ]
 
 
 def test_a_video_that_breaks_off_says_so_after_its_last_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

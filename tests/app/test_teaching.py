@@ -5,14 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from rich.progress import Progress
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from app.learning_commands import HeldOutWatch, Interrupt
+from app.learning_commands import HeldOutWatch, Interrupt, TrainInputs, TrainOutputs, run_train
 from app.teaching import Classroom
+from core.learning.dataset import write_mask, write_png
 from core.learning.training import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
 
@@ -56,3 +58,18 @@ def test_what_was_learnt_is_kept_before_the_eight_bit_copy_is_made(tmp_path: Pat
         with pytest.raises(MemoryError):
             room.teach(lesson, TrainingPlan(steps=_STEPS, batch=1, crop=(64, 64), workers=0, warmup_steps=1))
     assert lesson.kept == [_STEPS]
+
+
+def test_a_training_that_is_interrupted_before_its_first_step_is_no_success(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("images", "masks"):
+        (tmp_path / "set" / name).mkdir(parents=True)
+    write_png(tmp_path / "set" / "images" / "a.png", np.full((48, 64, 3), 90, np.uint8))
+    for target in ("vessel", "robot"):
+        write_mask(tmp_path / "set" / "masks" / f"a_{target}.png", np.zeros((48, 64), bool))
+    monkeypatch.setattr(Classroom, "teach", lambda *_: None)
+    with pytest.raises(KeyboardInterrupt):
+        run_train(TrainOutputs(tmp_path / "model"), TrainInputs([tmp_path / "set"]), None, 4, TrainingPlan(steps=1))
+    assert "interrupted before the first step" in capsys.readouterr().err
+    assert not (tmp_path / "model").exists()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -129,13 +131,35 @@ def test_a_folder_of_other_settings_is_refused(faked: list[Any], tmp_path: Path)
         call("0:1", out=tmp_path, max_seconds=9.0)
 
 
-@pytest.mark.parametrize("name", ["plan.json", "trials.jsonl"])
-def test_a_damaged_folder_is_refused_and_left_alone(faked: list[Any], tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("plan.json", "no json\n"),
+        ("trials.jsonl", "no json\n"),
+        ("trials.jsonl", '{"policy": "pursuit", "seed": 0}\n'),
+        ("trials.jsonl", "[1]\n"),
+    ],
+)
+def test_a_damaged_folder_is_refused_and_left_alone(faked: list[Any], tmp_path: Path, name: str, text: str) -> None:
     call("0:1", out=tmp_path)
-    (tmp_path / name).write_text("no json\n")
+    (tmp_path / name).write_text(text)
     with pytest.raises(TrialError, match="damaged"):
         call("0:1", out=tmp_path)
-    assert (tmp_path / name).read_text() == "no json\n"
+    assert (tmp_path / name).read_text() == text
+
+
+def test_a_plan_is_written_as_a_whole_or_not_at_all(faked: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write = Path.write_bytes
+
+    def half(self: Path, data: bytes) -> int:
+        write(self, data[: len(data) // 2])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self))
+
+    with monkeypatch.context() as patch, pytest.raises(TrialError, match=r"cannot be used \(No space left"):
+        patch.setattr(Path, "write_bytes", half)
+        call("0:1", out=tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    call("0:1", out=tmp_path)
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(faked: list[Any], tmp_path: Path) -> None:

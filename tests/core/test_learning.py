@@ -1,6 +1,8 @@
 """Data set layout, augmentation and the training loop on a toy task."""
 
+import errno
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -57,6 +59,13 @@ def test_samples_come_back_as_they_were_written(tmp_path: Path) -> None:
 def test_a_folder_without_labels_says_what_it_needs(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"needs images/NAME\.png"):
         find_samples([tmp_path])
+
+
+def test_two_pictures_of_one_stem_would_count_twice(tmp_path: Path) -> None:
+    folder = _toy_set(tmp_path / "set", 2)
+    (folder / "images" / "001.jpg").write_bytes((folder / "images" / "001.png").read_bytes())
+    with pytest.raises(DatasetError, match=r"001\.jpg and 001\.png have the same masks; remove one of them"):
+        find_samples([folder])
 
 
 def test_a_mask_of_another_size_is_named(tmp_path: Path) -> None:
@@ -409,6 +418,21 @@ def test_the_kernels_go_to_muon_and_the_rest_to_adamw() -> None:
 def test_masks_are_readable_pictures(tmp_path: Path) -> None:
     write_mask(tmp_path / "m.png", np.eye(4, dtype=bool))
     assert read_image(tmp_path / "m.png")[:, :, 0].tolist() == (np.eye(4) * 255).tolist()
+
+
+def test_a_picture_is_written_as_a_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "m.png"
+    write_mask(path, np.eye(4, dtype=bool))
+    before, write = path.read_bytes(), Path.write_bytes
+
+    def half(self: Path, data: bytes) -> int:
+        write(self, data[: len(data) // 2])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", half)
+    with pytest.raises(OSError, match=r"m\.png"):
+        write_mask(path, np.zeros((4, 4), bool))
+    assert {one: one.read_bytes() for one in tmp_path.iterdir()} == {path: before}
 
 
 def test_an_unwritable_place_is_an_error(tmp_path: Path) -> None:

@@ -27,8 +27,9 @@ from tests.hardware.soft_cameras import CONFIG as SOFT
 from tests.hardware.soft_cameras import SoftRealSense, SoftWebcam, write_bag
 
 
-def _video(path: Path, frames: int = 12, rate: int = 30) -> Path:
-    with av.open(str(path), "w") as container:
+def _video(path: Path, frames: int = 12, rate: int = 30, *, first_index: bool = False) -> Path:
+    """With `first_index` an MP4 can be opened when its end is cut off."""
+    with av.open(str(path), "w", options={"movflags": "faststart"} if first_index else {}) as container:
         stream = container.add_stream("mpeg4", rate=rate)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
         for index in range(frames):
@@ -141,6 +142,52 @@ def test_a_cut_video_gives_what_is_there(tmp_path: Path) -> None:
     assert 0 < count < 40
 
 
+def _ends(path: Path) -> tuple[int, EndOfStream]:
+    """How many frames come, and how they end."""
+    video = VideoFile(path, paced=False)
+    video.open()
+    count = 0
+    with pytest.raises(EndOfStream) as end:
+        while video.read(0.0) is not None:
+            count += 1
+    video.close()
+    return count, end.value
+
+
+@pytest.mark.parametrize("name", ["v.mp4", "v.mov", "v.avi"])
+def test_a_cut_video_that_knows_its_length_says_that_it_is_cut(tmp_path: Path, name: str) -> None:
+    path = _video(tmp_path / name, 40, first_index=True)
+    count, end = _ends(path)
+    assert (count, isinstance(end, DamagedStream)) == (40, False)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 6 // 10])
+    count, end = _ends(path)
+    assert 10 < count < 30
+    assert isinstance(end, DamagedStream)
+    assert str(end) == f"{path}: cut short: {count} of 40 pictures"
+
+
+def test_a_cut_video_that_knows_its_time_alone_says_so_when_much_is_lacking(tmp_path: Path) -> None:
+    path = _video(tmp_path / "v.mkv", 90)
+    assert not isinstance(_ends(path)[1], DamagedStream)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    assert str(_ends(path)[1]).endswith(" of 3.0 s")
+
+
+def test_a_trimmed_video_is_whole(tmp_path: Path) -> None:
+    """It still counts the pictures before its beginning, which are not shown."""
+    with av.open(str(_video(tmp_path / "v.mp4", 40))) as whole, av.open(str(tmp_path / "trimmed.mp4"), "w") as trimmed:
+        source = whole.streams.video[0]
+        target = trimmed.add_stream_from_template(source)
+        for packet in whole.demux(source):
+            if packet.pts is not None and packet.dts is not None:
+                early = round(0.5 / packet.time_base)
+                packet.pts, packet.dts, packet.stream = packet.pts - early, packet.dts - early, target
+                trimmed.mux(packet)
+    count, end = _ends(tmp_path / "trimmed.mp4")
+    assert 20 < count < 30
+    assert not isinstance(end, DamagedStream)
+
+
 class _Clock:
     """Time that passes only when somebody sleeps or decodes."""
 
@@ -236,7 +283,7 @@ def test_damage_is_told_from_the_end_by_its_kind(tmp_path: Path, monkeypatch: py
     video = VideoFile(_video(tmp_path / "v.mp4", 3), paced=False)
     video.open()
     monkeypatch.setattr(video, "_frames", broken())
-    with pytest.raises(DamagedStream, match="damaged after frame"):
+    with pytest.raises(DamagedStream, match="damaged before its first frame"):
         video.read(0.0)
     video.close()
 

@@ -1,5 +1,6 @@
 """Labelled sets from the twin: complete, repeatable, continued after an interruption, disjoint by seed."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,3 +85,15 @@ def test_the_benchs_own_look_is_the_trials_one() -> None:
 def test_a_smaller_count_is_refused_not_mixed(small_set: SynthPlan) -> None:
     with pytest.raises(SynthError, match="holds more than 2 frames"):
         write_set(SynthPlan(small_set.out, 2, 3, size=(320, 240)))
+
+
+def test_a_smaller_count_is_refused_wherever_the_frames_are(tmp_path: Path) -> None:
+    """Several workers were interrupted: the later episode is there before the end of the first."""
+    plan = SynthPlan(tmp_path / "set", 40, 3)
+    (plan.out / "images").mkdir(parents=True)
+    synth._prepare(replace(plan, out=tmp_path / "other"))
+    (tmp_path / "other" / "plan.json").rename(plan.out / "plan.json")
+    (plan.out / "images" / "000017.png").touch()
+    with pytest.raises(SynthError, match="holds more than 16 frames"):
+        synth._prepare(replace(plan, count=16))
+    synth._prepare(plan)
