@@ -127,7 +127,7 @@ class _Targets(dict[str, Point]):
         self.used: set[str] = set()
 
     def of(self, picture: SourcePicture) -> Point | None:
-        for stem in picture.real_stems:
+        for stem in (picture.stem, *picture.real_stems):
             if stem in self:
                 self.used.add(stem)
                 return self[stem]

@@ -9,7 +9,6 @@ import contextlib
 import os
 import re
 import tomllib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -93,8 +92,13 @@ def check_rig_name(name: str) -> str:
 
 
 def rig_path(name: str, folder: Path | None = None) -> Path:
-    """The file of a rig of this name."""
-    return (folder if folder is not None else rigs_folder()) / f"{name.strip()}{_ENDING}"
+    """The file of a rig of this name: one that is there in other letters, or a new one."""
+    folder = folder if folder is not None else rigs_folder()
+    path = folder / f"{name.strip()}{_ENDING}"
+    if path.exists():
+        return path
+    alike = (one.path for one in list_rigs(folder) if one.path.name.casefold() == path.name.casefold())
+    return next(alike, path)
 
 
 def list_rigs(folder: Path | None = None) -> tuple[ListedRig, ...]:
@@ -119,27 +123,19 @@ def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
 
     The file's name goes before the one inside, which a copy of the file keeps, and the exact one before one in other letters.
     """
-    listed = list_rigs(folder)
-    found = _called(name, listed)
-    if found is not None:
-        if found.rig is None:
-            raise RigFileError(found.problem)
-        return found.path, found.rig
-    if name.strip().casefold() in RESERVED:
-        raise RigFileError(f"{name}: is built in and has no file; rigs with one: {', '.join(rig.name for rig in listed) or 'none'}")
-    known = ", ".join((*RESERVED, *(rig.name for rig in listed)))
-    raise RigFileError(f"unknown rig {name!r}; known: {known}")
-
-
-def _called(name: str, listed: Sequence[ListedRig]) -> ListedRig | None:
-    wanted = name.strip()
+    listed, wanted = list_rigs(folder), name.strip()
     folded = wanted.casefold()
     for rank in range(4):
         for rig in listed:
             stem = rig.path.stem
             if (stem == wanted, rig.name == wanted, stem.casefold() == folded, rig.name.casefold() == folded)[rank]:
-                return rig
-    return None
+                if rig.rig is None:
+                    raise RigFileError(rig.problem)
+                return rig.path, rig.rig
+    if name.strip().casefold() in RESERVED:
+        raise RigFileError(f"{name}: is built in and has no file; rigs with one: {', '.join(rig.name for rig in listed) or 'none'}")
+    known = ", ".join((*RESERVED, *(rig.name for rig in listed)))
+    raise RigFileError(f"unknown rig {name!r}; known: {known}")
 
 
 def has_rig(name: str, folder: Path | None = None) -> bool:
@@ -181,10 +177,7 @@ def write_rig(rig: RigFile, path: Path | None = None) -> Path:
     RigFileError
         The disk does not take it.
     """
-    if path is None:
-        earlier = _called(rig.name, list_rigs())
-        path = earlier.path if earlier is not None else rig_path(rig.name)
-    target = path
+    target = path if path is not None else rig_path(rig.name)
     document = tomlkit.document()
     document.add(tomlkit.comment(_HEADER))
     document.update(rig.model_dump(mode="json", exclude_none=True))

@@ -86,9 +86,7 @@ class Gamepad:
     def _serve(self) -> None:
         while not self._thread.stopping:
             try:
-                found = find_gamepad(self._config)
-                if found is not None:
-                    _take(*found[:2])
+                found = find_gamepad(self._config, drives=True)
             except GamepadError as error:
                 self._tell(None, error)
             else:
@@ -130,21 +128,23 @@ class Gamepad:
         self._tell(None, GamepadError(f"the gamepad is no longer read ({type(error).__name__}: {error}): start the program again"))
 
 
-def find_gamepad(config: GamepadConfig) -> tuple[int, str, Layout] | None:
+def find_gamepad(config: GamepadConfig, *, drives: bool = False) -> tuple[int, str, Layout] | None:
     """Open the configured gamepad, or the first that there is: file descriptor, name, layout. None when none is plugged in.
+
+    Who `drives` with it has it alone; a check only looks.
 
     Raises
     ------
     GamepadError
-        The configured one is missing or no gamepad; ``GamepadRefused`` when it, or all that there are, is not permitted or has
-        its controls elsewhere.
+        The configured one is missing or no gamepad; ``GamepadRefused`` when it, or all that there are, is not permitted, in use or
+        has its controls elsewhere.
     """
     if config.device is not None:
-        return _open(config.device)
+        return _open(config.device, drives=drives)
     refused: GamepadRefused | None = None
     for path in sorted(_FOLDER.glob("js*"), key=lambda path: (len(path.name), path.name)):  # js2 before js10
         try:
-            return _open(str(path))
+            return _open(str(path), drives=drives)
         except GamepadError as error:
             # wheels and motion sensors are joysticks, too: nothing to complain about
             refused = refused or (error if isinstance(error, GamepadRefused) else None)
@@ -153,7 +153,7 @@ def find_gamepad(config: GamepadConfig) -> tuple[int, str, Layout] | None:
     return None
 
 
-def _open(path: str) -> tuple[int, str, Layout]:
+def _open(path: str, *, drives: bool) -> tuple[int, str, Layout]:
     try:
         device = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except PermissionError as error:
@@ -173,14 +173,16 @@ def _open(path: str) -> tuple[int, str, Layout]:
     if not RIGHT_STICK.issubset(layout.axes):
         os.close(device)
         raise GamepadRefused(f"gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one")
+    if drives:
+        _take(device, name)
     return device, name, layout
 
 
 def _take(device: int, name: str) -> None:
-    """Lock it: one gamepad must not drive the robots of two windows. A check that only looks at it takes no lock."""
+    """Lock it: one gamepad must not drive the robots of two windows."""
     try:
         fcntl.flock(device, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
+    except OSError as error:
         os.close(device)
         raise GamepadRefused(
             f"gamepad {name} is in use by another window, so its STOP does nothing here: close that window, or set gamepad.device"

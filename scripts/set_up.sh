@@ -94,8 +94,8 @@ install_python_packages() {
     local python=$1
     if [[ -f $half ]] || ! is_python_311 "$venv/bin/python"; then
         say "set-up: making $venv with $python (the first time takes some minutes)"
-        rm -rf "$venv"
-        mkdir "$venv"
+        mkdir -p "$venv"
+        find "$venv/" -mindepth 1 -delete # what is in it: it may be a link to a larger disk
         : >"$half"
         "$python" -m venv "$venv"
     fi

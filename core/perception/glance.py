@@ -8,6 +8,7 @@ frame without an answer. Then the next look is a whole one.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import cv2
@@ -31,11 +32,14 @@ CHANGED_SHARE = 0.03
 class Background:
     """What the last whole look at (h, w) working pixels saw. ``robot_probability`` also holds what the windows since then saw.
 
-    ``captured_s`` is when it was seen, ``head_s`` when the head was seen at ``head``: in the last frame.
+    ``captured_s`` is when it was seen, ``head_s`` when the head was seen at ``head``: in the last frame, ``step_s`` after the one
+    before, since when it had moved by ``step_px``.
     """
 
     captured_s: float
     head_s: float
+    step_s: float
+    step_px: float
     cells: NDArray[np.float32]
     head: Point
     vessel: Mask
@@ -66,13 +70,24 @@ class Glances:
             return None
         if not 0.0 <= captured_s - before.captured_s <= self._config.refresh_s:
             return None
-        if captured_s - before.head_s > (side / 2 - MARGIN_PX) / self._config.max_head_speed_px_s:
+        if not self._is_in_sight(before, captured_s, side / 2 - MARGIN_PX):
             return None
         window = window_around(before.head, (width, height), side)
         return None if has_changed(before.cells, self._cells, window) else (before, window)
 
+    def _is_in_sight(self, before: Background, captured_s: float, reach_px: float) -> bool:
+        """Whether the head must still be in its window.
+
+        A frame that comes late may show it anywhere. On a slow machine every frame comes late after a whole look, but no later than
+        the one before: there it counts how far the head moved in such a time.
+        """
+        passed_s = captured_s - before.head_s
+        is_usual = passed_s <= 1.5 * before.step_s and 2.0 * before.step_px <= reach_px
+        return is_usual or passed_s * self._config.max_head_speed_px_s <= reach_px
+
     def remember(self, scene: Scene) -> None:
         """Keep what the frame of the last ``choose`` showed; one without an answer leaves nothing that could be relied on."""
+        before = self._background
         if scene.pose is None or scene.path is None or scene.masks is None or scene.skeletons is None or scene.vessel_graph is None:
             self._background = None
         elif scene.window is None:
@@ -81,6 +96,8 @@ class Glances:
             self._background = Background(
                 scene.captured_s,
                 scene.captured_s,
+                scene.captured_s - before.head_s if before is not None else 0.0,
+                math.dist(scene.path.head, before.head) if before is not None else math.inf,
                 self._cells,
                 scene.path.head,
                 masks.vessel,
@@ -89,10 +106,14 @@ class Glances:
                 graph,
                 masks.robot_probability,
             )
-        elif self._background is not None:
-            robot_probability = scene.masks.robot_probability
+        elif before is not None:
             self._background = replace(
-                self._background, head_s=scene.captured_s, head=scene.path.head, robot_probability=robot_probability
+                before,
+                head_s=scene.captured_s,
+                step_s=scene.captured_s - before.head_s,
+                step_px=math.dist(scene.path.head, before.head),
+                head=scene.path.head,
+                robot_probability=scene.masks.robot_probability,
             )
 
 

@@ -157,7 +157,7 @@ class Pipeline:
             self._shape = frame.image.shape
         watch = _Stopwatch()
         scene = self._perceive(frame, target, watch, self._stream, past)
-        if recall(past.memory, frame.captured_s, tracking) is None:
+        if past.memory is not None and tracking.memory_s and recall(past.memory, frame.captured_s, tracking) is None:
             self._states.update(None)  # after a pause, or wound back: the state of then says nothing of now
         if scene.pose is not None and scene.path is not None:
             jump = check_jump(scene.path, past.memory, frame.captured_s, tracking)

@@ -103,7 +103,7 @@ class VideoFile:
             length_s, end_s = self._container.duration / av.time_base, self._end_s
         else:
             return ""
-        if self._count < stream.frames and length_s - end_s > length_s / stream.frames:
+        if self._count < stream.frames and length_s - end_s > 1.5 * length_s / max(1, self._count):
             return f"{self._count} of {stream.frames} pictures"
         return f"{end_s:.1f} of {length_s:.1f} s" if not stream.frames and length_s - end_s > _MAY_LACK_S else ""
 

@@ -215,6 +215,16 @@ def test_pictures_of_the_same_name_do_not_overwrite_each_other(picture: Path, tm
     assert sorted(p.name for p in (tmp_path / "m").glob("*_robot.png")) == ["a_2_robot.png", "a_3_robot.png", "a_robot.png"]
 
 
+def test_pictures_of_the_same_name_have_targets_of_their_own(picture: Path, tmp_path: Path) -> None:
+    for name in ("x/a.png", "y/a.png"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(picture.read_bytes())
+    (tmp_path / "t.json").write_text(json.dumps({"a": [320, 240], "a_2": [300, 200]}))
+    done = run("perceive", tmp_path / "x/a.png", tmp_path / "y/a.png", "--targets", tmp_path / "t.json")
+    assert done.returncode == 0, done.stderr
+    assert "targets of no picture" not in done.stderr
+
+
 def test_what_cannot_be_written_is_told_and_the_rest_goes_on(picture: Path, tmp_path: Path) -> None:
     (tmp_path / "m").mkdir()
     (tmp_path / "m" / "photo_vessel.png").mkdir()

@@ -93,6 +93,15 @@ def test_after_refresh_s_all_of_it_is_looked_at_again(pipeline: Pipeline, networ
     assert network.shown == [WHOLE, *[WINDOW] * 10, WHOLE]
 
 
+def test_a_slow_machine_comes_back_to_windows(pipeline: Pipeline, network: Colours) -> None:
+    """A whole look that takes longer than the head needs to leave the window would make the next one whole, too, and so on."""
+    for index in range(4):
+        see(pipeline, 0.3 * index, picture(300 + 5 * index))
+    assert network.shown == [WHOLE, WHOLE, WINDOW, WINDOW]
+    see(pipeline, 1.6, picture(320))
+    assert network.shown[-1] == WHOLE, "later than usual"
+
+
 def test_after_a_pause_in_which_the_head_may_have_left_the_window_all_of_it_is_looked_at(pipeline: Pipeline) -> None:
     see(pipeline, 0.0, picture(200))
     see(pipeline, 0.1, picture(200))

@@ -4,6 +4,7 @@ import itertools
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -152,6 +153,22 @@ def _ends(path: Path) -> tuple[int, EndOfStream]:
             count += 1
     video.close()
     return count, end.value
+
+
+def test_a_whole_video_in_a_fine_clock_is_not_cut(tmp_path: Path) -> None:
+    """An AVI counts the ticks of its clock, not its pictures."""
+    path = tmp_path / "fine.avi"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mjpeg", rate=1000)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuvj420p"
+        stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
+        for index in range(20):
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 10 * index, np.uint8), format="rgb24")
+            frame.pts, frame.time_base = 33 * index, Fraction(1, 1000)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    count, end = _ends(path)
+    assert (count, isinstance(end, DamagedStream)) == (20, False)
 
 
 @pytest.mark.parametrize("name", ["v.mp4", "v.mov", "v.avi"])
