@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some two hours of data and twenty
-# hours of training on two cores. The data can be interrupted and gone on with by the same call.
+# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some two hours of data and a day
+# of training on two cores. The data can be interrupted and gone on with by the same call.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-out/default_model}
@@ -31,6 +31,11 @@ OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames22" --count 360 --seed
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames23" --count 3400 --seed 1143000 --workers 2
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames24" --count 400 --seed 1147000 --family bench --workers 2
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames25" --count 6400 --seed 1148000 --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames26" --count 10400 --seed 1155000 --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames27" --count 800 --seed 1166000 --family bench --workers 2
+# The first of these two sets once more, by themselves.
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames28" --count 3600 --seed 1155000 --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames29" --count 240 --seed 1166000 --family bench --workers 2
 # Two threads that spin for each other lose half their time as soon as anything else runs, and two that sleep at once a quarter of it:
 # so they spin for a moment. And memory that is given back after each step has to be cleared for the next one.
 export OMP_WAIT_POLICY=passive GOMP_SPINCOUNT=20000 GLIBC_TUNABLES=glibc.malloc.hugetlb=1
@@ -92,7 +97,12 @@ $python main.py train --data "$out/frames21" --data "$out/frames22" --look-share
 # And once more, on three times as many frames, two of three of which nobody has seen: it had begun to know the last ones.
 sets=(--data "$out/frames21" --data "$out/frames22" --data "$out/frames23" --data "$out/frames24" --data "$out/frames25")
 $python main.py train "${sets[@]}" --look-share 0.5 --second-look --init "$out/near13" --focus 0.4 --end-weight 4 --batch 24 --rate 5e-3 \
-    --steps 12500 --stop-after 11704 --seed 35 --out "$out/default"
+    --steps 12500 --stop-after 11704 --seed 35 --out "$out/near14"
+# And once more, on others that nobody has seen; ended by hand, and its learning rate brought down on the first of them.
+$python main.py train --data "$out/frames26" --data "$out/frames27" --look-share 0.5 --second-look --init "$out/near14" --focus 0.4 \
+    --end-weight 4 --batch 24 --rate 5e-3 --steps 11000 --stop-after 6859 --seed 36 --out "$out/near15"
+$python main.py train --data "$out/frames28" --data "$out/frames29" --look-share 0.5 --second-look --init "$out/near15" --focus 0.4 \
+    --end-weight 4 --batch 24 --rate 2e-3 --steps 1200 --seed 37 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 960 --seed 950000 --workers 2
 # The twin's own look is in none of the random families, and has to be known, too.
