@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from app.cli_options import ConfigOption, JsonOption, PresetOption, ProgressOption, RigOption, SessionArgument, tell_asked_progress
-from core.errors import UserError
 
 
 def record(
@@ -74,8 +73,6 @@ def session_recover(
     """Repair a cut or damaged session into a copy; the original stays as it is."""
     from app.session_command import run_recover
 
-    if json and progress_json:
-        raise UserError("--json and --progress-json both write to standard output: give one of them")
     tell_asked_progress(progress_json)
     run_recover(session, into, as_json=json, only_look=only_look)
 

@@ -181,7 +181,6 @@ def test_training_refuses_what_could_have_no_effect(labelled: Path, tmp_path: Pa
         (("benchmark", "--window", "5", "--model", "x"), "leave --model and --preset out"),
         (("evaluate", "set", "--out", "out", "--manual-sd", "3"), "--manual-sd is for --like-paper"),
         (("evaluate", "set", "--out", "out", "--json", "--progress-json"), "both write to standard output"),
-        (("session", "recover", "session", "--json", "--progress-json"), "both write to standard output"),
         (("faults", "--only", "40", "--quick"), "fault 40 needs a line, a process or a window"),
         (("faults", "--out", "/nowhere/at/all.md"), "/nowhere/at/all.md: cannot be written"),
         (("annotate", "set", "--export", "csv", "--out", "o.csv", "--json"), "--json is for --report"),
