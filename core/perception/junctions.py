@@ -1,21 +1,23 @@
 """Where vessels meet: the junction put where the branches' own centerlines meet, not where the skeleton does.
 
 In the widened lumen of a bifurcation the skeleton leaves the trunk's centerline towards the opening, by some pixels over some two
-radii to each side. So the part of each branch within the opening is replaced: a trunk goes on smoothly through it, a side branch
-runs straight to the trunk, and where no two branches form a trunk all run straight to the point that fits their directions best.
+radii to each side. So the part of each branch within the opening is replaced: a trunk goes on smoothly through it, and a side
+branch runs to the trunk as its walls do, as far as they can be seen. Junctions so near to each other that no branch in between
+leaves their openings are taken together: one trunk runs through all of them.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
+from core.perception.lumen import wall_distances
 from core.types import Point, Points
 
 STEP_PX = 2.0
@@ -23,27 +25,56 @@ OPENING_MIN_RADII = 0.8
 OPENING_MAX_RADII = 2.5
 """An opening ends where the lumen is as narrow as the branch itself: looked for between these multiples of its junction's
 radius."""
+TOGETHER = 1.5
+"""A branch from junction to junction that has no gate even with the openings so many times as wide lies within both of them."""
 SETTLED = 1.1
 """As narrow as the branch itself: at most this factor of its own radius (and a third of a pixel)."""
 BEYOND_RADII = 0.4
 """The skeleton comes back to the middle a little later than the radius does."""
+WIDTH_POINTS = 5
+WIDTH_RADII = 0.3
+"""A branch's radius is that of so many points at its gate which are about as wide as it is."""
 HEADING_RADII = 1.0
 """A branch's direction is taken over this many of its radii, and at least 12 px."""
 CLEAR_RADII = 1.0
 """The opening reaches at least so many of the branch's radii beyond the junction's new place."""
 ROUNDS = 3
-TRUNK_MAX_TURN_DEG = 50.0
-TRUNK_LEAD_DEG = 10.0
-"""Two branches are a trunk if they turn less than this, and by so much less than any other two."""
+FITS = 1
+WIDER_DEG = 100.0
+"""A trunk is as wide as its branches: one that is left twice as wide is as unlikely as this much of a turn."""
+WALL_SEARCH_PX = 8
+WALL_RADII = 1.15
+"""A wall farther off than so many radii (and a pixel) is another one's: here is an opening. One so near to the trunk is its own."""
+TRUNK_STIFFNESS = 0.5
+BRANCH_STIFFNESS = 0.5
+"""How hard it is for walls to bend a line, in points of it."""
+ONE_WALL = 0.7
+"""How much a point counts that has a wall on one side only, whose distance should be the radius."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
-    """A branch seen from a junction: its centerline outwards (N, 2), the radius along it (N,), and what its far end is."""
+    """A branch seen from a junction.
+
+    Its centerline outwards (N, 2), the nearest wall's distance along it (N,), half the way from wall to wall across it (N,), NaN
+    where one is not seen, whether it ends in a junction, and the lumen's radius at this one.
+    """
 
     points: Points
     radius: NDArray[np.float64]
+    half_width: NDArray[np.float64]
     far_is_junction: bool
+    opening_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rebuilt:
+    """Junctions anew: their ``places`` along the trunk (M, 2), the trunk's pieces from each to the next (M - 1), and for each arm
+    the place that it starts from and its line."""
+
+    places: Points
+    pieces: list[tuple[Points, NDArray[np.float64]]]
+    arms: list[tuple[int, Arm]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,45 +91,91 @@ class _Gate:
         return (self.place[0] - place[0]) * self.outward[0] + (self.place[1] - place[1]) * self.outward[1]
 
 
-def rebuild(centre: Points, radius_px: float, arms: list[Arm]) -> tuple[Points, list[Arm]] | None:
-    """The junction's place (2,) and its arms anew, or None where too few arms are long enough to tell.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trunk:
+    """A curve from one arm's gate to another's (N, 2), and the lumen's radius along it (N,)."""
+
+    ends: tuple[int, int]
+    points: Points
+    radius: NDArray[np.float64]
+
+
+def are_together(arm: Arm, back: Arm) -> bool:
+    """Whether a branch between two junctions, seen from both, is too short to leave both openings."""
+    return any(
+        _gate(replace(a, opening_px=TOGETHER * a.opening_px), polyline.arc_length(a.points), 0.0) is None for a in (arm, back)
+    )
+
+
+def rebuild(arms: list[Arm], level: NDArray[np.float32]) -> Rebuilt | None:
+    """A junction, or some that are together, anew; None where too few arms are long enough to tell.
 
     Parameters
     ----------
-    centre : the skeleton's junction (2,).
-    radius_px : lumen radius there.
-    arms : all branches at the junction, outwards.
+    arms : all branches that lead out of the opening, outwards.
+    level : the vessel's mask or probability (h, w).
     """
     along = [polyline.arc_length(arm.points) for arm in arms]
-    gates: list[_Gate | None] = [_gate(arm, way, radius_px, 0.0) for arm, way in zip(arms, along, strict=True)]
+    gates: list[_Gate | None] = [_gate(arm, way, 0.0) for arm, way in zip(arms, along, strict=True)]
+    known = {index: gate for index, gate in enumerate(gates) if gate is not None}
+    if len(known) < 2:
+        return None
     for _ in range(ROUNDS):
-        known = {index: gate for index, gate in enumerate(gates) if gate is not None}
-        if len(known) < 2:
-            return None
         trunk = _trunk(known)
-        if trunk is None:
-            place = _meeting_point(list(known.values()), centre, radius_px)
-            bridges: dict[int, Points] = {}
-        else:
-            place, bridges = _on_trunk(trunk, gates, centre, radius_px)
+        bridges = {index: _side_branch(gate, trunk) for index, gate in known.items() if index not in trunk.ends}
         # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
-        inner = [0.0 if gate is None else gate.position_px + CLEAR_RADII * gate.radius_px - gate.beyond(place) for gate in gates]
-        if all(gate is None or gate.position_px >= needed for gate, needed in zip(gates, inner, strict=True)):
+        moved = {}
+        for index, gate in known.items():
+            place = _point(trunk.points[_mark(index, trunk, bridges)])
+            needed = gate.position_px + CLEAR_RADII * gate.radius_px - gate.beyond(place)
+            if gate.position_px < needed:
+                moved[index] = _gate(arms[index], along[index], needed) or gate
+        if all(gate == known[index] for index, gate in moved.items()):
             break
-        gates = [_gate(arm, way, radius_px, needed) for arm, way, needed in zip(arms, along, inner, strict=True)]
-    rebuilt = []
-    for index, (arm, way, gate) in enumerate(zip(arms, along, gates, strict=True)):
-        if gate is None:
-            rebuilt.append(_rejoined(arm, way, place))
+        known |= moved
+    trunk = _between_walls(_trunk(known), level)
+    bridges = {index: _side_branch(gate, trunk, level) for index, gate in known.items() if index not in trunk.ends}
+    return _assembled(arms, along, known, trunk, bridges)
+
+
+def _mark(index: int, trunk: _Trunk, bridges: dict[int, tuple[int, Points]]) -> int:
+    """Which point of the trunk an arm starts from."""
+    if index in bridges:
+        return bridges[index][0]
+    marks = [mark for mark, _ in bridges.values()] or [len(trunk.points) // 2]
+    return min(marks) if index == trunk.ends[0] else max(marks)
+
+
+def _assembled(
+    arms: list[Arm],
+    along: list[NDArray[np.float64]],
+    gates: dict[int, _Gate],
+    trunk: _Trunk,
+    bridges: dict[int, tuple[int, Points]],
+) -> Rebuilt:
+    for index in range(len(arms)):
+        if index not in gates:  # too short to have a gate
+            near = arms[index].points[min(2, len(arms[index].points) - 1)]
+            mark = int(np.hypot(*(trunk.points - near).T).argmin())
+            bridges[index] = min(max(mark, 1), len(trunk.points) - 2), np.empty((0, 2))
+    marks = sorted({mark for mark, _ in bridges.values()}) or [len(trunk.points) // 2]
+    pieces = [(trunk.points[first : last + 1], trunk.radius[first : last + 1]) for first, last in pairwise(marks)]
+    anew = []
+    for index, (arm, way) in enumerate(zip(arms, along, strict=True)):
+        mark = _mark(index, trunk, bridges)
+        if index not in gates:
+            anew.append((marks.index(mark), _rejoined(arm, way, _point(trunk.points[mark]))))
             continue
-        bridge = bridges.get(index)
-        if bridge is None:
-            bridge = _straight(place, gate.place)
+        gate = gates[index]
+        if index in bridges:
+            bridge = bridges[index][1]
+        else:
+            bridge = trunk.points[mark::-1] if index == trunk.ends[0] else trunk.points[mark:]
         rest = int(way.searchsorted(gate.position_px + 0.5 * STEP_PX, "right"))
         points = np.concatenate([bridge, arm.points[rest:]])
         radius = np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest:]])
-        rebuilt.append(Arm(points, radius, arm.far_is_junction))
-    return np.array(place), rebuilt
+        anew.append((marks.index(mark), replace(arm, points=points, radius=radius)))
+    return Rebuilt(trunk.points[marks], pieces, anew)
 
 
 def _rejoined(arm: Arm, along: NDArray[np.float64], place: Point) -> Arm:
@@ -107,11 +184,12 @@ def _rejoined(arm: Arm, along: NDArray[np.float64], place: Point) -> Arm:
     rest = along > position_px + max(aside_px, 0.5 * STEP_PX)
     rest[-1] = True
     points, radius = arm.points[rest], arm.radius[rest]
-    return Arm(np.concatenate([[place], points]), np.concatenate([radius[:1], radius]), arm.far_is_junction)
+    return replace(arm, points=np.concatenate([[place], points]), radius=np.concatenate([radius[:1], radius]))
 
 
-def _gate(arm: Arm, along: NDArray[np.float64], radius_px: float, at_least_px: float) -> _Gate | None:
+def _gate(arm: Arm, along: NDArray[np.float64], at_least_px: float) -> _Gate | None:
     """Where an arm has left the opening: its lumen is as narrow there as it stays. None for an arm too short to tell."""
+    radius_px = arm.opening_px
     low = max(OPENING_MIN_RADII * radius_px, at_least_px)
     usable = float(along[-1]) * (0.5 if arm.far_is_junction else 1.0) - 8.0
     high = min(max(OPENING_MAX_RADII * radius_px, low + radius_px), usable)
@@ -130,44 +208,113 @@ def _gate(arm: Arm, along: NDArray[np.float64], radius_px: float, at_least_px: f
     x, y = arm.points[index].tolist()
     far_x, far_y = arm.points[min(index + round(max(12.0, HEADING_RADII * own) / STEP_PX), len(along) - 1)].tolist()
     length = max(math.hypot(far_x - x, far_y - y), 1e-9)
-    return _Gate((x, y), ((far_x - x) / length, (far_y - y) / length), float(along[index]), own)
+    # The distance to the nearest wall is less than half the width wherever the line is not quite in the middle.
+    wide = arm.half_width[index : index + WIDTH_POINTS]
+    wide = wide[np.abs(wide - own) < WIDTH_RADII * own + 1.0]
+    return _Gate(
+        (x, y), ((far_x - x) / length, (far_y - y) / length), float(along[index]), polyline.median(wide) if len(wide) else own
+    )
 
 
-def _trunk(gates: dict[int, _Gate]) -> dict[int, _Gate] | None:
-    """The two arms that go on smoothly through the junction, if two clearly do."""
-    turns = []
-    for (i, first), (j, second) in combinations(gates.items(), 2):
-        cosine = -first.outward[0] * second.outward[0] - first.outward[1] * second.outward[1]
-        turns.append((math.degrees(math.acos(min(1.0, max(-1.0, cosine)))), i, j))
-    turns.sort()
-    best, i, j = turns[0]
-    rival = next((turn for turn, *pair in turns[1:] if i in pair or j in pair), math.inf)
-    if best > TRUNK_MAX_TURN_DEG or rival < best + TRUNK_LEAD_DEG:
-        return None
-    return {i: gates[i], j: gates[j]}
+def _trunk(gates: dict[int, _Gate]) -> _Trunk:
+    """The curve through the opening between the two arms that go on most smoothly and are wide enough for the others."""
+
+    def unlikeliness(pair: tuple[int, int]) -> float:
+        first, second = gates[pair[0]], gates[pair[1]]
+        narrow = min(first.radius_px, second.radius_px)
+        widest = max((gate.radius_px for index, gate in gates.items() if index not in pair), default=0.0)
+        return _turn_deg(first, second) + WIDER_DEG * max(0.0, widest / narrow - 1.0)
+
+    ends = min(combinations(gates, 2), key=unlikeliness)
+    first, second = gates[ends[0]], gates[ends[1]]
+    points = _hermite(first, second)
+    return _Trunk(ends, points, np.linspace(first.radius_px, second.radius_px, len(points)))
 
 
-def _on_trunk(
-    trunk: dict[int, _Gate], gates: list[_Gate | None], centre: Points, radius_px: float
-) -> tuple[Point, dict[int, Points]]:
-    """The place on the trunk where the other arms arrive, and the trunk's curve from there to its two gates."""
-    (i, first), (j, second) = trunk.items()
-    curve = _hermite(first, second)
-    marks = []
-    for index, gate in enumerate(gates):
-        if gate is None or index in trunk:
-            continue
-        back_x, back_y = gate.place[0] - curve[:, 0], gate.place[1] - curve[:, 1]
-        across = np.abs(back_x * gate.outward[1] - back_y * gate.outward[0])
-        on_way = back_x * gate.outward[0] + back_y * gate.outward[1] > 0.0
-        if on_way.any():
-            marks.append(int(np.where(on_way, across, np.inf).argmin()))
-    nearest = int(np.hypot(curve[:, 0] - centre[0], curve[:, 1] - centre[1]).argmin())
-    reach = math.ceil(1.5 * radius_px / STEP_PX)
-    mark = round(sum(marks) / len(marks)) if marks else nearest
-    mark = min(max(mark, nearest - reach, 1), nearest + reach, len(curve) - 2)
-    x, y = curve[mark].tolist()
-    return (x, y), {i: curve[mark::-1], j: curve[mark:]}
+def _between_walls(trunk: _Trunk, level: NDArray[np.float32]) -> _Trunk:
+    """The trunk bent as its walls do, as far as they can be seen; its ends and its directions there stay."""
+    share = np.linspace(0.0, 1.0, len(trunk.points))
+    hump = 16.0 * share**2 * (1.0 - share) ** 2
+    shapes = np.column_stack([hump, hump * (2.0 * share - 1.0)])
+    points = trunk.points
+    for _ in range(FITS):
+        normal, shift, weight = _to_walls(points, trunk.radius, level)
+        size = np.linalg.solve(shapes.T @ (weight[:, None] * shapes) + TRUNK_STIFFNESS * np.eye(2), shapes.T @ (weight * shift))
+        points = points + (shapes @ size)[:, None] * normal
+    return replace(trunk, points=points)
+
+
+def _turn_deg(first: _Gate, second: _Gate) -> float:
+    """By how much a line turns that comes in through one gate, goes straight to the other, and leaves through it."""
+    x, y = second.place[0] - first.place[0], second.place[1] - first.place[1]
+    length = max(math.hypot(x, y), 1e-9)
+    cosines = -(first.outward[0] * x + first.outward[1] * y) / length, (second.outward[0] * x + second.outward[1] * y) / length
+    return sum(math.degrees(math.acos(min(1.0, max(-1.0, cosine)))) for cosine in cosines)
+
+
+def _to_walls(
+    points: Points, radius: NDArray[np.float64], level: NDArray[np.float32], trunk: _Trunk | None = None
+) -> tuple[Points, NDArray[np.float64], NDArray[np.float64]]:
+    """Normals of a line (N, 2), how far to move along each to lie as the walls want it (N,), and how much they have to say (N,).
+
+    Between two walls that is the middle; beside one it is a radius off. A wall of the `trunk` says nothing of a side branch.
+    """
+    normal = polyline.normals(points)
+    right, left = _own_walls(points, normal, radius, level, trunk)
+    on_right, on_left = np.isfinite(right), np.isfinite(left)
+    shift = np.where(on_right, np.where(on_left, 0.5 * (right - left), right - radius), np.where(on_left, radius - left, 0.0))
+    weight = np.where(on_right & on_left, 1.0, np.where(on_right | on_left, ONE_WALL, 0.0))
+    return normal, np.clip(shift, -0.5 * radius, 0.5 * radius), weight
+
+
+def _own_walls(
+    points: Points, normal: Points, radius: NDArray[np.float64], level: NDArray[np.float32], trunk: _Trunk | None
+) -> NDArray[np.float64]:
+    """Distances of a line's own walls, to the right and to the left (2, N); NaN where there is none."""
+    places, directions = np.concatenate([points, points]), np.concatenate([normal, -normal])
+    limit = np.concatenate([radius, radius])
+    distance = wall_distances(level, places, directions, limit, WALL_SEARCH_PX)
+    distance[distance > WALL_RADII * limit + 1.0] = math.nan
+    seen = np.flatnonzero(np.isfinite(distance))
+    if trunk is not None and len(seen):
+        walls = places[seen] + distance[seen, None] * directions[seen]
+        away = np.hypot(walls[:, None, 0] - trunk.points[:, 0], walls[:, None, 1] - trunk.points[:, 1])
+        distance[seen[(away - WALL_RADII * trunk.radius).min(axis=1) <= 1.0]] = math.nan
+    return distance.reshape(2, -1)
+
+
+def _side_branch(gate: _Gate, trunk: _Trunk, level: NDArray[np.float32] | None = None) -> tuple[int, Points]:
+    """Which of the trunk's points a side branch comes from, and its line from there to its gate: a parabola, which leaves the gate
+    in its direction and bends as the branch's walls do."""
+    start, inward = np.array(gate.place), -np.array(gate.outward)
+    aside = np.array([-inward[1], inward[0]])
+    reach = max(40.0, 3.0 * float(np.hypot(*(trunk.points - start).T).min()))
+    way = np.arange(0.0, reach + 1.0, STEP_PX)
+    bend = 0.0
+    for left in reversed(range(FITS + 1)):
+        line = start + way[:, None] * inward + (bend * way**2)[:, None] * aside
+        gaps = np.hypot(trunk.points[:, None, 0] - line[:, 0], trunk.points[:, None, 1] - line[:, 1])
+        end, mark = _first_meeting(gaps)
+        piece = line[: end + 1]
+        if level is None or left == 0 or len(piece) < 4:
+            break
+        normal, shift, weight = _to_walls(piece, np.full(len(piece), gate.radius_px), level, trunk)
+        shape = (way[: end + 1] / way[end]) ** 2
+        wanted = shift * np.sign(normal @ aside)
+        bend += float((shape * weight) @ wanted) / (float((shape * weight) @ shape) + BRANCH_STIFFNESS) / float(way[end]) ** 2
+    mark = min(max(mark, 1), len(trunk.points) - 2)
+    inner = piece[:-1] if len(piece) > 2 else piece
+    return mark, np.concatenate([trunk.points[mark : mark + 1], inner[::-1]])
+
+
+def _first_meeting(gaps: NDArray[np.float64]) -> tuple[int, int]:
+    """Where a line first meets the trunk, given the distances (trunk's points, line's points): the line's and the trunk's point."""
+    nearest = gaps.min(axis=0)
+    close = np.flatnonzero(nearest < 0.75 * STEP_PX)
+    end = int(close[0]) if len(close) else int(nearest.argmin())
+    while end + 1 < len(nearest) and nearest[end + 1] < nearest[end]:
+        end += 1
+    return end, int(gaps[:, end].argmin())
 
 
 def _hermite(first: _Gate, second: _Gate) -> Points:
@@ -186,30 +333,5 @@ def _hermite_weights(count: int) -> NDArray[np.float64]:
     return np.column_stack([2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, 3 * t**2 - 2 * t**3, t**3 - t**2])
 
 
-def _meeting_point(gates: list[_Gate], centre: Points, radius_px: float) -> Point:
-    """Least-squares meeting point of the arms' lines, held to the skeleton's junction by a small weight and by its radius."""
-    centre_x, centre_y = centre.tolist()
-    # The sum over the gates of the projection across each one's direction: (xx, xy; xy, yy) . place = (right, below).
-    xx = yy = 0.05
-    xy, right, below = 0.0, 0.05 * centre_x, 0.05 * centre_y
-    for gate in gates:
-        (x, y), (u, v) = gate.place, gate.outward
-        xx, xy, yy = xx + v * v, xy - u * v, yy + u * u
-        right, below = right + v * (v * x - u * y), below + u * (u * y - v * x)
-    determinant = xx * yy - xy * xy
-    shift_x = (yy * right - xy * below) / determinant - centre_x
-    shift_y = (xx * below - xy * right) / determinant - centre_y
-    share = min(1.0, radius_px / max(math.hypot(shift_x, shift_y), 1e-9))
-    return centre_x + share * shift_x, centre_y + share * shift_y
-
-
-def _straight(start: Point, end: Point) -> Points:
-    weights = _line_weights(max(2, round(math.dist(start, end) / STEP_PX) + 1))
-    return np.asarray(weights @ np.array([start, end]))
-
-
-@lru_cache(maxsize=64)
-def _line_weights(count: int) -> NDArray[np.float64]:
-    """What start and end add to each of `count` points of a straight line, shape (count, 2)."""
-    t = np.linspace(0.0, 1.0, count)
-    return np.column_stack([1.0 - t, t])
+def _point(values: Points) -> Point:
+    return float(values[0]), float(values[1])

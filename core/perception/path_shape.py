@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 
 import numpy as np
@@ -16,8 +15,6 @@ TRIM_RADII = 1.2
 """Thinning bends the skeleton's last radius towards a corner of a blunt end."""
 END_HEADING_PX = 16.0
 """The end's direction and bend are taken over this length."""
-BEND_SHARE = 0.5
-"""So much of the bend is continued beyond it: noise bends too."""
 
 
 def refine(points: Points, masks: Masks, radius_px: float, smoothing_px: float, extend: bool) -> tuple[Points, float]:
@@ -68,30 +65,11 @@ def _to_edge(line: Points, masks: Masks, radius_px: float) -> Points:
     along = polyline.arc_length(line)
     total = float(along[-1])
     trimmed = polyline.cut(line, 0.0, total - min(TRIM_RADII * radius_px, 0.3 * total), along)
-    onward = _continued(trimmed, 6.0 * radius_px + 10.0)
+    onward = polyline.continued(trimmed, 6.0 * radius_px + 10.0, END_HEADING_PX)
     reach = edge_distance(onward, masks.robot, masks.robot_probability)
     if reach <= 0.0:
         return line
     return np.concatenate([trimmed[:-1], polyline.resample(polyline.cut(onward, 0.0, reach), STEP_PX)])
-
-
-def _continued(line: Points, length_px: float) -> Points:
-    """How the path would go on from its last point, bending as it did before: a point every px, the last point first."""
-    along = polyline.arc_length(line)
-    total = float(along[-1])
-    back_px = min(END_HEADING_PX, total)
-    last, middle, first = polyline.point_at(line, along, np.array([total, total - 0.5 * back_px, total - back_px])).tolist()
-    before = math.atan2(middle[1] - first[1], middle[0] - first[0])
-    after = math.atan2(last[1] - middle[1], last[0] - middle[0])
-    turn = (after - before + math.pi) % (2.0 * math.pi) - math.pi
-    per_px = BEND_SHARE * turn / max(0.5 * END_HEADING_PX, 1.0)
-    # From the middle of the last half, where its chord has the path's direction, to each further step.
-    headings = after + per_px * (0.25 * END_HEADING_PX + 0.5 + np.arange(int(length_px)))
-    onward = np.empty((len(headings) + 1, 2))
-    onward[0] = last
-    np.cos(headings, out=onward[1:, 0])
-    np.sin(headings, out=onward[1:, 1])
-    return np.add.accumulate(onward, axis=0, out=onward)
 
 
 def edge_distance(places: Points, mask: Mask, probability: NDArray[np.float32]) -> float:

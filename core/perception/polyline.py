@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import cv2
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 from core.types import Point, Points
 
+BEND_SHARE = 0.5
+"""So much of a line's bend is continued beyond its end: noise bends too."""
 REMAP_ROWS = 32_000
 """OpenCV's remap takes less than 32767 rows at a time."""
 
@@ -58,6 +61,28 @@ def cut(points: Points, start_px: float, end_px: float, along: NDArray[np.float6
     part[1:-1] = inner
     part[[0, -1]] = point_at(points, along, np.array([start, end]))
     return part
+
+
+def continued(points: Points, length_px: float, over_px: float) -> Points:
+    """How a polyline would go on from its last point, bending as it did before: a point every px, the last point first.
+
+    Its direction and its bend are taken over the last `over_px`, and ``BEND_SHARE`` of the bend is continued.
+    """
+    along = arc_length(points)
+    total = float(along[-1])
+    back_px = min(over_px, total)
+    last, middle, first = point_at(points, along, np.array([total, total - 0.5 * back_px, total - back_px])).tolist()
+    before = math.atan2(middle[1] - first[1], middle[0] - first[0])
+    after = math.atan2(last[1] - middle[1], last[0] - middle[0])
+    turn = (after - before + math.pi) % (2.0 * math.pi) - math.pi
+    per_px = BEND_SHARE * turn / max(0.5 * over_px, 1.0)
+    # From the middle of the last half, where its chord has the line's direction, to each further step.
+    headings = after + per_px * (0.25 * over_px + 0.5 + np.arange(int(length_px)))
+    onward = np.empty((len(headings) + 1, 2))
+    onward[0] = last
+    np.cos(headings, out=onward[1:, 0])
+    np.sin(headings, out=onward[1:, 1])
+    return np.add.accumulate(onward, axis=0, out=onward)
 
 
 def nearest(points: Points, point: Point, along: NDArray[np.float64] | None = None) -> tuple[float, float, Point]:

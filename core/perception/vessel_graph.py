@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from core.config import CleaningConfig
 from core.perception import bundle, pixel_graph, polyline
 from core.perception.bundle import Bundle
-from core.perception.junctions import Arm, rebuild
-from core.types import GraphEdge, Mask, Point, Points, VesselGraph
+from core.perception.junctions import Arm, are_together, rebuild
+from core.perception.lumen import RadiusMap, wall_distances
+from core.perception.vessel_ends import led_on
+from core.types import GraphEdge, Mask, Points, VesselGraph
 
 MAX_CHAINS = 200
 """A vessel tree with all its spurs has some twenty to fifty chains of pixels; a skeleton of more is a mesh of noise."""
@@ -22,13 +23,10 @@ SMOOTHING_PX = 9.0
 """Standard deviation of the smoothing along the way, which keeps bends: more than a radius of boundary noise."""
 SPUR_RADII = 1.5
 """A spur of thinning runs from the middle to a bump or corner of the wall: at most about one and a half lumen radii."""
-END_TRIM_RADII = 1.0
-BORDER_RADII = 1.2
-"""Where the image cuts a vessel off at a slant, the skeleton runs into the sharp corner this near to the border."""
+MOST_SHIFT_PX = 2.0
+"""The map of distances is not farther off than this: what is, is the wall of something else."""
 RADIUS_POINTS = 30
 """So many points of a vessel's end tell its radius there."""
-EROSION_PX = 0.9
-"""Thinning turns the last part of a vessel towards a corner of its end."""
 
 
 @dataclass(slots=True, eq=False)
@@ -37,24 +35,7 @@ class _Line:
     end: int
     points: Points
     radius: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-
-
-class _RadiusMap:
-    """Distance to the wall in px at sub-pixel places, from a distance map of every second pixel (0.2 ms instead of 0.9 ms).
-
-    One step of erosion lets the thinnest wall show on the coarse grid. It takes 0.5 to 1.3 px, depending on the wall's direction
-    (measured on straight tubes), so ``EROSION_PX`` is given back.
-    """
-
-    def __init__(self, mask: Mask) -> None:
-        cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-        half = cv2.erode(mask.view(np.uint8), cross, borderType=cv2.BORDER_REPLICATE)[::2, ::2]
-        distance = cv2.distanceTransform(np.ascontiguousarray(half), cv2.DIST_L2, 5)
-        # A mask that fills the image has no wall, and its distance would be the largest number there is.
-        self._map = np.minimum(np.asarray(distance, np.float32), np.float32(max(half.shape)))
-
-    def at(self, points: Points) -> NDArray[np.float64]:
-        return 2.0 * polyline.sample(self._map, points / 2.0) + EROSION_PX
+    half_width: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
 
 def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGraph:
@@ -69,7 +50,7 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
     traced = pixel_graph.trace(skeleton)
     if len(traced.chains) > MAX_CHAINS:
         return VesselGraph(np.empty((0, 2)), ())
-    radius = _RadiusMap(mask)
+    radius = RadiusMap(mask)
     lines = [_Line(chain.start, chain.end, chain.points) for chain in traced.chains]
     if config.prune_spurs:
         radius_at = radius.at(traced.nodes)
@@ -78,93 +59,105 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
             if len(kept) == len(lines):
                 break
             lines = _merged(kept)
-    _centre(lines, radius)
+    level = mask.astype(np.float32)
+    _centre(lines, radius, level)
     nodes = traced.nodes.copy()
     if config.rebuild_junctions:
-        _rebuild_junctions(lines, nodes, radius)
+        nodes = _rebuild_junctions(lines, nodes, radius, level)
     if config.extend_ends:
-        _straighten_ends(lines, nodes, radius, mask.shape)
+        _lead_on_ends(lines, nodes, radius, level)
     return _packed(lines, nodes)
 
 
-def _straighten_ends(lines: list[_Line], nodes: Points, radius: _RadiusMap, shape: tuple[int, ...]) -> None:
+def _lead_on_ends(lines: list[_Line], nodes: Points, radius: RadiusMap, level: NDArray[np.float32]) -> None:
     """Ends of vessels without the hook that thinning leaves there; at the image border they go on to the border."""
     degrees = _degrees(lines, len(nodes)).tolist()
     changed = []
     for line in lines:
-        ends = [side for side, node in (("start", line.start), ("end", line.end)) if degrees[node] == 1 and len(line.points) >= 4]
+        ends = [side for side, node in ((-1, line.start), (1, line.end)) if degrees[node] == 1 and len(line.points) >= 4]
         for side in ends:
-            backwards = side == "start"
-            last = line.radius[:RADIUS_POINTS] if backwards else line.radius[-RADIUS_POINTS:]
-            own_radius = polyline.median(last)  # in the corner where the skeleton ends the radius would be nearly nothing
-            points = _straight_end(line.points[::-1] if backwards else line.points, own_radius, shape)
-            line.points = points[::-1] if backwards else points
-            nodes[line.start if backwards else line.end] = points[-1]
-            if backwards and len(ends) == 2:
+            # In the corner where the skeleton ends the radius would be nearly nothing.
+            own_radius = polyline.median(line.radius[::side][-RADIUS_POINTS:])
+            points = led_on(line.points[::side], own_radius, level)
+            line.points = points[::side]
+            nodes[line.start if side < 0 else line.end] = points[-1]
+            if side < 0 and len(ends) == 2:
                 line.radius = radius.at(line.points)  # the other end asks for it
         if ends:
             changed.append(line)
     _measure(changed, radius)
 
 
-def _straight_end(points: Points, radius_px: float, shape: tuple[int, ...]) -> Points:
-    trim = round(END_TRIM_RADII * radius_px / STEP_PX)
-    right, bottom = shape[1] - 1.0, shape[0] - 1.0
-    x, y = points[-1].tolist()
-    if min(x, y, right - x, bottom - y) < 1.5 * radius_px:
-        to_side = np.minimum(points, (right, bottom) - points)
-        clear = np.minimum(to_side[::-1, 0], to_side[::-1, 1]) >= BORDER_RADII * radius_px
-        trim = max(trim, int(clear.argmax()))
-    kept = points[: len(points) - min(trim, 2 * len(points) // 3)]
-    x, y = kept[-1].tolist()
-    from_x, from_y = kept[max(len(kept) - 1 - round(max(radius_px, 10.0) / STEP_PX), 0)].tolist()
-    length = max(math.hypot(x - from_x, y - from_y), 1e-9)
-    direction = (x - from_x) / length, (y - from_y) / length
-    to_border = border_distance((x, y), direction, shape)
-    reach = to_border if to_border < 3.0 * radius_px else math.dist(points[-1], (x, y))
-    if reach < 0.5:
-        return kept
-    steps = np.append(np.arange(STEP_PX, reach, STEP_PX), reach)
-    return np.concatenate([kept, (x, y) + steps[:, None] * direction])
-
-
-def border_distance(place: Point, direction: Point, shape: tuple[int, ...]) -> float:
-    """How far it is from a place along a unit direction to the image's last row or column of pixels."""
-    limits = (shape[1] - 1.0, shape[0] - 1.0)
-    reaches = [
-        ((limit if step > 0 else 0.0) - start) / step
-        for start, step, limit in zip(place, direction, limits, strict=True)
-        if abs(step) > 1e-9
-    ]
-    return max(0.0, min(reaches, default=0.0))
-
-
-def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: _RadiusMap) -> None:
-    degrees = _degrees(lines, len(nodes))
-    sizes = radius.at(nodes)
-    at_node: dict[int, list[tuple[_Line, bool]]] = {}
-    for line in lines:
-        at_node.setdefault(line.start, []).append((line, True))
-        at_node.setdefault(line.end, []).append((line, False))
-    for node in np.flatnonzero(degrees >= 3).tolist():
-        touching = at_node[node]
-        arms = [
-            Arm(line.points, line.radius, bool(degrees[line.end] >= 3))
-            if outward
-            else Arm(line.points[::-1], line.radius[::-1], bool(degrees[line.start] >= 3))
-            for line, outward in touching
+def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, level: NDArray[np.float32]) -> Points:
+    """The lines led to junctions that are put anew; returns the nodes, some of which may be new, too."""
+    degrees, sizes = _degrees(lines, len(nodes)).tolist(), radius.at(nodes).tolist()
+    places: list[Points] = list(nodes)
+    for group, inner in _openings(lines, degrees, sizes):
+        sides = [
+            (line, outward)
+            for line in lines
+            for outward in (True, False)
+            if line not in inner and (line.start if outward else line.end) in group
         ]
-        anew = rebuild(nodes[node], float(sizes[node]), arms)
+        anew = rebuild([_arm(line, outward, degrees, sizes) for line, outward in sides], level)
         if anew is None:
             continue
-        nodes[node] = anew[0]
-        for (line, outward), arm in zip(touching, anew[1], strict=True):
-            if line.start == line.end:
-                if outward:
-                    back = next(b for (other, away), b in zip(touching, anew[1], strict=True) if other is line and not away)
-                    _close_loop(line, arm, back)
-                continue
-            line.points, line.radius = (arm.points, arm.radius) if outward else (arm.points[::-1], arm.radius[::-1])
+        numbers = sorted(group)[: len(anew.places)]
+        numbers += range(len(places), len(places) + len(anew.places) - len(numbers))
+        places += [np.empty(2)] * (len(anew.places) - len(group))
+        for number, place in zip(numbers, anew.places, strict=True):
+            places[number] = place
+        lines[:] = [line for line in lines if line not in inner]
+        lines += [_Line(*ends, *piece) for ends, piece in zip(pairwise(numbers), anew.pieces, strict=True)]
+        arms = {(id(line), outward): anew.arms[index] for index, (line, outward) in enumerate(sides)}
+        for line in {id(line): line for line, _ in sides}.values():
+            out, back = arms.get((id(line), True)), arms.get((id(line), False))
+            if out is not None:
+                line.start = numbers[out[0]]
+            if back is not None:
+                line.end = numbers[back[0]]
+            _lead(line, out[1] if out is not None else None, back[1] if back is not None else None)
+    return np.array(places).reshape(-1, 2)
+
+
+def _openings(lines: list[_Line], degrees: list[int], sizes: list[float]) -> list[tuple[set[int], list[_Line]]]:
+    """Junctions that are to be put anew together, each time with the lines between them."""
+    group_of = {node: {node} for node, degree in enumerate(degrees) if degree >= 3}
+    inner: list[_Line] = []
+    with_island: set[int] = set()
+    for line in lines:
+        if line.start == line.end or line.start not in group_of or line.end not in group_of:
+            continue
+        if not are_together(_arm(line, True, degrees, sizes), _arm(line, False, degrees, sizes)):
+            continue
+        if group_of[line.start] is group_of[line.end]:
+            with_island.add(line.start)  # two ways round something: no single trunk runs through such an opening
+            continue
+        inner.append(line)
+        joined = group_of[line.start] | group_of[line.end]
+        group_of |= dict.fromkeys(joined, joined)
+    groups = list({id(group): group for group in group_of.values()}.values())
+    whole = [group for group in groups if not group & with_island]
+    apart = [{node} for group in groups if group & with_island for node in group]
+    return [(group, [line for line in inner if line.start in group]) for group in whole] + [(group, []) for group in apart]
+
+
+def _arm(line: _Line, outward: bool, degrees: list[int], sizes: list[float]) -> Arm:
+    """A line seen from its start (`outward`) or from its end. Nodes beyond the lists are junctions that were put in meanwhile."""
+    near, far = (line.start, line.end) if outward else (line.end, line.start)
+    step = 1 if outward else -1
+    far_is_junction = far >= len(degrees) or degrees[far] >= 3
+    return Arm(line.points[::step], line.radius[::step], line.half_width[::step], far_is_junction, sizes[near])
+
+
+def _lead(line: _Line, out: Arm | None, back: Arm | None) -> None:
+    """Give a line the arms that it is, seen from its start and from its end: both, where it comes back to the same opening."""
+    if out is not None and back is not None:
+        _close_loop(line, out, back)
+    elif out is not None:
+        line.points, line.radius = out.points, out.radius
+    elif back is not None:
+        line.points, line.radius = back.points[::-1], back.radius[::-1]
 
 
 def _close_loop(line: _Line, out: Arm, back: Arm) -> None:
@@ -225,25 +218,39 @@ def _merged(lines: list[_Line]) -> list[_Line]:
     return merged
 
 
-def _centre(lines: list[_Line], radius: _RadiusMap) -> None:
-    """All lines made even, smooth and centred in the lumen, with the radius along them."""
+def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -> None:
+    """All lines made even, smooth and centred in the lumen, with the radius along them.
+
+    Twice: by the map of distances, which knows the middle to some half a pixel from anywhere in the lumen, and then between both
+    walls, to a fraction of a pixel. Where one of these is not to be seen, beside an opening, the first result stays.
+    """
     even = bundle.smooth(
         bundle.resample(Bundle.of([line.points for line in lines]), STEP_PX), SMOOTHING_PX / STEP_PX, keeps_bends=True
     )
+    counts = np.diff(even.starts)
+    # A line of one or two points has no inner point to centre.
+    inner = np.repeat(counts, counts) >= 3
     normal = bundle.normals(even)
     probe = 0.5 * radius.at(even.points)[:, None] * normal
     wider, narrower = np.split(radius.at(np.concatenate([even.points + probe, even.points - probe])), 2)
-    counts = np.diff(even.starts)
-    # A line of one or two points has no inner point to centre.
-    shift = np.where(np.repeat(counts, counts) < 3, 0.0, 0.5 * (wider - narrower))
-    moved = Bundle(even.points + shift[:, None] * normal, even.starts)
-    centred = bundle.smooth(moved, SMOOTHING_PX / STEP_PX, keeps_bends=True)
-    for line, points in zip(lines, centred.split(centred.points), strict=True):
-        line.points = points
+    centred = _moved(even, normal, np.where(inner, 0.5 * (wider - narrower), 0.0))
+    normal, expected = bundle.normals(centred), radius.at(centred.points)
+    right, left = (wall_distances(level, centred.points, side * normal, expected) for side in (1.0, -1.0))
+    shift = 0.5 * (right - left)
+    centred = _moved(centred, normal, np.where(inner & np.isfinite(shift), np.clip(shift, -MOST_SHIFT_PX, MOST_SHIFT_PX), 0.0))
+    half_widths = centred.split(0.5 * (right + left))
+    for line, points, half_width in zip(lines, centred.split(centred.points), half_widths, strict=True):
+        line.points, line.half_width = points, half_width
     _measure(lines, radius)
 
 
-def _measure(lines: list[_Line], radius: _RadiusMap) -> None:
+def _moved(lines: Bundle, normal: Points, shift: NDArray[np.float64]) -> Bundle:
+    """All points moved across their lines, and these smoothed."""
+    moved = Bundle(lines.points + shift[:, None] * normal, lines.starts)
+    return bundle.smooth(moved, SMOOTHING_PX / STEP_PX, keeps_bends=True)
+
+
+def _measure(lines: list[_Line], radius: RadiusMap) -> None:
     """The radius along some lines as they are now."""
     if lines:
         whole = Bundle.of([line.points for line in lines])

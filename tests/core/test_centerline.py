@@ -364,6 +364,62 @@ def test_branches_that_leave_close_to_each_other_leave_no_hook(apart_px: float) 
         assert len(edge.radius) == len(edge.points)
 
 
+def off_by(line: Points, edge: GraphEdge) -> float:
+    """How far an edge leaves a line at most."""
+    return max(polyline.nearest(line, (float(x), float(y)))[0] for x, y in edge.points)
+
+
+def test_a_centerline_lies_in_the_middle_to_a_third_of_a_pixel() -> None:
+    for line in (BENT, curve((60, 60), (200, 330), (420, 380), (600, 90))):
+        (edge,) = perceived((line, 14.0)).edges
+        gaps = [polyline.nearest(line, (float(x), float(y)))[0] for x, y in edge.points[15:-15]]
+        assert float(np.mean(gaps)) < 0.15
+        assert max(gaps) < 0.5
+
+
+def test_a_branch_bends_into_its_trunk_as_its_walls_do() -> None:
+    trunk = curve((40.0, 200.0), (320.0, 200.0), (600.0, 200.0))
+    branch = curve((260.0, 200.0), (290.0, 222.0), (325.0, 262.0), (340.0, 330.0), (335.0, 440.0))
+    graph = perceived((trunk, 16.0), (branch, 13.0))
+    assert degrees(graph) == [1, 1, 1, 3]
+    side = next(edge for edge in graph.edges if edge.points[:, 1].max() > 300)
+    inner = side.points[(side.points[:, 1] < 400)]
+    node = graph.nodes[int(np.argmax(np.bincount([n for e in graph.edges for n in (e.start, e.end)])))]
+    assert node == pytest.approx((260.0, 200.0), abs=9.0)
+    assert max(polyline.nearest(branch, (float(x), float(y)))[0] for x, y in inner) < 4.0
+    for edge in graph.edges:
+        if edge is not side:
+            assert off_by(trunk, edge) < 1.5
+
+
+@pytest.mark.parametrize("apart_px", [0.0, 14.0, 30.0, 46.0])
+@pytest.mark.parametrize("other_side", [False, True])
+def test_one_trunk_runs_through_junctions_that_are_near_to_each_other(apart_px: float, other_side: bool) -> None:
+    trunk = curve((40.0, 240.0), (320.0, 240.0), (600.0, 240.0))
+    first = curve((280.0, 240.0), (340.0, 190.0), (400.0, 60.0))
+    turned = -1.0 if other_side else 1.0
+    start = 280.0 + apart_px + (0.0 if other_side else 30.0)
+    second = np.array([[start, 240.0], [start + 180.0, 240.0 - turned * 150.0]])
+    graph = perceived((trunk, 16.0), (first, 11.0), (second, 11.0))
+    ends = [edge for edge in graph.edges if off_by(trunk, edge) < 2.5]
+    covered = np.concatenate([edge.points[:, 0] for edge in ends])
+    assert covered.min() < 62.0
+    assert covered.max() > 578.0
+    assert np.diff(np.sort(covered)).max() < 8.0, "the trunk is there from end to end, on its own line"
+
+
+def test_an_island_in_a_junction_stays_a_loop() -> None:
+    around = np.linspace(0.0, 2.0 * np.pi, 120)
+    halves = [np.column_stack([320.0 + 24.0 * np.cos(part), 240.0 + 24.0 * np.sin(part)]) for part in (around[:70], around[50:])]
+    arms = [np.array([320.0, 240.0]) + np.outer([14.0, 190.0], direction(angle)) for angle in (10, 130, 250)]
+    graph = perceived(*((half, 10.0) for half in halves), *((arm, 12.0) for arm in arms))
+    assert degrees(graph) == [1, 1, 1, 3, 3, 3]
+    assert len(graph.edges) == 6
+    for edge in graph.edges:
+        np.testing.assert_allclose(edge.points[0], graph.nodes[edge.start])
+        np.testing.assert_allclose(edge.points[-1], graph.nodes[edge.end])
+
+
 def test_a_vessel_that_fills_the_image_has_a_radius_of_its_size() -> None:
     full = np.ones((480, 640), bool)
     line = np.zeros((480, 640), bool)

@@ -1,0 +1,62 @@
+"""Where the vessel's wall is: roughly from any place in the lumen, and to a fraction of a pixel across a line through it."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.perception import polyline
+from core.types import Mask, Points
+
+EROSION_PX = 0.9
+SEARCH_PX = 4
+"""What a distance map of every second pixel may be wrong by, and a bit."""
+
+
+class RadiusMap:
+    """Distance to the wall in px at sub-pixel places, from a distance map of every second pixel (0.2 ms instead of 0.9 ms).
+
+    One step of erosion lets the thinnest wall show on the coarse grid. It takes 0.5 to 1.3 px, depending on the wall's direction
+    (measured on straight tubes), so ``EROSION_PX`` is given back.
+    """
+
+    def __init__(self, mask: Mask) -> None:
+        cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+        half = cv2.erode(mask.view(np.uint8), cross, borderType=cv2.BORDER_REPLICATE)[::2, ::2]
+        distance = cv2.distanceTransform(np.ascontiguousarray(half), cv2.DIST_L2, 5)
+        # A mask that fills the image has no wall, and its distance would be the largest number there is.
+        self._map = np.minimum(np.asarray(distance, np.float32), np.float32(max(half.shape)))
+
+    def at(self, points: Points) -> NDArray[np.float64]:
+        return 2.0 * polyline.sample(self._map, points / 2.0) + EROSION_PX
+
+
+def wall_distances(
+    level: NDArray[np.float32], points: Points, directions: Points, expected: NDArray[np.float64], search_px: int = SEARCH_PX
+) -> NDArray[np.float64]:
+    """How far the wall is from points, each along its own direction: to a fraction of a pixel.
+
+    Parameters
+    ----------
+    level : the vessel's mask or probability (h, w); the wall is where it falls through 0.5.
+    points, directions : places in the lumen (N, 2), and unit vectors (N, 2).
+    expected : about how far the wall is (N,).
+    search_px : how far to both sides of that it is looked for.
+
+    Returns
+    -------
+    (N,) in px; NaN where the wall is not there: in a branch's opening, or beyond the image's border.
+    """
+    distances = np.maximum(expected[:, None] + np.arange(-search_px, search_px + 1.0), 0.0)
+    places = points[:, None, :] + distances[:, :, None] * directions[:, None, :]
+    inside = polyline.sample(level, places)
+    outside = inside < 0.5
+    first = outside.argmax(axis=1)
+    rows = np.arange(len(points))
+    here, there = inside[rows, first - 1], inside[rows, first]
+    reach = distances[rows, first - 1] + (here - 0.5) / np.maximum(here - there, 1e-6)
+    # Nowhere outside, or from the start: both have 0 for the first place that is outside.
+    return np.where(first > 0, reach, math.nan)

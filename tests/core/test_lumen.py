@@ -1,0 +1,45 @@
+"""The vessel's wall: how far it is, to a fraction of a pixel."""
+
+import numpy as np
+import pytest
+
+from core.perception.lumen import RadiusMap, wall_distances
+
+AT = np.array([[60.0, 100.0], [80.0, 100.0], [100.0, 100.0]])
+DOWN = np.tile([0.0, 1.0], (3, 1))
+
+
+def tube(half_width: float) -> np.ndarray:
+    """Probability of a straight tube along row 100."""
+    rows = np.arange(200.0)[:, None] + np.zeros((1, 200))
+    return np.clip(0.5 + 0.25 * (half_width - np.abs(rows - 100.0)), 0.0, 1.0).astype(np.float32)
+
+
+@pytest.mark.parametrize("half_width", [3.0, 7.3, 12.5, 20.8])
+def test_a_wall_is_found_to_a_fraction_of_a_pixel_even_where_it_was_expected_elsewhere(half_width: float) -> None:
+    for off in (-3.0, 0.0, 3.0):
+        found = wall_distances(tube(half_width), AT, DOWN, np.full(3, half_width + off))
+        np.testing.assert_allclose(found, half_width, atol=0.02)
+
+
+def test_of_a_mask_it_lies_between_the_last_pixel_inside_and_the_first_outside() -> None:
+    mask = (tube(9.0) >= 0.5).astype(np.float32)
+    np.testing.assert_allclose(wall_distances(mask, AT, DOWN, np.full(3, 9.0)), 9.5, atol=0.01)
+
+
+def test_where_there_is_no_wall_there_is_no_distance() -> None:
+    level = tube(9.0)
+    level[:, 75:85] = 1.0  # an opening
+    found = wall_distances(level, AT, DOWN, np.full(3, 9.0))
+    assert np.isnan(found[1])
+    assert np.isfinite(found[[0, 2]]).all()
+
+
+def test_a_place_outside_the_lumen_has_none_either() -> None:
+    assert np.isnan(wall_distances(tube(9.0), AT + [0.0, 20.0], DOWN, np.full(3, 9.0))).all()
+
+
+def test_the_rough_radius_is_right_to_a_pixel_wherever_the_mask_has_a_wall() -> None:
+    radius = RadiusMap(tube(12.0) >= 0.5)
+    assert radius.at(AT) == pytest.approx(12.0, abs=1.0)
+    assert RadiusMap(np.ones((48, 64), bool)).at(np.array([[30.0, 20.0]]))[0] <= 65.0
