@@ -317,6 +317,7 @@ TEMPLATES = (
     "{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is",
     "gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one",
     "gamepad {name} is in use by another window, so its STOP does nothing here: close that window, or set gamepad.device",
+    "gamepad {name} cannot be locked ({why}), so its STOP does nothing here: unplug it and plug it in again",
     "the gamepad is no longer read ({kind}: {why}): start the program again",
     "{camera} gives no pictures: check its cable",
     "the driver of {camera} does not return: plug the camera out and in again",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -15,6 +14,7 @@ from app.language import tr, tr_text
 from app.widgets.offer_strip import Answer, Offer
 from app.work_thread import WorkThread
 from core.session.recovery import CutSession, find_cut_sessions
+from core.whole_file import write_whole
 
 _KEY = "recovery"
 _END_WITHIN_MS = 3000
@@ -44,9 +44,7 @@ class Declined:
     def add(self, name: str) -> None:
         """Raises OSError."""
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = self._path.with_name(f".{self._path.name}.{os.getpid()}")
-        temporary.write_text(json.dumps(sorted(self.names() | {name})), encoding="utf-8")
-        temporary.replace(self._path)
+        write_whole(self._path, json.dumps(sorted(self.names() | {name})).encode())
 
 
 class RecoveryDesk(QObject):

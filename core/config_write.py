@@ -6,10 +6,8 @@ allowed, a change that somebody else made meanwhile) the old file is kept beside
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shutil
-import tempfile
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -22,6 +20,7 @@ from tomlkit.toml_document import TOMLDocument
 from core.config import Config, ConfigError, load_config
 from core.config_schema import JOINTS, Kind, settings_by_key, value_at
 from core.settings_file import UNKNOWN, aside_name, usable_part
+from core.whole_file import write_whole
 
 _HEAD = "# LumenPilot's settings: only what differs from the defaults. Every key, its range and its meaning: core/config.py."
 
@@ -52,7 +51,7 @@ def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
         text, is_lossless = settings_text(old, config)
         if not is_lossless and not note:
             note = _kept(path, "had values that are not allowed")
-        write_atomically(path, text)
+        write_whole(path, text.encode("utf-8"), durable=True)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written ({error.strerror}); nothing was changed") from None
     return note
@@ -86,24 +85,6 @@ def changed_keys(first: Config, second: Config) -> tuple[str, ...]:
     """Dotted paths of all settings that differ."""
     one, other = first.model_dump(mode="json"), second.model_dump(mode="json")
     return tuple(key for key in settings_by_key() if value_at(one, key) != value_at(other, key))
-
-
-def write_atomically(path: Path, text: str) -> None:
-    """Replace the file's text as a whole, keeping its permissions. Raises OSError; the old file is then as it was."""
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    temporary = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(text.encode("utf-8"))
-            file.flush()
-            os.fsync(file.fileno())
-        if path.exists():
-            shutil.copymode(path, temporary)
-        temporary.replace(path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise
 
 
 def _old_text(path: Path, seen: str | None) -> tuple[str, str]:

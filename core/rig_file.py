@@ -5,8 +5,6 @@ A file that cannot be used is told in one line and left as it is; a rig that is 
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
 import tomllib
 from dataclasses import dataclass
@@ -23,6 +21,7 @@ from core.config import Config, PerceptionConfig, RigConfig, TwinConfig
 from core.errors import UserError
 from core.profiles import settings_folder
 from core.servo_config import ServosConfig
+from core.whole_file import write_whole
 
 FORMAT = 1
 RESERVED = ("twin", "realsense", "webcam")
@@ -181,19 +180,12 @@ def write_rig(rig: RigFile, path: Path | None = None) -> Path:
     document = tomlkit.document()
     document.add(tomlkit.comment(_HEADER))
     document.update(rig.model_dump(mode="json", exclude_none=True))
-    temporary = target.with_name(f".{target.name}.{os.getpid()}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("wb") as file:
-            file.write(tomlkit.dumps(document).encode())
-            file.flush()
-            os.fsync(file.fileno())
         if target.exists():
-            target.with_name(target.stem + _OLDER).write_bytes(target.read_bytes())
-        temporary.replace(target)
+            write_whole(target.with_name(target.stem + _OLDER), target.read_bytes(), durable=True)
+        write_whole(target, tomlkit.dumps(document).encode(), durable=True)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
         raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
     return target
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
+import shutil
 from pathlib import Path
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_whole(path: Path, data: bytes, *, durable: bool = False) -> None:
     """Write a file aside and rename it: who reads it, even after a crash, finds the old or the new one. A link is followed.
 
-    Raises OSError, which names `path`; nothing is left behind then.
+    An old file's permissions are kept. With `durable` that holds also when the power goes; it takes the disk some milliseconds.
+    Raises OSError, which names `path`; nothing is left behind then, and the old file is as it was.
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not target.is_file():  # a device or a pipe, whose place no file may take
@@ -19,9 +21,26 @@ def write_whole(path: Path, data: bytes) -> None:
         return
     aside = target.with_name(f".{secrets.token_hex(8)}.part")  # a name of its own length could be too long
     try:
-        aside.write_bytes(data)
+        with aside.open("wb") as file:
+            file.write(data)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
+        if target.exists():
+            shutil.copymode(target, aside)
         aside.replace(target)
+        if durable:
+            sync_folder(target.parent)
     except OSError as error:
         with contextlib.suppress(OSError):
             aside.unlink()
         raise OSError(error.errno, error.strerror, str(path)) from None
+
+
+def sync_folder(folder: Path) -> None:
+    """Force the folder's entries to the disk."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

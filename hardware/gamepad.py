@@ -182,10 +182,15 @@ def _take(device: int, name: str) -> None:
     """Lock it: one gamepad must not drive the robots of two windows."""
     try:
         fcntl.flock(device, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
+    except BlockingIOError as error:
         os.close(device)
         raise GamepadRefused(
             f"gamepad {name} is in use by another window, so its STOP does nothing here: close that window, or set gamepad.device"
+        ) from error
+    except OSError as error:
+        os.close(device)
+        raise GamepadRefused(
+            f"gamepad {name} cannot be locked ({error.strerror}), so its STOP does nothing here: unplug it and plug it in again"
         ) from error
 
 

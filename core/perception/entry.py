@@ -124,16 +124,20 @@ def is_at_vessel_end(place: Points, around: Surroundings) -> bool:
     """Whether a place (2,) lies at an end of the vessel graph."""
     if around.vessel is None:
         return False
-    distance, radius = _distance_to_vessel_end(place, around.vessel)
+    return _is_near(*_distance_to_vessel_end(place, around.vessel))
+
+
+def _is_near(distance: float, radius: float) -> bool:
+    """Whether something so far from an end of the vessel, of that radius, lies at it."""
     return distance <= 2.0 * radius + 5.0
 
 
 def _at_vessel_end(points: Points, around: Surroundings) -> float:
     if around.vessel is None or not around.vessel.edges:
         return 0.0
-    here, _ = _distance_to_vessel_end(points[0], around.vessel)
+    here, radius = _distance_to_vessel_end(points[0], around.vessel)
     there, _ = _distance_to_vessel_end(points[-1], around.vessel)
-    return float(is_at_vessel_end(points[0], around) and here < NEARER_BY * there)
+    return float(_is_near(here, radius) and here < NEARER_BY * there)
 
 
 def _thickness(points: Points, around: Surroundings) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import platform
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -19,6 +18,7 @@ from core.config import Config
 from core.errors import UserError
 from core.learning.model_file import ModelError, model_folder, read_model_info
 from core.rig_file import RigFileError, calibration_of
+from core.whole_file import write_whole
 
 MANIFEST, FRAMES, EVENTS = "manifest.json", "frames.jsonl", "events.jsonl"
 PREFIX, RECOVERED = "session_", "_recovered"
@@ -153,28 +153,8 @@ def new_manifest(about: About, session_id: str, started: datetime, monotonic_s: 
 def write_manifest(folder: Path, manifest: Manifest) -> int:
     """Write it atomically: whenever the process or the power goes, the old or the new one is there. Returns its bytes; OSError."""
     data = (manifest.model_dump_json(indent=1) + "\n").encode()
-    temporary = folder / f".{MANIFEST}.{os.getpid()}"
-    try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(folder / MANIFEST)
-    except OSError:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise
-    sync_folder(folder)
+    write_whole(folder / MANIFEST, data, durable=True)
     return len(data)
-
-
-def sync_folder(folder: Path) -> None:
-    """Force the folder's entries to the disk."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def read_manifest(folder: Path) -> Manifest:

@@ -24,7 +24,6 @@ from core.session.manifest import (
     Manifest,
     SessionError,
     read_manifest,
-    sync_folder,
     write_manifest,
 )
 from core.session.pictures import packet_times, video_number
@@ -33,6 +32,7 @@ from core.session.recorded import row_from_json
 from core.session.remux import Expected, remux
 from core.session.row_index import columns_of, quick_columns
 from core.session.video import VideoError
+from core.whole_file import sync_folder
 
 _PROBLEMS_KEPT = 50
 

@@ -136,10 +136,7 @@ def _write_episode(plan: SynthPlan, episode: int) -> int:
         write_mask(plan.out / "masks" / f"{frame.stem}_vessel.png", frame.picture.vessel)
         write_mask(plan.out / "masks" / f"{frame.stem}_robot.png", frame.picture.robot)
         rows.append(json.dumps(frame.truth, allow_nan=False))
-    path = _episode_file(plan, episode)
-    scratch = path.with_suffix(".new")
-    scratch.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    scratch.replace(path)
+    write_whole(_episode_file(plan, episode), ("\n".join(rows) + "\n").encode())
     return len(rows)
 
 
@@ -193,8 +190,8 @@ def _write_missing(plan: SynthPlan, workers: int, on_progress: Callable[[int], N
             finally:
                 # Nothing is left to cancel unless it was interrupted or an episode failed.
                 pool.shutdown(wait=False, cancel_futures=True)
-    rows = [_episode_file(plan, episode).read_text(encoding="utf-8") for episode in range(plan.episodes)]
-    (plan.out / "truth.jsonl").write_text("".join(rows), encoding="utf-8")
+    rows = [_episode_file(plan, episode).read_bytes() for episode in range(plan.episodes)]
+    write_whole(plan.out / "truth.jsonl", b"".join(rows))
 
 
 def _end_with_parent() -> None:

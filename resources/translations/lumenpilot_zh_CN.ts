@@ -1992,6 +1992,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>gamepad {name} cannot be locked ({why}), so its STOP does nothing here: unplug it and plug it in again</source>
+        <translation>手柄 {name} 无法锁定（{why}），因此它的停止键在此不起作用：拔下后重新插上</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>the gamepad is no longer read ({kind}: {why}): start the program again</source>
         <translation>不再读取手柄（{kind}：{why}）：请重新启动程序</translation>
     </message>

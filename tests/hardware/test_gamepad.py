@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import struct
 import threading
@@ -468,6 +469,18 @@ def test_a_second_window_says_that_the_gamepad_is_not_its_own_and_gets_it_when_t
     second.until(lambda: other.name == "js0")
     assert other.problem is None
     other.close()
+    device.unplug()
+
+
+def test_a_gamepad_that_cannot_be_locked_is_not_said_to_be_another_windows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    device = FakeDevice(tmp_path / "js0")
+
+    def no_locks(_: int, __: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    with pytest.raises(GamepadError, match=r"js0 cannot be locked \(No locks available\), so its STOP does nothing here"):
+        find_gamepad(GamepadConfig(device=str(tmp_path / "js0")), drives=True)
     device.unplug()
 
 
