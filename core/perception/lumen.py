@@ -14,6 +14,8 @@ from core.types import Mask, Points
 EROSION_PX = 0.9
 SEARCH_PX = 4
 """What a distance map of every second pixel may be wrong by, and a bit."""
+SOFTEST = 0.02
+"""Per px: a wall that falls less steeply than this says as little as this."""
 
 
 class RadiusMap:
@@ -50,6 +52,13 @@ def wall_distances(
     -------
     (N,) in px; NaN where the wall is not there: in a branch's opening, or beyond the image's border.
     """
+    return sharp_walls(level, points, directions, expected, search_px)[0]
+
+
+def sharp_walls(
+    level: NDArray[np.float32], points: Points, directions: Points, expected: NDArray[np.float64], search_px: int = SEARCH_PX
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """``wall_distances``, and how steeply the level falls there, per px (N,): a network that is not sure draws a soft wall."""
     distances = np.maximum(expected[:, None] + np.arange(-search_px, search_px + 1.0), 0.0)
     places = points[:, None, :] + distances[:, :, None] * directions[:, None, :]
     inside = polyline.sample(level, places)
@@ -58,5 +67,7 @@ def wall_distances(
     rows = np.arange(len(points))
     here, there = inside[rows, first - 1], inside[rows, first]
     reach = distances[rows, first - 1] + (here - 0.5) / np.maximum(here - there, 1e-6)
+    before, after = np.maximum(first - 2, 0), np.minimum(first + 1, 2 * search_px)
+    slope = (inside[rows, before] - inside[rows, after]) / np.maximum(after - before, 1)
     # Nowhere outside, or from the start: both have 0 for the first place that is outside.
-    return np.where(first > 0, reach, math.nan)
+    return np.where(first > 0, reach, math.nan), np.maximum(slope, SOFTEST)

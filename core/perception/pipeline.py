@@ -228,7 +228,7 @@ class Pipeline:
         with watch.stage("gaps"):
             skeletons = gaps.repair(skeletons, config.gaps)
         with watch.stage("graph"):
-            graph = build_graph(skeletons.vessel, found.vessel, config.cleaning)
+            graph = build_graph(skeletons.vessel, found.vessel, config.cleaning, found.vessel_probability)
         return replace(scene, skeletons=skeletons, vessel_graph=graph, refusal=quality.check_graph(graph, config.vectors))
 
     def _see_window(

@@ -12,7 +12,7 @@ from core.config import CleaningConfig
 from core.perception import bundle, pixel_graph, polyline
 from core.perception.bundle import Bundle
 from core.perception.junctions import Arm, are_together, rebuild
-from core.perception.lumen import RadiusMap, wall_distances
+from core.perception.lumen import RadiusMap, sharp_walls
 from core.perception.vessel_ends import led_on
 from core.types import GraphEdge, Mask, Points, VesselGraph
 
@@ -21,6 +21,9 @@ MAX_CHAINS = 200
 STEP_PX = 2.0
 SMOOTHING_PX = 9.0
 """Standard deviation of the smoothing along the way, which keeps bends: more than a radius of boundary noise."""
+WIDTH_PX = 20.0
+WIDTH_SHARE = 0.2
+"""The same of a vessel's width, and by how much that may differ from what is seen at one place."""
 SPUR_RADII = 1.5
 """A spur of thinning runs from the middle to a bump or corner of the wall: at most about one and a half lumen radii."""
 MOST_SHIFT_PX = 2.0
@@ -38,7 +41,7 @@ class _Line:
     half_width: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
 
-def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGraph:
+def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability: NDArray[np.float32] | None = None) -> VesselGraph:
     """The vessel graph of a skeleton; empty where that is a mesh of more than ``MAX_CHAINS`` chains.
 
     Parameters
@@ -46,6 +49,7 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
     skeleton : one-pixel skeleton of the vessel, shape (h, w).
     mask : the vessel's mask it came from: radius, centring, and how far the ends reach.
     config : whether spurs are pruned.
+    probability : what the mask came from (h, w): walls to a smaller fraction of a pixel, and how soft they are.
     """
     traced = pixel_graph.trace(skeleton)
     if len(traced.chains) > MAX_CHAINS:
@@ -60,7 +64,7 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig) -> VesselGra
                 break
             lines = _merged(kept)
     level = mask.astype(np.float32)
-    _centre(lines, radius, level)
+    _centre(lines, radius, level if probability is None else probability)
     nodes = traced.nodes.copy()
     if config.rebuild_junctions:
         nodes = _rebuild_junctions(lines, nodes, radius, level)
@@ -234,14 +238,35 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
     probe = 0.5 * radius.at(even.points)[:, None] * normal
     wider, narrower = np.split(radius.at(np.concatenate([even.points + probe, even.points - probe])), 2)
     centred = _moved(even, normal, np.where(inner, 0.5 * (wider - narrower), 0.0))
-    normal, expected = bundle.normals(centred), radius.at(centred.points)
-    right, left = (wall_distances(level, centred.points, side * normal, expected) for side in (1.0, -1.0))
-    shift = 0.5 * (right - left)
-    centred = _moved(centred, normal, np.where(inner & np.isfinite(shift), np.clip(shift, -MOST_SHIFT_PX, MOST_SHIFT_PX), 0.0))
-    half_widths = centred.split(0.5 * (right + left))
-    for line, points, half_width in zip(lines, centred.split(centred.points), half_widths, strict=True):
-        line.points, line.half_width = points, half_width
+    shift, half_width = _between_walls(centred, radius.at(centred.points), level)
+    centred = _moved(centred, bundle.normals(centred), np.where(inner, shift, 0.0))
+    half_widths = centred.split(half_width)
+    for line, points, half in zip(lines, centred.split(centred.points), half_widths, strict=True):
+        line.points, line.half_width = points, half
     _measure(lines, radius)
+
+
+def _between_walls(
+    lines: Bundle, expected: NDArray[np.float64], level: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """By how much each point lies beside the middle (N,), and half the way from wall to wall (N,); 0 and NaN where one is not seen.
+
+    A vessel's width changes slowly. So where one wall is soft, the middle is rather as far from the other one as half the width
+    that it has around there.
+    """
+    normal = bundle.normals(lines)
+    right, on_right = sharp_walls(level, lines.points, normal, expected)
+    left, on_left = sharp_walls(level, lines.points, -normal, expected)
+    half = 0.5 * (right + left)
+    seen = np.isfinite(half)
+    weight = np.where(seen, np.minimum(on_right, on_left) ** 2, 0.0)
+    sums = bundle.smooth(Bundle(np.column_stack([np.where(seen, half, 0.0) * weight, weight]), lines.starts), WIDTH_PX / STEP_PX)
+    around = np.clip(
+        sums.points[:, 0] / np.maximum(sums.points[:, 1], 1e-9), (1.0 - WIDTH_SHARE) * half, (1.0 + WIDTH_SHARE) * half
+    )
+    by_walls = on_right**2 * (right - around) + on_left**2 * (around - left)
+    shift = np.where(seen, by_walls / (on_right**2 + on_left**2), 0.0)
+    return np.clip(shift, -MOST_SHIFT_PX, MOST_SHIFT_PX), half
 
 
 def _moved(lines: Bundle, normal: Points, shift: NDArray[np.float64]) -> Bundle:

@@ -377,6 +377,24 @@ def test_a_centerline_lies_in_the_middle_to_a_third_of_a_pixel() -> None:
         assert max(gaps) < 0.5
 
 
+def test_where_one_wall_is_soft_the_other_one_and_the_width_around_count() -> None:
+    line = np.array([[-20.0, 240.0], [660.0, 240.0]])
+    deep = depth(line, 14.0)
+    vessel = probability(deep)
+    rows = np.arange(SIZE[1], dtype=np.float64)[:, None]
+    soft = 1.0 / (1.0 + np.exp(-0.25 * (rows - (240.0 - 17.0))))  # the upper wall, 3 px too far out
+    vessel[:240, 290:350] = soft[:240]
+    found = Masks(vessel >= 0.5, np.zeros_like(vessel, bool), vessel, np.zeros_like(vessel))
+    skeletons = skeleton.thin_masks(found, PerceptionConfig())
+    aside = []
+    for known in (None, vessel):
+        (edge,) = build_graph(skeletons.vessel, found.vessel, CleaningConfig(), known).edges
+        near = (edge.points[:, 0] > 300) & (edge.points[:, 0] < 340)
+        aside.append(float(np.abs(edge.points[near, 1] - 240.0).max()))
+    assert aside[0] == pytest.approx(1.5, abs=0.4)
+    assert aside[1] < 0.6
+
+
 def test_a_branch_bends_into_its_trunk_as_its_walls_do() -> None:
     trunk = curve((40.0, 200.0), (320.0, 200.0), (600.0, 200.0))
     branch = curve((260.0, 200.0), (290.0, 222.0), (325.0, 262.0), (340.0, 330.0), (335.0, 440.0))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from core.perception.lumen import RadiusMap, wall_distances
+from core.perception.lumen import RadiusMap, sharp_walls, wall_distances
 
 AT = np.array([[60.0, 100.0], [80.0, 100.0], [100.0, 100.0]])
 DOWN = np.tile([0.0, 1.0], (3, 1))
@@ -43,3 +43,16 @@ def test_the_rough_radius_is_right_to_a_pixel_wherever_the_mask_has_a_wall() -> 
     radius = RadiusMap(tube(12.0) >= 0.5)
     assert radius.at(AT) == pytest.approx(12.0, abs=1.0)
     assert RadiusMap(np.ones((48, 64), bool)).at(np.array([[30.0, 20.0]]))[0] <= 65.0
+
+
+def test_a_soft_wall_is_told_from_a_sharp_one() -> None:
+    rows = np.abs(np.arange(200.0)[:, None] - 100.0) + np.zeros((1, 200))
+    slopes = []
+    for steepness in (0.05, 0.2, 2.0):
+        level = (1.0 / (1.0 + np.exp(-4.0 * steepness * (12.0 - rows)))).astype(np.float32)
+        found, slope = sharp_walls(level, AT, DOWN, np.full(3, 12.0))
+        np.testing.assert_allclose(found, 12.0, atol=0.05)
+        slopes.append(float(slope[0]))
+    assert slopes == sorted(slopes)
+    assert slopes[0] == pytest.approx(0.05, rel=0.2)
+    assert slopes[2] > 4 * slopes[0]
