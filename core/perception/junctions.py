@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
-from core.perception.lumen import wall_distances
+from core.perception.lumen import two_shapes, wall_distances
 from core.types import Point, Points
 
 STEP_PX = 2.0
@@ -38,8 +38,6 @@ HEADING_RADII = 1.0
 """A branch's direction is taken over this many of its radii, and at least 12 px."""
 CLEAR_RADII = 1.0
 """The opening reaches at least so many of the branch's radii beyond the junction's new place."""
-ROUNDS = 3
-FITS = 1
 WIDER_DEG = 100.0
 """A trunk is as wide as its branches: one that is left twice as wide is as unlikely as this much of a turn."""
 WALL_SEARCH_PX = 8
@@ -120,19 +118,13 @@ def rebuild(arms: list[Arm], level: NDArray[np.float32]) -> Rebuilt | None:
     known = {index: gate for index, gate in enumerate(gates) if gate is not None}
     if len(known) < 2:
         return None
-    for _ in range(ROUNDS):
-        trunk = _trunk(known)
-        bridges = {index: _side_branch(gate, trunk) for index, gate in known.items() if index not in trunk.ends}
-        # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
-        moved = {}
-        for index, gate in known.items():
-            place = _point(trunk.points[_mark(index, trunk, bridges)])
-            needed = gate.position_px + CLEAR_RADII * gate.radius_px - gate.beyond(place)
-            if gate.position_px < needed:
-                moved[index] = _gate(arms[index], along[index], needed) or gate
-        if all(gate == known[index] for index, gate in moved.items()):
-            break
-        known |= moved
+    trunk = _trunk(known)
+    bridges = {index: _side_branch(gate, trunk) for index, gate in known.items() if index not in trunk.ends}
+    # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
+    for index, gate in list(known.items()):
+        needed = gate.position_px + CLEAR_RADII * gate.radius_px - gate.beyond(_point(trunk.points[_mark(index, trunk, bridges)]))
+        if gate.position_px < needed:
+            known[index] = _gate(arms[index], along[index], needed) or gate
     trunk = _between_walls(_trunk(known), level)
     bridges = {index: _side_branch(gate, trunk, level) for index, gate in known.items() if index not in trunk.ends}
     return _assembled(arms, along, known, trunk, bridges)
@@ -235,13 +227,10 @@ def _between_walls(trunk: _Trunk, level: NDArray[np.float32]) -> _Trunk:
     """The trunk bent as its walls do, as far as they can be seen; its ends and its directions there stay."""
     share = np.linspace(0.0, 1.0, len(trunk.points))
     hump = 16.0 * share**2 * (1.0 - share) ** 2
-    shapes = np.column_stack([hump, hump * (2.0 * share - 1.0)])
-    points = trunk.points
-    for _ in range(FITS):
-        normal, shift, weight = _to_walls(points, trunk.radius, level)
-        size = np.linalg.solve(shapes.T @ (weight[:, None] * shapes) + TRUNK_STIFFNESS * np.eye(2), shapes.T @ (weight * shift))
-        points = points + (shapes @ size)[:, None] * normal
-    return replace(trunk, points=points)
+    shapes = np.stack([hump, hump * (2.0 * share - 1.0)])
+    normal, shift, weight = _to_walls(trunk.points, trunk.radius, level)
+    size, lean = two_shapes(shapes, shift, weight, TRUNK_STIFFNESS)
+    return replace(trunk, points=trunk.points + (size * shapes[0] + lean * shapes[1])[:, None] * normal)
 
 
 def _turn_deg(first: _Gate, second: _Gate) -> float:
@@ -284,31 +273,33 @@ def _own_walls(
 
 
 def _side_branch(gate: _Gate, trunk: _Trunk, level: NDArray[np.float32] | None = None) -> tuple[int, Points]:
-    """Which of the trunk's points a side branch comes from, and its line from there to its gate: a parabola, which leaves the gate
-    in its direction and bends as the branch's walls do."""
+    """Which of the trunk's points a side branch comes from, and its line from there to its gate.
+
+    It leaves the gate in its direction, and goes straight or, where the `level` is given, as a parabola that its walls bend.
+    """
     start, inward = np.array(gate.place), -np.array(gate.outward)
     aside = np.array([-inward[1], inward[0]])
     reach = max(40.0, 3.0 * float(np.hypot(*(trunk.points - start).T).min()))
     way = np.arange(0.0, reach + 1.0, STEP_PX)
-    bend = 0.0
-    for left in reversed(range(FITS + 1)):
-        line = start + way[:, None] * inward + (bend * way**2)[:, None] * aside
-        gaps = np.hypot(trunk.points[:, None, 0] - line[:, 0], trunk.points[:, None, 1] - line[:, 1])
-        end, mark = _first_meeting(gaps)
-        piece = line[: end + 1]
-        if level is None or left == 0 or len(piece) < 4:
-            break
+    straight = start + way[:, None] * inward
+    end, mark = _first_meeting(straight, trunk)
+    piece = straight[: end + 1]
+    if level is not None and len(piece) >= 4:
         normal, shift, weight = _to_walls(piece, np.full(len(piece), gate.radius_px), level, trunk)
-        shape = (way[: end + 1] / way[end]) ** 2
-        wanted = shift * np.sign(normal @ aside)
-        bend += float((shape * weight) @ wanted) / (float((shape * weight) @ shape) + BRANCH_STIFFNESS) / float(way[end]) ** 2
+        shape = (way / way[end]) ** 2
+        seen = shape[: end + 1] * weight
+        bend = float(seen @ (shift * np.sign(normal @ aside))) / (float(seen @ shape[: end + 1]) + BRANCH_STIFFNESS)
+        bent = straight + (bend * shape)[:, None] * aside
+        end, mark = _first_meeting(bent, trunk)
+        piece = bent[: end + 1]
     mark = min(max(mark, 1), len(trunk.points) - 2)
     inner = piece[:-1] if len(piece) > 2 else piece
     return mark, np.concatenate([trunk.points[mark : mark + 1], inner[::-1]])
 
 
-def _first_meeting(gaps: NDArray[np.float64]) -> tuple[int, int]:
-    """Where a line first meets the trunk, given the distances (trunk's points, line's points): the line's and the trunk's point."""
+def _first_meeting(line: Points, trunk: _Trunk) -> tuple[int, int]:
+    """Where a line first meets the trunk: which of its points, and which of the trunk's."""
+    gaps = np.hypot(trunk.points[:, None, 0] - line[:, 0], trunk.points[:, None, 1] - line[:, 1])
     nearest = gaps.min(axis=0)
     close = np.flatnonzero(nearest < 0.75 * STEP_PX)
     end = int(close[0]) if len(close) else int(nearest.argmin())

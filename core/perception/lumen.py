@@ -52,22 +52,40 @@ def wall_distances(
     -------
     (N,) in px; NaN where the wall is not there: in a branch's opening, or beyond the image's border.
     """
-    return sharp_walls(level, points, directions, expected, search_px)[0]
+    return _crossings(level, points, directions, expected, search_px)[0]
 
 
 def sharp_walls(
-    level: NDArray[np.float32], points: Points, directions: Points, expected: NDArray[np.float64], search_px: int = SEARCH_PX
+    level: NDArray[np.float32], points: Points, directions: Points, expected: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """``wall_distances``, and how steeply the level falls there, per px (N,): a network that is not sure draws a soft wall."""
+    reach, inside, first = _crossings(level, points, directions, expected, SEARCH_PX)
+    rows = np.arange(len(points))
+    before, after = np.maximum(first - 2, 0), np.minimum(first + 1, 2 * SEARCH_PX)
+    return reach, np.maximum((inside[rows, before] - inside[rows, after]) / np.maximum(after - before, 1), SOFTEST)
+
+
+def _crossings(
+    level: NDArray[np.float32], points: Points, directions: Points, expected: NDArray[np.float64], search_px: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+    """Distances (N,), the level pixel by pixel in each direction (N, 2 `search_px` + 1), and the first outside (N,)."""
     distances = np.maximum(expected[:, None] + np.arange(-search_px, search_px + 1.0), 0.0)
-    places = points[:, None, :] + distances[:, :, None] * directions[:, None, :]
-    inside = polyline.sample(level, places)
-    outside = inside < 0.5
-    first = outside.argmax(axis=1)
+    x, y = (points[:, axis, None] + distances * directions[:, axis, None] for axis in (0, 1))
+    inside = polyline.sample_at(level, x, y)
+    first = (inside < 0.5).argmax(axis=1)
     rows = np.arange(len(points))
     here, there = inside[rows, first - 1], inside[rows, first]
     reach = distances[rows, first - 1] + (here - 0.5) / np.maximum(here - there, 1e-6)
-    before, after = np.maximum(first - 2, 0), np.minimum(first + 1, 2 * search_px)
-    slope = (inside[rows, before] - inside[rows, after]) / np.maximum(after - before, 1)
     # Nowhere outside, or from the start: both have 0 for the first place that is outside.
-    return np.where(first > 0, reach, math.nan), np.maximum(slope, SOFTEST)
+    return np.where(first > 0, reach, math.nan), inside, first
+
+
+def two_shapes(
+    shapes: NDArray[np.float64], wanted: NDArray[np.float64], weight: NDArray[np.float64], stiffness: float
+) -> tuple[float, float]:
+    """How much of each of two shapes (2, N) comes nearest to what is `wanted` (N,), by weights; `stiffness` keeps both small."""
+    first, second = shapes * weight
+    a, b, c = float(first @ shapes[0]) + stiffness, float(first @ shapes[1]), float(second @ shapes[1]) + stiffness
+    one, other = float(first @ wanted), float(second @ wanted)
+    determinant = a * c - b * b
+    return (c * one - b * other) / determinant, (a * other - b * one) / determinant

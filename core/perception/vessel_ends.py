@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
-from core.perception.lumen import wall_distances
+from core.perception.lumen import two_shapes, wall_distances
 from core.types import Points
 
 STEP_PX = 2.0
@@ -22,8 +22,8 @@ REACH_RADII = 3.0
 WALL_SEARCH_PX = 8
 WIDTH_SHARE = 0.15
 """What is narrower or wider than the vessel by more than this (and a pixel) is its end, or a branch's opening."""
-FITS = 2
-STIFFNESS = 0.3
+LEAST_POINTS = 3
+STIFFNESS = 0.15
 """How hard it is for walls to turn and to bend a line, in points of it."""
 
 
@@ -60,24 +60,21 @@ def _hook(points: Points, radius_px: float, limit: NDArray[np.float64]) -> int:
 
 def _between_walls(onward: Points, radius_px: float, level: NDArray[np.float32], length_px: float) -> Points:
     """A line of points, 1 px apart, turned and bent into the middle as far as both walls are seen, and straight on from there."""
+    normal = polyline.normals(onward)
+    every = np.s_[: int(length_px) + 1 : round(STEP_PX)]
+    places, directions = onward[every], normal[every]
+    both_ways = np.concatenate([directions, -directions])
+    radius = np.full(len(both_ways), radius_px)
+    right, left = wall_distances(level, np.concatenate([places, places]), both_ways, radius, WALL_SEARCH_PX).reshape(2, -1)
+    as_wide = np.flatnonzero(np.abs(0.5 * (right + left) - radius_px) < WIDTH_SHARE * radius_px + 1.0)
+    if len(as_wide) < LEAST_POINTS:
+        return onward
     share = np.arange(len(onward)) / max(length_px, 1.0)
-    count = min(len(onward), int(length_px) + 1)
-    radius = np.full(2 * count, radius_px)
-    for _ in range(FITS):
-        normal = polyline.normals(onward)
-        places, directions = onward[:count], normal[:count]
-        right, left = wall_distances(
-            level, np.concatenate([places, places]), np.concatenate([directions, -directions]), radius, WALL_SEARCH_PX
-        ).reshape(2, -1)
-        as_wide = np.flatnonzero(np.abs(0.5 * (right + left) - radius_px) < WIDTH_SHARE * radius_px + 1.0)
-        if len(as_wide) < 4:
-            break
-        shapes = np.column_stack([share[as_wide], share[as_wide] ** 2])
-        turn, bend = np.linalg.solve(shapes.T @ shapes + STIFFNESS * np.eye(2), shapes.T @ (0.5 * (right - left)[as_wide]))
-        last = share[as_wide[-1]]
-        shift = turn * share + bend * np.where(share <= last, share**2, last * (2.0 * share - last))
-        onward = onward + shift[:, None] * normal
-    return onward
+    seen = share[every][as_wide]
+    turn, bend = two_shapes(np.stack([seen, seen**2]), 0.5 * (right - left)[as_wide], np.ones(len(seen)), STIFFNESS)
+    last = seen[-1]
+    shift = turn * share + bend * np.where(share <= last, share**2, last * (2.0 * share - last))
+    return onward + shift[:, None] * normal
 
 
 def _way_out(onward: Points, limit: NDArray[np.float64]) -> float | None:
