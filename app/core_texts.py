@@ -33,6 +33,11 @@ FIXED = (
     "armed",
     "stopped",
     "quiet",
+    # the settings file
+    "was no TOML",
+    "was changed meanwhile",
+    "had values that are not allowed",
+    "too much is wrong; the defaults are used",
     # joints
     "right",
     "left",
@@ -300,7 +305,9 @@ TEMPLATES = (
     "servo port {port} is lost ({why}): check the USB cable, then connect again",
     "servo port {port} does not exist: plug the USB adapter in, or set servos.port",
     "no permission for servo port {port}: add your user to the group dialout, then log in again",
+    "servo port {port} is in use by another program: close that program first",
     "servo port {port} has no device behind it: unplug the USB adapter and plug it in again",
+    "{port} cannot be used as servo port ({why}): set servos.port to the USB adapter",
     "the pedal at {port} is gone: plug its USB cable in",
     "the pedal at {port} is gone ({why}): plug its USB cable in",
     "the pedal at {port} has not reported yet",
@@ -311,6 +318,7 @@ TEMPLATES = (
     "no permission for pedal port {port}: add your user to the group dialout, then log in again",
     "pedal port {port} is in use by another program, or by the servos: close it there, or set pedal.port",
     "pedal port {port} has no device behind it: unplug the pedal and plug it in again",
+    "{port} cannot be used as pedal port at {a} baud ({why}): set pedal.port and pedal.baud",
     "gamepad {path} is not there: plug it in, or leave gamepad.device out to take the first",
     "gamepad {path} cannot be opened: plug it in, or leave gamepad.device out to take the first",
     "no permission for gamepad {path}: add your user to the group input, then log in again",
@@ -334,6 +342,15 @@ TEMPLATES = (
     "driving stopped by an unexpected {kind}: {why}; start the rig again",
     "{what} failed ({kind}: {why}): start the rig again",
     "servo {a}: {miss}, {b} times: check its supply and cable, and that no two servos have the same id",
+    # the settings file
+    "{path}: cannot be read ({why}); the defaults are used",
+    "{path}: {why}; the defaults are used",
+    "{path}: {why}; it is kept as {name}, and the defaults are used",
+    "{path}: {why}, and cannot be set aside ({trouble}); the defaults are used",
+    "{path}: {key}: {why}; the default is used",
+    "is no TOML ({why})",
+    "{path}: cannot be written ({why}); nothing was changed",
+    "{name} {why}: the old one is kept as {kept}",
     # edits of an annotation
     "draw {what} mask",
     "simplify {what} mask",
@@ -343,6 +360,7 @@ TEMPLATES = (
 
 
 COMPOSED = (
+    "{path}: {key}: unknown key, kept but not used",
     "above {a} and at most {rest}",
     "above {a} and below {rest}",
     "at least {a} and below {rest}",
@@ -352,7 +370,7 @@ COMPOSED = (
     "at most {rest}",
     "below {rest}",
 )
-"""Ranges of settings, which the core puts together from parts."""
+"""Ranges of settings and a line about their file, which the core puts together from parts."""
 
 
 def texts_of_tables() -> Iterator[str]:

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication
 
 from app import theme
 from app.engine_thread import Phase
-from app.language import font_problem, tr, wanted
+from app.language import font_problem, tr, tr_text, wanted
 from app.language_menu import LanguageMenu, next_start_text
 from app.menus import MenuEntry, add_menu
 from app.next_step import Step
@@ -78,7 +78,7 @@ class SettingsDesk(QObject):
     def start(self) -> None:
         """Say what was wrong with the settings file."""
         for problem in self._file.problems:
-            self._window.say(problem, is_fault=True)
+            self._window.say(tr_text(problem), is_fault=True)
 
     @Slot()
     def open(self) -> None:
@@ -186,7 +186,7 @@ class SettingsDesk(QObject):
         self._window.take_settings(with_changes(self._window.config, before, config, _NOW))
         self._window.show_still(None)  # of a rig that is over, what was tried out on its last picture must not stay: it looks alive
         _take_theme(self._window.config)
-        self._window.say(tr("Settings saved in {path}", path=self._file.path) + (f". {note}" if note else ""))
+        self._window.say(tr("Settings saved in {path}", path=self._file.path) + (f". {tr_text(note)}" if note else ""))
         dialog.draft.mark_saved()
         dialog.accept()
         if restart:
@@ -199,9 +199,9 @@ class SettingsDesk(QObject):
             note = write_settings(self._file.path, config, self._file.text or "")
         except ConfigError as error:
             if self.dialog is not None:
-                self.dialog.show_notice(str(error), is_fault=True)
+                self.dialog.show_notice(tr_text(str(error)), is_fault=True)
             else:
-                self._window.say(str(error), is_fault=True)
+                self._window.say(tr_text(str(error)), is_fault=True)
             return None
         self._saved = config
         self._file = SettingsFile(self._file.path, {}, _text_of(self._file))

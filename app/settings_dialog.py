@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from app import theme
-from app.language import tr
+from app.language import tr, tr_text
 from app.settings_model import SettingsDraft, search
 from app.widgets.enter_key import takes_enter
 from app.widgets.profile_row import ProfileRow
@@ -88,7 +88,7 @@ class SettingsDialog(QDialog):
         self._fill_tree()
         self._wire()
         self._show_profiles()
-        self.show_notice("\n".join(problems), is_fault=True)
+        self.show_notice("\n".join(map(tr_text, problems)), is_fault=True)
         self.show_section(self._section)
         self.setMinimumSize(*_LEAST)
         self.resize(*_SIZE)
@@ -263,7 +263,7 @@ class SettingsDialog(QDialog):
             self.show_notice(str(error), is_fault=True)
         else:
             self.draft.load(file.config)
-            self.show_notice("\n".join(file.problems), is_fault=True)
+            self.show_notice("\n".join(map(tr_text, file.problems)), is_fault=True)
         self._show_profiles()
         self._changed()
 

@@ -682,6 +682,26 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>was no TOML</source>
+        <translation>不是 TOML 文件</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>was changed meanwhile</source>
+        <translation>在此期间被修改</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>had values that are not allowed</source>
+        <translation>含有不允许的值</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>too much is wrong; the defaults are used</source>
+        <translation>错误过多；使用默认值</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>right</source>
         <translation>右</translation>
     </message>
@@ -1907,8 +1927,18 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>servo port {port} is in use by another program: close that program first</source>
+        <translation>舵机端口 {port} 正被另一个程序使用：先关闭那个程序</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>servo port {port} has no device behind it: unplug the USB adapter and plug it in again</source>
         <translation>舵机端口 {port} 后面没有设备：拔下 USB 适配器再重新插入</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{port} cannot be used as servo port ({why}): set servos.port to the USB adapter</source>
+        <translation>{port} 不能用作舵机端口（{why}）：把 servos.port 设为 USB 适配器</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -1959,6 +1989,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>pedal port {port} has no device behind it: unplug the pedal and plug it in again</source>
         <translation>脚踏板端口 {port} 后面没有设备：拔下脚踏板并重新插入</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{port} cannot be used as pedal port at {a} baud ({why}): set pedal.port and pedal.baud</source>
+        <translation>{port} 不能以 {a} 波特用作脚踏板端口（{why}）：设置 pedal.port 和 pedal.baud</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -2077,6 +2112,46 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>{path}: cannot be read ({why}); the defaults are used</source>
+        <translation>{path}：无法读取（{why}）；使用默认值</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: {why}; the defaults are used</source>
+        <translation>{path}：{why}；使用默认值</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: {why}; it is kept as {name}, and the defaults are used</source>
+        <translation>{path}：{why}；文件保留为 {name}，并使用默认值</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: {why}, and cannot be set aside ({trouble}); the defaults are used</source>
+        <translation>{path}：{why}，且无法移开（{trouble}）；使用默认值</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: {key}: {why}; the default is used</source>
+        <translation>{path}：{key}：{why}；使用默认值</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>is no TOML ({why})</source>
+        <translation>不是 TOML 文件（{why}）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: cannot be written ({why}); nothing was changed</source>
+        <translation>{path}：无法写入（{why}）；没有任何更改</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{name} {why}: the old one is kept as {kept}</source>
+        <translation>{name} {why}：旧文件保留为 {kept}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>draw {what} mask</source>
         <translation>绘制{what}掩膜</translation>
     </message>
@@ -2094,6 +2169,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>take the algorithm's {what} mask</source>
         <translation>采用算法的{what}掩膜</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: {key}: unknown key, kept but not used</source>
+        <translation>{path}：{key}：未知的键，保留但不使用</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

@@ -164,6 +164,12 @@ def test_texts_with_values_are_translated_and_filled(chinese: None) -> None:
             "no permission for servo port /dev/x: add your user to the group dialout, then log in again",
             "没有舵机端口 /dev/x 的权限：把您的用户加入 dialout 组，然后重新登录",
         ),
+        (
+            "/x/settings.toml: is no TOML (Expected '='); it is kept as settings.toml.bad-1, and the defaults are used",
+            "/x/settings.toml：不是 TOML 文件（Expected '='）；文件保留为 settings.toml.bad-1，并使用默认值",
+        ),
+        ("/x/settings.toml: rig.kind: unknown key, kept but not used", "/x/settings.toml：rig.kind：未知的键，保留但不使用"),
+        ("settings.toml was changed meanwhile: the old one is kept as a.bad", "settings.toml 在此期间被修改：旧文件保留为 a.bad"),
         ("something that nobody has listed", "something that nobody has listed"),
         ("", ""),
     ],
