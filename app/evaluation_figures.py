@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -22,6 +23,7 @@ from app.figure_style import BLUE, GREY, INK, PALE, styled
 from app.palette import ON_PICTURE
 from core.study.agreement import LIMITS_SD, RANGE_DEG
 from core.study.evaluation import AnglePairs
+from core.whole_file import write_whole
 
 GREEN, VERMILLION = ON_PICTURE.GREEN, ON_PICTURE.VERMILLION  # on white paper, always
 _MEAN, _LIMIT = VERMILLION, GREEN
@@ -46,8 +48,10 @@ def draw_figures(pairs: AnglePairs, metrics: dict[str, Any]) -> dict[str, Figure
 
 def save_figure(figure: Figure, path: Path) -> None:
     """As SVG, PDF or PNG by `path`'s ending, without a date, so that equal figures are equal files; raises OSError."""
+    drawn = BytesIO()  # a disk that is full makes the PDF's writer fail in ways of its own
     with styled():
-        figure.savefig(path, metadata=_DATELESS.get(path.suffix), dpi=160)
+        figure.savefig(drawn, format=path.suffix.removeprefix("."), metadata=_DATELESS.get(path.suffix), dpi=160)
+    write_whole(path, drawn.getvalue())
 
 
 def write_svg(figure: Figure, stream: TextIO) -> None:

@@ -18,8 +18,10 @@ from xml.etree import ElementTree
 import cv2
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from app.evaluate_command import LikePaper, run_evaluate
+from app.evaluation_figures import save_figure
 from core.config import TwinConfig
 from core.errors import UserError
 from core.learning.dataset import write_png
@@ -457,3 +459,11 @@ def test_names_that_are_no_utf8_are_shown_as_bytes(paper_csv: Path, labelled: Pa
     truth.write_text(truth.read_text().replace('"000000"', json.dumps(name)))
     assert evaluate(folder, out=tmp_path / "of_set")["source"]["name"] == r"caf\xe9"
     assert read_measurements(tmp_path / "of_set" / "measurements.csv")[-1].image == r"caf\xe9"
+
+
+@pytest.mark.parametrize("ending", [".svg", ".pdf", ".png"])
+def test_a_figure_that_the_disk_does_not_take_is_an_error_of_the_disk(tmp_path: Path, ending: str) -> None:
+    full = tmp_path / f"figure{ending}"
+    full.symlink_to("/dev/full")
+    with pytest.raises(OSError, match="No space left"):
+        save_figure(Figure(), full)
