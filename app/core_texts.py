@@ -34,10 +34,11 @@ FIXED = (
     "stopped",
     "quiet",
     # the settings file
+    "a profile's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit",
     "was no TOML",
     "was changed meanwhile",
     "had values that are not allowed",
-    "too much is wrong; the defaults are used",
+    "too much is wrong",
     # joints
     "right",
     "left",
@@ -349,6 +350,10 @@ TEMPLATES = (
     "{path}: {why}, and cannot be set aside ({trouble}); the defaults are used",
     "{path}: {key}: {why}; the default is used",
     "is no TOML ({why})",
+    "profile {name}: it is no longer there ({path})",
+    "profile {name}: a preset has this name; choose another one",
+    "profile {name}: it comes with the program and cannot be deleted",
+    "profile {name}: cannot be deleted ({why})",
     "{path}: cannot be written ({why}); nothing was changed",
     "{name} {why}: the old one is kept as {kept}",
     # edits of an annotation

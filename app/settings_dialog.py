@@ -260,7 +260,7 @@ class SettingsDialog(QDialog):
         try:
             file = self._profiles.load(profile)
         except ProfileError as error:
-            self.show_notice(str(error), is_fault=True)
+            self.show_notice(tr_text(str(error)), is_fault=True)
         else:
             self.draft.load(file.config)
             self.show_notice("\n".join(map(tr_text, file.problems)), is_fault=True)
@@ -292,9 +292,9 @@ class SettingsDialog(QDialog):
     def _do(self, action: Callable[[], str]) -> None:
         """Do something with a profile and say how it went."""
         try:
-            self.show_notice(action())
+            self.show_notice(tr_text(action()))
         except ProfileError as error:
-            self.show_notice(str(error), is_fault=True)
+            self.show_notice(tr_text(str(error)), is_fault=True)
         self._show_profiles()
 
     # ---- keys

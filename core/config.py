@@ -57,8 +57,10 @@ class CleaningConfig(_Section):
     min_robot_area_px: int = Field(40, ge=0, le=100_000, description="smaller pieces of robot are dropped")
     max_hole_area_px: int = Field(150, ge=0, le=100_000, description="holes up to this size are filled, in both masks")
     prune_spurs: bool = Field(True, description="drop vessel spurs shorter than the local lumen radius")
-    extend_ends: bool = Field(True, description="extend ends along their tangent to the edge of mask or image")
-    rebuild_junctions: bool = Field(True, description="lead vessel branches straight into their trunk where the skeleton bends")
+    extend_ends: bool = Field(True, description="lead ends on as they run, to the edge of mask or image")
+    rebuild_junctions: bool = Field(
+        True, description="lead vessel branches into their trunk as their walls run, not as the skeleton"
+    )
     half_size_thinning: bool = Field(True, description="thin the vessel on every second pixel: faster, same topology")
 
 

@@ -182,9 +182,8 @@ def write_rig(rig: RigFile, path: Path | None = None) -> Path:
     document.update(rig.model_dump(mode="json", exclude_none=True))
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        if target.exists():
-            write_whole(target.with_name(target.stem + _OLDER), target.read_bytes(), durable=True)
-        write_whole(target, tomlkit.dumps(document).encode(), durable=True)
+        older = target.with_name(target.stem + _OLDER)
+        write_whole(target, tomlkit.dumps(document).encode(), durable=True, older=older)
     except OSError as error:
         raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
     return target

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from core.config import Config, load_config, merge
 
 UNKNOWN = "unknown key, kept but not used"
+_TOO_MUCH = "too much is wrong"
 _MOST_ROUNDS = 500
 
 
@@ -78,7 +79,7 @@ def usable_part(data: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
                 problems.append(f"{key}: {_message(error)}; the default is used")
         else:
             return data, problems
-    return {}, [*problems, "too much is wrong; the defaults are used"]
+    return {}, [*problems, f"{_TOO_MUCH}; the defaults are used"]
 
 
 def _without(data: dict[str, Any], location: tuple[Any, ...]) -> tuple[dict[str, Any], str]:

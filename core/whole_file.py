@@ -9,10 +9,11 @@ import shutil
 from pathlib import Path
 
 
-def write_whole(path: Path, data: bytes, *, durable: bool = False) -> None:
+def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path | None = None) -> None:
     """Write a file aside and rename it: who reads it, even after a crash, finds the old or the new one. A link is followed.
 
-    An old file's permissions are kept. With `durable` that holds also when the power goes; it takes the disk some milliseconds.
+    An old file's permissions are kept, where the file system lets us. With `durable` all that holds also when the power goes; it
+    takes the disk some milliseconds. What was there before is copied to `older`, once the new one has found room.
     Raises OSError, which names `path`; nothing is left behind then, and the old file is as it was.
     """
     target = Path(os.path.realpath(path))
@@ -22,19 +23,23 @@ def write_whole(path: Path, data: bytes, *, durable: bool = False) -> None:
     aside = target.with_name(f".{secrets.token_hex(8)}.part")  # a name of its own length could be too long
     try:
         with aside.open("wb") as file:
+            if target.exists():
+                with contextlib.suppress(PermissionError):  # a disk of somebody else's that we may write on
+                    shutil.copymode(target, aside)
             file.write(data)
             if durable:
                 file.flush()
                 os.fsync(file.fileno())
-        if target.exists():
-            shutil.copymode(target, aside)
+        if older is not None and target.exists():
+            write_whole(older, target.read_bytes(), durable=durable)
         aside.replace(target)
-        if durable:
-            sync_folder(target.parent)
     except OSError as error:
         with contextlib.suppress(OSError):
             aside.unlink()
         raise OSError(error.errno, error.strerror, str(path)) from None
+    if durable:
+        with contextlib.suppress(OSError):  # some file systems cannot; the new file is in place by now
+            sync_folder(target.parent)
 
 
 def sync_folder(folder: Path) -> None:

@@ -43,6 +43,8 @@ WIDER_DEG = 100.0
 WALL_SEARCH_PX = 8
 WALL_RADII = 1.15
 """A wall farther off than so many radii (and a pixel) is another one's: here is an opening. One so near to the trunk is its own."""
+MISSED_PX = 6.0
+"""A side branch that passes the trunk by so much does not come from it."""
 TRUNK_STIFFNESS = 0.5
 BRANCH_STIFFNESS = 0.5
 """How hard it is for walls to bend a line, in points of it."""
@@ -105,13 +107,17 @@ def are_together(arm: Arm, back: Arm) -> bool:
     )
 
 
-def rebuild(arms: list[Arm], level: NDArray[np.float32]) -> Rebuilt | None:
-    """A junction, or some that are together, anew; None where too few arms are long enough to tell.
+def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> Rebuilt | None:
+    """A junction, or some that are together, anew.
+
+    None where too few arms are long enough to tell, and where an arm of junctions that are together does not lead to the trunk: it
+    comes from a side branch, or there is no single trunk.
 
     Parameters
     ----------
     arms : all branches that lead out of the opening, outwards.
     level : the vessel's mask or probability (h, w).
+    is_alone : whether that is one junction.
     """
     along = [polyline.arc_length(arm.points) for arm in arms]
     gates: list[_Gate | None] = [_gate(arm, way, 0.0) for arm, way in zip(arms, along, strict=True)]
@@ -127,6 +133,12 @@ def rebuild(arms: list[Arm], level: NDArray[np.float32]) -> Rebuilt | None:
             known[index] = _gate(arms[index], along[index], needed) or gate
     trunk = _between_walls(_trunk(known), level)
     bridges = {index: _side_branch(gate, trunk, level) for index, gate in known.items() if index not in trunk.ends}
+    missed = {index for index, (_, line) in bridges.items() if math.dist(line[0].tolist(), line[1].tolist()) > MISSED_PX}
+    if missed and not is_alone:
+        return None
+    for index in missed:
+        mark, _ = bridges[index]
+        bridges[index] = mark, polyline.resample(np.array([trunk.points[mark], known[index].place]), STEP_PX)
     return _assembled(arms, along, known, trunk, bridges)
 
 
@@ -213,7 +225,7 @@ def _trunk(gates: dict[int, _Gate]) -> _Trunk:
 
     def unlikeliness(pair: tuple[int, int]) -> float:
         first, second = gates[pair[0]], gates[pair[1]]
-        narrow = min(first.radius_px, second.radius_px)
+        narrow = max(min(first.radius_px, second.radius_px), 0.5)
         widest = max((gate.radius_px for index, gate in gates.items() if index not in pair), default=0.0)
         return _turn_deg(first, second) + WIDER_DEG * max(0.0, widest / narrow - 1.0)
 

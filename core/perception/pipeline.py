@@ -228,7 +228,10 @@ class Pipeline:
         with watch.stage("gaps"):
             skeletons = gaps.repair(skeletons, config.gaps)
         with watch.stage("graph"):
-            graph = build_graph(skeletons.vessel, found.vessel, config.cleaning, found.vessel_probability)
+            # Walls are looked for at 0.5, the mask ends where the user has said.
+            below = np.float32(0.5 - config.segmentation.vessel_threshold)
+            level = found.vessel_probability + below if below else found.vessel_probability
+            graph = build_graph(skeletons.vessel, found.vessel, config.cleaning, level)
         return replace(scene, skeletons=skeletons, vessel_graph=graph, refusal=quality.check_graph(graph, config.vectors))
 
     def _see_window(

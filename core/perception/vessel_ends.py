@@ -42,7 +42,7 @@ def led_on(points: Points, radius_px: float, level: NDArray[np.float32]) -> Poin
     onward = polyline.continued(kept, max(REACH_RADII * radius_px, 1.5 * lost_px) + 1.0, max(radius_px, HEADING_PX))
     onward = _between_walls(onward, radius_px, level, lost_px)
     way_out = _way_out(onward, limit)
-    reach = lost_px if way_out is None or way_out > REACH_RADII * radius_px else way_out
+    reach = lost_px if way_out is None or way_out > max(REACH_RADII * radius_px, lost_px) else way_out
     if reach < 0.5:
         return kept
     return np.concatenate([kept[:-1], polyline.resample(polyline.cut(onward, 0.0, reach), STEP_PX)])

@@ -39,6 +39,7 @@ class _Line:
     points: Points
     radius: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     half_width: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """Of the line as it was centred: where it is led elsewhere since then, nobody asks for it."""
 
 
 def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability: NDArray[np.float32] | None = None) -> VesselGraph:
@@ -49,7 +50,7 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability:
     skeleton : one-pixel skeleton of the vessel, shape (h, w).
     mask : the vessel's mask it came from: radius, centring, and how far the ends reach.
     config : whether spurs are pruned.
-    probability : what the mask came from (h, w): walls to a smaller fraction of a pixel, and how soft they are.
+    probability : what the mask came from (h, w), 0.5 at its edge: walls to a smaller fraction of a pixel, and how soft they are.
     """
     traced = pixel_graph.trace(skeleton)
     if len(traced.chains) > MAX_CHAINS:
@@ -80,6 +81,8 @@ def _lead_on_ends(lines: list[_Line], nodes: Points, radius: RadiusMap, level: N
     for line in lines:
         ends = [side for side, node in ((-1, line.start), (1, line.end)) if degrees[node] == 1 and len(line.points) >= 4]
         for side in ends:
+            if len(line.points) < 4:
+                continue  # the other end has taken most of it
             # In the corner where the skeleton ends the radius would be nearly nothing.
             own_radius = polyline.median(line.radius[::side][-RADIUS_POINTS:])
             points = led_on(line.points[::side], own_radius, level)
@@ -96,15 +99,19 @@ def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, lev
     """The lines led to junctions that are put anew; returns the nodes, some of which may be new, too."""
     degrees, sizes = _degrees(lines, len(nodes)).tolist(), radius.at(nodes).tolist()
     places: list[Points] = list(nodes)
-    for group, inner in _openings(lines, degrees, sizes):
+    pending = _openings(lines, degrees, sizes)
+    while pending:
+        group, inner = pending.pop(0)
         sides = [
             (line, outward)
             for line in lines
             for outward in (True, False)
             if line not in inner and (line.start if outward else line.end) in group
         ]
-        anew = rebuild([_arm(line, outward, degrees, sizes) for line, outward in sides], level)
+        anew = rebuild([_arm(line, outward, degrees, sizes) for line, outward in sides], level, is_alone=len(group) == 1)
         if anew is None:
+            if len(group) > 1:
+                pending += [({node}, []) for node in sorted(group)]
             continue
         numbers = sorted(group)[: len(anew.places)]
         numbers += range(len(places), len(places) + len(anew.places) - len(numbers))
@@ -231,9 +238,9 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
     even = bundle.smooth(
         bundle.resample(Bundle.of([line.points for line in lines]), STEP_PX), SMOOTHING_PX / STEP_PX, keeps_bends=True
     )
-    counts = np.diff(even.starts)
-    # A line of one or two points has no inner point to centre.
-    inner = np.repeat(counts, counts) >= 3
+    # A line's ends stay in their nodes, and one of two points has no others.
+    inner = np.ones(len(even.points), np.bool_)
+    inner[even.starts[:-1]] = inner[even.starts[1:] - 1] = False
     normal = bundle.normals(even)
     probe = 0.5 * radius.at(even.points)[:, None] * normal
     wider, narrower = np.split(radius.at(np.concatenate([even.points + probe, even.points - probe])), 2)
@@ -261,9 +268,9 @@ def _between_walls(
     seen = np.isfinite(half)
     weight = np.where(seen, np.minimum(on_right, on_left) ** 2, 0.0)
     sums = bundle.smooth(Bundle(np.column_stack([np.where(seen, half, 0.0) * weight, weight]), lines.starts), WIDTH_PX / STEP_PX)
-    around = np.clip(
-        sums.points[:, 0] / np.maximum(sums.points[:, 1], 1e-9), (1.0 - WIDTH_SHARE) * half, (1.0 + WIDTH_SHARE) * half
-    )
+    # Smoothing mirrors a line through its ends, where a weight that is nothing becomes less.
+    around = np.where(sums.points[:, 1] > 1e-6, sums.points[:, 0] / np.maximum(sums.points[:, 1], 1e-6), half)
+    around = np.clip(around, (1.0 - WIDTH_SHARE) * half, (1.0 + WIDTH_SHARE) * half)
     by_walls = on_right**2 * (right - around) + on_left**2 * (around - left)
     shift = np.where(seen, by_walls / (on_right**2 + on_left**2), 0.0)
     return np.clip(shift, -MOST_SHIFT_PX, MOST_SHIFT_PX), half

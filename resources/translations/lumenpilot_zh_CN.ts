@@ -682,6 +682,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>a profile's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit</source>
+        <translation>配置方案名称由 1 至 60 个字母、数字或 - _ . ( ) + 组成，并以字母或数字开头</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>was no TOML</source>
         <translation>不是 TOML 文件</translation>
     </message>
@@ -697,8 +702,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>too much is wrong; the defaults are used</source>
-        <translation>错误过多；使用默认值</translation>
+        <source>too much is wrong</source>
+        <translation>错误过多</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -2139,6 +2144,26 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>is no TOML ({why})</source>
         <translation>不是 TOML 文件（{why}）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>profile {name}: it is no longer there ({path})</source>
+        <translation>配置方案 {name}：已不存在（{path}）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>profile {name}: a preset has this name; choose another one</source>
+        <translation>配置方案 {name}：与预设同名；请换一个名称</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>profile {name}: it comes with the program and cannot be deleted</source>
+        <translation>配置方案 {name}：随程序提供，不能删除</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>profile {name}: cannot be deleted ({why})</source>
+        <translation>配置方案 {name}：无法删除（{why}）</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9329,8 +9354,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>extend ends along their tangent to the edge of mask or image</source>
-        <translation>沿切线把端点延长到掩膜或图像边缘</translation>
+        <source>lead ends on as they run, to the edge of mask or image</source>
+        <translation>把端点顺着走向延长到掩膜或图像边缘</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9339,8 +9364,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>lead vessel branches straight into their trunk where the skeleton bends</source>
-        <translation>骨架弯折处，让血管分支直接汇入主干</translation>
+        <source>lead vessel branches into their trunk as their walls run, not as the skeleton</source>
+        <translation>让血管分支顺着管壁而不是骨架汇入主干</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

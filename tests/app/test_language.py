@@ -169,6 +169,7 @@ def test_texts_with_values_are_translated_and_filled(chinese: None) -> None:
             "/x/settings.toml：不是 TOML 文件（Expected '='）；文件保留为 settings.toml.bad-1，并使用默认值",
         ),
         ("/x/settings.toml: rig.kind: unknown key, kept but not used", "/x/settings.toml：rig.kind：未知的键，保留但不使用"),
+        ("/x/settings.toml: too much is wrong; the defaults are used", "/x/settings.toml：错误过多；使用默认值"),
         ("settings.toml was changed meanwhile: the old one is kept as a.bad", "settings.toml 在此期间被修改：旧文件保留为 a.bad"),
         ("something that nobody has listed", "something that nobody has listed"),
         ("", ""),

@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -424,6 +425,65 @@ def test_one_trunk_runs_through_junctions_that_are_near_to_each_other(apart_px: 
     assert covered.min() < 62.0
     assert covered.max() > 578.0
     assert np.diff(np.sort(covered)).max() < 8.0, "the trunk is there from end to end, on its own line"
+
+
+def has_no_jump_and_stays_within(graph: VesselGraph, *tubes: tuple[Points, float]) -> bool:
+    """Whether all edges are evenly drawn, end in their nodes, and run within the vessel."""
+    inside = np.maximum.reduce([depth(line, radius) for line, radius in tubes])
+    for edge in graph.edges:
+        np.testing.assert_allclose(edge.points[[0, -1]], graph.nodes[[edge.start, edge.end]])
+        places = np.rint(edge.points).astype(int)
+        if np.hypot(*np.diff(edge.points, axis=0).T).max() > 6.0 or (inside[places[:, 1], places[:, 0]] < -1.0).any():
+            return False
+    return True
+
+
+def test_a_branch_of_a_branch_stays_on_it_however_near_the_trunk_is() -> None:
+    scene = (
+        (np.array([[320.0, -20.0], [320.0, 500.0]]), 16.0),
+        (np.array([[320.0, 260.0], [60.0, 230.0]]), 13.0),
+        (np.array([[272.0, 254.0], [268.0, 60.0]]), 8.0),
+    )
+    graph = perceived(*scene)
+    assert degrees(graph) == [1, 1, 1, 1, 3, 3]
+    assert has_no_jump_and_stays_within(graph, *scene)
+    twig = next(edge for edge in graph.edges if edge.points[:, 1].min() < 80 and edge.points[:, 0].max() < 300)
+    assert max(twig.points[:, 1]) == pytest.approx(254.0, abs=8.0)
+
+
+def test_a_link_between_two_vessels_leaves_both_whole() -> None:
+    scene = (
+        (np.array([[300.0, -20.0], [300.0, 500.0]]), 10.0),
+        (np.array([[340.0, -20.0], [340.0, 500.0]]), 10.0),
+        (np.array([[300.0, 240.0], [340.0, 240.0]]), 8.0),
+    )
+    graph = perceived(*scene)
+    assert degrees(graph) == [1, 1, 1, 1, 3, 3]
+    assert has_no_jump_and_stays_within(graph, *scene)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_whatever_a_vessel_looks_like_its_lines_end_in_their_nodes_and_in_the_picture(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    width, height = int(rng.integers(40, 200)), int(rng.integers(40, 200))
+    mask = np.zeros((height, width), np.uint8)
+    for _ in range(int(rng.integers(2, 7))):
+        corners = (rng.uniform(-0.2, 1.2, (int(rng.integers(2, 6)), 2)) * (width, height)).astype(np.int32)
+        cv2.polylines(mask, [corners], bool(rng.random() < 0.3), 1, int(rng.integers(1, 24)))
+    graph = build_graph(skeleton.thin_half_size(mask > 0), mask > 0, CleaningConfig())
+    for edge in graph.edges:
+        assert len(edge.points) == len(edge.radius) >= 1
+        assert np.isfinite(edge.points).all()
+        np.testing.assert_allclose(edge.points[0], graph.nodes[edge.start])
+        np.testing.assert_allclose(edge.points[-1], graph.nodes[edge.end])
+        assert (edge.points > -10.0).all()
+        assert (edge.points < (width + 9.0, height + 9.0)).all()
+
+
+def test_a_wall_on_the_very_edge_of_belief_is_survived() -> None:
+    level = np.zeros((100, 100), np.float32)
+    level[50, 5:95] = level[5:95, 50] = 0.5
+    assert len(build_graph(level >= 0.5, level >= 0.5, CleaningConfig(), level).edges) >= 1
 
 
 def test_an_island_in_a_junction_stays_a_loop() -> None:

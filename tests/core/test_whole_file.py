@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -48,3 +49,42 @@ def test_a_disk_that_does_not_take_it_leaves_the_old_one_and_is_named(
     assert caught.value.filename == str(path)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_that_cannot_be_synced_is_no_failure_for_the_new_file_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cannot(_: Path) -> None:
+        raise OSError(errno.EINVAL, "Invalid argument")
+
+    monkeypatch.setattr("core.whole_file.sync_folder", cannot)
+    write_whole(tmp_path / "a.toml", b"new", durable=True)
+    assert (tmp_path / "a.toml").read_bytes() == b"new"
+
+
+def test_where_permissions_cannot_be_set_it_is_written_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def not_ours(*_: object) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    path = tmp_path / "a.toml"
+    path.write_bytes(b"old")
+    monkeypatch.setattr(shutil, "copymode", not_ours)
+    write_whole(path, b"new")
+    assert path.read_bytes() == b"new"
+
+
+def test_what_was_there_is_kept_beside_it_only_once_the_new_one_has_found_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, older = tmp_path / "a.toml", tmp_path / "a.older.toml"
+    for text in (b"one", b"two", b"three"):
+        write_whole(path, text, durable=True, older=older)
+    assert (path.read_bytes(), older.read_bytes()) == (b"three", b"two")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(path, b"four", durable=True, older=older)
+    assert (path.read_bytes(), older.read_bytes()) == (b"three", b"two")
