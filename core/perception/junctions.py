@@ -38,6 +38,8 @@ HEADING_RADII = 1.0
 """A branch's direction is taken over this many of its radii, and at least 12 px."""
 CLEAR_RADII = 1.0
 """The opening reaches at least so many of the branch's radii beyond the junction's new place."""
+TRUNK_LEAD_DEG = 10.0
+"""Where another pair of a lone junction's arms is a trunk nearly as likely, by so much, none is: a symmetric fork stays one."""
 WIDER_DEG = 100.0
 """A trunk is as wide as its branches: one that is left twice as wide is as unlikely as this much of a turn."""
 WALL_SEARCH_PX = 8
@@ -124,6 +126,8 @@ def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> R
     known = {index: gate for index, gate in enumerate(gates) if gate is not None}
     if len(known) < 2:
         return None
+    if is_alone and len(known) == len(arms) and not _has_clear_trunk(known):
+        return _fork(arms, along, known)
     trunk = _trunk(known)
     bridges = {index: _side_branch(gate, trunk) for index, gate in known.items() if index not in trunk.ends}
     # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
@@ -220,16 +224,54 @@ def _gate(arm: Arm, along: NDArray[np.float64], at_least_px: float) -> _Gate | N
     )
 
 
+def _unlikeliness(gates: dict[int, _Gate], pair: tuple[int, int]) -> float:
+    """Of a trunk between two arms, in degrees: how much it turns, and how much narrower it is than the others."""
+    first, second = gates[pair[0]], gates[pair[1]]
+    narrow = max(min(first.radius_px, second.radius_px), 0.5)
+    widest = max((gate.radius_px for index, gate in gates.items() if index not in pair), default=0.0)
+    return _turn_deg(first, second) + WIDER_DEG * max(0.0, widest / narrow - 1.0)
+
+
+def _has_clear_trunk(gates: dict[int, _Gate]) -> bool:
+    """Whether no other pair that shares an arm with the likeliest one is nearly as likely."""
+    ranked = sorted((_unlikeliness(gates, pair), pair) for pair in combinations(gates, 2))
+    best, ends = ranked[0]
+    rivals = [unlikeliness for unlikeliness, pair in ranked[1:] if set(pair) & set(ends)]
+    return not rivals or rivals[0] >= best + TRUNK_LEAD_DEG
+
+
+def _fork(arms: list[Arm], along: list[NDArray[np.float64]], gates: dict[int, _Gate]) -> Rebuilt:
+    """A junction without a trunk: all arms straight to the point that fits their directions best."""
+    place = _meeting_point(list(gates.values()))
+    anew = []
+    for index, (arm, way) in enumerate(zip(arms, along, strict=True)):
+        gate = gates[index]
+        bridge = polyline.resample(np.array([place, gate.place]), STEP_PX)
+        rest = int(way.searchsorted(gate.position_px + 0.5 * STEP_PX, "right"))
+        points = np.concatenate([bridge, arm.points[rest:]])
+        anew.append(
+            (0, replace(arm, points=points, radius=np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest:]])))
+        )
+    return Rebuilt(np.array([place]), [], anew)
+
+
+def _meeting_point(gates: list[_Gate]) -> Point:
+    """Least-squares meeting point of the arms' lines, held to their gates' middle by a small weight."""
+    centre_x, centre_y = (sum(gate.place[axis] for gate in gates) / len(gates) for axis in (0, 1))
+    # The sum over the gates of the projection across each one's direction: (xx, xy; xy, yy) . place = (right, below).
+    xx = yy = 0.05
+    xy, right, below = 0.0, 0.05 * centre_x, 0.05 * centre_y
+    for gate in gates:
+        (x, y), (u, v) = gate.place, gate.outward
+        xx, xy, yy = xx + v * v, xy - u * v, yy + u * u
+        right, below = right + v * (v * x - u * y), below + u * (u * y - v * x)
+    determinant = xx * yy - xy * xy
+    return (yy * right - xy * below) / determinant, (xx * below - xy * right) / determinant
+
+
 def _trunk(gates: dict[int, _Gate]) -> _Trunk:
     """The curve through the opening between the two arms that go on most smoothly and are wide enough for the others."""
-
-    def unlikeliness(pair: tuple[int, int]) -> float:
-        first, second = gates[pair[0]], gates[pair[1]]
-        narrow = max(min(first.radius_px, second.radius_px), 0.5)
-        widest = max((gate.radius_px for index, gate in gates.items() if index not in pair), default=0.0)
-        return _turn_deg(first, second) + WIDER_DEG * max(0.0, widest / narrow - 1.0)
-
-    ends = min(combinations(gates, 2), key=unlikeliness)
+    ends = min(combinations(gates, 2), key=lambda pair: _unlikeliness(gates, pair))
     first, second = gates[ends[0]], gates[ends[1]]
     points = _hermite(first, second)
     return _Trunk(ends, points, np.linspace(first.radius_px, second.radius_px, len(points)))

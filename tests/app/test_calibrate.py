@@ -28,7 +28,9 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_set(SynthPlan(out, 10, 77, (320, 240)))
     rows = [json.loads(line) for line in (out / "truth.jsonl").read_text().splitlines()]
     for row in rows[::2]:
-        row["theta_deg"] = None if row["theta_deg"] is None else 180.0 - abs(row["theta_deg"])
+        if row["theta_deg"] is not None:
+            row["theta_deg"] = 180.0 - row["theta_deg"]
+            row["theta_signed_deg"] = (row["theta_signed_deg"] + 360.0) % 360.0 - 180.0
     (out / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     return out
 

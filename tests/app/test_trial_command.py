@@ -149,14 +149,11 @@ def test_a_damaged_folder_is_refused_and_left_alone(faked: list[Any], tmp_path: 
 
 
 def test_a_plan_is_written_as_a_whole_or_not_at_all(faked: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write = Path.write_bytes
-
-    def half(self: Path, data: bytes) -> int:
-        write(self, data[: len(data) // 2])
+    def full(self: Path, _: Path) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self))
 
     with monkeypatch.context() as patch, pytest.raises(TrialError, match=r"cannot be used \(No space left"):
-        patch.setattr(Path, "write_bytes", half)
+        patch.setattr(Path, "replace", full)
         call("0:1", out=tmp_path)
     assert list(tmp_path.iterdir()) == []
     call("0:1", out=tmp_path)
