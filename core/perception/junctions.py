@@ -179,11 +179,15 @@ def _assembled(
             bridge = bridges[index][1]
         else:
             bridge = trunk.points[mark::-1] if index == trunk.ends[0] else trunk.points[mark:]
-        rest = int(way.searchsorted(gate.position_px + 0.5 * STEP_PX, "right"))
-        points = np.concatenate([bridge, arm.points[rest:]])
-        radius = np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest:]])
-        anew.append((marks.index(mark), replace(arm, points=points, radius=radius)))
+        anew.append((marks.index(mark), _bridged(arm, way, gate, bridge)))
     return Rebuilt(trunk.points[marks], pieces, anew)
+
+
+def _bridged(arm: Arm, along: NDArray[np.float64], gate: _Gate, bridge: Points) -> Arm:
+    """An arm with a line from the junction to its gate in place of what it had within the opening."""
+    rest = int(along.searchsorted(gate.position_px + 0.5 * STEP_PX, "right"))
+    radius = np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest:]])
+    return replace(arm, points=np.concatenate([bridge, arm.points[rest:]]), radius=radius)
 
 
 def _rejoined(arm: Arm, along: NDArray[np.float64], place: Point) -> Arm:
@@ -243,15 +247,8 @@ def _has_clear_trunk(gates: dict[int, _Gate]) -> bool:
 def _fork(arms: list[Arm], along: list[NDArray[np.float64]], gates: dict[int, _Gate]) -> Rebuilt:
     """A junction without a trunk: all arms straight to the point that fits their directions best."""
     place = _meeting_point(list(gates.values()))
-    anew = []
-    for index, (arm, way) in enumerate(zip(arms, along, strict=True)):
-        gate = gates[index]
-        bridge = polyline.resample(np.array([place, gate.place]), STEP_PX)
-        rest = int(way.searchsorted(gate.position_px + 0.5 * STEP_PX, "right"))
-        points = np.concatenate([bridge, arm.points[rest:]])
-        anew.append(
-            (0, replace(arm, points=points, radius=np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest:]])))
-        )
+    straight = [polyline.resample(np.array([place, gates[index].place]), STEP_PX) for index in range(len(arms))]
+    anew = [(0, _bridged(arm, along[k], gates[k], straight[k])) for k, arm in enumerate(arms)]
     return Rebuilt(np.array([place]), [], anew)
 
 

@@ -245,8 +245,9 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
     probe = 0.5 * radius.at(even.points)[:, None] * normal
     wider, narrower = np.split(radius.at(np.concatenate([even.points + probe, even.points - probe])), 2)
     centred = _moved(even, normal, np.where(inner, 0.5 * (wider - narrower), 0.0))
-    shift, half_width = _between_walls(centred, radius.at(centred.points), level)
-    centred = _moved(centred, bundle.normals(centred), np.where(inner, shift, 0.0))
+    normal = bundle.normals(centred)
+    shift, half_width = _between_walls(centred, normal, radius.at(centred.points), level)
+    centred = _moved(centred, normal, np.where(inner, shift, 0.0))
     half_widths = centred.split(half_width)
     for line, points, half in zip(lines, centred.split(centred.points), half_widths, strict=True):
         line.points, line.half_width = points, half
@@ -254,14 +255,13 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
 
 
 def _between_walls(
-    lines: Bundle, expected: NDArray[np.float64], level: NDArray[np.float32]
+    lines: Bundle, normal: Points, expected: NDArray[np.float64], level: NDArray[np.float32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """By how much each point lies beside the middle (N,), and half the way from wall to wall (N,); 0 and NaN where one is not seen.
 
     A vessel's width changes slowly. So where one wall is soft, the middle is rather as far from the other one as half the width
     that it has around there.
     """
-    normal = bundle.normals(lines)
     right, on_right = sharp_walls(level, lines.points, normal, expected)
     left, on_left = sharp_walls(level, lines.points, -normal, expected)
     half = 0.5 * (right + left)
