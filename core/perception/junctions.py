@@ -39,7 +39,9 @@ HEADING_RADII = 1.0
 CLEAR_RADII = 1.0
 """The opening reaches at least so many of the branch's radii beyond the junction's new place."""
 TRUNK_LEAD_DEG = 10.0
-"""Where another pair of a lone junction's arms is a trunk nearly as likely, by so much, none is: a symmetric fork stays one."""
+"""Where another pair of a lone junction's arms is a trunk nearly as likely, by so much, both are: a symmetric fork stays one."""
+FORKED_PX = 0.5
+"""Two trunks that are so far apart have parted."""
 WIDER_DEG = 100.0
 """A trunk is as wide as its branches: one that is left twice as wide is as unlikely as this much of a turn."""
 WALL_SEARCH_PX = 8
@@ -126,8 +128,9 @@ def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> R
     known = {index: gate for index, gate in enumerate(gates) if gate is not None}
     if len(known) < 2:
         return None
-    if is_alone and len(known) == len(arms) and not _has_clear_trunk(known):
-        return _fork(arms, along, known)
+    equal = _equal_trunks(known) if is_alone and len(known) == len(arms) else None
+    if equal is not None:
+        return _fork(arms, along, known, equal, level)
     trunk = _trunk(known)
     bridges = {index: _side_branch(gate, trunk) for index, gate in known.items() if index not in trunk.ends}
     # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
@@ -236,39 +239,44 @@ def _unlikeliness(gates: dict[int, _Gate], pair: tuple[int, int]) -> float:
     return _turn_deg(first, second) + WIDER_DEG * max(0.0, widest / narrow - 1.0)
 
 
-def _has_clear_trunk(gates: dict[int, _Gate]) -> bool:
-    """Whether no other pair that shares an arm with the likeliest one is nearly as likely."""
-    ranked = sorted((_unlikeliness(gates, pair), pair) for pair in combinations(gates, 2))
-    best, ends = ranked[0]
-    rivals = [unlikeliness for unlikeliness, pair in ranked[1:] if set(pair) & set(ends)]
-    return not rivals or rivals[0] >= best + TRUNK_LEAD_DEG
+def _equal_trunks(gates: dict[int, _Gate]) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """Of three arms, the two pairs that are a trunk nearly alike, the arm of both first; None for a clear trunk."""
+    if len(gates) != 3:
+        return None
+    (best, ends), (other, others), _ = sorted((_unlikeliness(gates, pair), pair) for pair in combinations(gates, 2))
+    if other >= best + TRUNK_LEAD_DEG:
+        return None
+    (parent,) = set(ends) & set(others)
+    (first,), (second,) = set(ends) - {parent}, set(others) - {parent}
+    return (parent, first), (parent, second)
 
 
-def _fork(arms: list[Arm], along: list[NDArray[np.float64]], gates: dict[int, _Gate]) -> Rebuilt:
-    """A junction without a trunk: all arms straight to the point that fits their directions best."""
-    place = _meeting_point(list(gates.values()))
-    straight = [polyline.resample(np.array([place, gates[index].place]), STEP_PX) for index in range(len(arms))]
-    anew = [(0, _bridged(arm, along[k], gates[k], straight[k])) for k, arm in enumerate(arms)]
-    return Rebuilt(np.array([place]), [], anew)
-
-
-def _meeting_point(gates: list[_Gate]) -> Point:
-    """Least-squares meeting point of the arms' lines, held to their gates' middle by a small weight."""
-    centre_x, centre_y = (sum(gate.place[axis] for gate in gates) / len(gates) for axis in (0, 1))
-    # The sum over the gates of the projection across each one's direction: (xx, xy; xy, yy) . place = (right, below).
-    xx = yy = 0.05
-    xy, right, below = 0.0, 0.05 * centre_x, 0.05 * centre_y
-    for gate in gates:
-        (x, y), (u, v) = gate.place, gate.outward
-        xx, xy, yy = xx + v * v, xy - u * v, yy + u * u
-        right, below = right + v * (v * x - u * y), below + u * (u * y - v * x)
-    determinant = xx * yy - xy * xy
-    return (yy * right - xy * below) / determinant, (xx * below - xy * right) / determinant
+def _fork(
+    arms: list[Arm],
+    along: list[NDArray[np.float64]],
+    gates: dict[int, _Gate],
+    trunks: tuple[tuple[int, int], tuple[int, int]],
+    level: NDArray[np.float32],
+) -> Rebuilt:
+    """A junction without a clear trunk: its parent goes on smoothly into both branches, and ends where they part."""
+    curves = [_between_walls(_trunk_of(gates, ends), level).points for ends in trunks]
+    both = np.stack([curve[: min(len(curves[0]), len(curves[1]))] for curve in curves])
+    apart = np.hypot(*(both[0] - both[1]).T) > FORKED_PX
+    mark = min(max(int(apart.argmax()), 2), both.shape[1] - 2)
+    shared = both[:, : mark + 1].mean(axis=0)
+    bridges = {trunks[0][0]: shared[::-1]}
+    for (_, branch), curve in zip(trunks, curves, strict=True):
+        bridges[branch] = np.concatenate([shared[-1:], curve[mark + 1 :]])
+    anew = [(0, _bridged(arm, along[k], gates[k], bridges[k])) for k, arm in enumerate(arms)]
+    return Rebuilt(shared[-1:], [], anew)
 
 
 def _trunk(gates: dict[int, _Gate]) -> _Trunk:
     """The curve through the opening between the two arms that go on most smoothly and are wide enough for the others."""
-    ends = min(combinations(gates, 2), key=lambda pair: _unlikeliness(gates, pair))
+    return _trunk_of(gates, min(combinations(gates, 2), key=lambda pair: _unlikeliness(gates, pair)))
+
+
+def _trunk_of(gates: dict[int, _Gate], ends: tuple[int, int]) -> _Trunk:
     first, second = gates[ends[0]], gates[ends[1]]
     points = _hermite(first, second)
     return _Trunk(ends, points, np.linspace(first.radius_px, second.radius_px, len(points)))

@@ -411,6 +411,43 @@ def test_a_branch_bends_into_its_trunk_as_its_walls_do() -> None:
             assert off_by(trunk, edge) < 1.5
 
 
+def way_between(graph: VesselGraph, start: Point, end: Point) -> Points:
+    """The two edges that lead from one end of a fork to another one, as one line."""
+    from_start, to_end = (min(graph.edges, key=lambda edge: polyline.nearest(edge.points, near)[0]) for near in (start, end))
+    node = next(iter({from_start.start, from_start.end} & {to_end.start, to_end.end}))
+    inward = from_start.points if from_start.end == node else from_start.points[::-1]
+    outward = to_end.points if to_end.start == node else to_end.points[::-1]
+    return np.concatenate([inward, outward[1:]])
+
+
+def test_a_symmetric_fork_goes_on_smoothly_and_alike_into_both_branches() -> None:
+    stem = np.array([[-20.0, 240.0], [300.0, 240.0]])
+    up = curve((300.0, 240.0), (330.0, 234.0), (400.0, 200.0), (600.0, 60.0))
+    down = up * [1.0, -1.0] + [0.0, 480.0]
+    graph = perceived((stem, 16.0), (up, 15.0), (down, 15.0))
+    assert degrees(graph) == [1, 1, 1, 3]
+    ways = [way_between(graph, (20.0, 240.0), end) for end in ((590.0, 67.0), (590.0, 413.0))]
+    for way, true in zip(ways, (up, down), strict=True):
+        line = np.concatenate([stem, true[1:]])
+        inner = way[(way[:, 0] > 40) & (way[:, 0] < 560)]
+        assert max(polyline.nearest(line, (float(x), float(y)))[0] for x, y in inner) < 3.5
+        step = np.diff(polyline.resample(inner, 4.0), axis=0)
+        turn_deg = np.degrees(np.abs(np.diff(np.unwrap(np.arctan2(step[:, 1], step[:, 0])))))
+        assert turn_deg.max() < 12.0
+    mirrored = ways[1] * [1.0, -1.0] + [0.0, 480.0]
+    assert max(polyline.nearest(mirrored, (float(x), float(y)))[0] for x, y in ways[0]) < 0.5
+
+
+@pytest.mark.parametrize("turn_deg", [28.0, 32.0, 36.0])
+def test_a_trunk_that_bends_as_much_as_its_branch_turns_away_stays_on_its_line(turn_deg: float) -> None:
+    trunk = curve((-20.0, 240.0), (140.0, 238.0), (280.0, 240.0), (420.0, 205.0), (560.0, 120.0))
+    branch = np.array([[290.0, 239.0], [290.0, 239.0] + 220 * np.array(direction(turn_deg))])
+    graph = perceived((trunk, 16.0), (branch, 15.0))
+    way = way_between(graph, (20.0, 240.0), (550.0, 126.0))
+    inner = way[(way[:, 0] > 40) & (way[:, 0] < 530)]
+    assert max(polyline.nearest(trunk, (float(x), float(y)))[0] for x, y in inner) < 2.0
+
+
 @pytest.mark.parametrize("apart_px", [0.0, 14.0, 30.0, 46.0])
 @pytest.mark.parametrize("other_side", [False, True])
 def test_one_trunk_runs_through_junctions_that_are_near_to_each_other(apart_px: float, other_side: bool) -> None:
