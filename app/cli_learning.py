@@ -66,6 +66,9 @@ def train(
     end_weight: Annotated[
         float, typer.Option(min=0, max=20, help="how much more than elsewhere a pixel counts near the robot's ends")
     ] = 0.0,
+    robot_weight: Annotated[
+        float, typer.Option(min=0.1, max=10, help="how much the robot's loss counts beside the vessel's")
+    ] = 1.5,
     base: Annotated[
         int | None, typer.Option(min=4, max=128, help="plain U-Net of this base width instead of the folded one")
     ] = None,
@@ -92,6 +95,7 @@ def train(
         strip_share=strips,
         focus_share=focus,
         end_weight=end_weight,
+        robot_weight=robot_weight,
         keeps_statistics=remember > 0,
         stop_after=stop_after,
         seed=seed,

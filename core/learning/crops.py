@@ -29,6 +29,10 @@ _LAST_SHARE = 0.5
 _JITTER_PX = 10.0
 _EDGE_PX = 4
 """What is wrong farther than this from the robot's outline is no blur of it: a piece was missed or invented."""
+_WALL_PX = 3
+"""And what of a vessel is wrong farther than this from its wall shifts the line between the walls by more than a pixel."""
+_WALL_REACH_PX = 60.0
+"""So near to the robot's ends: the vessel's vector is fitted to 20 px to each side of the head."""
 _WRONG_PLACES = 32
 _WRONG_JITTER_PX = 30.0
 _END_REACH_PX = 20.0
@@ -112,7 +116,7 @@ class Seen:
 class Looks:
     """What a model saw in a frame at its first look, and in the end, where it has a second one.
 
-    ``wrong`` are places on pieces of robot that it missed or invented in the end.
+    ``wrong`` are places on pieces of robot, and of vessel beside the robot's ends, that it missed or invented in the end.
     """
 
     first: Seen
@@ -122,20 +126,22 @@ class Looks:
     @classmethod
     def at(cls, sample: Sample, segment: Segmenter, near: Segmenter | None = None) -> Looks:
         """Look at a frame, with a second look by `near`; raises DatasetError."""
-        image, _, truth = sample.load(WORKING_SIZE_PX)
+        image, vessel, robot = sample.load(WORKING_SIZE_PX)
         probabilities = segment(image)
         first = last = Seen.of(*probabilities)
         if near is not None:
             probabilities = look_again(image, probabilities, near)
             last = Seen.of(*probabilities)
-        return cls(first, last, tuple(_wrong_places(probabilities[1] >= np.float32(0.5), truth)))
+        found_vessel, found_robot = (probability >= np.float32(0.5) for probability in probabilities)
+        shifted = _wrong(found_vessel, vessel, _WALL_PX) & _beside_ends(robot)
+        return cls(first, last, tuple(_some_of(_wrong(found_robot, robot, _EDGE_PX)) + _some_of(shifted)))
 
 
 class NearCrops(Dataset[Crop]):
     """For the second look: windows as it is shown them, with what the first look (`looks`, one per sample) says there.
 
     Half of them come with what was seen in the end instead: a second look may be followed by another one (``SecondLook``).
-    ``plan.focus_share`` of them show a piece of robot that was missed or invented, of any frame with one.
+    ``plan.focus_share`` of them show a piece that was missed or invented, of any frame with one.
     """
 
     def __init__(self, samples: list[Sample], looks: list[Looks], plan: TrainingPlan) -> None:
@@ -186,11 +192,24 @@ def _beside(places: tuple[Point, ...], jitter_px: float, robot: Mask, rng: Gener
     return min(max(x + across, 0.0), width - 1.0), min(max(y + down, 0.0), height - 1.0)
 
 
-def _wrong_places(found: Mask, true: Mask) -> list[Point]:
-    """Places on what was missed or invented beyond the blur of an edge, evenly over it."""
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1))
+def _wrong(found: Mask, true: Mask, edge_px: int) -> Mask:
+    """What was missed or invented farther than `edge_px` from the true outline, or from the found one."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * edge_px + 1, 2 * edge_px + 1))
     near_found, near_true = (cv2.dilate(mask.view(np.uint8), disc) > 0 for mask in (found, true))
-    rows, columns = np.nonzero((true & ~near_found) | (found & ~near_true))
+    return np.asarray((true & ~near_found) | (found & ~near_true))
+
+
+def _beside_ends(robot: Mask) -> Mask:
+    """Pixels within ``_WALL_REACH_PX`` of an end of the true robot."""
+    beside = np.zeros(robot.shape, np.uint8)
+    for end in _true_ends(robot):
+        cv2.circle(beside, end, round(_WALL_REACH_PX), 1, cv2.FILLED)
+    return beside > 0
+
+
+def _some_of(mask: Mask) -> list[Point]:
+    """Places (x, y) evenly over a mask, ``_WRONG_PLACES`` or some more."""
+    rows, columns = np.nonzero(mask)
     step = max(1, len(rows) // _WRONG_PLACES)
     return list(zip(columns[::step].astype(float).tolist(), rows[::step].astype(float).tolist(), strict=True))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import pickle
 import shutil
 from pathlib import Path
@@ -21,6 +22,7 @@ from core.perception.second_look import MOST_LOOKS, WINDOW_PX, Planes, SecondLoo
 from core.perception.segmentation import OpenVinoSegmenter, open_second_look
 from core.perception.unet import DualUNet, UNetShape
 from core.perception.windows import MARGIN_PX, window_around
+from core.types import Point
 
 SIZE = (480, 640)
 TINY = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
@@ -38,11 +40,12 @@ class First:
 
     engine = "drawn"
 
-    def __init__(self, robot: np.ndarray) -> None:
+    def __init__(self, robot: np.ndarray, vessel: np.ndarray | None = None) -> None:
         self.robot = robot
+        self.vessel = np.full(SIZE, 0.25, np.float32) if vessel is None else vessel
 
     def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return np.full(SIZE, 0.25, np.float32), self.robot
+        return self.vessel, self.robot
 
 
 class Near:
@@ -183,9 +186,14 @@ def _samples(folder: Path, count: int = 2) -> list[Sample]:
     return samples
 
 
+def sees(robot: np.ndarray) -> First:
+    """A first look that knows the samples' vessel."""
+    return First(robot, bar(0, 500))
+
+
 def test_windows_are_shown_with_their_labels_and_the_first_look(tmp_path: Path) -> None:
     samples = _samples(tmp_path)
-    looks = [Looks.at(sample, First(bar(0, 230))) for sample in samples]
+    looks = [Looks.at(sample, sees(bar(0, 230))) for sample in samples]
     plan = TrainingPlan(steps=20, batch=4, crop=(WINDOW_PX, WINDOW_PX), look_share=0.0, seed=3)
     crops = NearCrops(samples, looks, plan)
     assert len(crops) == 80
@@ -203,7 +211,7 @@ def test_windows_are_shown_with_their_labels_and_the_first_look(tmp_path: Path) 
 def test_what_the_first_look_got_wrong_is_shown(tmp_path: Path) -> None:
     """The first look is blind: without its errors, nobody would know where to look."""
     samples = _samples(tmp_path, 1)
-    looks = [Looks.at(samples[0], First(np.zeros(SIZE, np.float32)))]
+    looks = [Looks.at(samples[0], sees(np.zeros(SIZE, np.float32)))]
     assert looks[0].first.places == ()
     crops = NearCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0))
     shown = sum(bool(crops[index][1][1].any()) for index in range(100))
@@ -212,21 +220,37 @@ def test_what_the_first_look_got_wrong_is_shown(tmp_path: Path) -> None:
 
 def test_wrong_are_pieces_missed_or_invented_and_not_the_blur_of_an_edge(tmp_path: Path) -> None:
     sample = _samples(tmp_path, 1)[0]  # the robot ends at 250
-    assert Looks.at(sample, First(bar(0, 252))).wrong == ()
-    missed = Looks.at(sample, First(bar(0, 150))).wrong
+    assert Looks.at(sample, sees(bar(0, 252))).wrong == ()
+    missed = Looks.at(sample, sees(bar(0, 150))).wrong
     assert missed
     assert all(150 < x < 250 and abs(y - 240) <= 4 for x, y in missed)
-    invented = Looks.at(sample, First(np.maximum(bar(0, 250), bar(400, 460, row=100)))).wrong
+    invented = Looks.at(sample, sees(np.maximum(bar(0, 250), bar(400, 460, row=100)))).wrong
     assert invented
     assert all(400 <= x < 460 and abs(y - 100) <= 4 for x, y in invented)
 
 
+def test_wrong_is_a_vessels_wall_beside_the_robots_end_too(tmp_path: Path) -> None:
+    sample = _samples(tmp_path, 1)[0]  # the robot ends at 250, the vessel at 500
+    first = sees(bar(0, 250))
+
+    def with_wall(shift_px: int, *, until: int = 640) -> tuple[Point, ...]:
+        vessel = first.vessel.copy()
+        vessel[:, :until] = np.roll(vessel, shift_px, axis=0)[:, :until]
+        return Looks.at(sample, First(bar(0, 250), vessel)).wrong
+
+    assert with_wall(0) == () and with_wall(2) == (), "that is the blur of an edge"
+    shifted = with_wall(6)
+    assert shifted
+    assert all(math.hypot(x - 246, y - 240) <= 64 for x, y in shifted)
+    assert with_wall(6, until=150) == (), "nobody measures so far behind the head"
+
+
 def test_what_the_second_look_mends_is_not_wrong(tmp_path: Path) -> None:
     def near(planes: Planes, /) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(planes.shape[:2], np.float32), (planes[:, :, 0] < 100).astype(np.float32)
+        return planes[:, :, 3] / np.float32(255), (planes[:, :, 0] < 100).astype(np.float32)
 
     sample = _samples(tmp_path, 1)[0]
-    first = First(bar(0, 210))
+    first = sees(bar(0, 210))
     assert Looks.at(sample, first).wrong
     assert Looks.at(sample, first, near).wrong == ()
     looks = Looks.at(sample, first, near)
@@ -242,7 +266,7 @@ def test_what_the_second_look_mends_is_not_wrong(tmp_path: Path) -> None:
 def test_focused_windows_show_what_was_wrong(tmp_path: Path) -> None:
     """Two frames, one of them understood: with focus, the piece that was missed in the other is in nearly every window."""
     samples = _samples(tmp_path)
-    looks = [Looks.at(samples[0], First(bar(0, 250))), Looks.at(samples[1], First(bar(0, 200)))]
+    looks = [Looks.at(samples[0], sees(bar(0, 250))), Looks.at(samples[1], sees(bar(0, 200)))]
     assert looks[0].wrong == () and looks[1].wrong
 
     def missed_shown(focus: float) -> int:
