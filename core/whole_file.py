@@ -6,7 +6,11 @@ import contextlib
 import os
 import secrets
 import shutil
+import time
 from pathlib import Path
+
+LEFT_AFTER_S = 60.0
+"""A file aside that nobody has written to for so long was left by a process that was killed."""
 
 
 def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path | None = None) -> None:
@@ -40,6 +44,14 @@ def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path |
     if durable:
         with contextlib.suppress(OSError):  # some file systems cannot; the new file is in place by now
             sync_folder(target.parent)
+
+
+def sweep_unfinished(folder: Path) -> None:
+    """Remove what a process that was killed left of its files; what cannot be removed stays."""
+    for aside in folder.glob(".*.part"):
+        with contextlib.suppress(OSError):
+            if time.time() - aside.stat().st_mtime > LEFT_AFTER_S:
+                aside.unlink()
 
 
 def sync_folder(folder: Path) -> None:

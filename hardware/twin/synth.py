@@ -23,7 +23,7 @@ from core.config import PerceptionConfig
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.types import Points
-from core.whole_file import write_whole
+from core.whole_file import sweep_unfinished, write_whole
 from hardware.twin.appearance import LOOK_FAMILIES, Appearance, default_appearance, make_view, random_appearance
 from hardware.twin.autopilot import RouteFollower
 from hardware.twin.phantom import Phantom
@@ -227,6 +227,7 @@ def _prepare(plan: SynthPlan) -> None:
             write_whole(path, f"{json.dumps(described)}\n".encode())  # first: it says whose folder this is
         for name in ("images", "masks", "episodes"):
             (plan.out / name).mkdir(exist_ok=True)
+            sweep_unfinished(plan.out / name)
     except OSError as error:
         raise SynthError(f"{plan.out}: cannot be written ({error.strerror}); choose another folder") from None
     except ValueError:

@@ -1,5 +1,6 @@
 """Labelled sets from the twin: complete, repeatable, continued after an interruption, disjoint by seed."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,6 +55,16 @@ def test_an_interrupted_set_goes_on_and_keeps_what_is_there(small_set: SynthPlan
     write_set(small_set)
     assert written == [0]
     assert (small_set.out / "images" / "000001.png").read_bytes() == before
+
+
+def test_what_a_killed_run_left_is_removed_and_what_another_one_writes_just_now_is_not(small_set: SynthPlan) -> None:
+    left, current = (small_set.out / "images" / f".{name}.part" for name in ("0011", "0022"))
+    left.write_bytes(b"half a picture")
+    current.write_bytes(b"half a picture")
+    os.utime(left, (1.0, 1.0))
+    write_set(small_set)
+    assert not left.exists() and current.exists()
+    current.unlink()
 
 
 def test_another_plan_does_not_overwrite_a_set(small_set: SynthPlan) -> None:
