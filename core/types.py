@@ -84,7 +84,7 @@ class RobotPath:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraphEdge:
-    """A piece of vessel: ``points`` (N, 2) from node ``start`` to node ``end``, lumen ``radius`` (N,) along it."""
+    """A piece of vessel: ``points`` (N, 2) from node ``start`` to node ``end``; how far the nearest wall is, ``radius`` (N,)."""
 
     start: int
     end: int

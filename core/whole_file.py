@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import secrets
 import shutil
 import time
@@ -11,6 +12,7 @@ from pathlib import Path
 
 LEFT_AFTER_S = 60.0
 """A file aside that nobody has written to for so long was left by a process that was killed."""
+_ASIDE = re.compile(r"\.[0-9a-f]{16}\.part")
 
 
 def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path | None = None) -> None:
@@ -24,7 +26,7 @@ def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path |
     if target.exists() and not target.is_file():  # a device or a pipe, whose place no file may take
         target.write_bytes(data)
         return
-    aside = target.with_name(f".{secrets.token_hex(8)}.part")  # a name of its own length could be too long
+    aside = target.with_name(f".{secrets.token_hex(8)}.part")  # as _ASIDE has it; a name of its own length could be too long
     try:
         with aside.open("wb") as file:
             if target.exists():
@@ -46,12 +48,17 @@ def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path |
             sync_folder(target.parent)
 
 
+def is_aside(path: Path) -> bool:
+    """Whether a file bears a name that ``write_whole`` gives a file until it is complete."""
+    return _ASIDE.fullmatch(path.name) is not None
+
+
 def sweep_unfinished(folder: Path) -> None:
-    """Remove what a process that was killed left of its files; what cannot be removed stays."""
-    for aside in folder.glob(".*.part"):
+    """Remove what a process that was killed a minute ago or longer left of its files; what cannot be removed stays."""
+    for path in filter(is_aside, folder.glob(".*.part")):
         with contextlib.suppress(OSError):
-            if time.time() - aside.stat().st_mtime > LEFT_AFTER_S:
-                aside.unlink()
+            if time.time() - path.stat().st_mtime > LEFT_AFTER_S:
+                path.unlink()
 
 
 def sync_folder(folder: Path) -> None:

@@ -30,7 +30,7 @@ _JITTER_PX = 10.0
 _EDGE_PX = 4
 """What is wrong farther than this from the robot's outline is no blur of it: a piece was missed or invented."""
 _WALL_PX = 3
-"""And what of a vessel is wrong farther than this from its wall shifts the line between the walls by more than a pixel."""
+"""Nor is what of a vessel is wrong farther than this from its wall: the line between the walls may lie more than a pixel aside."""
 _WALL_REACH_PX = 60.0
 """So near to the robot's ends: the vessel's vector is fitted to 20 px to each side of the head."""
 _WRONG_PLACES = 32
@@ -193,7 +193,7 @@ def _beside(places: tuple[Point, ...], jitter_px: float, robot: Mask, rng: Gener
 
 
 def _wrong(found: Mask, true: Mask, edge_px: int) -> Mask:
-    """What was missed or invented farther than `edge_px` from the true outline, or from the found one."""
+    """What was missed farther than `edge_px` from all that was found, or invented farther than that from all that is true."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * edge_px + 1, 2 * edge_px + 1))
     near_found, near_true = (cv2.dilate(mask.view(np.uint8), disc) > 0 for mask in (found, true))
     return np.asarray((true & ~near_found) | (found & ~near_true))

@@ -29,9 +29,9 @@ class TrainingPlan:
     """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours,
     ``look_share`` of them are changed in exposure, colour, sharpness and noise, and in ``strip_share`` of the first look's ones
     clips lie over the robot. ``stop_after`` ends before the learning rate has come down: for a run that another one goes on from.
-    ``focus_share`` of the samples are drawn by difficulty. Around the robot's true ends a pixel counts ``1 + end_weight`` times:
-    theta and state are measured there. With ``keeps_statistics`` the normalisation stays as it was learnt: that of a few frames
-    alike would ruin it for all others."""
+    ``focus_share`` of the samples are drawn by difficulty. The robot's loss counts ``robot_weight`` times the vessel's, and around
+    the robot's true ends a pixel ``1 + end_weight`` times: theta and state are measured there. With ``keeps_statistics`` the
+    normalisation stays as it was learnt: that of a few frames alike would ruin it for all others."""
 
     steps: int = 6000
     batch: int = 12

@@ -2,8 +2,9 @@
 
 In the widened lumen of a bifurcation the skeleton leaves the trunk's centerline towards the opening, by some pixels over some two
 radii to each side. So the part of each branch within the opening is replaced: a trunk goes on smoothly through it, and a side
-branch runs to the trunk as its walls do, as far as they can be seen. Junctions so near to each other that no branch in between
-leaves their openings are taken together: one trunk runs through all of them.
+branch runs to the trunk as its walls do, as far as they can be seen. A stem that might go on into either branch does so into both;
+where the branches might be each other's trunk, too, all three go straight to one point. Junctions so near to each other that no
+branch in between leaves their openings are taken together: one trunk runs through all of them.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ HEADING_RADII = 1.0
 CLEAR_RADII = 1.0
 """The opening reaches at least so many of the branch's radii beyond the junction's new place."""
 TRUNK_LEAD_DEG = 10.0
-"""Where another pair of a lone junction's arms is a trunk nearly as likely, by so much, both are: a symmetric fork stays one."""
+"""Where another pair of a lone junction's three arms is a trunk nearly as likely, by so much, it has no clear one."""
+ROUND_DEG = 100.0
+"""And where the way from one branch to the other turns by less than this, none of the three is the stem of the others."""
 FORKED_PX = 0.5
 """Two trunks that are so far apart have parted."""
 WIDER_DEG = 100.0
@@ -114,8 +117,8 @@ def are_together(arm: Arm, back: Arm) -> bool:
 def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> Rebuilt | None:
     """A junction, or some that are together, anew.
 
-    None where too few arms are long enough to tell, and where an arm of junctions that are together does not lead to the trunk: it
-    comes from a side branch, or there is no single trunk.
+    None where too few arms are long enough to tell, where an arm of junctions that are together does not lead to the trunk (it
+    comes from a side branch, or there is no single trunk), and where a place would lie outside the vessel.
 
     Parameters
     ----------
@@ -123,6 +126,18 @@ def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> R
     level : the vessel's mask or probability (h, w).
     is_alone : whether that is one junction.
     """
+    anew = _anew(arms, level, is_alone)
+    return anew if anew is not None and _is_inside(anew, level) else None
+
+
+def _is_inside(anew: Rebuilt, level: NDArray[np.float32]) -> bool:
+    """Whether all places are in the vessel and all lines in the picture, which smoothing may leave by a pixel."""
+    lines = np.concatenate([*(points for points, _ in anew.pieces), *(arm.points for _, arm in anew.arms)])
+    limit = np.array([level.shape[1], level.shape[0]])
+    return bool((lines >= -1.0).all() and (lines <= limit).all() and (polyline.sample(level, anew.places) >= 0.5).all())
+
+
+def _anew(arms: list[Arm], level: NDArray[np.float32], is_alone: bool) -> Rebuilt | None:
     along = [polyline.arc_length(arm.points) for arm in arms]
     gates: list[_Gate | None] = [_gate(arm, way, 0.0) for arm, way in zip(arms, along, strict=True)]
     known = {index: gate for index, gate in enumerate(gates) if gate is not None}
@@ -130,7 +145,9 @@ def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> R
         return None
     equal = _equal_trunks(known) if is_alone and len(known) == len(arms) else None
     if equal is not None:
-        return _fork(arms, along, known, equal, level)
+        (_, first), (_, second) = equal
+        from_branch_to_branch = _turn_deg(known[first], known[second])
+        return _star(arms, along, known) if from_branch_to_branch < ROUND_DEG else _fork(arms, along, known, equal, level)
     trunk = _trunk(known)
     bridges = {index: _side_branch(gate, trunk) for index, gate in known.items() if index not in trunk.ends}
     # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
@@ -199,7 +216,8 @@ def _rejoined(arm: Arm, along: NDArray[np.float64], place: Point) -> Arm:
     rest = along > position_px + max(aside_px, 0.5 * STEP_PX)
     rest[-1] = True
     points, radius = arm.points[rest], arm.radius[rest]
-    return replace(arm, points=np.concatenate([[place], points]), radius=np.concatenate([radius[:1], radius]))
+    way = polyline.resample(np.array([place, points[0]]), STEP_PX)[:-1]
+    return replace(arm, points=np.concatenate([way, points]), radius=np.concatenate([np.full(len(way), radius[0]), radius]))
 
 
 def _gate(arm: Arm, along: NDArray[np.float64], at_least_px: float) -> _Gate | None:
@@ -246,9 +264,9 @@ def _equal_trunks(gates: dict[int, _Gate]) -> tuple[tuple[int, int], tuple[int, 
     (best, ends), (other, others), _ = sorted((_unlikeliness(gates, pair), pair) for pair in combinations(gates, 2))
     if other >= best + TRUNK_LEAD_DEG:
         return None
-    (parent,) = set(ends) & set(others)
-    (first,), (second,) = set(ends) - {parent}, set(others) - {parent}
-    return (parent, first), (parent, second)
+    (stem,) = set(ends) & set(others)
+    (first,), (second,) = set(ends) - {stem}, set(others) - {stem}
+    return (stem, first), (stem, second)
 
 
 def _fork(
@@ -258,17 +276,39 @@ def _fork(
     trunks: tuple[tuple[int, int], tuple[int, int]],
     level: NDArray[np.float32],
 ) -> Rebuilt:
-    """A junction without a clear trunk: its parent goes on smoothly into both branches, and ends where they part."""
+    """A junction whose stem goes on smoothly into both branches, and ends where they part."""
     curves = [_between_walls(_trunk_of(gates, ends), level).points for ends in trunks]
-    both = np.stack([curve[: min(len(curves[0]), len(curves[1]))] for curve in curves])
-    apart = np.hypot(*(both[0] - both[1]).T) > FORKED_PX
-    mark = min(max(int(apart.argmax()), 2), both.shape[1] - 2)
-    shared = both[:, : mark + 1].mean(axis=0)
-    bridges = {trunks[0][0]: shared[::-1]}
+    common = np.stack([curve[: min(len(curves[0]), len(curves[1]))] for curve in curves])
+    is_apart = np.hypot(*(common[0] - common[1]).T) > FORKED_PX
+    last = common.shape[1] - 2
+    mark = min(max(int(is_apart.argmax()), 2), last) if is_apart.any() else last
+    shared = common[:, : mark + 1].mean(axis=0)
+    stem = trunks[0][0]
+    bridges = {stem: shared[::-1]}
     for (_, branch), curve in zip(trunks, curves, strict=True):
         bridges[branch] = np.concatenate([shared[-1:], curve[mark + 1 :]])
-    anew = [(0, _bridged(arm, along[k], gates[k], bridges[k])) for k, arm in enumerate(arms)]
-    return Rebuilt(shared[-1:], [], anew)
+    return Rebuilt(shared[-1:], [], [(0, _bridged(arm, along[k], gates[k], bridges[k])) for k, arm in enumerate(arms)])
+
+
+def _star(arms: list[Arm], along: list[NDArray[np.float64]], gates: dict[int, _Gate]) -> Rebuilt:
+    """A junction any two of whose arms might be the trunk: all go straight to the point that fits their directions best."""
+    place = _meeting_point(list(gates.values()))
+    straight = [polyline.resample(np.array([place, gates[index].place]), STEP_PX) for index in range(len(arms))]
+    return Rebuilt(np.array([place]), [], [(0, _bridged(arm, along[k], gates[k], straight[k])) for k, arm in enumerate(arms)])
+
+
+def _meeting_point(gates: list[_Gate]) -> Point:
+    """Least-squares meeting point of the arms' lines, held to their gates' middle by a small weight."""
+    centre_x, centre_y = (sum(gate.place[axis] for gate in gates) / len(gates) for axis in (0, 1))
+    # The sum over the gates of the projection across each one's direction: (xx, xy; xy, yy) . place = (right, below).
+    xx = yy = 0.05
+    xy, right, below = 0.0, 0.05 * centre_x, 0.05 * centre_y
+    for gate in gates:
+        (x, y), (u, v) = gate.place, gate.outward
+        xx, xy, yy = xx + v * v, xy - u * v, yy + u * u
+        right, below = right + v * (v * x - u * y), below + u * (u * y - v * x)
+    determinant = xx * yy - xy * xy
+    return (yy * right - xy * below) / determinant, (xx * below - xy * right) / determinant
 
 
 def _trunk(gates: dict[int, _Gate]) -> _Trunk:
@@ -337,7 +377,6 @@ def _side_branch(gate: _Gate, trunk: _Trunk, level: NDArray[np.float32] | None =
     It leaves the gate in its direction, and goes straight or, where the `level` is given, as a parabola that its walls bend.
     """
     start, inward = np.array(gate.place), -np.array(gate.outward)
-    aside = np.array([-inward[1], inward[0]])
     reach = max(40.0, 3.0 * float(np.hypot(*(trunk.points - start).T).min()))
     way = np.arange(0.0, reach + 1.0, STEP_PX)
     straight = start + way[:, None] * inward
@@ -347,8 +386,8 @@ def _side_branch(gate: _Gate, trunk: _Trunk, level: NDArray[np.float32] | None =
         normal, shift, weight = _to_walls(piece, np.full(len(piece), gate.radius_px), level, trunk)
         shape = (way / way[end]) ** 2
         seen = shape[: end + 1] * weight
-        bend = float(seen @ (shift * np.sign(normal @ aside))) / (float(seen @ shape[: end + 1]) + BRANCH_STIFFNESS)
-        bent = straight + (bend * shape)[:, None] * aside
+        bend = float(seen @ shift) / (float(seen @ shape[: end + 1]) + BRANCH_STIFFNESS)
+        bent = straight + (bend * shape)[:, None] * normal[0]
         end, mark = _first_meeting(bent, trunk)
         piece = bent[: end + 1]
     mark = min(max(mark, 1), len(trunk.points) - 2)

@@ -30,6 +30,8 @@ STIFFNESS = 0.15
 def led_on(points: Points, radius_px: float, level: NDArray[np.float32]) -> Points:
     """A centerline without the last part, which thinning has turned aside, and in its place one that runs between the walls there.
 
+    It ends as far out as the skeleton did, or goes on to the image's border.
+
     Parameters
     ----------
     points : centerline (N, 2), the end in question last.

@@ -56,7 +56,8 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability:
     if len(traced.chains) > MAX_CHAINS:
         return VesselGraph(np.empty((0, 2)), ())
     radius = RadiusMap(mask)
-    lines = [_Line(chain.start, chain.end, chain.points) for chain in traced.chains]
+    # A junction of pixels may have two chains only, where its third one was too short to be one.
+    lines = _merged([_Line(chain.start, chain.end, chain.points) for chain in traced.chains])
     if config.prune_spurs:
         radius_at = radius.at(traced.nodes)
         for _ in range(3):
@@ -70,29 +71,21 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability:
     if config.rebuild_junctions:
         nodes = _rebuild_junctions(lines, nodes, radius, level)
     if config.extend_ends:
-        _lead_on_ends(lines, nodes, radius, level)
-    return _packed(lines, nodes)
+        _lead_on_ends(lines, nodes, level)
+    return _packed(lines, nodes, radius)
 
 
-def _lead_on_ends(lines: list[_Line], nodes: Points, radius: RadiusMap, level: NDArray[np.float32]) -> None:
+def _lead_on_ends(lines: list[_Line], nodes: Points, level: NDArray[np.float32]) -> None:
     """Ends of vessels without the hook that thinning leaves there; at the image border they go on to the border."""
     degrees = _degrees(lines, len(nodes)).tolist()
-    changed = []
     for line in lines:
-        ends = [side for side, node in ((-1, line.start), (1, line.end)) if degrees[node] == 1 and len(line.points) >= 4]
-        for side in ends:
-            if len(line.points) < 4:
-                continue  # the other end has taken most of it
+        for side, node in ((-1, line.start), (1, line.end)):
+            if degrees[node] != 1 or len(line.points) < 4:  # that short, the other end has taken most of it
+                continue
             # In the corner where the skeleton ends the radius would be nearly nothing.
             own_radius = polyline.median(line.radius[::side][-RADIUS_POINTS:])
-            points = led_on(line.points[::side], own_radius, level)
-            line.points = points[::side]
-            nodes[line.start if side < 0 else line.end] = points[-1]
-            if side < 0 and len(ends) == 2:
-                line.radius = radius.at(line.points)  # the other end asks for it
-        if ends:
-            changed.append(line)
-    _measure(changed, radius)
+            line.points = led_on(line.points[::side], own_radius, level)[::side]
+            nodes[node] = line.points[::side][-1]
 
 
 def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, level: NDArray[np.float32]) -> Points:
@@ -179,11 +172,13 @@ def _close_loop(line: _Line, out: Arm, back: Arm) -> None:
     line.radius = np.concatenate([out.radius[:first], back.radius[:second][::-1]])
 
 
-def _packed(lines: list[_Line], nodes: Points) -> VesselGraph:
-    """The graph with only those nodes that are still used."""
+def _packed(lines: list[_Line], nodes: Points, radius: RadiusMap) -> VesselGraph:
+    """The graph with only those nodes that are still used, and the radius along the lines as they are now."""
     used = sorted({node for line in lines for node in (line.start, line.end)})
     number = {node: index for index, node in enumerate(used)}
-    edges = tuple(GraphEdge(number[line.start], number[line.end], line.points, line.radius) for line in lines)
+    whole = Bundle.of([line.points for line in lines])
+    measured = zip(lines, whole.split(radius.at(whole.points)), strict=True)
+    edges = tuple(GraphEdge(number[line.start], number[line.end], line.points, values) for line, values in measured)
     return VesselGraph(nodes[used], edges)
 
 
@@ -248,10 +243,8 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
     normal = bundle.normals(centred)
     shift, half_width = _between_walls(centred, normal, radius.at(centred.points), level)
     centred = _moved(centred, normal, np.where(inner, shift, 0.0))
-    half_widths = centred.split(half_width)
-    for line, points, half in zip(lines, centred.split(centred.points), half_widths, strict=True):
-        line.points, line.half_width = points, half
-    _measure(lines, radius)
+    for line, *values in zip(lines, *map(centred.split, (centred.points, radius.at(centred.points), half_width)), strict=True):
+        line.points, line.radius, line.half_width = values
 
 
 def _between_walls(
@@ -280,11 +273,3 @@ def _moved(lines: Bundle, normal: Points, shift: NDArray[np.float64]) -> Bundle:
     """All points moved across their lines, and these smoothed."""
     moved = Bundle(lines.points + shift[:, None] * normal, lines.starts)
     return bundle.smooth(moved, SMOOTHING_PX / STEP_PX, keeps_bends=True)
-
-
-def _measure(lines: list[_Line], radius: RadiusMap) -> None:
-    """The radius along some lines as they are now."""
-    if lines:
-        whole = Bundle.of([line.points for line in lines])
-        for line, values in zip(lines, whole.split(radius.at(whole.points)), strict=True):
-            line.radius = values

@@ -23,7 +23,7 @@ from core.config import PerceptionConfig
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.types import Points
-from core.whole_file import sweep_unfinished, write_whole
+from core.whole_file import is_aside, sweep_unfinished, write_whole
 from hardware.twin.appearance import LOOK_FAMILIES, Appearance, default_appearance, make_view, random_appearance
 from hardware.twin.autopilot import RouteFollower
 from hardware.twin.phantom import Phantom
@@ -215,7 +215,7 @@ def _prepare(plan: SynthPlan) -> None:
     }
     path = plan.out / "plan.json"
     try:
-        if not path.is_file() and plan.out.is_dir() and any(plan.out.iterdir()):
+        if not path.is_file() and plan.out.is_dir() and not all(map(is_aside, plan.out.iterdir())):
             raise SynthError(f"{plan.out}: holds something that synth did not write; choose another folder")
         plan.out.mkdir(parents=True, exist_ok=True)
         if any(int(image.stem) >= plan.count for image in (plan.out / "images").glob("*.png") if image.stem.isdecimal()):
@@ -225,9 +225,11 @@ def _prepare(plan: SynthPlan) -> None:
                 raise SynthError(f"{plan.out}: holds a set with other settings ({path.name}); choose another folder")
         else:
             write_whole(path, f"{json.dumps(described)}\n".encode())  # first: it says whose folder this is
-        for name in ("images", "masks", "episodes"):
-            (plan.out / name).mkdir(exist_ok=True)
-            sweep_unfinished(plan.out / name)
+        folders = [plan.out / name for name in ("images", "masks", "episodes")]
+        for folder in folders:
+            folder.mkdir(exist_ok=True)
+        for folder in (plan.out, *folders):
+            sweep_unfinished(folder)
     except OSError as error:
         raise SynthError(f"{plan.out}: cannot be written ({error.strerror}); choose another folder") from None
     except ValueError:

@@ -321,6 +321,17 @@ def test_a_loop_stays_a_loop() -> None:
     assert len(graph.edges) == 4
 
 
+def test_the_radius_near_a_junction_does_not_depend_on_the_branchs_other_end() -> None:
+    trunk, branch = curve((-20, 240), (320, 240), (660, 240)), np.array([[320.0, 240.0], [430.0, 60.0]])
+    near = []
+    for config in (CleaningConfig(), CleaningConfig(extend_ends=False)):
+        side = min(perceived((trunk, 16.0), (branch, 10.0), config=config).edges, key=lambda edge: edge.points[:, 1].min())
+        outward = slice(None) if side.points[0, 1] > side.points[-1, 1] else slice(None, None, -1)
+        near.append(side.radius[outward][:12])
+    np.testing.assert_allclose(near[0], near[1], atol=0.2)
+    assert 14.0 < near[0][0] < 18.0, "at first it is in its trunk's lumen"
+
+
 def test_a_ring_alone_and_an_empty_mask() -> None:
     graph = perceived((arc(-10, 190), 14.0), (arc(170, 370), 14.0))
     assert len(graph.edges) == 1
@@ -438,6 +449,37 @@ def test_a_symmetric_fork_goes_on_smoothly_and_alike_into_both_branches() -> Non
     assert max(polyline.nearest(mirrored, (float(x), float(y)))[0] for x, y in ways[0]) < 0.5
 
 
+def theta_through(graph: VesselGraph, place: Point, heading: Point) -> float:
+    """By how many degrees the vessel's direction beside a head there differs from the robot's."""
+    found = centerline_at(graph, place, heading, 20.0)
+    assert found is not None
+    vector = fit_vessel_vector(found)
+    assert vector is not None
+    turn = np.arctan2(*vector.direction[::-1]) - np.arctan2(*heading[::-1])
+    return float(np.degrees((turn + np.pi) % (2 * np.pi) - np.pi))
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, 17.0, 40.0, 75.0])
+@pytest.mark.parametrize("spread_deg", [110.0, 120.0, 125.0])
+def test_where_any_two_of_three_may_be_the_trunk_all_ways_are_alike(turned_deg: float, spread_deg: float) -> None:
+    middle = np.array([320.3, 240.2])
+    outward = [np.array(direction(turned_deg + angle)) for angle in (0.0, spread_deg, -spread_deg)]
+    graph = perceived(*((np.array([middle, middle + 200 * way]), 14.0) for way in outward))
+    assert degrees(graph) == [1, 1, 1, 3]
+    for start, end in ((0, 1), (1, 2), (2, 0)):
+        heading = outward[end] - outward[start]
+        heading /= np.hypot(*heading)
+        assert abs(theta_through(graph, (320.3, 240.2), (float(heading[0]), float(heading[1])))) < 9.0
+
+
+@pytest.mark.parametrize("radius", [13.5, 15.0, 16.0, 17.0])
+def test_a_narrow_vessel_that_a_wide_one_ends_on_stays_straight(radius: float) -> None:
+    narrow, wide = np.array([[-20.0, 200.0], [660.0, 200.0]]), np.array([[320.0, 200.0], [320.0, 440.0]])
+    graph = perceived((narrow, 8.0), (wide, radius))
+    assert degrees(graph) == [1, 1, 1, 3]
+    assert abs(theta_through(graph, (320.0, 200.0), EAST)) < 2.0
+
+
 @pytest.mark.parametrize("turn_deg", [28.0, 32.0, 36.0])
 def test_a_trunk_that_bends_as_much_as_its_branch_turns_away_stays_on_its_line(turn_deg: float) -> None:
     trunk = curve((-20.0, 240.0), (140.0, 238.0), (280.0, 240.0), (420.0, 205.0), (560.0, 120.0))
@@ -513,8 +555,8 @@ def test_whatever_a_vessel_looks_like_its_lines_end_in_their_nodes_and_in_the_pi
         assert np.isfinite(edge.points).all()
         np.testing.assert_allclose(edge.points[0], graph.nodes[edge.start])
         np.testing.assert_allclose(edge.points[-1], graph.nodes[edge.end])
-        assert (edge.points > -10.0).all()
-        assert (edge.points < (width + 9.0, height + 9.0)).all()
+        assert (edge.points > -3.0).all()
+        assert (edge.points < (width + 2.0, height + 2.0)).all()
 
 
 def test_a_wall_on_the_very_edge_of_belief_is_survived() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from core.whole_file import write_whole
+from core.whole_file import sweep_unfinished, write_whole
 
 
 @pytest.mark.parametrize("durable", [False, True])
@@ -88,3 +88,16 @@ def test_what_was_there_is_kept_beside_it_only_once_the_new_one_has_found_room(
     with pytest.raises(OSError, match="No space left"):
         write_whole(path, b"four", durable=True, older=older)
     assert (path.read_bytes(), older.read_bytes()) == (b"three", b"two")
+
+
+def test_only_what_was_left_of_its_own_files_is_swept(tmp_path: Path) -> None:
+    own, foreign, young, folder = (tmp_path / f".{name}.part" for name in (f"{1:016x}", "holiday", f"{2:016x}", f"{3:016x}"))
+    for path in (own, foreign, young):
+        path.write_bytes(b"half of it")
+    folder.mkdir()
+    for path in (own, foreign, folder):
+        os.utime(path, (1.0, 1.0))
+    sweep_unfinished(tmp_path)
+    assert not own.exists()
+    assert foreign.exists() and young.exists() and folder.exists()
+    sweep_unfinished(tmp_path / "absent")

@@ -57,14 +57,22 @@ def test_an_interrupted_set_goes_on_and_keeps_what_is_there(small_set: SynthPlan
     assert (small_set.out / "images" / "000001.png").read_bytes() == before
 
 
-def test_what_a_killed_run_left_is_removed_and_what_another_one_writes_just_now_is_not(small_set: SynthPlan) -> None:
-    left, current = (small_set.out / "images" / f".{name}.part" for name in ("0011", "0022"))
-    left.write_bytes(b"half a picture")
-    current.write_bytes(b"half a picture")
-    os.utime(left, (1.0, 1.0))
+def test_what_a_killed_run_left_is_removed(small_set: SynthPlan) -> None:
+    left = [small_set.out / name / f".{7:016x}.part" for name in (".", "images", "masks", "episodes")]
+    for path in left:
+        path.write_bytes(b"half of it")
+        os.utime(path, (1.0, 1.0))
     write_set(small_set)
-    assert not left.exists() and current.exists()
-    current.unlink()
+    assert not any(path.exists() for path in left)
+
+
+def test_a_run_that_was_killed_before_it_had_begun_is_gone_on_with(tmp_path: Path) -> None:
+    left = tmp_path / f".{7:016x}.part"
+    left.write_bytes(b"half a plan")
+    assert write_set(SynthPlan(tmp_path, 1, 3, size=(320, 240))) == 1
+    (tmp_path / "plan.json").unlink()
+    with pytest.raises(SynthError, match="did not write"):
+        write_set(SynthPlan(tmp_path, 1, 3, size=(320, 240)))
 
 
 def test_another_plan_does_not_overwrite_a_set(small_set: SynthPlan) -> None:
