@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from core.config import CleaningConfig
 from core.perception import bundle, pixel_graph, polyline
 from core.perception.bundle import Bundle
-from core.perception.junctions import Arm, are_together, rebuild
+from core.perception.junctions import are_together, rebuild
 from core.perception.lumen import RadiusMap, sharp_walls
+from core.perception.openings import Arm
 from core.perception.vessel_ends import led_on
 from core.types import GraphEdge, Mask, Points, VesselGraph
 

@@ -1,0 +1,132 @@
+"""Lines through a junction's opening: a trunk that goes on smoothly, and side branches to it, both bent as their walls are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.perception import polyline
+from core.perception.lumen import two_shapes, wall_distances
+from core.perception.openings import STEP_PX, Gate
+from core.types import Points
+
+WALL_SEARCH_PX = 8
+WALL_RADII = 1.15
+"""A wall farther off than so many radii (and a pixel) is another one's: here is an opening. One so near to the trunk is its own."""
+TRUNK_STIFFNESS = 0.5
+BRANCH_STIFFNESS = 0.5
+"""How hard it is for walls to bend a line, in points of it."""
+ONE_WALL = 0.7
+"""How much a point counts that has a wall on one side only, whose distance should be the radius."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trunk:
+    """A curve from one arm's gate to another's (N, 2), and the lumen's radius along it (N,)."""
+
+    ends: tuple[int, int]
+    points: Points
+    radius: NDArray[np.float64]
+
+
+def trunk_between(gates: dict[int, Gate], ends: tuple[int, int]) -> Trunk:
+    """The smooth curve from one arm's gate to another's, as wide as these are."""
+    first, second = gates[ends[0]], gates[ends[1]]
+    points = _hermite(first, second)
+    return Trunk(ends, points, np.linspace(first.radius_px, second.radius_px, len(points)))
+
+
+def between_walls(trunk: Trunk, level: NDArray[np.float32]) -> Trunk:
+    """The trunk bent as its walls do, as far as they can be seen; its ends and its directions there stay."""
+    share = np.linspace(0.0, 1.0, len(trunk.points))
+    hump = 16.0 * share**2 * (1.0 - share) ** 2
+    shapes = np.stack([hump, hump * (2.0 * share - 1.0)])
+    normal, shift, weight = _to_walls(trunk.points, trunk.radius, level)
+    size, lean = two_shapes(shapes, shift, weight, TRUNK_STIFFNESS)
+    return replace(trunk, points=trunk.points + (size * shapes[0] + lean * shapes[1])[:, None] * normal)
+
+
+def side_branch(gate: Gate, trunk: Trunk, level: NDArray[np.float32] | None = None) -> tuple[int, Points]:
+    """Which of the trunk's points a side branch comes from, and its line from there to its gate.
+
+    It leaves the gate in its direction, and goes straight or, where the `level` is given, as a parabola that its walls bend.
+    """
+    start, inward = np.array(gate.place), -np.array(gate.outward)
+    reach = max(40.0, 3.0 * float(np.hypot(*(trunk.points - start).T).min()))
+    way = np.arange(0.0, reach + 1.0, STEP_PX)
+    straight = start + way[:, None] * inward
+    end, mark = _first_meeting(straight, trunk)
+    piece = straight[: end + 1]
+    if level is not None and len(piece) >= 4:
+        normal, shift, weight = _to_walls(piece, np.full(len(piece), gate.radius_px), level, trunk)
+        shape = (way / way[end]) ** 2
+        seen = shape[: end + 1] * weight
+        bend = float(seen @ shift) / (float(seen @ shape[: end + 1]) + BRANCH_STIFFNESS)
+        bent = straight + (bend * shape)[:, None] * normal[0]
+        end, mark = _first_meeting(bent, trunk)
+        piece = bent[: end + 1]
+    mark = min(max(mark, 1), len(trunk.points) - 2)
+    inner = piece[:-1] if len(piece) > 2 else piece
+    return mark, np.concatenate([trunk.points[mark : mark + 1], inner[::-1]])
+
+
+def _first_meeting(line: Points, trunk: Trunk) -> tuple[int, int]:
+    """Where a line first meets the trunk: which of its points, and which of the trunk's."""
+    gaps = np.hypot(trunk.points[:, None, 0] - line[:, 0], trunk.points[:, None, 1] - line[:, 1])
+    nearest = gaps.min(axis=0)
+    close = np.flatnonzero(nearest < 0.75 * STEP_PX)
+    end = int(close[0]) if len(close) else int(nearest.argmin())
+    while end + 1 < len(nearest) and nearest[end + 1] < nearest[end]:
+        end += 1
+    return end, int(gaps[:, end].argmin())
+
+
+def _to_walls(
+    points: Points, radius: NDArray[np.float64], level: NDArray[np.float32], trunk: Trunk | None = None
+) -> tuple[Points, NDArray[np.float64], NDArray[np.float64]]:
+    """Normals of a line (N, 2), how far to move along each to lie as the walls want it (N,), and how much they have to say (N,).
+
+    Between two walls that is the middle; beside one it is a radius off. A wall of the `trunk` says nothing of a side branch.
+    """
+    normal = polyline.normals(points)
+    right, left = _own_walls(points, normal, radius, level, trunk)
+    on_right, on_left = np.isfinite(right), np.isfinite(left)
+    shift = np.where(on_right, np.where(on_left, 0.5 * (right - left), right - radius), np.where(on_left, radius - left, 0.0))
+    weight = np.where(on_right & on_left, 1.0, np.where(on_right | on_left, ONE_WALL, 0.0))
+    return normal, np.clip(shift, -0.5 * radius, 0.5 * radius), weight
+
+
+def _own_walls(
+    points: Points, normal: Points, radius: NDArray[np.float64], level: NDArray[np.float32], trunk: Trunk | None
+) -> NDArray[np.float64]:
+    """Distances of a line's own walls, to the right and to the left (2, N); NaN where there is none."""
+    places, directions = np.concatenate([points, points]), np.concatenate([normal, -normal])
+    limit = np.concatenate([radius, radius])
+    distance = wall_distances(level, places, directions, limit, WALL_SEARCH_PX)
+    distance[distance > WALL_RADII * limit + 1.0] = math.nan
+    seen = np.flatnonzero(np.isfinite(distance))
+    if trunk is not None and len(seen):
+        walls = places[seen] + distance[seen, None] * directions[seen]
+        away = np.hypot(walls[:, None, 0] - trunk.points[:, 0], walls[:, None, 1] - trunk.points[:, 1])
+        distance[seen[(away - WALL_RADII * trunk.radius).min(axis=1) <= 1.0]] = math.nan
+    return distance.reshape(2, -1)
+
+
+def _hermite(first: Gate, second: Gate) -> Points:
+    """A smooth curve from one gate inwards and out through another, a point about every ``STEP_PX``; at least 4 points."""
+    span = math.dist(first.place, second.place)
+    weights = _hermite_weights(max(4, round(span / STEP_PX) + 1))
+    inward = -span * first.outward[0], -span * first.outward[1]
+    outward = span * second.outward[0], span * second.outward[1]
+    return np.asarray(weights @ np.array([first.place, inward, second.place, outward]))
+
+
+@lru_cache(maxsize=64)
+def _hermite_weights(count: int) -> NDArray[np.float64]:
+    """What each of start, start direction, end and end direction adds to each of `count` points, shape (count, 4)."""
+    t = np.linspace(0.0, 1.0, count)
+    return np.column_stack([2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, 3 * t**2 - 2 * t**3, t**3 - t**2])
