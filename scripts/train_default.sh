@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some two hours of data and a day
+# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some three hours of data and a day
 # of training on two cores. The data can be interrupted and gone on with by the same call.
 set -euo pipefail
 cd "$(dirname "$0")/.."
