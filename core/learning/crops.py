@@ -133,7 +133,7 @@ class Looks:
             probabilities = look_again(image, probabilities, near)
             last = Seen.of(*probabilities)
         found_vessel, found_robot = (probability >= np.float32(0.5) for probability in probabilities)
-        shifted = _wrong(found_vessel, vessel, _WALL_PX) & _beside_ends(robot)
+        shifted = _wrong(found_vessel, vessel, _WALL_PX) & (_end_distances(robot) <= _WALL_REACH_PX)
         return cls(first, last, tuple(_some_of(_wrong(found_robot, robot, _EDGE_PX)) + _some_of(shifted)))
 
 
@@ -199,14 +199,6 @@ def _wrong(found: Mask, true: Mask, edge_px: int) -> Mask:
     return np.asarray((true & ~near_found) | (found & ~near_true))
 
 
-def _beside_ends(robot: Mask) -> Mask:
-    """Pixels within ``_WALL_REACH_PX`` of an end of the true robot."""
-    beside = np.zeros(robot.shape, np.uint8)
-    for end in _true_ends(robot):
-        cv2.circle(beside, end, round(_WALL_REACH_PX), 1, cv2.FILLED)
-    return beside > 0
-
-
 def _some_of(mask: Mask) -> list[Point]:
     """Places (x, y) evenly over a mask, ``_WRONG_PLACES`` or some more."""
     rows, columns = np.nonzero(mask)
@@ -229,11 +221,16 @@ def _tensors(image: NDArray[np.uint8], vessel: Mask, robot: Mask, plan: Training
 
 def _nearness(robot: Mask) -> NDArray[np.uint8]:
     """How near each pixel is to an end of the true robot, 255 there; where the cut-out's border cuts it off it does not end."""
+    return np.asarray(np.rint(255 * np.exp(-0.5 * (_end_distances(robot) / np.float32(_END_REACH_PX)) ** 2)), np.uint8)
+
+
+def _end_distances(robot: Mask) -> NDArray[np.float32]:
+    """How far each pixel is from the nearest end of the true robot; infinite where it has none."""
     rows, columns = np.ogrid[: robot.shape[0], : robot.shape[1]]
     nearest = np.full(robot.shape, np.inf, np.float32)
     for x, y in _true_ends(robot):
         np.minimum(nearest, (rows - y) ** 2 + (columns - x) ** 2, out=nearest)
-    return np.asarray(np.rint(255 * np.exp(-0.5 * nearest / np.float32(_END_REACH_PX**2))), np.uint8)
+    return np.sqrt(nearest)
 
 
 def _true_ends(robot: Mask) -> list[tuple[int, int]]:

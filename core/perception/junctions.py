@@ -39,7 +39,7 @@ class Rebuilt:
     the place that it starts from and its line."""
 
     places: Points
-    pieces: list[tuple[Points, NDArray[np.float64]]]
+    pieces: list[Points]
     arms: list[tuple[int, Arm]]
 
 
@@ -68,7 +68,7 @@ def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> R
 
 def _is_inside(anew: Rebuilt, level: NDArray[np.float32]) -> bool:
     """Whether all places are in the vessel and all lines in the picture, which smoothing may leave by a pixel."""
-    lines = np.concatenate([*(points for points, _ in anew.pieces), *(arm.points for _, arm in anew.arms)])
+    lines = np.concatenate([*anew.pieces, *(arm.points for _, arm in anew.arms)])
     limit = np.array([level.shape[1], level.shape[0]])
     return bool((lines >= -1.0).all() and (lines <= limit).all() and (polyline.sample(level, anew.places) >= 0.5).all())
 
@@ -123,7 +123,7 @@ def _assembled(
             mark = int(np.hypot(*(trunk.points - near).T).argmin())
             bridges[index] = min(max(mark, 1), len(trunk.points) - 2), np.empty((0, 2))
     marks = sorted({mark for mark, _ in bridges.values()}) or [len(trunk.points) // 2]
-    pieces = [(trunk.points[first : last + 1], trunk.radius[first : last + 1]) for first, last in pairwise(marks)]
+    pieces = [trunk.points[first : last + 1] for first, last in pairwise(marks)]
     anew = []
     for index, (arm, way) in enumerate(zip(arms, along, strict=True)):
         mark = _mark(index, trunk, bridges)

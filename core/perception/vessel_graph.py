@@ -113,7 +113,7 @@ def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, lev
         for number, place in zip(numbers, anew.places, strict=True):
             places[number] = place
         lines[:] = [line for line in lines if line not in inner]
-        lines += [_Line(*ends, *piece) for ends, piece in zip(pairwise(numbers), anew.pieces, strict=True)]
+        lines += [_Line(*ends, piece) for ends, piece in zip(pairwise(numbers), anew.pieces, strict=True)]
         arms = {(id(line), outward): anew.arms[index] for index, (line, outward) in enumerate(sides)}
         for line in {id(line): line for line, _ in sides}.values():
             out, back = arms.get((id(line), True)), arms.get((id(line), False))
