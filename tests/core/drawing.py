@@ -5,7 +5,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from core.perception import polyline
-from core.types import Mask, Masks, Points
+from core.types import Mask, Masks, Point, Points
 
 SIZE = (640, 480)
 
@@ -51,6 +51,11 @@ def masks_of(vessel: np.ndarray, robot: np.ndarray) -> Masks:
 def everywhere(size: tuple[int, int] = SIZE) -> np.ndarray:
     """A vessel that fills the image."""
     return np.ones((size[1], size[0]), np.float32)
+
+
+def direction(angle_deg: float) -> Point:
+    """Unit vector, degrees from right to down."""
+    return float(np.cos(np.radians(angle_deg))), float(np.sin(np.radians(angle_deg)))
 
 
 def curve(*points: tuple[float, float]) -> Points:
