@@ -213,6 +213,7 @@ TEMPLATES = (
     "what looks like it covers {a} % of the image (at most {b} %)",
     "its mask has no centerline, or more than {a} branches",
     "{a} px long (at least {b} px)",
+    "what looks like one has walls beside the head that are blurred over {a} px (at most {b} px)",
     "{a} % of the robot is bridged (at most {b} %)",
     "{a} % of its last {b} px lie in the vessel (at least {c} %)",
     "a second branch fits {a} % as well (at most {b} %)",

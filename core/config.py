@@ -134,6 +134,12 @@ class QualityConfig(_Section):
     min_sharpness: float = Field(0.045, ge=0.0, le=1.0, description="steepest step per px against the contrast; 0 = not checked")
     min_robot_length_px: float = Field(20.0, ge=2.0, le=640.0, description="a shorter robot has no direction")
     min_inside_vessel: Share = Field(0.6, description="share of the robot's last 40 px that must lie in the lumen")
+    max_wall_blur_px: float = Field(
+        10.0,
+        gt=0.0,
+        le=1000.0,
+        description="width of the model's doubt at the vessel's walls beside the head; at a lumen that it knows some 1 px",
+    )
     max_bridged_share: Share = Field(0.4, description="repaired length over path length")
     max_ambiguity: Share = Field(0.95, description="how near the second best path may come to the best one")
     min_confidence: Share = Field(0.3, description="below it there is no answer")

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from core.config import PerceptionConfig
 from core.perception import polyline
-from core.types import Centerline, Masks, Points, RobotPath, Vector
+from core.types import Centerline, Masks, Point, Points, RobotPath, Vector
 
 _BEYOND_PX = (4.0, 24.0)
 """Where a robot that goes on beyond the head that was found would be seen."""
@@ -146,11 +146,24 @@ def collect(path: RobotPath, robot: Vector, centerline: Centerline, masks: Masks
     )
 
 
+def wall_blur_px(masks: Masks, head: Point) -> float:
+    """How wide, on average, the network's doubt at the vessel's walls is beside the head, px: 4 p(1 - p) summed over them.
+
+    For a wall whose probability is a logistic function of the distance that is the width from 0.1 to 0.9. A lumen is clear but for
+    its rim; what is drawn around a robot where there is none is doubt all over.
+    """
+    probability, inside = _around(masks.vessel_probability, head), np.ascontiguousarray(_around(masks.vessel, head)).view(np.uint8)
+    rim = cv2.countNonZero(inside) - cv2.countNonZero(cv2.erode(inside, np.ones((3, 3), np.uint8), borderValue=1))
+    doubt = float(cv2.sumElems(probability)[0]) - float(np.vdot(probability, probability))
+    # One wall across the window at least: where the lumen fills all of it, there is nothing to divide by.
+    return 4.0 * doubt / max(rim, 2 * _AROUND_PX)
+
+
 def _mean(values: NDArray[Any]) -> float:
     return float(values.sum()) / values.size
 
 
-def _around(values: NDArray[np.float32], place: tuple[float, float]) -> NDArray[np.float32]:
+def _around(values: NDArray[Any], place: Point) -> NDArray[Any]:
     x, y = (round(coordinate) for coordinate in place)
     return values[max(0, y - _AROUND_PX) : y + _AROUND_PX + 1, max(0, x - _AROUND_PX) : x + _AROUND_PX + 1]
 

@@ -301,6 +301,9 @@ class Pipeline:
         assert robot is not None
         assert vessel is not None
         with watch.stage("pose"):
+            refusal = quality.check_walls(found, path.head, config.quality)
+            if refusal is not None:
+                return replace(scene, refusal=refusal)
             pose = measure(robot, vessel, config.pose)
             evidence = collect(path, robot, centerline, found, config)
         if sight.swings:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from core.config import PerceptionConfig, QualityConfig, VectorConfig
 from core.perception import polyline
-from core.perception.evidence import at
+from core.perception.evidence import at, wall_blur_px
 from core.perception.vessel_graph import MAX_CHAINS
-from core.types import Centerline, Image, Mask, Masks, Reason, Refusal, RobotPath, VesselGraph
+from core.types import Centerline, Image, Mask, Masks, Point, Reason, Refusal, RobotPath, VesselGraph
 
 SAMPLE_STEP = 4
 """Brightness is judged on every fourth pixel."""
@@ -152,6 +152,17 @@ def check_centerline(centerline: Centerline | None, config: QualityConfig) -> Re
         detail = f"a second branch fits {100 * centerline.ambiguity:.0f} % as well (at most {100 * config.max_ambiguity:.0f} %)"
         return Refusal(Reason.AMBIGUOUS_BRANCH, detail)
     return None
+
+
+def check_walls(masks: Masks, head: Point, config: QualityConfig) -> Refusal | None:
+    """NO_VESSEL, when the model is in doubt about the vessel's walls beside the head: theta and the distances come from them."""
+    if not config.enabled:
+        return None
+    blur_px = wall_blur_px(masks, head)
+    if blur_px <= config.max_wall_blur_px:
+        return None
+    detail = f"what looks like one has walls beside the head that are blurred over {blur_px:.1f} px"
+    return Refusal(Reason.NO_VESSEL, f"{detail} (at most {config.max_wall_blur_px:.1f} px)")
 
 
 def check_confidence(confidence: float, config: QualityConfig) -> Refusal | None:

@@ -1492,6 +1492,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>what looks like one has walls beside the head that are blurred over {a} px (at most {b} px)</source>
+        <translation>看似血管之物在头部旁的管壁模糊宽度为 {a} px（至多 {b} px）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>{a} % of the robot is bridged (at most {b} %)</source>
         <translation>机器人有 {a} % 是桥接的（最多 {b} %）</translation>
     </message>
@@ -9746,6 +9751,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>share of the robot's last 40 px that must lie in the lumen</source>
         <translation>机器人末段 40 px 必须在管腔内的比例</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Max wall blur</source>
+        <translation>管壁模糊上限</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>width of the model's doubt at the vessel's walls beside the head; at a lumen that it knows some 1 px</source>
+        <translation>模型对头部旁血管壁位置存疑的宽度；对其熟悉的管腔约为 1 px</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

@@ -102,6 +102,16 @@ def test_a_refusal_keeps_what_was_found_before_it(pipeline: Pipeline, network: D
 # ---- how steady an answer is ----
 
 
+def test_a_vessel_without_clear_walls_is_none_and_is_kept_to_be_looked_at(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    network.vessel = cv2.GaussianBlur(network.vessel, (0, 0), 7.0)
+    scene = pipeline.perceive_single(frame())
+    assert reason(scene) is Reason.NO_VESSEL
+    assert "blurred over" in str(scene.refusal)
+    assert scene.masks is not None
+    assert scene.path is not None
+    assert scene.vessel_vector is not None
+
+
 def swings(network: DrawnNetwork) -> tuple[float, float]:
     """Of theta and head, as they lie in the evidence."""
     scene = Pipeline(network, CONFIG, single=Sight(network, swings=True)).perceive_single(frame())

@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
 from core.config import PerceptionConfig, QualityConfig
 from core.perception import quality
+from core.perception.evidence import wall_blur_px
 from core.perception.tracking import Memory, check_jump, recall
 from core.types import Centerline, GraphEdge, Masks, Points, Reason, Refusal, RobotPath, VesselGraph
 
@@ -25,6 +28,11 @@ def masks(vessel_from: int = 0, vessel_probability: float = 1.0, robot_probabili
     vessel[40:81, vessel_from:] = True
     robot[56:65, 20:121] = True
     return Masks(vessel, robot, (vessel * vessel_probability).astype(np.float32), (robot * robot_probability).astype(np.float32))
+
+
+def softened(found: Masks, sigma_px: float) -> Masks:
+    """The same masks, of a network that is less sure of the vessel's walls."""
+    return replace(found, vessel_probability=cv2.GaussianBlur(found.vessel_probability, (0, 0), sigma_px))
 
 
 def picture(kind: str) -> np.ndarray:
@@ -70,6 +78,41 @@ def test_the_steepest_steps_are_found_without_sorting_all(size: int) -> None:
         steps = values.astype(np.float32)
         place = int(0.995 * (size - 1))
         assert quality._of_the_largest(steps, size - place) == np.sort(steps)[place]
+
+
+@pytest.mark.parametrize("scale_px", [1.0, 2.0, 4.0])
+def test_wall_blur_is_the_width_of_the_doubt_at_a_wall(scale_px: float) -> None:
+    beside = np.abs(np.arange(300.0) - 150.0) - 40.0
+    probability = np.tile((1 / (1 + np.exp(beside / scale_px))).astype(np.float32)[:, None], (1, 300))
+    found = Masks(probability >= 0.5, np.zeros((300, 300), bool), probability, np.zeros((300, 300), np.float32))
+    turned = replace(found, vessel=np.ascontiguousarray(found.vessel.T), vessel_probability=probability.T.copy())
+    # From 0.1 to 0.9: ln(9) scales to each side of the middle.
+    assert wall_blur_px(found, (150.0, 150.0)) == pytest.approx(2 * np.log(9) * scale_px, rel=0.12)
+    assert wall_blur_px(turned, (150.0, 150.0)) == pytest.approx(wall_blur_px(found, (150.0, 150.0)), rel=1e-3)
+
+
+def test_wall_blur_is_of_what_lies_beside_the_head_and_known_everywhere() -> None:
+    sharp = masks()
+    assert wall_blur_px(sharp, (120.0, 60.0)) < 0.01
+    assert wall_blur_px(softened(sharp, 3.0), (120.0, 60.0)) > 4.0
+    away = replace(sharp, vessel_probability=sharp.vessel_probability.copy())
+    away.vessel_probability[:, :40] = 0.5
+    assert wall_blur_px(away, (120.0, 60.0)) < 0.01
+    full = np.ones(SHAPE, np.float32)
+    for head in ((0.0, 0.0), (-2.0, 60.0), (199.0, 119.0)):
+        assert np.isfinite(wall_blur_px(sharp, head))
+        assert wall_blur_px(Masks(full > 0, sharp.robot, full, sharp.robot_probability), head) == 0.0
+
+
+def test_a_halo_is_no_vessel() -> None:
+    halo = replace(masks(), vessel_probability=np.where(masks().vessel, np.float32(0.6), np.float32(0.3)))
+    refusal = quality.check_walls(halo, (120.0, 60.0), LIMITS)
+    assert refusal is not None
+    assert refusal.reason is Reason.NO_VESSEL
+    assert "(at most 10.0 px)" in refusal.detail
+    assert quality.check_walls(halo, (120.0, 60.0), QualityConfig(enabled=False)) is None
+    assert quality.check_walls(halo, (120.0, 60.0), QualityConfig(max_wall_blur_px=1000.0)) is None
+    assert quality.check_walls(softened(masks(), 2.0), (120.0, 60.0), LIMITS) is None
 
 
 def test_sharpness_is_only_asked_where_a_limit_is_set() -> None:
