@@ -135,7 +135,7 @@ class QualityConfig(_Section):
     min_robot_length_px: float = Field(20.0, ge=2.0, le=640.0, description="a shorter robot has no direction")
     min_inside_vessel: Share = Field(0.6, description="share of the robot's last 40 px that must lie in the lumen")
     max_wall_blur_px: float = Field(
-        10.0,
+        12.0,
         gt=0.0,
         le=1000.0,
         description="width of the model's doubt at the vessel's walls beside the head; at a lumen that it knows some 1 px",

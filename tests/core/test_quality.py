@@ -109,7 +109,7 @@ def test_a_halo_is_no_vessel() -> None:
     refusal = quality.check_walls(halo, (120.0, 60.0), LIMITS)
     assert refusal is not None
     assert refusal.reason is Reason.NO_VESSEL
-    assert "(at most 10.0 px)" in refusal.detail
+    assert "(at most 12.0 px)" in refusal.detail
     assert quality.check_walls(halo, (120.0, 60.0), QualityConfig(enabled=False)) is None
     assert quality.check_walls(halo, (120.0, 60.0), QualityConfig(max_wall_blur_px=1000.0)) is None
     assert quality.check_walls(softened(masks(), 2.0), (120.0, 60.0), LIMITS) is None
