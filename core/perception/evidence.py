@@ -152,11 +152,10 @@ def wall_blur_px(masks: Masks, head: Point) -> float:
     For a wall whose probability is a logistic function of the distance that is the width from 0.1 to 0.9. A lumen is clear but for
     its rim; what is drawn around a robot where there is none is doubt all over.
     """
-    probability, inside = _around(masks.vessel_probability, head), np.ascontiguousarray(_around(masks.vessel, head)).view(np.uint8)
+    near, inside = _around(masks.vessel_probability, head), np.ascontiguousarray(_around(masks.vessel, head)).view(np.uint8)
     rim = cv2.countNonZero(inside) - cv2.countNonZero(cv2.erode(inside, np.ones((3, 3), np.uint8), borderValue=1))
-    doubt = float(cv2.sumElems(probability)[0]) - float(np.vdot(probability, probability))
     # One wall across the window at least: where the lumen fills all of it, there is nothing to divide by.
-    return 4.0 * doubt / max(rim, 2 * _AROUND_PX)
+    return 4.0 * float((near * (1 - near)).sum()) / max(rim, 2 * _AROUND_PX)
 
 
 def _mean(values: NDArray[Any]) -> float:

@@ -99,9 +99,6 @@ def test_a_refusal_keeps_what_was_found_before_it(pipeline: Pipeline, network: D
     assert list(scene.latency_ms) == ["prepare", "network", "masks", "total"]
 
 
-# ---- how steady an answer is ----
-
-
 def test_a_vessel_without_clear_walls_is_none_and_is_kept_to_be_looked_at(pipeline: Pipeline, network: DrawnNetwork) -> None:
     network.vessel = cv2.GaussianBlur(network.vessel, (0, 0), 7.0)
     scene = pipeline.perceive_single(frame())
@@ -110,6 +107,9 @@ def test_a_vessel_without_clear_walls_is_none_and_is_kept_to_be_looked_at(pipeli
     assert scene.masks is not None
     assert scene.path is not None
     assert scene.vessel_vector is not None
+
+
+# ---- how steady an answer is ----
 
 
 def swings(network: DrawnNetwork) -> tuple[float, float]:
