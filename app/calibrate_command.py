@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -14,14 +16,26 @@ from app.learning_commands import progress_bar
 from app.left_out import LeftOut
 from core.config import PerceptionConfig, load_config
 from core.perception.evidence import Calibration
+from core.types import Image
+
+if TYPE_CHECKING:
+    from core.learning.dataset import Sample
 
 
-def run_calibrate(folder: Path, *, model: str, config_path: Path | None, knows: Sequence[Path] = ()) -> None:
+_EXAMPLES = 80
+"""Frames from which the eight-bit networks are made: they see two windows of each at their second look."""
+
+
+def run_calibrate(
+    folder: Path, *, model: str, config_path: Path | None, knows: Sequence[Path] = (), eight_bit: bool = False
+) -> None:
     """Perceive every frame of a labelled set, once and in all orientations; store a calibration of each in the model's manifest.
 
-    And what kind of pictures these and those in `knows` are: others are refused from then on.
+    And what kind of pictures these and those in `knows` are: others are refused from then on. With `eight_bit`, the networks'
+    eight-bit copies are first made anew from some of the frames.
     """
     from core.learning.dataset import POSE_KEYS, find_labelled
+    from core.learning.eight_bit import renew_eight_bit
     from core.learning.model_file import model_folder, sha256_of, write_calibration
     from core.perception.pipeline import open_pipeline, open_sights
     from core.perception.second_look import SecondLook
@@ -37,6 +51,9 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None, knows: 
     target, tables, left_out = model_folder(model), [], LeftOut()
     config = _configuration(model, config_path, "always")
     with progress_bar() as bar:
+        if eight_bit:
+            task = bar.add_task("eight-bit networks", total=100)
+            renew_eight_bit(target, _examples(samples, config), lambda share: bar.update(task, completed=round(100 * share)))
         for mirrored in ("never", "always"):
             pipeline = open_pipeline(_configuration(model, config_path, mirrored), recalibrating=True)
             title = "frames" if mirrored == "never" else "all orientations"
@@ -60,6 +77,17 @@ def run_calibrate(folder: Path, *, model: str, config_path: Path | None, knows: 
     write_calibration(target, *calibrations, second_looks=looks, familiarity=familiarity)
     Console(markup=False, emoji=False).print(*tables)
     sys.stderr.write("measure it on another set: main.py benchmark --accuracy SET\n")
+
+
+def _examples(samples: Sequence[Sample], config: PerceptionConfig) -> list[Image]:
+    """Pictures from all over the set; one that cannot be read is told when it is perceived."""
+    from core.learning.dataset import DatasetError
+
+    images = []
+    for sample in samples[:: max(1, len(samples) // _EXAMPLES)]:
+        with suppress(DatasetError):
+            images.append(sample.load(config.working_size_px)[0])
+    return images
 
 
 def _configuration(model: str, config_path: Path | None, mirrored: str) -> PerceptionConfig:

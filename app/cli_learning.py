@@ -121,6 +121,9 @@ def calibrate(
     knows: Annotated[
         list[Path] | None, typer.Option("--knows", help="another folder of pictures, labelled or not, of a kind that it knows, too")
     ] = None,
+    eight_bit: Annotated[
+        bool, typer.Option("--eight-bit", help="first make the networks' eight-bit copies anew, from some of the frames")
+    ] = False,
     config: ConfigOption = None,
 ) -> None:
     """Teach a model what its confidence means: the share of right answers among those that it is so sure of.
@@ -129,4 +132,4 @@ def calibrate(
     """
     from app.calibrate_command import run_calibrate
 
-    run_calibrate(folder, model=model, config_path=config, knows=knows or ())
+    run_calibrate(folder, model=model, config_path=config, knows=knows or (), eight_bit=eight_bit)

@@ -278,6 +278,28 @@ def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs:
         shutil.rmtree(scratch, ignore_errors=True)
 
 
+def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
+    """Make the eight-bit copy of a model's network anew from `examples`, as ``save_model`` does; its figures are no longer true.
+
+    Raises
+    ------
+    ModelError
+        The model is damaged, or cannot be written.
+    """
+    network = load_network(folder)[0]
+    check_can_write(folder)
+    folder = folder.resolve()
+    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        shutil.copytree(folder, scratch, dirs_exist_ok=True)
+        export_onnx(_eight_bit(network, examples), network.shape.stride, scratch / ONNX_INT8)
+        _update(scratch, {"onnx_int8_sha256": sha256_of(scratch / ONNX_INT8), "figures": {}})
+        scratch.chmod(0o755)
+        _put(scratch, folder)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
 def check_can_write(folder: Path) -> None:
     """Raise ModelError when `folder` is anything but a model, an empty folder, or not there: nothing else is ever replaced."""
     try:
@@ -338,7 +360,7 @@ def _eight_bit(network: DualUNet, examples: Sequence[Image]) -> EightBitUNet:
     eight_bit = EightBitUNet(network.eval()).eval()
     # Cropped to whole strides: padding would teach the ranges edges that no camera shows.
     cuts = (image[: image.shape[0] // stride * stride, : image.shape[1] // stride * stride] for image in examples)
-    eight_bit.learn_ranges(torch.from_numpy(cut.transpose(2, 0, 1)[None].copy()).float() / 255 for cut in cuts if cut.size)
+    eight_bit.learn(torch.from_numpy(cut.transpose(2, 0, 1)[None].copy()).float() / 255 for cut in cuts if cut.size)
     return eight_bit
 
 

@@ -1,14 +1,17 @@
 """Eight-bit copy of a trained network: what runs on processors, in a third of the time of fp32 (docs/method.md).
 
-Weights (in seven of the eight bits) get one step size per output channel, activations one per tensor, both chosen from what a few
+Weights (in seven of the eight bits) get one step size per output channel, activations one per tensor, chosen from what a few
 training frames make of them (B. Jacob et al., "Quantization and training of neural networks for efficient
-integer-arithmetic-only inference", CVPR 2018). The copy is an ordinary torch module whose fake quantisation exports as ONNX
-QuantizeLinear / DequantizeLinear pairs, which OpenVINO computes in int8.
+integer-arithmetic-only inference", CVPR 2018). Weights are not rounded each to its nearest step: what one of them loses by it, the
+others that see the same pixels make good (E. Frantar et al., "GPTQ: accurate post-training quantization for generative pre-trained
+transformers", ICLR 2023), and what is lost on average goes into the bias. The copy is an ordinary torch module whose fake
+quantisation exports as ONNX QuantizeLinear / DequantizeLinear pairs, which OpenVINO computes in int8.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from copy import deepcopy
 from typing import Any
 
 import torch
@@ -22,6 +25,12 @@ WEIGHT_STEPS = 63
 silently where two full steps meet two full activations (2 * 255 * 127 > 32767); with seven bits they cannot (2 * 255 * 64)."""
 _KEPT_SHARE = 0.9999
 """Share of the activations that the range covers; the few beyond it are clipped so that all others get finer steps."""
+_PLACES = 512
+"""Of each example, at which a convolution's inputs are looked at to choose how its weights are rounded."""
+_DAMPING = 0.01
+"""Share of the inputs' mean variance that is added to each: what a few examples say of rare inputs is not to be relied on."""
+_PIXEL_STEP = 4.0 / 255
+"""One of 255 levels as the network sees it. Its zero lies between two levels; the copy's has to lie on one."""
 
 
 class _Steps(nn.Module):
@@ -43,11 +52,58 @@ class _Steps(nn.Module):
         return torch.fake_quantize_per_tensor_affine(x, scale, round(-self.low / scale), 0, 255)
 
 
+class _Moments:
+    """Mean and covariance of what a convolution's weights are multiplied with, from random places of the examples."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._sum: Any = 0.0
+        self._products: Any = 0.0
+        self._random = torch.Generator().manual_seed(0)
+
+    def add(self, inputs: Tensor) -> None:
+        """Inputs (places, K)."""
+        chosen = inputs[torch.randperm(len(inputs), generator=self._random)[:_PLACES]].double()
+        self._count += len(chosen)
+        self._sum = self._sum + chosen.sum(0)
+        self._products = self._products + chosen.T @ chosen
+
+    def mean(self) -> Tensor:
+        return self._sum / self._count  # type: ignore[no-any-return]
+
+    def covariance(self) -> Tensor:
+        mean = self.mean()
+        return self._products / self._count - mean[:, None] * mean[None, :]  # type: ignore[no-any-return]
+
+
+def _rounded(weight: Tensor, scale: Tensor, covariance: Tensor) -> Tensor:
+    """Rows of weights (N, K) in whole steps of `scale` (N,) that do most nearly the same to inputs of this covariance (K, K)."""
+    # Those whose inputs vary most first: the others make good what their rounding loses.
+    order = covariance.diagonal().argsort(descending=True)
+    damped = covariance[order][:, order]
+    damped += torch.eye(len(order), dtype=damped.dtype) * (_DAMPING * damped.diagonal().mean()).clamp_min(1e-12)
+    follow = torch.linalg.cholesky(torch.linalg.inv(damped), upper=True)
+    left = weight.double()[:, order]
+    whole = torch.empty_like(left)
+    step = scale.double()
+    for column in range(len(order)):
+        now = left[:, column]
+        whole[:, column] = torch.round(now / step).clamp(-WEIGHT_STEPS, WEIGHT_STEPS) * step
+        lost = (now - whole[:, column]) / follow[column, column]
+        left[:, column + 1 :] -= lost[:, None] * follow[column, column + 1 :]
+    back = torch.empty_like(whole)
+    back[:, order] = whole
+    return back.to(weight.dtype)
+
+
 class _Conv(nn.Module):
     """A convolution, plain or transposed, with eight-bit weights and perhaps a rectifier."""
 
+    scale: Tensor
+
     def __init__(self, conv: nn.Conv2d | nn.ConvTranspose2d, rectify: bool) -> None:
         super().__init__()
+        conv = deepcopy(conv)
         channel = 1 if isinstance(conv, nn.ConvTranspose2d) else 0
         weight = conv.weight.detach()
         scale = weight.abs().amax(dim=[d for d in range(4) if d != channel]).clamp_min(1e-8) / WEIGHT_STEPS
@@ -55,9 +111,36 @@ class _Conv(nn.Module):
         self.conv, self.rectify, self.channel = conv, rectify, channel
         self.register_buffer("scale", scale)
         self.register_buffer("zero", zero)
+        self.moments: _Moments | None = None
+
+    def round_weights(self) -> None:
+        """Round the weights by what was seen of their inputs, and put what is lost on average into the bias."""
+        if self.moments is None:
+            return
+        weight, channels = self.conv.weight.detach(), self.scale.numel()
+        rows = weight.permute(1, 2, 3, 0).reshape(-1, weight.shape[0]) if self.channel else weight.reshape(channels, -1)
+        whole = _rounded(rows, self.scale.repeat_interleave(len(rows) // channels), self.moments.covariance())
+        lost = ((rows - whole).double() @ self.moments.mean()).reshape(channels, -1).mean(1)
+        turned = whole.reshape(*weight.shape[1:], -1).permute(3, 0, 1, 2) if self.channel else whole.reshape(weight.shape)
+        self.conv.weight.data.copy_(turned)
+        assert self.conv.bias is not None
+        self.conv.bias.data += lost.to(self.conv.bias.dtype)
+        self.moments = None
+
+    def _see(self, x: Tensor) -> None:
+        assert self.moments is not None
+        if self.channel == 0 and self.conv.kernel_size != (1, 1):
+            places = nn.functional.unfold(x, self.conv.kernel_size, padding=1).transpose(1, 2).flatten(0, 1)
+        else:  # each pixel for itself
+            places = x.permute(0, 2, 3, 1).flatten(0, 2)
+        self.moments.add(places)
 
     def forward(self, x: Tensor) -> Tensor:
-        weight = torch.fake_quantize_per_channel_affine(self.conv.weight, self.scale, self.zero, self.channel, -128, 127)  # type: ignore[arg-type]
+        weight = self.conv.weight
+        if self.moments is not None:
+            self._see(x)
+        else:
+            weight = torch.fake_quantize_per_channel_affine(weight, self.scale, self.zero, self.channel, -128, 127)  # type: ignore[arg-type]
         if isinstance(self.conv, nn.ConvTranspose2d):
             y = nn.functional.conv_transpose2d(x, weight, self.conv.bias, stride=2)
         else:
@@ -94,22 +177,32 @@ class EightBitUNet(nn.Module):
         super().__init__()
         self.shape = network.shape
         self.input_steps = _Steps()
+        self.input_steps.low, self.input_steps.high = -128 * _PIXEL_STEP, 127 * _PIXEL_STEP
         self.encoder = nn.ModuleList([_Chain(_block(block)) for block in network.encoder])
         # One range for everything that meets at a level: what the skip connection and both up-samplings bring is concatenated.
         self.level_steps = nn.ModuleList([_Steps() for _ in network.encoder])
         self.decoders = nn.ModuleList([_EightBitDecoder(decoder) for decoder in (network.vessel, network.robot)])
+        first: Any = self.encoder[0]
+        first = first.convolutions[0].conv
+        # Half a level, by which the input's zero was moved. At the picture's edges, padded with zeros, that is a bit too much.
+        first.bias.data += 0.5 * _PIXEL_STEP * first.weight.detach().sum(dim=(1, 2, 3))
 
-    def learn_ranges(self, images: Iterable[Tensor]) -> None:
-        """Choose all ranges from the given (N, 3, H, W) batches in 0..1."""
+    def learn(self, images: Iterable[Tensor]) -> None:
+        """Choose all ranges, and how weights are rounded, from the given (N, planes, H, W) batches of levels in 0..1."""
         steps = [module for module in self.modules() if isinstance(module, _Steps)]
+        convolutions = [module for module in self.modules() if isinstance(module, _Conv)]
+        for module in convolutions:
+            module.moments = _Moments()
         with torch.no_grad():
             for image in images:
                 self(image)
-        for module in steps:
-            module.learning = False
+            for module in convolutions:
+                module.round_weights()
+        for step in steps:
+            step.learning = False
 
     def forward(self, image: Tensor) -> Tensor:
-        x = (image - 0.5) * 4.0
+        x = (image - 128 / 255) * 4.0
         if self.shape.fold > 1:
             x = nn.functional.pixel_unshuffle(x, self.shape.fold)
         x = self.input_steps(x)

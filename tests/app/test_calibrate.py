@@ -13,7 +13,7 @@ import core.study.known_pictures as knowing
 from app.calibrate_command import run_calibrate
 from core.config import PerceptionConfig
 from core.learning.dataset import DatasetError
-from core.learning.model_file import INFO, MODELS, read_model_info
+from core.learning.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, WEIGHTS, read_model_info
 from core.perception.evidence import WITHOUT_SWINGS
 from core.perception.pipeline import open_sights
 from core.perception.second_look import MOST_LOOKS
@@ -66,7 +66,12 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
     monkeypatch.setattr(knowing, "LEAST", 4)
     more = tmp_path / "more"
     shutil.copytree(frames / "images", more)
-    run_calibrate(frames, model=str(model), config_path=None, knows=[more])
+    before, near_before = (read_model_info(folder) for folder in (model, model / SECOND_LOOK))
+    run_calibrate(frames, model=str(model), config_path=None, knows=[more], eight_bit=True)
+    for folder, older in ((model, before), (model / SECOND_LOOK, near_before)):
+        newer = read_model_info(folder, verify=(WEIGHTS, ONNX, ONNX_INT8))
+        assert newer.onnx_int8_sha256 not in (None, older.onnx_int8_sha256), "its eight-bit copy is another one, from ten frames"
+        assert newer.weights_sha256 == older.weights_sha256
     info = read_model_info(model)
     assert info.mirrored_second_looks == MOST_LOOKS
     assert info.figures == {}

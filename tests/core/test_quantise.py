@@ -8,7 +8,7 @@ import torch
 
 from core.config import SegmentationConfig
 from core.learning.model_file import ONNX_INT8, ModelError, read_model_info, save_model
-from core.learning.quantise import EightBitUNet, _Conv
+from core.learning.quantise import EightBitUNet, _Conv, _Moments, _rounded
 from core.perception.segmentation import OpenVinoSegmenter, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 from core.types import Image
@@ -33,6 +33,10 @@ def _network() -> DualUNet:
     return network.eval()
 
 
+def _batches(count: int) -> list[torch.Tensor]:
+    return [torch.from_numpy(p.transpose(2, 0, 1)[None, :, :64].copy()).float() / 255 for p in _pictures(count)]
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("models") / "tiny"
@@ -43,8 +47,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_copy_answers_like_the_original() -> None:
     network = _network()
     copy = EightBitUNet(network).eval()
-    batches = [torch.from_numpy(p.transpose(2, 0, 1)[None, :, :64].copy()).float() / 255 for p in _pictures(4)]
-    copy.learn_ranges(batches)
+    batches = _batches(4)
+    copy.learn(batches)
     with torch.no_grad():
         original, eight_bit = (torch.sigmoid(n(batches[0])) for n in (network, copy))
     spread = float(original.max() - original.min())
@@ -52,9 +56,57 @@ def test_the_copy_answers_like_the_original() -> None:
     assert not torch.equal(original, eight_bit), "nothing was quantised"
 
 
+def test_no_level_of_a_picture_is_lost() -> None:
+    copy = EightBitUNet(_network()).eval()
+    copy.learn(_batches(2))
+    levels = (torch.arange(256).float() / 255 - 128 / 255) * 4
+    assert torch.allclose(copy.input_steps(levels), levels, atol=1e-6)
+
+
+def test_the_original_stays_as_it_was() -> None:
+    network = _network()
+    before = {name: value.clone() for name, value in network.state_dict().items()}
+    EightBitUNet(network).eval().learn(_batches(2))
+    assert all(torch.equal(value, before[name]) for name, value in network.state_dict().items())
+
+
+def test_weights_that_see_the_same_make_good_what_one_of_them_loses_by_rounding() -> None:
+    """Neighbouring pixels are alike: four inputs that always agree need only the sum of their weights to be right."""
+    torch.manual_seed(1)
+    weight, scale = torch.rand(50, 4) - 0.5, torch.full((50,), 0.1)
+    alike = torch.ones(4, 4, dtype=torch.float64) + 1e-3 * torch.eye(4, dtype=torch.float64)
+    whole = _rounded(weight, scale, alike)
+    nearest = torch.round(weight / 0.1) * 0.1
+    assert torch.allclose(whole / 0.1, torch.round(whole / 0.1), atol=1e-5)
+    lost, lost_by_nearest = ((weight - one).sum(1).abs() for one in (whole, nearest))
+    assert float(lost.max()) < 0.051  # half a step, as of a single weight
+    assert float(lost.mean()) < 0.6 * float(lost_by_nearest.mean())
+
+
+@pytest.mark.parametrize("transposed", [False, True])
+def test_what_rounding_loses_on_average_goes_into_the_bias(transposed: bool) -> None:
+    torch.manual_seed(2)
+    plain = torch.nn.ConvTranspose2d(6, 5, 2, stride=2) if transposed else torch.nn.Conv2d(6, 5, 3, padding=1)
+    part = _Conv(plain, rectify=False)
+    part.scale *= 8  # so coarse that every weight matters
+    part.moments = _Moments()
+    x = 3 + torch.rand(1, 6, 24, 24)
+    with torch.no_grad():
+        exact = plain(x)
+        assert torch.equal(part(x), exact), "what it learns from is exact"
+        part.round_weights()
+        found = part(x)
+    inside = np.s_[:, :, 2:-2, 2:-2]
+    lost = (found - exact)[inside]
+    assert 0 < float(lost.abs().mean())
+    assert float(lost.mean(dim=(0, 2, 3)).abs().max()) < 0.2 * float(exact[inside].std())
+
+
 def test_two_products_never_overflow_the_sixteen_bits_of_an_old_processor() -> None:
     """Without VNNI, u8 x s8 products are added in pairs with 16 bits, and what is beyond is cut off without a word."""
-    parts = [module for module in EightBitUNet(_network()).modules() if isinstance(module, _Conv)]
+    copy = EightBitUNet(_network()).eval()
+    copy.learn(_batches(2))
+    parts = [module for module in copy.modules() if isinstance(module, _Conv)]
     assert len(parts) > 20
     for part in parts:
         shape = [-1 if axis == part.channel else 1 for axis in range(4)]

@@ -1,0 +1,52 @@
+"""New eight-bit copies of a model's networks, without training: after a better way to make them was found, or for another rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from core.config import SegmentationConfig
+from core.learning.model_file import second_look_of, write_eight_bit
+from core.perception.second_look import Planes, look_again
+from core.perception.segmentation import Probability, Segmenter, open_second_look, open_segmenter
+from core.types import Image
+
+
+class _Listening:
+    """A second look's network that keeps what it was asked about."""
+
+    def __init__(self, near: Segmenter) -> None:
+        self._near = near
+        self.asked: list[Planes] = []
+
+    @property
+    def engine(self) -> str:
+        return self._near.engine
+
+    def __call__(self, image: Planes) -> tuple[Probability, Probability]:
+        self.asked.append(image)
+        return self._near(image)
+
+
+def renew_eight_bit(folder: Path, images: Sequence[Image], on_progress: Callable[[float], None] = lambda share: None) -> None:
+    """Make the eight-bit copies of the model in `folder` anew, from what its networks see of RGB `images` at working size.
+
+    `on_progress` is told which share is done, 0..1.
+
+    Raises
+    ------
+    ModelError
+        The model is damaged, or cannot be written.
+    """
+    write_eight_bit(folder, images)
+    on_progress(0.5)
+    config = SegmentationConfig(model=str(folder))
+    near = open_second_look(config)
+    where = second_look_of(folder)
+    if near is not None and where is not None:
+        first, listening = open_segmenter(config), _Listening(near)
+        for image in images:
+            look_again(image, first(image), listening)
+        if listening.asked:
+            write_eight_bit(where, listening.asked)
+    on_progress(1.0)
