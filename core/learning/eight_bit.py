@@ -11,6 +11,9 @@ from core.perception.second_look import Planes, look_again
 from core.perception.segmentation import Probability, Segmenter, open_second_look, open_segmenter
 from core.types import Image
 
+MOST_WINDOWS = 160
+"""More of them say no more about the second look's ranges."""
+
 
 class _Listening:
     """A second look's network that keeps what it was asked about."""
@@ -31,22 +34,25 @@ class _Listening:
 def renew_eight_bit(folder: Path, images: Sequence[Image], on_progress: Callable[[float], None] = lambda share: None) -> None:
     """Make the eight-bit copies of the model in `folder` anew, from what its networks see of RGB `images` at working size.
 
-    `on_progress` is told which share is done, 0..1.
+    What its confidence meant is no longer quite true. `on_progress` is told which share is done, 0..1.
 
     Raises
     ------
     ModelError
-        The model is damaged, or cannot be written.
+        The model is damaged, cannot be written, or sees nothing of a robot in these pictures.
     """
-    write_eight_bit(folder, images)
-    on_progress(0.5)
-    config = SegmentationConfig(model=str(folder))
-    near = open_second_look(config)
-    where = second_look_of(folder)
-    if near is not None and where is not None:
+    # In fp32: the copies that are there may be damaged, or the reason for new ones.
+    config = SegmentationConfig(model=str(folder), precision="fp32")
+    near, where = open_second_look(config), second_look_of(folder)
+    asked: list[Planes] = []
+    if near is not None:
         first, listening = open_segmenter(config), _Listening(near)
-        for image in images:
+        for done, image in enumerate(images):
             look_again(image, first(image), listening)
-        if listening.asked:
-            write_eight_bit(where, listening.asked)
+            on_progress(0.2 * done / len(images))
+        asked = listening.asked[:: -(-len(listening.asked) // MOST_WINDOWS) or 1]
+    write_eight_bit(folder, images)
+    on_progress(0.6)
+    if where is not None:
+        write_eight_bit(where, asked)
     on_progress(1.0)

@@ -11,7 +11,8 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -195,7 +196,7 @@ def save_model(
 ) -> ModelInfo:
     """Write weights, ONNX and manifest. The folder appears whole or not at all; an older model of that name is replaced last.
 
-    From `examples`, typical RGB images at working size, the ranges of an eight-bit copy are learnt; without them there is none.
+    From `examples`, typical RGB images at working size, an eight-bit copy learns ranges and rounding; without them there is none.
     `second_look` is the folder of a second look's network that comes along as it is.
 
     Raises
@@ -213,8 +214,9 @@ def save_model(
         save_file(state, scratch / WEIGHTS)
         (scratch / WEIGHTS).chmod(0o644)  # others at the same machine may use it, too; by itself it is the writer's alone
         export_onnx(network, network.shape.stride, scratch / ONNX)
-        if len(examples):
-            export_onnx(_eight_bit(network, examples), network.shape.stride, scratch / ONNX_INT8)
+        cuts = _whole_strides(examples, network.shape.stride)
+        if cuts:
+            export_onnx(_eight_bit(network, cuts), network.shape.stride, scratch / ONNX_INT8)
         info = ModelInfo(
             format=1,
             name=folder.name,
@@ -222,7 +224,7 @@ def save_model(
             stride=network.shape.stride,
             weights_sha256=sha256_of(scratch / WEIGHTS),
             onnx_sha256=sha256_of(scratch / ONNX),
-            onnx_int8_sha256=sha256_of(scratch / ONNX_INT8) if len(examples) else None,
+            onnx_int8_sha256=sha256_of(scratch / ONNX_INT8) if cuts else None,
             second_look_sha256=read_model_info(second_look, verify=()).weights_sha256 if second_look is not None else None,
             training=training,
             figures=figures,
@@ -263,9 +265,7 @@ def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs:
     folder = folder.resolve()
     scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
     try:
-        for name in (WEIGHTS, ONNX, ONNX_INT8, INFO):
-            if (base / name).is_file():
-                shutil.copyfile(base / name, scratch / name)
+        _copy(base, scratch)
         save_model(network, scratch / SECOND_LOOK, **kwargs)
         figures = read_model_info(scratch, verify=()).figures
         held_out = figures if figures.get("held_out") else {}
@@ -278,26 +278,52 @@ def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs:
         shutil.rmtree(scratch, ignore_errors=True)
 
 
-def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
-    """Make the eight-bit copy of a model's network anew from `examples`, as ``save_model`` does; its figures are no longer true.
+@contextmanager
+def changed(folder: Path) -> Iterator[Path]:
+    """A copy of a model to work on, which takes its place in the end; whatever goes wrong leaves the model as it was.
 
     Raises
     ------
     ModelError
         The model is damaged, or cannot be written.
     """
-    network = load_network(folder)[0]
+    read_model_info(folder)
     check_can_write(folder)
     folder = folder.resolve()
     scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
     try:
-        shutil.copytree(folder, scratch, dirs_exist_ok=True)
-        export_onnx(_eight_bit(network, examples), network.shape.stride, scratch / ONNX_INT8)
-        _update(scratch, {"onnx_int8_sha256": sha256_of(scratch / ONNX_INT8), "figures": {}})
+        _copy(folder, scratch)
+        if (near := second_look_of(folder)) is not None:
+            (scratch / SECOND_LOOK).mkdir()
+            _copy(near, scratch / SECOND_LOOK)
+        yield scratch
         scratch.chmod(0o755)
         _put(scratch, folder)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _copy(folder: Path, to: Path) -> None:
+    """A model's own files, but not their modes: a model that is read only may be worked on elsewhere."""
+    for name in (WEIGHTS, ONNX, ONNX_INT8, INFO):
+        if (folder / name).is_file():
+            shutil.copyfile(folder / name, to / name)
+
+
+def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
+    """Make the eight-bit copy of a model's network anew from `examples`, as ``save_model`` does; its figures are no longer true.
+
+    Raises
+    ------
+    ModelError
+        The model is damaged, or there is no picture of the network's stride or more among the examples.
+    """
+    network = load_network(folder)[0]
+    cuts = _whole_strides(examples, network.shape.stride)
+    if not cuts:
+        raise ModelError(f"{folder}: nothing to make its eight-bit copy from; give pictures that can be read")
+    export_onnx(_eight_bit(network, cuts), network.shape.stride, folder / ONNX_INT8)
+    _update(folder, {"onnx_int8_sha256": sha256_of(folder / ONNX_INT8), "figures": {}})
 
 
 def check_can_write(folder: Path) -> None:
@@ -351,16 +377,19 @@ def _update(folder: Path, changes: dict[str, Any]) -> None:
         raise ModelError(f"{folder / INFO}: cannot be written ({error.strerror}); copy the model to a folder of your own") from None
 
 
+def _whole_strides(images: Sequence[Image], stride: int) -> list[Image]:
+    """The pictures cropped to whole strides: padding would teach ranges edges that no camera shows. Smaller ones are left out."""
+    cuts = (image[: image.shape[0] // stride * stride, : image.shape[1] // stride * stride] for image in images)
+    return [cut for cut in cuts if cut.size]
+
+
 def _eight_bit(network: DualUNet, examples: Sequence[Image]) -> EightBitUNet:
     import torch
 
     from core.learning.quantise import EightBitUNet
 
-    stride = network.shape.stride
     eight_bit = EightBitUNet(network.eval()).eval()
-    # Cropped to whole strides: padding would teach the ranges edges that no camera shows.
-    cuts = (image[: image.shape[0] // stride * stride, : image.shape[1] // stride * stride] for image in examples)
-    eight_bit.learn(torch.from_numpy(cut.transpose(2, 0, 1)[None].copy()).float() / 255 for cut in cuts if cut.size)
+    eight_bit.learn(torch.from_numpy(image.transpose(2, 0, 1)[None].copy()).float() / 255 for image in examples)
     return eight_bit
 
 

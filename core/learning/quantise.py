@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from copy import deepcopy
-from typing import Any
+from typing import Any, cast
 
 import torch
 from torch import Tensor, nn
@@ -71,16 +71,18 @@ class _Moments:
     def mean(self) -> Tensor:
         return self._sum / self._count  # type: ignore[no-any-return]
 
-    def covariance(self) -> Tensor:
+    def products(self, *, centred: bool) -> Tensor:
+        """Mean products (K, K) of any two inputs, or of what they differ by from their means."""
         mean = self.mean()
-        return self._products / self._count - mean[:, None] * mean[None, :]  # type: ignore[no-any-return]
+        products: Tensor = self._products / self._count
+        return products - mean[:, None] * mean[None, :] if centred else products
 
 
-def _rounded(weight: Tensor, scale: Tensor, covariance: Tensor) -> Tensor:
-    """Rows of weights (N, K) in whole steps of `scale` (N,) that do most nearly the same to inputs of this covariance (K, K)."""
+def _rounded(weight: Tensor, scale: Tensor, products: Tensor) -> Tensor:
+    """Rows of weights (N, K) in whole steps of `scale` (N,) that do most nearly the same to inputs of such mean products (K, K)."""
     # Those whose inputs vary most first: the others make good what their rounding loses.
-    order = covariance.diagonal().argsort(descending=True)
-    damped = covariance[order][:, order]
+    order = products.diagonal().argsort(descending=True, stable=True)
+    damped = products[order][:, order]
     damped += torch.eye(len(order), dtype=damped.dtype) * (_DAMPING * damped.diagonal().mean()).clamp_min(1e-12)
     follow = torch.linalg.cholesky(torch.linalg.inv(damped), upper=True)
     left = weight.double()[:, order]
@@ -118,8 +120,10 @@ class _Conv(nn.Module):
         if self.moments is None:
             return
         weight, channels = self.conv.weight.detach(), self.scale.numel()
+        # A plain convolution's bias makes good what a row loses on average. A transposed one has a row for each of four pixels, and
+        # one bias for all of them.
         rows = weight.permute(1, 2, 3, 0).reshape(-1, weight.shape[0]) if self.channel else weight.reshape(channels, -1)
-        whole = _rounded(rows, self.scale.repeat_interleave(len(rows) // channels), self.moments.covariance())
+        whole = _rounded(rows, self.scale.repeat_interleave(len(rows) // channels), self.moments.products(centred=not self.channel))
         lost = ((rows - whole).double() @ self.moments.mean()).reshape(channels, -1).mean(1)
         turned = whole.reshape(*weight.shape[1:], -1).permute(3, 0, 1, 2) if self.channel else whole.reshape(weight.shape)
         self.conv.weight.data.copy_(turned)
@@ -130,7 +134,11 @@ class _Conv(nn.Module):
     def _see(self, x: Tensor) -> None:
         assert self.moments is not None
         if self.channel == 0 and self.conv.kernel_size != (1, 1):
-            places = nn.functional.unfold(x, self.conv.kernel_size, padding=1).transpose(1, 2).flatten(0, 1)
+            places = (
+                nn.functional.unfold(x, self.conv.kernel_size, padding=cast("tuple[int, ...]", self.conv.padding))
+                .transpose(1, 2)
+                .flatten(0, 1)
+            )
         else:  # each pixel for itself
             places = x.permute(0, 2, 3, 1).flatten(0, 2)
         self.moments.add(places)

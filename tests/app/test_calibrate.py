@@ -6,17 +6,20 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
+from core.image_io import read_image
 
 import core.study.calibration as fitting
 import core.study.known_pictures as knowing
 from app.calibrate_command import run_calibrate
 from core.config import PerceptionConfig
 from core.learning.dataset import DatasetError
-from core.learning.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, WEIGHTS, read_model_info
+from core.learning.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, sha256_of
 from core.perception.evidence import WITHOUT_SWINGS
 from core.perception.pipeline import open_sights
 from core.perception.second_look import MOST_LOOKS
+from core.perception.segmentation import OpenVinoSegmenter
 from core.study.calibration import CalibrationError
 from hardware.twin.synth import SynthPlan, write_set
 
@@ -66,12 +69,17 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
     monkeypatch.setattr(knowing, "LEAST", 4)
     more = tmp_path / "more"
     shutil.copytree(frames / "images", more)
-    before, near_before = (read_model_info(folder) for folder in (model, model / SECOND_LOOK))
+    olds, near_before = (read_model_info(folder) for folder in (model, model / SECOND_LOOK))
     run_calibrate(frames, model=str(model), config_path=None, knows=[more], eight_bit=True)
-    for folder, older in ((model, before), (model / SECOND_LOOK, near_before)):
+    for folder, older in ((model, olds), (model / SECOND_LOOK, near_before)):
         newer = read_model_info(folder, verify=(WEIGHTS, ONNX, ONNX_INT8))
         assert newer.onnx_int8_sha256 not in (None, older.onnx_int8_sha256), "its eight-bit copy is another one, from ten frames"
         assert newer.weights_sha256 == older.weights_sha256
+    assert not list(model.parent.glob(".older-*")), "nothing is left of the copy that it was worked on in"
+    image = read_image(sorted((frames / "images").iterdir())[0])
+    eight_bit, exact = (OpenVinoSegmenter(model, 1, precision)(image) for precision in ("int8", "fp32"))
+    for one, other in zip(eight_bit, exact, strict=True):
+        assert 0 < float(np.abs(one - other).mean()) < 0.02
     info = read_model_info(model)
     assert info.mirrored_second_looks == MOST_LOOKS
     assert info.figures == {}
@@ -99,8 +107,23 @@ def test_a_folder_without_pictures_is_said_before_anything_else(frames: Path, mo
         run_calibrate(frames, model=str(model), config_path=None, knows=[tmp_path])
 
 
-def test_too_few_frames_leave_the_model_as_it_is(frames: Path, model: Path) -> None:
-    before = (model / INFO).read_bytes()
+@pytest.mark.parametrize("eight_bit", [False, True])
+def test_too_few_frames_leave_the_model_as_it_is(frames: Path, model: Path, *, eight_bit: bool) -> None:
+    """Also its networks: new ones would be believed as the old ones were."""
+    before = _files(model)
     with pytest.raises(CalibrationError, match="give it more frames"):
-        run_calibrate(frames, model=str(model), config_path=None)
-    assert (model / INFO).read_bytes() == before
+        run_calibrate(frames, model=str(model), config_path=None, eight_bit=eight_bit)
+    assert _files(model) == before
+
+
+def _files(folder: Path) -> dict[Path, str]:
+    """Every file beside and in the folder, by its hash."""
+    return {path: sha256_of(path) for path in folder.parent.rglob("*") if path.is_file()}
+
+
+def test_a_damaged_network_is_said_before_the_work(frames: Path, model: Path) -> None:
+    (model / ONNX).write_bytes(b"cut")
+    before = _files(model)
+    with pytest.raises(ModelError, match=r"older/network\.onnx: SHA-256 differs"):
+        run_calibrate(frames, model=str(model), config_path=None, eight_bit=True)
+    assert _files(model) == before

@@ -1,13 +1,16 @@
 """The eight-bit copy of a network: close to the original, stored and verified beside it, chosen by the configuration."""
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
 from core.config import SegmentationConfig
-from core.learning.model_file import ONNX_INT8, ModelError, read_model_info, save_model
+from core.learning.model_file import ONNX_INT8, ModelError, changed, read_model_info, save_model, write_eight_bit
 from core.learning.quantise import EightBitUNet, _Conv, _Moments, _rounded
 from core.perception.segmentation import OpenVinoSegmenter, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
@@ -99,7 +102,60 @@ def test_what_rounding_loses_on_average_goes_into_the_bias(transposed: bool) -> 
     inside = np.s_[:, :, 2:-2, 2:-2]
     lost = (found - exact)[inside]
     assert 0 < float(lost.abs().mean())
-    assert float(lost.mean(dim=(0, 2, 3)).abs().max()) < 0.2 * float(exact[inside].std())
+    phases = [lost[..., i::2, j::2] for i in (0, 1) for j in (0, 1)] if transposed else [lost]
+    for phase in phases:  # no chequerboard either
+        assert float(phase.mean(dim=(0, 2, 3)).abs().max()) < 0.2 * float(exact[inside].std())
+
+
+@pytest.mark.parametrize("transposed", [False, True])
+def test_rounding_together_loses_less_than_rounding_each_to_its_nearest(transposed: bool) -> None:
+    """On smooth maps that it has not seen, as the maps of a network are."""
+    torch.manual_seed(4)
+    maps = torch.nn.functional.avg_pool2d(torch.rand(2, 8, 66, 66), 5, stride=1)
+    maps[:, 4:] = 0.7 * maps[:, :4] + 0.3 * maps[:, 4:]
+    plain = torch.nn.ConvTranspose2d(8, 6, 2, stride=2) if transposed else torch.nn.Conv2d(8, 6, 3, padding=1)
+    nearest, together = _Conv(plain, rectify=False), _Conv(plain, rectify=False)
+    together.moments = _Moments()
+    with torch.no_grad():
+        together(maps[:1])
+        together.round_weights()
+        lost = [float((part(maps[1:]) - plain(maps[1:])).pow(2).mean()) for part in (nearest, together)]
+    assert lost[1] < 0.5 * lost[0]
+
+
+@pytest.mark.parametrize("planes", [3, 5])
+def test_moving_the_zero_onto_a_level_changes_nothing(planes: int) -> None:
+    torch.manual_seed(5)
+    network = DualUNet(replace(TINY, inputs=planes)).eval()
+    first: Any = EightBitUNet(network).encoder[0]
+    first = first.convolutions[0]
+    first.moments = _Moments()  # weights as they are
+    levels = torch.randint(0, 256, (1, planes, 32, 32)).float() / 255
+    with torch.no_grad():
+        moved = first(torch.nn.functional.pixel_unshuffle((levels - 128 / 255) * 4, 2))
+        before: Any = network.encoder[0]
+        expected = before[:3](torch.nn.functional.pixel_unshuffle((levels - 0.5) * 4, 2))
+    assert torch.allclose(moved[..., 1:-1, 1:-1], expected[..., 1:-1, 1:-1], atol=1e-5)
+
+
+def test_an_eight_bit_copy_needs_a_picture_and_changes_nothing_without(folder: Path, tmp_path: Path) -> None:
+    model = shutil.copytree(folder, tmp_path / "model")
+    before = {path: path.read_bytes() for path in model.iterdir()}
+    with pytest.raises(ModelError, match="nothing to make its eight-bit copy from"), changed(model) as work:
+        write_eight_bit(work, [np.zeros((8, 200, 3), np.uint8)])
+    assert {path: path.read_bytes() for path in model.iterdir()} == before
+    assert list(tmp_path.iterdir()) == [model]
+
+
+def test_a_model_without_an_eight_bit_copy_gets_one(tmp_path: Path) -> None:
+    save_model(_network(), tmp_path / "plain", training={}, figures={"a": 1})
+    (tmp_path / "link").symlink_to(tmp_path / "plain")
+    with changed(tmp_path / "link") as work:
+        write_eight_bit(work, _pictures(3))
+    info = read_model_info(tmp_path / "plain", verify=(ONNX_INT8,))
+    assert info.figures == {}
+    assert "int8" in OpenVinoSegmenter(tmp_path / "link", 1).engine
+    assert (tmp_path / "link").is_symlink()
 
 
 def test_two_products_never_overflow_the_sixteen_bits_of_an_old_processor() -> None:
