@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from core.image_io import read_image
 
 import core.study.calibration as fitting
 import core.study.known_pictures as knowing
 from app.calibrate_command import run_calibrate
 from core.config import PerceptionConfig
+from core.images import read_image
 from core.learning.dataset import DatasetError
 from core.learning.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, sha256_of
 from core.perception.evidence import WITHOUT_SWINGS
