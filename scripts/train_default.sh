@@ -40,6 +40,11 @@ OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames30" --count 11000 --se
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames31" --count 800 --seed 1179000 --family bench --workers 2
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames32" --count 10400 --seed 1180000 --workers 2
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames33" --count 800 --seed 1193000 --family bench --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames34" --count 5600 --seed 1181000 --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames35" --count 1280 --seed 1182000 --family opaque_channel --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames36" --count 1280 --seed 1183000 --family subtraction --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames37" --count 480 --seed 1193100 --family bench --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames38" --count 2400 --seed 1184000 --workers 2
 # Two threads that spin for each other lose half their time as soon as anything else runs, and two that sleep at once a quarter of it:
 # so they spin for a moment. And memory that is given back after each step has to be cleared for the next one.
 export OMP_WAIT_POLICY=passive GOMP_SPINCOUNT=20000 GLIBC_TUNABLES=glibc.malloc.hugetlb=1
@@ -116,11 +121,15 @@ $python main.py train "${sets[@]}" --second-look --init "$out/near17" --focus 0.
 # And once more, on others that nobody has seen, also where a vessel's wall beside the robot's ends was wrong, and with more weight on
 # the vessel: most of the wrong states were its.
 $python main.py train --data "$out/frames32" --data "$out/frames33" --look-share 0.5 --second-look --init "$out/near18" --focus 0.4 \
-    --end-weight 4 --robot-weight 0.75 --batch 24 --rate 4e-3 --steps 6300 --seed 40 --out "$out/default"
+    --end-weight 4 --robot-weight 0.75 --batch 24 --rate 4e-3 --steps 6300 --seed 40 --out "$out/near19"
+# And once more, on others that nobody has seen, opaque channels and subtraction more often; ended by hand shortly before its end.
+sets=(--data "$out/frames34" --data "$out/frames35" --data "$out/frames36" --data "$out/frames37" --data "$out/frames38")
+$python main.py train "${sets[@]}" --look-share 0.5 --second-look --init "$out/near19" --focus 0.4 --end-weight 4 --robot-weight 0.75 \
+    --batch 24 --rate 4e-3 --steps 14000 --stop-after 13101 --seed 42 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 960 --seed 950000 --workers 2
 # The twin's own look is in none of the random families, and has to be known, too.
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/bench" --count 160 --seed 951000 --family bench --workers 2
-$python main.py calibrate "$out/calibration" --knows "$out/bench" --model "$out/default"
+$python main.py calibrate "$out/calibration" --knows "$out/bench" --eight-bit --model "$out/default"
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/test" --count 512 --seed 900000 --workers 2
 $python main.py benchmark --accuracy "$out/test" --model "$out/default" --store
