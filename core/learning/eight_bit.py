@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from core.perception.second_look import Planes, look_again
 from core.perception.segmentation import Probability, Segmenter, open_second_look, open_segmenter
 from core.types import Image
 
-MOST_WINDOWS = 160
+_MOST_WINDOWS = 160
 """More of them say no more about the second look's ranges."""
 
 
@@ -39,7 +40,7 @@ def renew_eight_bit(folder: Path, images: Sequence[Image], on_progress: Callable
     Raises
     ------
     ModelError
-        The model is damaged, cannot be written, or sees nothing of a robot in these pictures.
+        The model is damaged, or sees nothing of a robot in these pictures.
     """
     # In fp32: the copies that are there may be damaged, or the reason for new ones.
     config = SegmentationConfig(model=str(folder), precision="fp32")
@@ -50,7 +51,7 @@ def renew_eight_bit(folder: Path, images: Sequence[Image], on_progress: Callable
         for done, image in enumerate(images):
             look_again(image, first(image), listening)
             on_progress(0.2 * done / len(images))
-        asked = listening.asked[:: -(-len(listening.asked) // MOST_WINDOWS) or 1]
+        asked = listening.asked[:: max(1, math.ceil(len(listening.asked) / _MOST_WINDOWS))]
     write_eight_bit(folder, images)
     on_progress(0.6)
     if where is not None:

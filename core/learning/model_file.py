@@ -21,12 +21,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from core.config import RESOURCES
 from core.errors import UserError
+from core.learning.onnx_export import export_eight_bit, export_onnx, whole_strides
 from core.perception.evidence import Calibration
 from core.perception.familiarity import Familiarity
 from core.types import Image
 
 if TYPE_CHECKING:
-    from core.learning.quantise import EightBitUNet
     from core.perception.unet import DualUNet
 
 WEIGHTS, ONNX, ONNX_INT8, INFO = "weights.safetensors", "network.onnx", "network_int8.onnx", "model.json"
@@ -206,20 +206,17 @@ def save_model(
     """
     from safetensors.torch import save_file
 
-    check_can_write(folder)
-    folder = folder.resolve()
-    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
+    with _put_in_place(folder) as scratch:
         state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
         save_file(state, scratch / WEIGHTS)
         (scratch / WEIGHTS).chmod(0o644)  # others at the same machine may use it, too; by itself it is the writer's alone
         export_onnx(network, network.shape.stride, scratch / ONNX)
-        cuts = _whole_strides(examples, network.shape.stride)
+        cuts = whole_strides(examples, network.shape.stride)
         if cuts:
-            export_onnx(_eight_bit(network, cuts), network.shape.stride, scratch / ONNX_INT8)
+            export_eight_bit(network, cuts, scratch / ONNX_INT8)
         info = ModelInfo(
             format=1,
-            name=folder.name,
+            name=folder.resolve().name,
             shape=network.shape.to_json(),
             stride=network.shape.stride,
             weights_sha256=sha256_of(scratch / WEIGHTS),
@@ -233,11 +230,21 @@ def save_model(
         (scratch / INFO).write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
         if second_look is not None:
             shutil.copytree(second_look, scratch / SECOND_LOOK)
+    return info
+
+
+@contextmanager
+def _put_in_place(folder: Path) -> Iterator[Path]:
+    """An empty folder that takes the model's place in the end; whatever goes wrong leaves that as it was. Raises ModelError."""
+    check_can_write(folder)
+    folder = folder.resolve()
+    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        yield scratch
         scratch.chmod(0o755)
         _put(scratch, folder)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
-    return info
 
 
 def _put(scratch: Path, folder: Path) -> None:
@@ -261,21 +268,14 @@ def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs:
     What was measured of `base`, figures and calibrations, is not true of the new model and left out; but Dice on held-out frames
     and the kinds of pictures that it knows are its network's alone, and stay.
     """
-    check_can_write(folder)
-    folder = folder.resolve()
-    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
+    with _put_in_place(folder) as scratch:
         _copy(base, scratch)
         save_model(network, scratch / SECOND_LOOK, **kwargs)
         figures = read_model_info(scratch, verify=()).figures
         held_out = figures if figures.get("held_out") else {}
         near_sha256 = sha256_of(scratch / SECOND_LOOK / WEIGHTS)
         changes: dict[str, Any] = {"calibration": None, "calibration_mirrored": None, "figures": held_out}
-        _update(scratch, {"name": folder.name, "second_look_sha256": near_sha256} | changes)
-        scratch.chmod(0o755)
-        _put(scratch, folder)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        _update(scratch, {"name": folder.resolve().name, "second_look_sha256": near_sha256} | changes)
 
 
 @contextmanager
@@ -288,19 +288,14 @@ def changed(folder: Path) -> Iterator[Path]:
         The model is damaged, or cannot be written.
     """
     read_model_info(folder)
-    check_can_write(folder)
-    folder = folder.resolve()
-    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
+    if (near := second_look_of(folder)) is not None:
+        read_model_info(near)
+    with _put_in_place(folder) as scratch:
         _copy(folder, scratch)
-        if (near := second_look_of(folder)) is not None:
+        if near is not None:
             (scratch / SECOND_LOOK).mkdir()
             _copy(near, scratch / SECOND_LOOK)
         yield scratch
-        scratch.chmod(0o755)
-        _put(scratch, folder)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _copy(folder: Path, to: Path) -> None:
@@ -319,10 +314,10 @@ def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
         The model is damaged, or there is no picture of the network's stride or more among the examples.
     """
     network = load_network(folder)[0]
-    cuts = _whole_strides(examples, network.shape.stride)
+    cuts = whole_strides(examples, network.shape.stride)
     if not cuts:
-        raise ModelError(f"{folder}: nothing to make its eight-bit copy from; give pictures that can be read")
-    export_onnx(_eight_bit(network, cuts), network.shape.stride, folder / ONNX_INT8)
+        raise ModelError("nothing to make an eight-bit copy from; give pictures that can be read and show a robot")
+    export_eight_bit(network, cuts, folder / ONNX_INT8)
     _update(folder, {"onnx_int8_sha256": sha256_of(folder / ONNX_INT8), "figures": {}})
 
 
@@ -375,45 +370,3 @@ def _update(folder: Path, changes: dict[str, Any]) -> None:
         os.replace(scratch, folder / INFO)
     except OSError as error:
         raise ModelError(f"{folder / INFO}: cannot be written ({error.strerror}); copy the model to a folder of your own") from None
-
-
-def _whole_strides(images: Sequence[Image], stride: int) -> list[Image]:
-    """The pictures cropped to whole strides: padding would teach ranges edges that no camera shows. Smaller ones are left out."""
-    cuts = (image[: image.shape[0] // stride * stride, : image.shape[1] // stride * stride] for image in images)
-    return [cut for cut in cuts if cut.size]
-
-
-def _eight_bit(network: DualUNet, examples: Sequence[Image]) -> EightBitUNet:
-    import torch
-
-    from core.learning.quantise import EightBitUNet
-
-    eight_bit = EightBitUNet(network.eval()).eval()
-    eight_bit.learn(torch.from_numpy(image.transpose(2, 0, 1)[None].copy()).float() / 255 for image in examples)
-    return eight_bit
-
-
-def export_onnx(network: DualUNet | EightBitUNet, stride: int, path: Path) -> None:
-    """Export with free height and width (multiples of `stride`); pre- and post-processing are inside the graph."""
-    import warnings
-
-    import torch
-
-    from core.perception.unet import Probabilities
-
-    example = torch.zeros(1, stride * 2, stride * 2, network.shape.inputs, dtype=torch.uint8)
-    was_training = network.training
-    with warnings.catch_warnings():
-        # The tracing exporter is the one that needs no further packages; its deprecation is noise to the user.
-        warnings.simplefilter("ignore")
-        torch.onnx.export(
-            Probabilities(network.eval()),
-            (example,),
-            str(path),
-            input_names=["image"],
-            output_names=["probabilities"],
-            dynamic_axes={"image": {1: "height", 2: "width"}, "probabilities": {2: "height", 3: "width"}},
-            opset_version=17,
-            dynamo=False,
-        )
-    network.train(was_training)

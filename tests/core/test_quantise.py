@@ -141,7 +141,7 @@ def test_moving_the_zero_onto_a_level_changes_nothing(planes: int) -> None:
 def test_an_eight_bit_copy_needs_a_picture_and_changes_nothing_without(folder: Path, tmp_path: Path) -> None:
     model = shutil.copytree(folder, tmp_path / "model")
     before = {path: path.read_bytes() for path in model.iterdir()}
-    with pytest.raises(ModelError, match="nothing to make its eight-bit copy from"), changed(model) as work:
+    with pytest.raises(ModelError, match="nothing to make an eight-bit copy from"), changed(model) as work:
         write_eight_bit(work, [np.zeros((8, 200, 3), np.uint8)])
     assert {path: path.read_bytes() for path in model.iterdir()} == before
     assert list(tmp_path.iterdir()) == [model]
