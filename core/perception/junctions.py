@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from core.perception import polyline
 from core.perception.opening_lines import Trunk, between_walls, side_branch, trunk_between
-from core.perception.openings import STEP_PX, Arm, Gate, equal_trunks, gate_of, likeliest_trunk, meeting_point, turn_deg
+from core.perception.openings import STEP_PX, Arm, Gate, equal_trunks, gate_of, likely_trunks, meeting_point, turn_deg
 from core.types import Point, Points
 
 TOGETHER = 1.5
@@ -79,27 +79,40 @@ def _anew(arms: list[Arm], level: NDArray[np.float32], is_alone: bool) -> Rebuil
     known = {index: gate for index, gate in enumerate(gates) if gate is not None}
     if len(known) < 2:
         return None
-    equal = equal_trunks(known) if is_alone and len(known) == len(arms) else None
+    likely = likely_trunks(known)
+    equal = equal_trunks(likely) if is_alone and len(known) == len(arms) else None
     if equal is not None:
         (_, first), (_, second) = equal
         from_branch_to_branch = turn_deg(known[first], known[second])
         return _star(arms, along, known) if from_branch_to_branch < ROUND_DEG else _fork(arms, along, known, equal, level)
-    trunk = trunk_between(known, likeliest_trunk(known))
+    trunk = trunk_between(known, likely[0][1])
     bridges = {index: side_branch(gate, trunk) for index, gate in known.items() if index not in trunk.ends}
     # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
+    moved = False
     for index, gate in list(known.items()):
         needed = gate.position_px + CLEAR_RADII * gate.radius_px - gate.beyond(_point(trunk.points[_mark(index, trunk, bridges)]))
         if gate.position_px < needed:
             known[index] = gate_of(arms[index], along[index], needed) or gate
-    trunk = between_walls(trunk_between(known, likeliest_trunk(known)), level)
-    bridges = {index: side_branch(gate, trunk, level) for index, gate in known.items() if index not in trunk.ends}
-    missed = {index for index, (_, line) in bridges.items() if math.dist(line[0].tolist(), line[1].tolist()) > MISSED_PX}
-    if missed and not is_alone:
-        return None
-    for index in missed:
-        mark, _ = bridges[index]
-        bridges[index] = mark, polyline.resample(np.array([trunk.points[mark], known[index].place]), STEP_PX)
+            moved = True
+    if moved:
+        trunk = trunk_between(known, likely_trunks(known)[0][1])
+    trunk = between_walls(trunk, level)
+    # Who comes from elsewhere shows it without its walls, too: that one first, and the others need not be looked at.
+    straight = {index: _missed_px(line) for index, (_, line) in bridges.items()}
+    bridges = {}
+    for index in sorted(known.keys() - set(trunk.ends), key=lambda index: -straight.get(index, 0.0)):
+        mark, line = side_branch(known[index], trunk, level)
+        if _missed_px(line) > MISSED_PX:
+            if not is_alone:
+                return None
+            line = polyline.resample(np.array([trunk.points[mark], known[index].place]), STEP_PX)
+        bridges[index] = mark, line
     return _assembled(arms, along, known, trunk, bridges)
+
+
+def _missed_px(line: Points) -> float:
+    """By how much a side branch passes the trunk: its line begins on it."""
+    return math.dist(line[0].tolist(), line[1].tolist())
 
 
 def _mark(index: int, trunk: Trunk, bridges: dict[int, tuple[int, Points]]) -> int:

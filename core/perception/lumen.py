@@ -69,13 +69,17 @@ def _crossings(
     level: NDArray[np.float32], points: Points, directions: Points, expected: NDArray[np.float64], search_px: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
     """Distances (N,), the level pixel by pixel in each direction (N, 2 `search_px` + 1), and the first outside (N,)."""
-    distances = np.maximum(expected[:, None] + np.arange(-search_px, search_px + 1.0), 0.0)
-    x, y = (points[:, axis, None] + distances * directions[:, axis, None] for axis in (0, 1))
+    distances = expected[:, None] + np.arange(-search_px, search_px + 1.0)
+    np.maximum(distances, 0.0, out=distances)
+    x, y = distances * directions[:, 0, None], distances * directions[:, 1, None]
+    x += points[:, 0, None]
+    y += points[:, 1, None]
     inside = polyline.sample_at(level, x, y)
     first = (inside < 0.5).argmax(axis=1)
     rows = np.arange(len(points))
-    here, there = inside[rows, first - 1], inside[rows, first]
-    reach = distances[rows, first - 1] + (here - 0.5) / np.maximum(here - there, 1e-6)
+    before = first - 1
+    here, there = inside[rows, before], inside[rows, first]
+    reach = distances[rows, before] + (here - 0.5) / np.maximum(here - there, 1e-6)
     # Nowhere outside, or from the start: both have 0 for the first place that is outside.
     return np.where(first > 0, reach, math.nan), inside, first
 

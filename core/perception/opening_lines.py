@@ -76,13 +76,24 @@ def side_branch(gate: Gate, trunk: Trunk, level: NDArray[np.float32] | None = No
 
 def _first_meeting(line: Points, trunk: Trunk) -> tuple[int, int]:
     """Where a line first meets the trunk: which of its points, and which of the trunk's."""
-    gaps = np.hypot(trunk.points[:, None, 0] - line[:, 0], trunk.points[:, None, 1] - line[:, 1])
-    nearest = gaps.min(axis=0)
-    close = np.flatnonzero(nearest < 0.75 * STEP_PX)
-    end = int(close[0]) if len(close) else int(nearest.argmin())
+    gaps = _squared_gaps(trunk.points, line)
+    nearest: list[float] = gaps.min(axis=0).tolist()
+    end = next((place for place, gap in enumerate(nearest) if gap < (0.75 * STEP_PX) ** 2), None)
+    if end is None:
+        end = nearest.index(min(nearest))
     while end + 1 < len(nearest) and nearest[end + 1] < nearest[end]:
         end += 1
     return end, int(gaps[:, end].argmin())
+
+
+def _squared_gaps(points: Points, others: Points) -> NDArray[np.float64]:
+    """The squared distance from each of (N, 2) points to each of (M, 2) others, shape (N, M): a third of the time of roots."""
+    gaps = points[:, 0, None] - others[:, 0]
+    down = points[:, 1, None] - others[:, 1]
+    gaps *= gaps
+    down *= down
+    gaps += down
+    return gaps
 
 
 def _to_walls(
@@ -111,8 +122,8 @@ def _own_walls(
     seen = np.flatnonzero(np.isfinite(distance))
     if trunk is not None and len(seen):
         walls = places[seen] + distance[seen, None] * directions[seen]
-        away = np.hypot(walls[:, None, 0] - trunk.points[:, 0], walls[:, None, 1] - trunk.points[:, 1])
-        distance[seen[(away - WALL_RADII * trunk.radius).min(axis=1) <= 1.0]] = math.nan
+        near = (_squared_gaps(walls, trunk.points) <= (WALL_RADII * trunk.radius + 1.0) ** 2).any(axis=1)
+        distance[seen[near]] = math.nan
     return distance.reshape(2, -1)
 
 

@@ -102,16 +102,17 @@ def _unlikeliness(gates: dict[int, Gate], pair: tuple[int, int]) -> float:
     return turn_deg(first, second) + WIDER_DEG * max(0.0, widest / narrow - 1.0)
 
 
-def likeliest_trunk(gates: dict[int, Gate]) -> tuple[int, int]:
-    """The two arms that go on most smoothly and are wide enough for the others."""
-    return min(combinations(gates, 2), key=lambda pair: _unlikeliness(gates, pair))
+def likely_trunks(gates: dict[int, Gate]) -> list[tuple[float, tuple[int, int]]]:
+    """All pairs of arms, each with how unlikely a trunk it is, in degrees: the two that go on most smoothly and are wide enough for
+    the others come first."""
+    return sorted((_unlikeliness(gates, pair), pair) for pair in combinations(gates, 2))
 
 
-def equal_trunks(gates: dict[int, Gate]) -> tuple[tuple[int, int], tuple[int, int]] | None:
-    """Of three arms, the two pairs that are a trunk nearly alike, the arm of both first; None for a clear trunk."""
-    if len(gates) != 3:
+def equal_trunks(likely: list[tuple[float, tuple[int, int]]]) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """Of the three pairs of three arms, the two that are a trunk nearly alike, the arm of both first; None for a clear trunk."""
+    if len(likely) != 3:
         return None
-    (best, ends), (other, others), _ = sorted((_unlikeliness(gates, pair), pair) for pair in combinations(gates, 2))
+    (best, ends), (other, others), _ = likely
     if other >= best + TRUNK_LEAD_DEG:
         return None
     (stem,) = set(ends) & set(others)

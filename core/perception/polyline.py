@@ -147,11 +147,14 @@ def sample_at(values: NDArray[np.float32], x: NDArray[np.float64], y: NDArray[np
     """``sample`` at places given by their coordinates, two arrays of one shape."""
     if x.size == 0:
         return np.zeros(x.shape)
-    across, down = (np.ascontiguousarray(axis, np.float32).reshape(-1) for axis in (x, y))
-    parts = [slice(first, first + REMAP_ROWS) for first in range(0, len(across), REMAP_ROWS)]
-    found = [cv2.remap(values, across[p], down[p], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).ravel() for p in parts]
-    whole = found[0] if len(found) == 1 else np.concatenate(found)
-    return whole.astype(np.float64).reshape(x.shape)
+    across, down = x.astype(np.float32).reshape(-1), y.astype(np.float32).reshape(-1)
+    found = np.empty(x.shape)
+    flat = found.reshape(-1)
+    for first in range(0, len(across), REMAP_ROWS):
+        part = slice(first, first + REMAP_ROWS)
+        seen = cv2.remap(values, across[part], down[part], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        flat[part] = seen.ravel()
+    return found
 
 
 def median(values: NDArray[np.float64]) -> float:
