@@ -16,7 +16,7 @@ from typing import Annotated, TextIO
 import typer
 
 from app.cli_campaigns import benchmark, faults, screenshots, soak, trial
-from app.cli_learning import calibrate, synth, train
+from app.cli_learning import average, calibrate, synth, train
 from app.cli_options import ConfigOption, RigOption
 from app.cli_rigs import doctor, rig_commands
 from app.cli_sessions import play, record, replay, session_commands
@@ -145,6 +145,7 @@ for _command in (
     perceive,
     synth,
     train,
+    average,
     calibrate,
     annotate,
     evaluate,

@@ -1,4 +1,4 @@
-"""Commands that make a model: synth, train, calibrate."""
+"""Commands that make a model: synth, train, average, calibrate."""
 
 from __future__ import annotations
 
@@ -113,6 +113,19 @@ def train(
         second_look=second_look,
         widen=widen,
     )
+
+
+def average(
+    models: Annotated[list[str], typer.Argument(help="two models or more; one that is named twice counts twice")],
+    out: Annotated[Path, typer.Option(help="folder of their mean")],
+) -> None:
+    """The mean, weight by weight, of models that were trained from each other, such as one before and after fine-tuning.
+
+    It comes without eight-bit copies and without calibration: calibrate SET --eight-bit gives it both.
+    """
+    from app.average_command import run_average
+
+    run_average(models, out)
 
 
 def calibrate(

@@ -16,8 +16,8 @@ from app.cli import app, main
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (
-    "gui", "perceive", "synth", "train", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay", "play",
-    "ablation", "screenshots", "faults", "soak", "doctor", "session", "rig",
+    "gui", "perceive", "synth", "train", "average", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay",
+    "play", "ablation", "screenshots", "faults", "soak", "doctor", "session", "rig",
 )  # fmt: skip
 INNER = {"session": ("info", "recover", "export"), "rig": ("list", "show", "calibrate", "board")}
 SLOW = ("PySide6", "numpy", "torch", "openvino", "cv2", "scipy", "mujoco", "pydantic", "rich")

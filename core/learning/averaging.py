@@ -1,0 +1,73 @@
+"""The mean of models that were trained from each other, weight by weight.
+
+Between a model and what fine-tuning made of it the loss has no wall: elsewhere their mean was found to forget less of the old
+pictures than the new one [1]_ and to be steadier than each [2]_; what it gave here is in docs/method.md.
+
+References
+----------
+.. [1] M. Wortsman et al., "Robust fine-tuning of zero-shot models", CVPR 2022.
+.. [2] M. Wortsman et al., "Model soups: averaging weights of multiple fine-tuned models improves accuracy without increasing
+   inference time", ICML 2022.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+
+from core.learning.model_file import SECOND_LOOK, ModelError, load_network, save_model, second_look_of
+
+if TYPE_CHECKING:
+    from core.perception.unet import DualUNet
+
+
+def average_models(folders: Sequence[Path], out: Path) -> None:
+    """Write the mean of some models to `out`; one that is named twice counts twice. Their second looks are averaged, too.
+
+    What was measured of them is not true of their mean: it comes without figures, calibration and eight-bit copies, which
+    ``calibrate --eight-bit`` makes.
+
+    Raises
+    ------
+    ModelError
+        A model is damaged, or not of the first one's shape; or `out` cannot be written.
+    """
+    near = [second_look_of(folder) for folder in folders]
+    lacking = [folder for folder, look in zip(folders, near, strict=True) if look is None]
+    if lacking and len(lacking) < len(folders):
+        raise ModelError(f"{lacking[0]}: has no second look, and others have one; their mean would not fit together")
+    first, told = _mean_of(folders)
+    with tempfile.TemporaryDirectory() as scratch:
+        second = None
+        if not lacking:
+            second = Path(scratch) / SECOND_LOOK
+            network, of_it = _mean_of([look for look in near if look is not None])
+            save_model(network, second, training=of_it, figures={})
+        save_model(first, out, training=told, figures={}, second_look=second)
+
+
+def _mean_of(folders: Sequence[Path]) -> tuple[DualUNet, dict[str, Any]]:
+    """The network with the mean of all weights, and what is known of its training."""
+    mean, info = load_network(folders[0])
+    sums = {name: tensor.double() for name, tensor in mean.state_dict().items() if tensor.is_floating_point()}
+    unseen: list[set[str]] = [set(info.training.get("without") or ())]
+    for folder in folders[1:]:
+        network, other = load_network(folder)
+        if network.shape != mean.shape:
+            raise ModelError(f"{folder}: is not of the shape of {folders[0]}; only models trained from each other have a mean")
+        unseen.append(set(other.training.get("without") or ()))
+        for name, tensor in network.state_dict().items():
+            if name in sums:
+                sums[name] += tensor.double()
+    with torch.no_grad():
+        for name, tensor in mean.state_dict().items():
+            if name in sums:
+                tensor.copy_(sums[name] / len(folders))
+    training: dict[str, Any] = {"mean_of": [folder.resolve().name for folder in folders]}
+    if never := sorted(set.intersection(*unseen)):
+        training["without"] = never
+    return mean, training
