@@ -79,14 +79,14 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability:
 def _lead_on_ends(lines: list[_Line], nodes: Points, level: NDArray[np.float32]) -> None:
     """Ends of vessels without the hook that thinning leaves there; at the image border they go on to the border."""
     degrees = _degrees(lines, len(nodes)).tolist()
-    for line in lines:
-        for side, node in ((-1, line.start), (1, line.end)):
-            if degrees[node] != 1 or len(line.points) < 4:  # that short, the other end has taken most of it
-                continue
-            # In the corner where the skeleton ends the radius would be nearly nothing.
-            own_radius = polyline.median(line.radius[::side][-RADIUS_POINTS:])
-            line.points = led_on(line.points[::side], own_radius, level)[::side]
-            nodes[node] = line.points[::side][-1]
+    starts = [(line, -1, line.start) for line in lines if degrees[line.start] == 1]
+    ends = [(line, 1, line.end) for line in lines if degrees[line.end] == 1]
+    for sides in (starts, ends):  # one after the other: of a short line the first end has taken most
+        long = [side for side in sides if len(side[0].points) >= 4]
+        # In the corner where the skeleton ends the radius would be nearly nothing.
+        told = [(line.points[::side], polyline.median(line.radius[::side][-RADIUS_POINTS:])) for line, side, _ in long]
+        for (line, side, node), points in zip(long, led_on(told, level), strict=True):
+            line.points, nodes[node] = points[::side], points[-1]
 
 
 def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, level: NDArray[np.float32]) -> Points:

@@ -32,7 +32,7 @@ def hooked(line: Points, count: int, by_px: float) -> Points:
 @pytest.mark.parametrize("radius", [9.0, 14.0])
 def test_a_vessel_that_ends_in_a_bend_bends_to_its_end(radius: float, around_px: float) -> None:
     line = bend(20.0, around_px)
-    found = led_on(hooked(line, round(0.6 * radius), 0.7 * radius), radius, level(line, radius))
+    found = led_on([(hooked(line, round(0.6 * radius), 0.7 * radius), radius)], level(line, radius))[0]
     aside = np.abs(np.hypot(*(found - [320.0, 240.0]).T) - around_px)
     assert aside.max() < 1.2
     assert np.hypot(*(found[-1] - line[-1])) < 0.6 * radius, "it ends where it ended"
@@ -41,19 +41,19 @@ def test_a_vessel_that_ends_in_a_bend_bends_to_its_end(radius: float, around_px:
 
 def test_it_goes_on_to_the_border_that_cuts_it_off() -> None:
     line = np.column_stack([np.arange(200.0, 700.0, 2.0), np.linspace(200.0, 260.0, 250)])
-    found = led_on(line[line[:, 0] < 625.0], 12.0, level(line, 12.0))
+    found = led_on([(line[line[:, 0] < 625.0], 12.0)], level(line, 12.0))[0]
     assert found[-1, 0] == pytest.approx(LIMIT[0], abs=0.5)
     assert np.abs(found[:, 1] - np.interp(found[:, 0], line[:, 0], line[:, 1])).max() < 0.8
 
 
 def test_a_short_stump_keeps_a_third_and_its_length() -> None:
     line = np.column_stack([np.arange(300.0, 320.0, 2.0), np.full(10, 240.0)])
-    found = led_on(line, 20.0, level(np.array([[280.0, 240.0], [340.0, 240.0]]), 20.0))
+    found = led_on([(line, 20.0)], level(np.array([[280.0, 240.0], [340.0, 240.0]]), 20.0))[0]
     assert found[-1] == pytest.approx(line[-1], abs=1.0)
     assert found[0] == pytest.approx(line[0])
 
 
 def test_where_no_wall_is_seen_it_goes_on_as_it_was() -> None:
     line = bend(0.0, 100.0)
-    found = led_on(line, 14.0, np.ones((SIZE[1], SIZE[0]), np.float32))
+    found = led_on([(line, 14.0)], np.ones((SIZE[1], SIZE[0]), np.float32))[0]
     assert np.abs(np.hypot(*(found - [320.0, 240.0]).T) - 100.0).max() < 2.0
