@@ -10,7 +10,7 @@ branch in between leaves their openings are taken together: one trunk runs throu
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -45,9 +45,7 @@ class Rebuilt:
 
 def are_together(arm: Arm, back: Arm) -> bool:
     """Whether a branch between two junctions, seen from both, is too short to leave both openings."""
-    return any(
-        gate_of(replace(a, opening_px=TOGETHER * a.opening_px), polyline.arc_length(a.points), 0.0) is None for a in (arm, back)
-    )
+    return any(gate_of(a, polyline.arc_length(a.points), 0.0, wider=TOGETHER) is None for a in (arm, back))
 
 
 def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> Rebuilt | None:
@@ -156,7 +154,7 @@ def _bridged(arm: Arm, along: NDArray[np.float64], gate: Gate, bridge: Points) -
     """An arm with a line from the junction to its gate in place of what it had within the opening."""
     rest = int(along.searchsorted(gate.position_px + 0.5 * STEP_PX, "right"))
     radius = np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest:]])
-    return replace(arm, points=np.concatenate([bridge, arm.points[rest:]]), radius=radius)
+    return arm.along(np.concatenate([bridge, arm.points[rest:]]), radius)
 
 
 def _rejoined(arm: Arm, along: NDArray[np.float64], place: Point) -> Arm:
@@ -166,7 +164,7 @@ def _rejoined(arm: Arm, along: NDArray[np.float64], place: Point) -> Arm:
     rest[-1] = True
     points, radius = arm.points[rest], arm.radius[rest]
     way = polyline.resample(np.array([place, points[0]]), STEP_PX)[:-1]
-    return replace(arm, points=np.concatenate([way, points]), radius=np.concatenate([np.full(len(way), radius[0]), radius]))
+    return arm.along(np.concatenate([way, points]), np.concatenate([np.full(len(way), radius[0]), radius]))
 
 
 def _fork(

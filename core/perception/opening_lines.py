@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -37,17 +37,16 @@ def trunk_between(gates: dict[int, Gate], ends: tuple[int, int]) -> Trunk:
     """The smooth curve from one arm's gate to another's, as wide as these are."""
     first, second = gates[ends[0]], gates[ends[1]]
     points = _hermite(first, second)
-    return Trunk(ends, points, np.linspace(first.radius_px, second.radius_px, len(points)))
+    radius = first.radius_px + (second.radius_px - first.radius_px) * _shares(len(points))
+    return Trunk(ends, points, radius)
 
 
 def between_walls(trunk: Trunk, level: NDArray[np.float32]) -> Trunk:
     """The trunk bent as its walls do, as far as they can be seen; its ends and its directions there stay."""
-    share = np.linspace(0.0, 1.0, len(trunk.points))
-    hump = 16.0 * share**2 * (1.0 - share) ** 2
-    shapes = np.stack([hump, hump * (2.0 * share - 1.0)])
+    shapes = _humps(len(trunk.points))
     normal, shift, weight = _to_walls(trunk.points, trunk.radius, level)
     size, lean = two_shapes(shapes, shift, weight, TRUNK_STIFFNESS)
-    return replace(trunk, points=trunk.points + (size * shapes[0] + lean * shapes[1])[:, None] * normal)
+    return Trunk(trunk.ends, trunk.points + (size * shapes[0] + lean * shapes[1])[:, None] * normal, trunk.radius)
 
 
 def side_branch(gate: Gate, trunk: Trunk, level: NDArray[np.float32] | None = None) -> tuple[int, Points]:
@@ -55,8 +54,8 @@ def side_branch(gate: Gate, trunk: Trunk, level: NDArray[np.float32] | None = No
 
     It leaves the gate in its direction, and goes straight or, where the `level` is given, as a parabola that its walls bend.
     """
-    start, inward = np.array(gate.place), -np.array(gate.outward)
-    reach = max(40.0, 3.0 * float(np.hypot(*(trunk.points - start).T).min()))
+    start, inward = np.array([gate.place]), -np.array(gate.outward)
+    reach = max(40.0, 3.0 * math.sqrt(_squared_gaps(start, trunk.points).min()))
     way = np.arange(0.0, reach + 1.0, STEP_PX)
     straight = start + way[:, None] * inward
     end, mark = _first_meeting(straight, trunk)
@@ -137,7 +136,21 @@ def _hermite(first: Gate, second: Gate) -> Points:
 
 
 @lru_cache(maxsize=64)
+def _shares(count: int) -> NDArray[np.float64]:
+    """From 0 to 1 in `count` even steps."""
+    return np.linspace(0.0, 1.0, count)
+
+
+@lru_cache(maxsize=64)
+def _humps(count: int) -> NDArray[np.float64]:
+    """Two shapes (2, `count`) that leave a line's ends and its directions there as they are: one to a side, and one leaning."""
+    share = _shares(count)
+    hump = 16.0 * share**2 * (1.0 - share) ** 2
+    return np.stack([hump, hump * (2.0 * share - 1.0)])
+
+
+@lru_cache(maxsize=64)
 def _hermite_weights(count: int) -> NDArray[np.float64]:
     """What each of start, start direction, end and end direction adds to each of `count` points, shape (count, 4)."""
-    t = np.linspace(0.0, 1.0, count)
+    t = _shares(count)
     return np.column_stack([2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, 3 * t**2 - 2 * t**3, t**3 - t**2])

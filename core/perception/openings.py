@@ -47,6 +47,10 @@ class Arm:
     far_is_junction: bool
     opening_px: float
 
+    def along(self, points: Points, radius: NDArray[np.float64]) -> Arm:
+        """The same arm led along another line."""
+        return Arm(points, radius, self.half_width, self.far_is_junction, self.opening_px)
+
 
 @dataclass(frozen=True, slots=True)
 class Gate:
@@ -62,12 +66,12 @@ class Gate:
         return (self.place[0] - place[0]) * self.outward[0] + (self.place[1] - place[1]) * self.outward[1]
 
 
-def gate_of(arm: Arm, along: NDArray[np.float64], at_least_px: float) -> Gate | None:
+def gate_of(arm: Arm, along: NDArray[np.float64], at_least_px: float, *, wider: float = 1.0) -> Gate | None:
     """Where an arm has left the opening: its lumen is as narrow there as it stays. None for an arm too short to tell.
 
-    `along` is its arc length (N,); the gate lies at least `at_least_px` along it.
+    `along` is its arc length (N,); the gate lies at least `at_least_px` along it, and the opening counts as `wider` as it is.
     """
-    radius_px = arm.opening_px
+    radius_px = wider * arm.opening_px
     low = max(OPENING_MIN_RADII * radius_px, at_least_px)
     usable = float(along[-1]) * (0.5 if arm.far_is_junction else 1.0) - 8.0
     high = min(max(OPENING_MAX_RADII * radius_px, low + radius_px), usable)
@@ -98,7 +102,7 @@ def _unlikeliness(gates: dict[int, Gate], pair: tuple[int, int]) -> float:
     """Of a trunk between two arms, in degrees: how much it turns, and how much narrower it is than the others."""
     first, second = gates[pair[0]], gates[pair[1]]
     narrow = max(min(first.radius_px, second.radius_px), 0.5)
-    widest = max((gate.radius_px for index, gate in gates.items() if index not in pair), default=0.0)
+    widest = max([gate.radius_px for index, gate in gates.items() if index not in pair], default=0.0)
     return turn_deg(first, second) + WIDER_DEG * max(0.0, widest / narrow - 1.0)
 
 
@@ -124,8 +128,9 @@ def turn_deg(first: Gate, second: Gate) -> float:
     """By how much a line turns that comes in through one gate, goes straight to the other, and leaves through it."""
     x, y = second.place[0] - first.place[0], second.place[1] - first.place[1]
     length = max(math.hypot(x, y), 1e-9)
-    cosines = -(first.outward[0] * x + first.outward[1] * y) / length, (second.outward[0] * x + second.outward[1] * y) / length
-    return sum(math.degrees(math.acos(min(1.0, max(-1.0, cosine)))) for cosine in cosines)
+    coming = -(first.outward[0] * x + first.outward[1] * y) / length
+    going = (second.outward[0] * x + second.outward[1] * y) / length
+    return math.degrees(math.acos(min(1.0, max(-1.0, coming))) + math.acos(min(1.0, max(-1.0, going))))
 
 
 def meeting_point(gates: list[Gate]) -> Point:
