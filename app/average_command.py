@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.outputs import is_same
 from core.errors import UserError
 
 
@@ -20,11 +21,15 @@ def run_average(models: Sequence[str], out: Path) -> None:
     folders = [model_folder(name) for name in models]
     if len({folder.resolve() for folder in folders}) == 1:
         raise UserError(f"{models[0]} is its own mean; name another model beside it")
-    if any(is_same(out, folder) for folder in folders) or (out / INFO).is_file():
+    out = Path(os.path.realpath(out))  # the whole of it: a bare name may be that of another model
+    if any(out.is_relative_to(os.path.realpath(folder)) for folder in folders):
+        raise UserError(f"{out}: lies within a model that is to be averaged; choose another --out")
+    if (out / INFO).is_file():
         raise UserError(f"{out}: is a model already; choose another --out")
     check_can_write(out)  # said before anything is read
     average_models(folders, out)
     sys.stderr.write(
         f"the mean of {', '.join(models)} written to {out}\n"
-        f"make its eight-bit copies and teach it what its confidence means: main.py calibrate SET --eight-bit --model {out}\n"
+        "make its eight-bit copies and teach it what its confidence means: "
+        f"main.py calibrate SET --eight-bit --model {shlex.quote(str(out))}\n"
     )

@@ -121,7 +121,8 @@ def average(
 ) -> None:
     """The mean, weight by weight, of models that were trained from each other, such as one before and after fine-tuning.
 
-    It comes without eight-bit copies and without calibration: calibrate SET --eight-bit gives it both.
+    Of others of the same shape the mean sees nothing, and nobody checks that. It comes without eight-bit copies and without
+    calibration: calibrate SET --eight-bit gives it both.
     """
     from app.average_command import run_average
 

@@ -17,9 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import torch
-
-from core.learning.model_file import SECOND_LOOK, ModelError, load_network, save_model, second_look_of
+from core.learning.model_file import SECOND_LOOK, ModelError, load_network, save_model, second_look_of, trained_without
 
 if TYPE_CHECKING:
     from core.perception.unet import DualUNet
@@ -27,6 +25,9 @@ if TYPE_CHECKING:
 
 def average_models(folders: Sequence[Path], out: Path) -> None:
     """Write the mean of some models to `out`; one that is named twice counts twice. Their second looks are averaged, too.
+
+    Nobody checks that they were trained from each other: of two that only have their shape in common the mean sees nothing. Its
+    manifest names them by the SHA-256 of their weights.
 
     What was measured of them is not true of their mean: it comes without figures, calibration and eight-bit copies, which
     ``calibrate --eight-bit`` makes.
@@ -41,6 +42,8 @@ def average_models(folders: Sequence[Path], out: Path) -> None:
     if lacking and len(lacking) < len(folders):
         raise ModelError(f"{lacking[0]}: has no second look, and others have one; their mean would not fit together")
     first, told = _mean_of(folders)
+    if never := sorted(set.intersection(*(set(trained_without(folder)) for folder in folders))):
+        told["without"] = never
     with tempfile.TemporaryDirectory() as scratch:
         second = None
         if not lacking:
@@ -51,23 +54,22 @@ def average_models(folders: Sequence[Path], out: Path) -> None:
 
 
 def _mean_of(folders: Sequence[Path]) -> tuple[DualUNet, dict[str, Any]]:
-    """The network with the mean of all weights, and what is known of its training."""
+    """The network with the mean of all weights, and whose mean that is.
+
+    The normalisation's means and variances are averaged like weights: between models so near to each other it need not learn anew.
+    """
     mean, info = load_network(folders[0])
     sums = {name: tensor.double() for name, tensor in mean.state_dict().items() if tensor.is_floating_point()}
-    unseen: list[set[str]] = [set(info.training.get("without") or ())]
+    hashes = [info.weights_sha256]
     for folder in folders[1:]:
         network, other = load_network(folder)
         if network.shape != mean.shape:
-            raise ModelError(f"{folder}: is not of the shape of {folders[0]}; only models trained from each other have a mean")
-        unseen.append(set(other.training.get("without") or ()))
+            raise ModelError(f"{folder}: has another shape than {folders[0]} (made deeper or wider since?); a mean needs one shape")
+        hashes.append(other.weights_sha256)
         for name, tensor in network.state_dict().items():
             if name in sums:
                 sums[name] += tensor.double()
-    with torch.no_grad():
-        for name, tensor in mean.state_dict().items():
-            if name in sums:
-                tensor.copy_(sums[name] / len(folders))
-    training: dict[str, Any] = {"mean_of": [folder.resolve().name for folder in folders]}
-    if never := sorted(set.intersection(*unseen)):
-        training["without"] = never
-    return mean, training
+    for name, tensor in mean.state_dict().items():
+        if name in sums:
+            tensor.copy_(sums[name] / len(folders))
+    return mean, {"mean_of": hashes}

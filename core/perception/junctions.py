@@ -95,7 +95,8 @@ def _anew(arms: list[Arm], level: NDArray[np.float32], is_alone: bool) -> Rebuil
     if moved:
         trunk = trunk_between(known, likely_trunks(known)[0][1])
     trunk = between_walls(trunk, level)
-    # Who comes from elsewhere shows it without its walls, too: that one first, and the others need not be looked at.
+    # Who comes from elsewhere mostly shows it without its walls, too. It is asked first, with its walls, and they decide: where it
+    # does come from elsewhere the others need not be asked.
     straight = {index: _missed_px(line) for index, (_, line) in bridges.items()}
     bridges = {}
     for index in sorted(known.keys() - set(trunk.ends), key=lambda index: -straight.get(index, 0.0)):

@@ -48,8 +48,8 @@ class _End:
 def led_on(ends: Sequence[tuple[Points, float]], level: NDArray[np.float32]) -> list[Points]:
     """Centerlines without the last part, which thinning has turned aside, and in its place one that runs between the walls there.
 
-    Each ends as far out as the skeleton did, or goes on to the image's border. All walls are looked for at once: that takes as long
-    as for one end.
+    Each ends as far out as the skeleton did, or goes on to the image's border. All walls are looked for at once, which takes
+    hardly longer than for one end.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ def test_the_shipped_model_and_its_copy(twin_of_default: Path, tmp_path: Path) -
     assert done.exit_code == 0, done.output
     assert f"calibrate SET --eight-bit --model {tmp_path / 'mean'}" in done.output
     info = read_model_info(tmp_path / "mean", verify=(WEIGHTS, ONNX))
-    assert info.training == {"mean_of": ["default", "mine"]}
+    assert info.training == {"mean_of": [sha256_of(MODELS / "default" / WEIGHTS)] * 2}
     assert sha256_of(tmp_path / "mean" / WEIGHTS) == sha256_of(MODELS / "default" / WEIGHTS)
 
 
@@ -35,9 +35,24 @@ def test_what_has_no_mean(twin_of_default: Path, tmp_path: Path) -> None:
         run_average(["default"], tmp_path / "mean")
     with pytest.raises(UserError, match="is its own mean"):
         run_average(["default", str(MODELS / "default")], tmp_path / "mean")
+    for within in (twin_of_default, twin_of_default / "mean", twin_of_default / "second_look"):
+        with pytest.raises(UserError, match="lies within a model that is to be averaged; choose another --out"):
+            run_average(["default", str(twin_of_default)], within)
+    third = Path(shutil.copytree(twin_of_default, tmp_path / "third"))
     with pytest.raises(UserError, match="is a model already; choose another --out"):
-        run_average(["default", str(twin_of_default)], twin_of_default)
+        run_average(["default", str(twin_of_default)], third)
     with pytest.raises(UserError, match="no model 'nobody'"):
         run_average(["default", "nobody"], tmp_path / "mean")
     assert json.loads((twin_of_default / INFO).read_text()) == before
     assert not (tmp_path / "mean").exists()
+
+
+def test_a_bare_name_is_told_as_the_folder_that_it_is(
+    twin_of_default: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Else the advice would lead to the shipped model of that name."""
+    (tmp_path / "my lab").mkdir()
+    monkeypatch.chdir(tmp_path / "my lab")
+    run_average(["default", str(twin_of_default)], Path("default"))
+    assert f"--eight-bit --model '{tmp_path / 'my lab' / 'default'}'\n" in capsys.readouterr().err
+    assert read_model_info(tmp_path / "my lab" / "default").training["mean_of"]

@@ -15,6 +15,7 @@ from core.learning.model_file import (
     INFO,
     ONNX_INT8,
     SECOND_LOOK,
+    WEIGHTS,
     ModelError,
     load_network,
     read_model_info,
@@ -24,10 +25,11 @@ from core.learning.model_file import (
     sha256_of,
     trained_without,
 )
-from core.perception.segmentation import open_second_look, open_segmenter
+from core.perception.segmentation import TorchSegmenter, open_second_look, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 
 TINY = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
+WIDER = UNetShape((8, 8, 8, 8, 8), (4, 4, 4, 4), 1, 2)
 PICTURE = np.random.default_rng(3).integers(0, 255, (64, 96, 3), np.uint8)
 
 
@@ -51,6 +53,11 @@ def models(tmp_path: Path) -> list[Path]:
     return folders
 
 
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file in it, byte for byte."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
 def weights(folder: Path) -> dict[str, torch.Tensor]:
     return load_network(folder)[0].state_dict()
 
@@ -70,37 +77,56 @@ def test_every_weight_is_the_mean_in_both_looks(models: list[Path], tmp_path: Pa
 def test_it_opens_in_fp32_and_says_whose_mean_it_is(models: list[Path], tmp_path: Path) -> None:
     average_models(models, tmp_path / "mean")
     info = read_model_info(tmp_path / "mean")
-    assert info.training["mean_of"] == ["one", "other"]
+    for part in ("", SECOND_LOOK):
+        hashes = [sha256_of(folder / part / WEIGHTS) for folder in models]
+        assert read_model_info(tmp_path / "mean" / part).training["mean_of"] == hashes
     assert trained_without(tmp_path / "mean") == ("backlit",), "which neither of them has seen"
     assert (info.calibration, info.familiarity, info.onnx_int8_sha256, info.figures) == (None, None, None, {})
     assert not (tmp_path / "mean" / ONNX_INT8).exists()
     config = SegmentationConfig(model=str(tmp_path / "mean"), threads=1)
-    vessel, robot = open_segmenter(config)(PICTURE)
-    assert vessel.shape == robot.shape == PICTURE.shape[:2]
+    asked = (TorchSegmenter(tmp_path / "mean", 1), TorchSegmenter(models[0], 1))
+    for found, expected, of_one in zip(open_segmenter(config)(PICTURE), *(segment(PICTURE) for segment in asked), strict=True):
+        assert np.abs(found - expected).mean() < 0.003, "what perception runs is the mean, too"
+        assert np.abs(found - of_one).mean() > 0.03
     assert open_second_look(config) is not None
 
 
 def test_the_mean_of_equals_is_the_same_to_the_last_bit(models: list[Path], tmp_path: Path) -> None:
     shutil.copytree(models[0], tmp_path / "copy")
     average_models([models[0], tmp_path / "copy", models[0]], tmp_path / "mean")
-    assert sha256_of(tmp_path / "mean" / "weights.safetensors") == sha256_of(models[0] / "weights.safetensors")
+    assert sha256_of(tmp_path / "mean" / WEIGHTS) == sha256_of(models[0] / WEIGHTS)
 
 
 def test_what_does_not_fit_together_is_one_clear_error_and_leaves_nothing(models: list[Path], tmp_path: Path) -> None:
     wider = tmp_path / "wider"
-    save_model(network(5, UNetShape((8, 8, 8, 8, 8), (4, 4, 4, 4), 1, 2)), wider, training={}, figures={})
+    save_model(network(5, WIDER), wider, training={}, figures={})
     bare = tmp_path / "bare"
     save_model(network(6), bare, training={}, figures={})
     torn = Path(shutil.copytree(models[1], tmp_path / "torn"))
-    (torn / "weights.safetensors").write_bytes(b"torn")
+    (torn / WEIGHTS).write_bytes(b"torn")
+    closer = tmp_path / "closer"
+    save_with_second_look(
+        models[1], network(7, UNetShape((8, 8, 8, 8, 8), (4, 4, 4, 4), 1, 2, inputs=5)), closer, training={}, figures={}
+    )
+    before = contents(tmp_path)
     for others, told in (
-        ([bare, wider], "wider: is not of the shape of"),
+        ([bare, wider], "wider: has another shape than"),
+        ([models[0], closer], "second_look: has another shape than"),
         ([models[0], bare], "bare: has no second look"),
         ([models[0], torn], "restore the model folder"),
     ):
         with pytest.raises(ModelError, match=told):
             average_models(others, tmp_path / "mean")
-        assert not (tmp_path / "mean").exists()
+        assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("told", [5, "backlit", [{}], None])
+def test_a_strange_word_about_the_training_is_no_reason_to_break(models: list[Path], tmp_path: Path, told: object) -> None:
+    info = json.loads((models[1] / INFO).read_text())
+    info["training"]["without"] = told
+    (models[1] / INFO).write_text(json.dumps(info))
+    average_models(models, tmp_path / "mean")
+    assert trained_without(tmp_path / "mean") == ()
 
 
 def test_a_folder_that_is_no_model_is_never_replaced(models: list[Path], tmp_path: Path) -> None:

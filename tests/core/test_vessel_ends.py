@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from core.perception import polyline
 from core.perception.vessel_ends import led_on
 from core.types import Points
 from tests.core.drawing import SIZE, depth
@@ -57,3 +58,13 @@ def test_where_no_wall_is_seen_it_goes_on_as_it_was() -> None:
     line = bend(0.0, 100.0)
     found = led_on([(line, 14.0)], np.ones((SIZE[1], SIZE[0]), np.float32))[0]
     assert np.abs(np.hypot(*(found - [320.0, 240.0]).T) - 100.0).max() < 2.0
+
+
+def test_many_ends_at_once_are_each_as_it_is_alone() -> None:
+    ways = [np.array([[60.0, 70.0 + 90 * k], [200.0 + 60 * k, 70.0 + 90 * k]]) for k in range(4)]
+    radii = [8.0, 15.0, 11.0, 20.0]
+    both = np.maximum.reduce([level(way, radius) for way, radius in zip(ways, radii, strict=True)])
+    ends = [(hooked(polyline.resample(way, 2.0), round(0.6 * r), 0.7 * r), r) for way, r in zip(ways, radii, strict=True)]
+    for found, end in zip(led_on(ends, both), ends, strict=True):
+        np.testing.assert_array_equal(found, led_on([end], both)[0])
+    assert led_on([], both) == []
