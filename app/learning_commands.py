@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
@@ -144,9 +145,11 @@ def run_train(
         raise DatasetError(f"{outputs.held_out}: is trained on, so that it cannot judge; give --held-out another folder")
     if not inputs.data and not inputs.synthetic:
         raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
-    out = outputs.out.resolve()
-    began_with = model_folder(init) if init is not None else None  # said before half a minute of frames is made
-    if (out / INFO).is_file() and (began_with is None or began_with.resolve() != out):
+    out = Path(os.path.realpath(outputs.out))
+    began_with = Path(os.path.realpath(model_folder(init))) if init is not None else None  # before half a minute of frames is made
+    if began_with is not None and began_with in out.parents:
+        raise DatasetError(f"{out}: lies within the model of --init, which a new one would take along; choose another --out")
+    if (out / INFO).is_file() and began_with != out:
         raise DatasetError(f"{out}: is a model already; choose another --out, or give --init {outputs.out} to go on with it")
     check_can_write(out)
     folders = list(inputs.data)

@@ -324,7 +324,9 @@ def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
 def check_can_write(folder: Path) -> None:
     """Raise ModelError when `folder` is anything but a model, an empty folder, or not there: nothing else is ever replaced."""
     try:
-        folder = folder.resolve()
+        folder = Path(os.path.realpath(folder))  # Path.resolve raises something else on links in a loop
+        if folder.is_symlink():
+            raise ModelError(f"{folder}: is a link that leads nowhere but to itself; choose another folder")
         if folder.exists() and not (folder / INFO).is_file() and (not folder.is_dir() or any(folder.iterdir())):
             raise ModelError(f"{folder}: exists and is not a model; choose another folder")
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -148,6 +148,13 @@ def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> Non
     with pytest.raises(UserError, match="is a model already; choose another --out"):
         run_train(TrainOutputs(tmp_path / "model"), TrainInputs([labelled]), None, 4, TrainingPlan(steps=1))
     assert (tmp_path / "model" / "model.json").read_text() == "{}"
+    model = str(tmp_path / "model")
+    with pytest.raises(UserError, match="lies within the model of --init"):
+        run_train(TrainOutputs(tmp_path / "model" / "newer"), TrainInputs([labelled]), model, None, TrainingPlan(steps=1))
+    assert [path.name for path in (tmp_path / "model").iterdir()] == ["model.json"]
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    with pytest.raises(UserError, match="leads nowhere but to itself"):
+        run_train(TrainOutputs(tmp_path / "loop"), TrainInputs([labelled]), None, 4, TrainingPlan(steps=1))
 
 
 @pytest.mark.parametrize(

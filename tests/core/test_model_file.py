@@ -206,3 +206,10 @@ def test_a_network_of_other_planes_under_a_good_hash_is_one_clear_error(model: P
     with pytest.raises(ModelError, match=r"is no network of model\.json's shape") as raised:
         OpenVinoSegmenter(model, 1)(np.zeros((64, 64, 3), np.uint8))
     assert len(str(raised.value).splitlines()) == 1
+
+
+def test_a_link_that_leads_to_itself_is_one_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    with pytest.raises(ModelError, match="leads nowhere but to itself; choose another folder"):
+        save_model(DualUNet(TINY).eval(), tmp_path / "loop", training={}, figures={})
+    assert (tmp_path / "loop").is_symlink()
