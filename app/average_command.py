@@ -14,7 +14,7 @@ from core.errors import UserError
 def run_average(models: Sequence[str], out: Path) -> None:
     """Write the mean of the models named to the folder `out`, and say what it lacks; raises UserError."""
     from core.learning.averaging import average_models
-    from core.learning.model_file import INFO, check_can_write, model_folder
+    from core.learning.model_file import INFO, check_can_write, check_outside, model_folder
 
     if len(models) < 2:
         raise UserError("name two models at least: main.py average MODEL MODEL --out DIR")
@@ -22,8 +22,7 @@ def run_average(models: Sequence[str], out: Path) -> None:
     if len({folder.resolve() for folder in folders}) == 1:
         raise UserError(f"{models[0]} is its own mean; name another model beside it")
     out = Path(os.path.realpath(out))  # the whole of it: a bare name may be that of another model
-    if any(out.is_relative_to(os.path.realpath(folder)) for folder in folders):
-        raise UserError(f"{out}: lies within a model that is to be averaged; choose another --out")
+    check_outside(out, folders)
     if (out / INFO).is_file():
         raise UserError(f"{out}: is a model already; choose another --out")
     check_can_write(out)  # said before anything is read

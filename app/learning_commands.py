@@ -136,7 +136,7 @@ def run_train(
     from app.lessons import FrameLesson, Lesson, SecondLookLesson
     from app.teaching import Classroom, second_plan, teach_second_look
     from core.learning.dataset import DatasetError, find_samples
-    from core.learning.model_file import INFO, check_can_write, model_folder
+    from core.learning.model_file import INFO, check_can_write, check_outside, model_folder
 
     if second_look and outputs.held_out is not None:
         raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
@@ -146,10 +146,9 @@ def run_train(
     if not inputs.data and not inputs.synthetic:
         raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
     out = Path(os.path.realpath(outputs.out))
-    began_with = Path(os.path.realpath(model_folder(init))) if init is not None else None  # before half a minute of frames is made
-    if began_with is not None and began_with in out.parents:
-        raise DatasetError(f"{out}: lies within the model of --init, which a new one would take along; choose another --out")
-    if (out / INFO).is_file() and began_with != out:
+    began_with = model_folder(init) if init is not None else None  # said before half a minute of frames is made
+    check_outside(out, [began_with] if began_with is not None else [])
+    if (out / INFO).is_file() and (began_with is None or not is_same(began_with, out)):
         raise DatasetError(f"{out}: is a model already; choose another --out, or give --init {outputs.out} to go on with it")
     check_can_write(out)
     folders = list(inputs.data)

@@ -336,6 +336,13 @@ def check_can_write(folder: Path) -> None:
         raise ModelError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 
 
+def check_outside(out: Path, models: Sequence[Path]) -> None:
+    """Raise ModelError when `out` lies within one of these models: what is read there would be changed, or go with it one day."""
+    place = Path(os.path.realpath(out))
+    if any(Path(os.path.realpath(folder)) in place.parents for folder in models):
+        raise ModelError(f"{place}: lies within a model that is read for it; choose another --out")
+
+
 def write_figures(folder: Path, figures: dict[str, Any]) -> None:
     """Store measured figures in the manifest of a model, atomically."""
     _update(folder, {"figures": figures})

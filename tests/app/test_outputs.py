@@ -149,7 +149,7 @@ def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> Non
         run_train(TrainOutputs(tmp_path / "model"), TrainInputs([labelled]), None, 4, TrainingPlan(steps=1))
     assert (tmp_path / "model" / "model.json").read_text() == "{}"
     model = str(tmp_path / "model")
-    with pytest.raises(UserError, match="lies within the model of --init"):
+    with pytest.raises(UserError, match="lies within a model that is read for it"):
         run_train(TrainOutputs(tmp_path / "model" / "newer"), TrainInputs([labelled]), model, None, TrainingPlan(steps=1))
     assert [path.name for path in (tmp_path / "model").iterdir()] == ["model.json"]
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
