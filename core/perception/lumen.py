@@ -37,49 +37,55 @@ class RadiusMap:
 
 
 def wall_distances(
-    level: NDArray[np.float32], points: Points, directions: Points, expected: NDArray[np.float64], search_px: int = SEARCH_PX
+    level: NDArray[np.float32], points: Points, normals: Points, expected: NDArray[np.float64], search_px: int = SEARCH_PX
 ) -> NDArray[np.float64]:
-    """How far the wall is from points, each along its own direction: to a fraction of a pixel.
+    """How far the walls to both sides of a line are: to a fraction of a pixel.
 
     Parameters
     ----------
     level : the vessel's mask or probability (h, w); the wall is where it falls through 0.5.
-    points, directions : places in the lumen (N, 2), and unit vectors (N, 2).
-    expected : about how far the wall is (N,).
-    search_px : how far to both sides of that it is looked for.
+    points, normals : places in the lumen (N, 2), and unit vectors (N, 2) across the line.
+    expected : about how far the walls are (N,).
+    search_px : how far to both sides of that they are looked for.
 
     Returns
     -------
-    (N,) in px; NaN where the wall is not there: in a branch's opening, or beyond the image's border.
+    (2, N) in px, along the normals and against them; NaN where a wall is not there: in a branch's opening, or beyond the image's
+    border.
     """
-    return _crossings(level, points, directions, expected, search_px)[0]
+    return _crossings(level, points, normals, expected, search_px)[0].reshape(2, -1)
 
 
 def sharp_walls(
-    level: NDArray[np.float32], points: Points, directions: Points, expected: NDArray[np.float64]
+    level: NDArray[np.float32], points: Points, normals: Points, expected: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """``wall_distances``, and how steeply the level falls there, per px (N,): a network that is not sure draws a soft wall."""
-    reach, inside, first = _crossings(level, points, directions, expected, SEARCH_PX)
-    rows = np.arange(len(points))
+    """``wall_distances``, and how steeply the level falls there, per px (2, N): a network that is not sure draws a soft wall."""
+    reach, inside, first = _crossings(level, points, normals, expected, SEARCH_PX)
+    rows = np.arange(len(first))
     before, after = np.maximum(first - 2, 0), np.minimum(first + 1, 2 * SEARCH_PX)
-    return reach, np.maximum((inside[rows, before] - inside[rows, after]) / np.maximum(after - before, 1), SOFTEST)
+    slope = np.maximum((inside[rows, before] - inside[rows, after]) / np.maximum(after - before, 1), SOFTEST)
+    return reach.reshape(2, -1), slope.reshape(2, -1)
 
 
 def _crossings(
-    level: NDArray[np.float32], points: Points, directions: Points, expected: NDArray[np.float64], search_px: int
+    level: NDArray[np.float32], points: Points, normals: Points, expected: NDArray[np.float64], search_px: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
-    """Distances (N,), the level pixel by pixel in each direction (N, 2 `search_px` + 1), and the first outside (N,)."""
+    """Along all normals and then against all: distances (2N,), the level pixel by pixel (2N, 2 `search_px` + 1), and the first
+    pixel outside (2N,)."""
     distances = expected[:, None] + np.arange(-search_px, search_px + 1.0)
     np.maximum(distances, 0.0, out=distances)
-    x, y = distances * directions[:, 0, None], distances * directions[:, 1, None]
-    x += points[:, 0, None]
-    y += points[:, 1, None]
-    inside = polyline.sample_at(level, x, y)
+    count, looked = distances.shape
+    x, y = np.empty((2, count, looked)), np.empty((2, count, looked))
+    for places, axis in ((x, 0), (y, 1)):
+        offset, place = distances * normals[:, axis, None], points[:, axis, None]
+        np.add(place, offset, out=places[0])
+        np.subtract(place, offset, out=places[1])
+    inside = polyline.sample_at(level, x, y).reshape(2 * count, looked)
     first = (inside < 0.5).argmax(axis=1)
-    rows = np.arange(len(points))
+    rows = np.arange(2 * count)
     before = first - 1
     here, there = inside[rows, before], inside[rows, first]
-    reach = distances[rows, before] + (here - 0.5) / np.maximum(here - there, 1e-6)
+    reach = distances[rows % count, before] + (here - 0.5) / np.maximum(here - there, 1e-6)
     # Nowhere outside, or from the start: both have 0 for the first place that is outside.
     return np.where(first > 0, reach, math.nan), inside, first
 

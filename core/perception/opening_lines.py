@@ -114,16 +114,15 @@ def _own_walls(
     points: Points, normal: Points, radius: NDArray[np.float64], level: NDArray[np.float32], trunk: Trunk | None
 ) -> NDArray[np.float64]:
     """Distances of a line's own walls, to the right and to the left (2, N); NaN where there is none."""
-    places, directions = np.concatenate([points, points]), np.concatenate([normal, -normal])
-    limit = np.concatenate([radius, radius])
-    distance = wall_distances(level, places, directions, limit, WALL_SEARCH_PX)
-    distance[distance > WALL_RADII * limit + 1.0] = math.nan
-    seen = np.flatnonzero(np.isfinite(distance))
-    if trunk is not None and len(seen):
-        walls = places[seen] + distance[seen, None] * directions[seen]
+    distance = wall_distances(level, points, normal, radius, WALL_SEARCH_PX)
+    distance[distance > WALL_RADII * radius + 1.0] = math.nan
+    seen = np.isfinite(distance)
+    if trunk is not None and seen.any():
+        side, place = np.nonzero(seen)
+        walls = points[place] + (np.where(side, -1.0, 1.0) * distance[seen])[:, None] * normal[place]
         near = (_squared_gaps(walls, trunk.points) <= (WALL_RADII * trunk.radius + 1.0) ** 2).any(axis=1)
-        distance[seen[near]] = math.nan
-    return distance.reshape(2, -1)
+        distance[side[near], place[near]] = math.nan
+    return distance
 
 
 def _hermite(first: Gate, second: Gate) -> Points:

@@ -65,8 +65,7 @@ def led_on(ends: Sequence[tuple[Points, float]], level: NDArray[np.float32]) -> 
     places = Bundle.of([end.onward[end.seen] for end in cut])
     directions = np.concatenate([normal[end.seen] for end, normal in zip(cut, normals, strict=True)])
     radius = np.repeat([end.radius_px for end in cut], np.diff(places.starts))
-    doubled = np.concatenate([places.points, places.points]), np.concatenate([directions, -directions])
-    right, left = wall_distances(level, *doubled, np.concatenate([radius, radius]), WALL_SEARCH_PX).reshape(2, -1)
+    right, left = wall_distances(level, places.points, directions, radius, WALL_SEARCH_PX)
     walls = zip(places.split(right), places.split(left), strict=True)
     return [_joined(end, _between(end, normal, *both), limit) for end, normal, both in zip(cut, normals, walls, strict=True)]
 

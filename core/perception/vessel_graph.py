@@ -79,9 +79,12 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability:
 def _lead_on_ends(lines: list[_Line], nodes: Points, level: NDArray[np.float32]) -> None:
     """Ends of vessels without the hook that thinning leaves there; at the image border they go on to the border."""
     degrees = _degrees(lines, len(nodes)).tolist()
-    starts = [(line, -1, line.start) for line in lines if degrees[line.start] == 1]
-    ends = [(line, 1, line.end) for line in lines if degrees[line.end] == 1]
-    for sides in (starts, ends):  # one after the other: of a short line the first end has taken most
+    at_once = [(line, -1, line.start) for line in lines if degrees[line.start] == 1]
+    later: list[tuple[_Line, int, int]] = []
+    for line in lines:
+        if degrees[line.end] == 1:  # of a short line with two ends the first one has taken most
+            (later if degrees[line.start] == 1 else at_once).append((line, 1, line.end))
+    for sides in (at_once, later):
         long = [side for side in sides if len(side[0].points) >= 4]
         # In the corner where the skeleton ends the radius would be nearly nothing.
         told = [(line.points[::side], polyline.median(line.radius[::side][-RADIUS_POINTS:])) for line, side, _ in long]
@@ -256,8 +259,7 @@ def _between_walls(
     A vessel's width changes slowly. So where one wall is soft, the middle is rather as far from the other one as half the width
     that it has around there.
     """
-    right, on_right = sharp_walls(level, lines.points, normal, expected)
-    left, on_left = sharp_walls(level, lines.points, -normal, expected)
+    (right, left), (on_right, on_left) = sharp_walls(level, lines.points, normal, expected)
     half = 0.5 * (right + left)
     seen = np.isfinite(half)
     weight = np.where(seen, np.minimum(on_right, on_left) ** 2, 0.0)

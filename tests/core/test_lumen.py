@@ -31,8 +31,14 @@ def test_where_there_is_no_wall_there_is_no_distance() -> None:
     level = tube(9.0)
     level[:, 75:85] = 1.0  # an opening
     found = wall_distances(level, AT, DOWN, np.full(3, 9.0))
-    assert np.isnan(found[1])
-    assert np.isfinite(found[[0, 2]]).all()
+    assert np.isnan(found[:, 1]).all()
+    assert np.isfinite(found[:, [0, 2]]).all()
+
+
+def test_the_walls_of_both_sides_are_told_apart() -> None:
+    right, left = wall_distances(tube(9.0), AT + [0.0, 2.0], DOWN, np.full(3, 9.0))
+    np.testing.assert_allclose(right, 7.0, atol=0.02)
+    np.testing.assert_allclose(left, 11.0, atol=0.02)
 
 
 def test_a_place_outside_the_lumen_has_none_either() -> None:
@@ -52,7 +58,7 @@ def test_a_soft_wall_is_told_from_a_sharp_one() -> None:
         level = (1.0 / (1.0 + np.exp(-4.0 * steepness * (12.0 - rows)))).astype(np.float32)
         found, slope = sharp_walls(level, AT, DOWN, np.full(3, 12.0))
         np.testing.assert_allclose(found, 12.0, atol=0.05)
-        slopes.append(float(slope[0]))
+        slopes.append(float(slope[0, 0]))
     assert slopes == sorted(slopes)
     assert slopes[0] == pytest.approx(0.05, rel=0.2)
     assert slopes[2] > 4 * slopes[0]
