@@ -151,6 +151,9 @@ def run_train(
     if (out / INFO).is_file() and (began_with is None or not is_same(began_with, out)):
         raise DatasetError(f"{out}: is a model already; choose another --out, or give --init {outputs.out} to go on with it")
     check_can_write(out)
+    for read in [*inputs.data, *([outputs.held_out] if outputs.held_out is not None else [])]:
+        if out in (place := Path(os.path.realpath(read)), *place.parents):
+            raise DatasetError(f"{read}: lies within --out, which is replaced now and then; choose another --out")
     folders = list(inputs.data)
     samples = [sample for folder in folders for sample in _samples_of(folder, inputs.without)]
     if inputs.synthetic:

@@ -13,6 +13,7 @@ from rich.progress import Progress
 from app.lessons import FrameLesson, Lesson, SecondLookLesson, has_second_look
 from app.progress_lines import Teller
 from core.learning.dataset import Sample
+from core.learning.model_file import ModelError
 from core.learning.training import Progress as Report
 from core.learning.training import TrainingPlan, train
 from core.perception.unet import DualUNet
@@ -24,6 +25,8 @@ _TOLD_EVERY = 2
 """Steps between two lines for another program: a step takes half a second and more."""
 _MAY_BE_LOST = 20
 """Steps that may be lost when the last, whole copy of the network cannot be made."""
+_KEPT_EVERY = 1000
+"""Steps from one checkpoint to the next."""
 _LOOKS = 10
 """How often held-out frames are looked at during a training."""
 _SECOND_SHARE, _SECOND_BATCH = 0.3, 24
@@ -78,6 +81,15 @@ class Classroom:
                 held_out.look(network, step)
             keep(network, step, whole=whole)
 
+        def look_and_try_to_keep(network: DualUNet, step: int) -> None:
+            # A disk that is full for a while must not end what takes hours: there are more checkpoints, and the end.
+            try:
+                look_and_keep(network, step)
+            except ModelError as error:
+                self.log(f"{time.strftime('%H:%M:%S')} step {step} could not be kept: {error}\n")
+                if self.teller is None:
+                    self.bar.console.print(f"step {step} could not be kept, the training goes on: {error}", soft_wrap=True)
+
         def keep_at_once(network: DualUNet, step: int) -> None:
             # Hours of learning must not hang on the eight-bit copy, which takes a while; nor either of them on the workers' end.
             if step > _MAY_BE_LOST:
@@ -89,12 +101,12 @@ class Classroom:
             crops,
             plan,
             on_progress=report,
-            on_checkpoint=look_and_keep,
+            on_checkpoint=look_and_try_to_keep,
             on_last=keep_at_once,
             # a window that has gone can no longer ask for the end
             should_stop=lambda: self.interrupt.asked or (self.teller is not None and not self.teller.is_heard),
             report_every=50 if self.teller is None else _TOLD_EVERY,
-            checkpoint_every=1000 if not self.watch.is_on else max(_TOLD_EVERY, plan.steps // _LOOKS),
+            checkpoint_every=_KEPT_EVERY if not self.watch.is_on else max(_TOLD_EVERY, plan.steps // _LOOKS),
         )
         self.steps_before += done
         return done

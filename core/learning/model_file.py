@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 WEIGHTS, ONNX, ONNX_INT8, INFO = "weights.safetensors", "network.onnx", "network_int8.onnx", "model.json"
 SECOND_LOOK = "second_look"
 """The folder within a model that holds the network of its second look, where it has one."""
+_INFO_SCRATCH = f".{INFO}.new"
 MODELS = RESOURCES / "models"
 
 
@@ -204,11 +205,15 @@ def save_model(
     ModelError
         The folder is something else than a model, or cannot be written.
     """
+    from safetensors import SafetensorError
     from safetensors.torch import save_file
 
     with _put_in_place(folder) as scratch:
         state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
-        save_file(state, scratch / WEIGHTS)
+        try:
+            save_file(state, scratch / WEIGHTS)
+        except SafetensorError as error:  # it has its own for a full disk
+            raise _cannot_write(folder, str(error).strip().splitlines()[-1]) from None
         (scratch / WEIGHTS).chmod(0o644)  # others at the same machine may use it, too; by itself it is the writer's alone
         export_onnx(network, network.shape.stride, scratch / ONNX)
         cuts = whole_strides(examples, network.shape.stride)
@@ -229,7 +234,8 @@ def save_model(
         )
         (scratch / INFO).write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
         if second_look is not None:
-            shutil.copytree(second_look, scratch / SECOND_LOOK)
+            (scratch / SECOND_LOOK).mkdir()
+            _copy(second_look, scratch / SECOND_LOOK)
     return info
 
 
@@ -243,12 +249,24 @@ def _put_in_place(folder: Path) -> Iterator[Path]:
         yield scratch
         scratch.chmod(0o755)
         _put(scratch, folder)
+    except OSError as error:
+        places = [Path(os.fsdecode(name)) for name in (error.filename, error.filename2) if name is not None]
+        if places and not any(place in (scratch, folder) or scratch in place.parents for place in places):
+            raise  # a file that is read is at fault
+        raise _cannot_write(folder, error.strerror or str(error)) from None
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
 
 
+def _cannot_write(folder: Path, reason: str) -> ModelError:
+    return ModelError(f"{folder}: cannot be written ({reason}); make room, or choose another folder")
+
+
 def _put(scratch: Path, folder: Path) -> None:
-    """Move a whole model to its place; where that fails, the one that was there before is there again."""
+    """Move a whole model to its place; where that fails, the one that was there before is there again.
+
+    What else lay in the old one's folder, somebody's notes or frames, lies in the new one's then.
+    """
     aside = scratch.with_name(scratch.name + ".old")
     # Aside first, deleted last: whenever this is interrupted, one of the two is whole.
     if folder.exists():
@@ -259,7 +277,23 @@ def _put(scratch: Path, folder: Path) -> None:
         if aside.exists():
             os.replace(aside, folder)
         raise
-    shutil.rmtree(aside, ignore_errors=True)
+    if aside.exists():
+        _carry_over(aside, folder)
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _carry_over(old: Path, new: Path) -> None:
+    """Move what is not the model's own to its new folder; what cannot be moved stays where it is, and is told."""
+    own = {WEIGHTS, ONNX, ONNX_INT8, INFO, _INFO_SCRATCH}
+    try:
+        for entry in list(old.iterdir()):
+            if entry.name == SECOND_LOOK and entry.is_dir() and not entry.is_symlink():
+                _carry_over(entry, new / SECOND_LOOK)
+            elif entry.name not in own:
+                new.mkdir(exist_ok=True)
+                os.replace(entry, new / entry.name)
+    except OSError as error:
+        raise ModelError(f"{old}: holds what lay in the older model's folder and cannot be moved ({error.strerror})") from None
 
 
 def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs: Any) -> None:
@@ -373,7 +407,7 @@ def write_calibration(
 
 def _update(folder: Path, changes: dict[str, Any]) -> None:
     info = read_model_info(folder).model_copy(update=changes)
-    scratch = folder / f".{INFO}.new"
+    scratch = folder / _INFO_SCRATCH
     try:
         scratch.write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
         os.replace(scratch, folder / INFO)

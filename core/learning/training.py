@@ -137,8 +137,9 @@ def train(
     """Train `network` in place; returns the network with averaged weights and the number of steps done.
 
     `crops` (``crops.py``) gives ``plan.steps * plan.batch`` crops with their labels.
-    `should_stop` is asked after every step; what was learnt until then is returned. `on_last` is given it first, on the CPU, while
-    the crops' workers still run: processes have broken down when these ended. Where the device computes in bf16, autocast is used.
+    `should_stop` is asked after every step; what was learnt until then is returned. `on_last` is given it first, while the crops'
+    workers still run: processes have broken down when these ended. Both it and `on_checkpoint` are given a network on the CPU.
+    Where the device computes in bf16, autocast is used.
     Raises DatasetError for a frame that cannot be read, after `on_last` was given what was learnt until then.
     """
     torch.manual_seed(plan.seed)
@@ -185,7 +186,7 @@ def train(
             on_progress(Progress(done, plan.steps, smooth_loss, float(smooth_dice[0]), float(smooth_dice[1]), rate))
             mark, marked = now, done
         if done % checkpoint_every == 0 and done < plan.steps:
-            on_checkpoint(average, done)
+            on_checkpoint(_on_cpu(average), done)
         if should_stop() or done in (plan.steps, plan.stop_after):
             on_last(average.to("cpu"), done)
             break
@@ -194,6 +195,11 @@ def train(
     for error in failed:
         raise error
     return average.to("cpu"), done
+
+
+def _on_cpu(network: DualUNet) -> DualUNet:
+    """The network, or a copy where it is on another device: it is led on there."""
+    return network if next(network.parameters()).device.type == "cpu" else copy.deepcopy(network).to("cpu")
 
 
 @torch.no_grad()

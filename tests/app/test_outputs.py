@@ -16,6 +16,7 @@ from app.perceive_command import Outputs, _check_keeps_inputs, _written_names, r
 from app.session_command import run_export, run_info
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
+from core.learning.model_file import MODELS
 from core.learning.training import TrainingPlan
 from core.session.completeness import rows_cut_off
 from core.session.events import Event, EventKind
@@ -140,6 +141,17 @@ def test_frames_are_not_made_into_somebody_elses_folder(labelled: Path) -> None:
     with pytest.raises(SynthError, match="holds something that synth did not write"):
         write_set(SynthPlan(labelled, 4, 0))
     assert contents(labelled) == before
+
+
+def test_frames_within_the_model_that_is_trained_are_not_learnt_from(labelled: Path, tmp_path: Path) -> None:
+    model = Path(shutil.copytree(MODELS / "default", tmp_path / "model"))
+    frames = Path(shutil.copytree(labelled, model / "frames"))
+    before = contents(frames)
+    for option in ("--data", "--held-out"):
+        other = () if option == "--data" else ("--data", labelled)
+        with pytest.raises(UserError, match="frames: lies within --out, which is replaced now and then; choose another --out"):
+            call("train", option, frames, *other, "--init", model, "--out", model, "--steps", "1")
+    assert contents(frames) == before
 
 
 def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from torch.utils.data import Dataset
 from app.learning_commands import HeldOutWatch, Interrupt, TrainInputs, TrainOutputs, run_train
 from app.teaching import Classroom
 from core.learning.dataset import write_mask, write_png
+from core.learning.model_file import ModelError
 from core.learning.training import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
 
@@ -58,6 +59,26 @@ def test_what_was_learnt_is_kept_before_the_eight_bit_copy_is_made(tmp_path: Pat
         with pytest.raises(MemoryError):
             room.teach(lesson, TrainingPlan(steps=_STEPS, batch=1, crop=(64, 64), workers=0, warmup_steps=1))
     assert lesson.kept == [_STEPS]
+
+
+def test_a_checkpoint_that_cannot_be_written_does_not_end_the_training(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lesson, told = _Lesson(), list[str]()
+    full = [True]
+
+    def save(network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
+        assert all(parameter.device.type == "cpu" for parameter in network.parameters())
+        if full and full.pop():
+            raise ModelError(f"{out}: cannot be written (no space); make room, or choose another folder")
+        lesson.kept.append(training["steps_done"])
+
+    monkeypatch.setattr(lesson, "save", save)
+    monkeypatch.setattr("app.teaching._KEPT_EVERY", 7)
+    watch = HeldOutWatch(None, tmp_path / "out", None, lambda _: None)
+    with Progress(disable=True) as bar:
+        room = Classroom(tmp_path / "out", {}, told.append, None, bar, Interrupt(), watch)
+        assert room.teach(lesson, TrainingPlan(steps=_STEPS, batch=1, crop=(64, 64), workers=0, warmup_steps=1)) == _STEPS
+    assert lesson.kept == [14, _STEPS, _STEPS]
+    assert [line for line in told if "step 7 could not be kept: " in line and "cannot be written (no space)" in line]
 
 
 def test_a_training_that_is_interrupted_before_its_first_step_is_no_success(

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,10 @@ from core.learning.model_file import (
     MODELS,
     ONNX,
     ONNX_INT8,
+    SECOND_LOOK,
     WEIGHTS,
     ModelError,
+    changed,
     check_files,
     load_network,
     model_folder,
@@ -154,6 +157,37 @@ def test_a_shipped_models_files_are_those_of_its_manifest(manifest: Path) -> Non
     check_files(info, manifest.parent, sorted(there - {INFO}))
 
 
+def test_what_else_lies_in_a_models_folder_outlives_the_model(model: Path) -> None:
+    (model / "frames" / "images").mkdir(parents=True)
+    (model / "frames" / "images" / "a.png").write_bytes(b"drawn by hand")
+    (model / SECOND_LOOK).mkdir()
+    (model / SECOND_LOOK / "NOTES.md").write_text("mine")
+    with changed(model) as work:
+        write_figures(work, {"new": 1})
+    save_model(DualUNet(TINY).eval(), model, training={"steps": 1}, figures={})
+    assert read_model_info(model).training == {"steps": 1}
+    assert (model / "frames" / "images" / "a.png").read_bytes() == b"drawn by hand"
+    assert (model / SECOND_LOOK / "NOTES.md").read_text() == "mine"
+    assert [path.name for path in model.parent.iterdir()] == [model.name]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of a file's size")
+def test_a_full_disk_is_one_clear_error_and_the_old_model_stays(model: Path) -> None:
+    import resource
+
+    before, limits = (model / WEIGHTS).read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(ModelError, match=r"tiny: cannot be written \(.*too large.*\); make room, or choose another folder"):
+            save_model(DualUNet(TINY).eval(), model, training={}, figures={})
+        with pytest.raises(ModelError, match=r"tiny: cannot be written \(.*too large.*\); make room"), changed(model):
+            pass
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert (model / WEIGHTS).read_bytes() == before
+    assert [path.name for path in model.parent.iterdir()] == [model.name]
+
+
 def test_where_a_new_model_cannot_take_its_place_the_old_one_stays(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = read_model_info(model)
     rename = os.replace
@@ -165,7 +199,7 @@ def test_where_a_new_model_cannot_take_its_place_the_old_one_stays(model: Path, 
 
     monkeypatch.setattr(os, "replace", fails_into_place)
     torch.manual_seed(2)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(ModelError, match="No space"):
         save_model(DualUNet(TINY).eval(), model, training={}, figures={})
     monkeypatch.undo()
     assert read_model_info(model) == before
