@@ -16,6 +16,7 @@ from core.config import Config
 from core.devices import DeviceError, EndOfStream
 from core.learning.model_file import check_model
 from core.record_config import sessions_folder
+from core.rig_file import as_calibrated
 from core.session.events import event_of_alert
 from core.session.files import check_parent
 from core.session.manifest import SessionError, about_rig
@@ -26,7 +27,9 @@ if TYPE_CHECKING:
     from app.rig_engine import RigEngine
 
 _STEP_S = 0.1
-_FIRST_FRAME_WITHIN_S = 15.0
+_PICTURE_WITHIN_S = 15.0
+_GAP_S = 2.0
+"""A slow machine may take so long from picture to picture; what is longer is told."""
 
 
 @dataclass(slots=True)
@@ -35,7 +38,12 @@ class _Progress:
 
     started_s: float | None = None
     ended: str = "all recorded"
+    failed: str = ""
+    """Why it ended too early, or without the camera."""
     camera_dropped: int = 0
+    without_picture_s: float = 0.0
+    picture_s: float = 0.0
+    """When the last one was understood."""
 
     @property
     def seconds(self) -> float:
@@ -45,7 +53,11 @@ class _Progress:
 def run_record(
     seconds: float, out: Path | None, *, rig: str | None, config_path: Path | None, lossless: bool, as_json: bool
 ) -> None:
-    """Record so many seconds into a new session in `out`; raises SessionError, DeviceError, ConfigError, ModelError."""
+    """Record so many seconds into a new session in `out`; raises SessionError, DeviceError, ConfigError, ModelError.
+
+    A camera that is lost meanwhile is waited for until the time is over, and how long it was away is told; one that is still away
+    then is an error, as every failure is, which names what was recorded.
+    """
     config, kind = window_config(rig, config_path, None)
     settings = config.record.model_copy(update={"ring_s": 0.0} | ({"codec": "lossless"} if lossless else {}))
     config = config.model_copy(update={"record": settings})
@@ -55,7 +67,7 @@ def run_record(
     engine = EngineMaker()(config)
     writer: SessionWriter | None = None
     try:
-        writer = SessionWriter(settings, about_rig(config, kind.value, config.rig.name), folder=folder)
+        writer = SessionWriter(settings, about_rig(as_calibrated(config), kind.value, config.rig.name), folder=folder)
         done = _record(engine, writer, seconds)
         length_s = done.seconds
     finally:
@@ -64,9 +76,11 @@ def run_record(
         finally:
             engine.close()
     status = writer.status()
+    kept = f"; what was written is in {status.folder}" if status.folder else ""
     if status.problem:
-        kept = f"; what was written is in {status.folder}" if status.folder else ""
         raise SessionError(f"{status.problem}{kept}")
+    if done.failed:
+        raise DeviceError(f"{done.failed}{kept}")
     if status.folder is None:
         raise SessionError(f"nothing was recorded: {done.ended} before the first picture")
     if not is_whole:
@@ -78,6 +92,7 @@ def run_record(
         "frames": status.frames,
         "dropped": status.dropped,
         "camera_dropped": done.camera_dropped,
+        "without_picture_s": round(done.without_picture_s, 3),
         "bytes": _size(status.folder),
     }
     _tell(result, config, as_json)
@@ -85,6 +100,18 @@ def run_record(
 
 def _record(engine: RigEngine, writer: SessionWriter, seconds: float) -> _Progress:
     done = _Progress()
+    try:
+        _record_into(engine, writer, seconds, done)
+    except DeviceError as error:
+        done.ended = done.failed = str(error)
+    away_s = time.monotonic() - done.picture_s
+    if not done.failed and done.started_s is not None and (engine.problem or away_s > _PICTURE_WITHIN_S):
+        done.ended = done.failed = engine.problem or f"no picture from the camera for {away_s:.0f} s; check its cable"
+    writer.stop(done.ended)
+    return done
+
+
+def _record_into(engine: RigEngine, writer: SessionWriter, seconds: float, done: _Progress) -> None:
     began_s = time.monotonic()
     is_warm, dropped_before = False, 0
     writer.start()
@@ -101,15 +128,22 @@ def _record(engine: RigEngine, writer: SessionWriter, seconds: float) -> _Progre
                 break
             _tell_driving(engine, writer)
             if tick is None:
-                if done.started_s is None and time.monotonic() - began_s > _FIRST_FRAME_WITHIN_S:
-                    raise DeviceError(f"no picture from the camera for {_FIRST_FRAME_WITHIN_S:.0f} s; check its cable")
+                if done.started_s is None and time.monotonic() - began_s > _PICTURE_WITHIN_S:
+                    no_picture = f"no picture from the camera for {_PICTURE_WITHIN_S:.0f} s; check its cable"
+                    raise DeviceError(engine.problem or no_picture)
+                if done.started_s is not None and engine.problem:
+                    bar.update(task, completed=int(done.seconds), description=f"seconds, no picture: {engine.problem}")
                 continue
             if not is_warm:
                 # The first one waited for the network to warm up: it is seconds old when it is understood.
                 is_warm = True
                 continue
             if done.started_s is None:
-                done.started_s, dropped_before = time.monotonic(), tick.dropped_frames
+                done.started_s = done.picture_s = time.monotonic()
+                dropped_before = tick.dropped_frames
+            if (away_s := time.monotonic() - done.picture_s) > _GAP_S:
+                done.without_picture_s += away_s
+            done.picture_s = time.monotonic()
             done.camera_dropped = tick.dropped_frames - dropped_before
             _put(engine, writer, tick)
             status = writer.status()
@@ -118,8 +152,6 @@ def _record(engine: RigEngine, writer: SessionWriter, seconds: float) -> _Progre
             bar.update(
                 task, completed=int(done.seconds), description=f"seconds, {status.bytes / 1e6:.1f} MB, {status.dropped} dropped"
             )
-    writer.stop(done.ended)
-    return done
 
 
 def _put(engine: RigEngine, writer: SessionWriter, tick: Tick) -> None:
@@ -150,6 +182,8 @@ def _tell(result: dict[str, Any], config: Config, as_json: bool) -> None:
         return
     sys.stdout.write(f"{result['session']}\n")
     minutes = max(result["seconds"], 1e-3) / 60.0
+    if result["without_picture_s"]:
+        sys.stderr.write(f"for {result['without_picture_s']:.1f} s of it the camera sent no picture\n")
     sys.stderr.write(
         f"{result['ended']}: {result['seconds']:.1f} s, {result['frames']} frames, {result['dropped']} dropped by the recorder, "
         f"{result['camera_dropped']} by camera and perception, {result['bytes'] / 1e6:.1f} MB "

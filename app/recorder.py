@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
 
 from app.engine_thread import EngineThread
@@ -10,7 +12,7 @@ from core.config import Config
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.faults import Cause
-from core.session.events import EventKind, event_of_alert
+from core.session.events import EventKind, event_of_alert, event_of_target
 from core.session.manifest import about_rig
 from core.session.record_status import RecordStatus, faults_between
 from core.session.writer import SessionWriter
@@ -62,10 +64,11 @@ class Recorder(QObject):
 
     @Slot()
     def toggle(self) -> None:
-        """Begin a session, or end it."""
+        """Begin a session with the next picture, or end it; one that has not begun yet is taken back."""
         if self._writer is None:
             return
-        if self._writer.status().recording:
+        status = self._writer.status()
+        if status.recording or status.armed:
             self._writer.stop()
         else:
             self._writer.start()
@@ -87,11 +90,13 @@ class Recorder(QObject):
 
     def note(self, text: str) -> None:
         """Keep a note with the session."""
-        self._event(EventKind.NOTE, text)
+        if self._writer is not None:
+            self._writer.event(EventKind.NOTE, text)
 
     def target(self, target: Point | None) -> None:
         """Keep the operator's destination, source pixels."""
-        self._event(EventKind.TARGET, "" if target is None else f"{target[0]:.1f}, {target[1]:.1f}")
+        if self._writer is not None:
+            self._writer.add_event(event_of_target(target, time.monotonic()))
 
     def drive(self, view: DriveView) -> None:
         """Keep that mode or faults have changed, also when there are no pictures."""
@@ -119,10 +124,6 @@ class Recorder(QObject):
         writer, pilot = self._writer, self._thread.pilot
         if writer is not None:
             writer.put(tick, pilot.view if pilot is not None else None, self._thread.bus_status())
-
-    def _event(self, kind: EventKind, text: str) -> None:
-        if self._writer is not None:
-            self._writer.event(kind, text)
 
     @Slot()
     def _look(self) -> None:

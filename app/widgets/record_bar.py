@@ -62,7 +62,8 @@ class RecordBar(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         is_bad = bool(self._status.problem)
-        edge = palette.VERMILLION if self._status.recording or is_bad else palette.LINE
+        is_on = self._status.recording or self._status.armed
+        edge = palette.VERMILLION if is_on or is_bad else palette.LINE
         painter.setPen(QPen(QColor(edge), 1.5))
         painter.setBrush(QColor(palette.RAISED if self._status.recording else palette.PANEL))
         painter.drawRoundedRect(frame, 6, 6)
@@ -90,4 +91,6 @@ def _lines_of(status: RecordStatus) -> tuple[str, str]:
         return f"{minutes}:{seconds:02d}", f"{status.dropped} dropped" if status.dropped else size
     if status.problem:
         return tr("Record"), tr("stopped: disk?")
-    return tr("Record"), "saving" if status.saving else "F9"
+    if status.armed:
+        return tr("Record"), tr("no picture yet")
+    return tr("Record"), tr("saving") if status.saving else "F9"

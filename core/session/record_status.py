@@ -20,6 +20,7 @@ class RecordStatus:
 
     Attributes
     ----------
+    armed : a session begins with the next picture.
     recording : a session is being written to `folder` (afterwards: the last one).
     elapsed_s, frames, bytes : of that session.
     dropped : frames that the recorder could not take since the session's start, because its queue was full.
@@ -31,6 +32,7 @@ class RecordStatus:
     saved : the newest session that was completed, by stop or from the ring.
     """
 
+    armed: bool = False
     recording: bool = False
     folder: Path | None = None
     elapsed_s: float = 0.0

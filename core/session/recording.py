@@ -65,6 +65,7 @@ class Recording:
         self._is_armed = False
         self._early: list[Event] = []
         self._drive: DriveView | None = None
+        self._target: Event | None = None
         self._dropped_told = 0
         self._dropped_told_s = -math.inf
         self._lost: _Lost | None = None
@@ -127,6 +128,8 @@ class Recording:
 
     def take_event(self, event: Event) -> None:
         """Keep it and write it; between start and the first frame it waits. Raises OSError."""
+        if event.kind is EventKind.TARGET:
+            self._target = event
         if self._ring is not None:
             self._ring.add_event(event)
         if self._files is not None:
@@ -156,7 +159,7 @@ class Recording:
         """A session begins with the next frame; nothing happens when one is being recorded."""
         if self._files is None:
             self._is_armed = True
-            self._board.show(problem="")
+            self._board.show(armed=True, problem="")
 
     def _open(self, picture: Picture) -> None:
         self._is_armed = False
@@ -164,7 +167,7 @@ class Recording:
         self._files = SessionFiles(self._parent, self._about, self._config, first_s=first_s, now_s=self._clock())
         self.dropped_before, self._dropped_told, self._dropped_told_s = picture.dropped, 0, -math.inf
         self.began_s = self._clock()
-        self._board.show(recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
+        self._board.show(armed=False, recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
         drive = picture.drive or self._drive
         if drive is not None:
             # the session must tell by itself where it began
@@ -172,6 +175,8 @@ class Recording:
             self._files.write_event(next(events_between(None, self._drive)))
             for fault in drive.active:
                 self._files.write_event(Event(first_s, EventKind.FAULT, str(fault.cause), {"detail": fault.detail}))
+        if self._target is not None and self._target not in self._early:
+            self._files.write_event(replace(self._target, time_s=first_s))
         early, self._early = self._early, []
         for event in early:
             self._files.write_event(event)
@@ -181,6 +186,7 @@ class Recording:
         self._is_armed, self._early = False, []
         files, self._files = self._files, None
         if files is None:
+            self._board.show(armed=False)
             return
         count, elapsed_s = dropped - self.dropped_before, max(0.0, self._clock() - self.began_s)
         problem = files.close(ended, count)
@@ -197,7 +203,7 @@ class Recording:
     def change_rig(self, about: About, dropped: int) -> None:
         """A session never mixes two rigs, and neither does the ring."""
         self.end("another rig was opened", dropped)
-        self._about, self._drive, self._lost = about, None, None
+        self._about, self._drive, self._target, self._lost = about, None, None, None
         if self._ring is not None:
             self._ring.clear()
 

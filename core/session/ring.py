@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from core.session.events import Event
+from core.session.events import Event, EventKind
 from core.session.video import FrameEncoder, Packet
 
 
@@ -64,11 +64,14 @@ class Ring:
         self._events.append(event)
 
     def content(self) -> tuple[list[EncodedFrame], list[Event]]:
-        """A copy: the frames in order, and the events since the first of them."""
+        """A copy: the frames in order, and the events since the first of them, with the destination that was chosen before."""
         frames = [frame for group in self._groups for frame in group]
         if not frames:
             return [], []
-        return frames, [event for event in self._events if event.time_s >= frames[0].captured_s]
+        first_s = frames[0].captured_s
+        chosen = [event for event in self._events if event.kind is EventKind.TARGET and event.time_s < first_s]
+        before = [replace(event, time_s=first_s) for event in chosen[-1:]]
+        return frames, before + [event for event in self._events if event.time_s >= first_s]
 
     def clear(self) -> None:
         self._groups.clear()

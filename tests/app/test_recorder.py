@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
@@ -11,7 +12,9 @@ from app.operator_window import OperatorWindow
 from core.config import Config
 from core.control.alerts import ALERTS, Alert
 from core.control.faults import Cause
+from core.session.events import EventKind
 from core.session.reader import SessionReader
+from core.study.replay import event_target
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, until
 
@@ -41,7 +44,8 @@ def test_one_key_begins_and_ends_a_session(running: OperatorWindow, engine: Fake
     assert reader.manifest.closed
     assert reader.manifest.kind == "SIM"
     kinds = [event.kind.value for event in reader.events]
-    assert "target" in kinds
+    (target,) = [event for event in reader.events if event.kind is EventKind.TARGET]
+    assert event_target(target) == pytest.approx((500.0, 280.0), abs=0.01)
     assert "alert" in kinds
     assert not reader.problems
     reader.close()

@@ -135,4 +135,7 @@ def test_recorded_targets_come_from_routes_and_where_there_is_none_from_events()
 
 
 def test_a_damaged_target_is_no_target() -> None:
+    # as windows wrote it once
+    assert RecordedTargets([Event(0.0, EventKind.TARGET, "300.5, 200.0")]).of(row(0, 1.0, full=False)) == (300.5, 200.0)
+    assert RecordedTargets([Event(0.0, EventKind.TARGET, "")]).of(row(0, 1.0, full=False)) is None
     assert RecordedTargets([Event(0.0, EventKind.TARGET, "?", {"xy": ["a", 1]})]).of(row(0, 1.0, full=False)) is None  # type: ignore[arg-type]

@@ -24,13 +24,14 @@ from core.control.faults import Cause, Fault
 from core.control.modes import Mode
 from core.session import files as session_files
 from core.session import writer as session_writer
-from core.session.events import EventKind
+from core.session.events import EventKind, event_of_target
 from core.session.files import SessionFiles, is_being_written
 from core.session.manifest import About, read_manifest, write_manifest
 from core.session.reader import SessionReader
 from core.session.ring import EncodedFrame, Ring
 from core.session.video import FrameEncoder, Packet
 from core.session.writer import SessionWriter
+from core.study.replay import event_target
 from core.types import Tick
 from tests.core.session_data import ABOUT, QUICK, SIZE, drive_of, number_in, record, tick_of, wait_for
 
@@ -249,6 +250,47 @@ def test_a_note_between_start_and_the_first_frame_is_kept(tmp_path: Path) -> Non
     assert session is not None
     with SessionReader(session) as reader:
         assert "ready" in [event.text for event in reader.events]
+
+
+def test_the_destination_that_was_chosen_before_is_told_at_the_start(tmp_path: Path) -> None:
+    def targets_of(session: Path | None) -> list[tuple[float, object]]:
+        assert session is not None
+        with SessionReader(session) as reader:
+            return [(event.time_s, event_target(event)) for event in reader.events if event.kind is EventKind.TARGET]
+
+    with writer_in(tmp_path, replace_config(ring_s=2.0)) as writer:
+        writer.add_event(event_of_target((10.0, 20.0), 999.0))
+        writer.add_event(event_of_target((30.0, 40.0), 999.5))
+        writer.start()
+        for tick in ticks(3):
+            writer.put(tick)
+        writer.stop()
+        wait_for(lambda: writer.status().saved is not None)
+        assert targets_of(first := writer.status().saved) == [(1000.0, (30.0, 40.0))]
+        writer.save_last()
+        wait_for(lambda: writer.status().saved != first)
+        assert targets_of(writer.status().saved) == [(1000.0, (30.0, 40.0))]
+        writer.add_event(event_of_target(None, 1000.5))
+        writer.set_about(About("LIVE", "bench"))
+        writer.start()
+        writer.put(tick_of(9, 1001.0))
+    assert targets_of(writer.status().saved) == []
+
+
+def test_a_session_that_waits_for_its_first_picture_says_so_and_can_be_taken_back(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        wait_for(lambda: writer.status().armed)
+        assert not writer.status().recording
+        writer.stop()
+        wait_for(lambda: not writer.status().armed)
+        writer.put(tick_of(0, 1000.0))
+        writer.start()
+        writer.put(tick_of(1, 1000.1))
+        wait_for(lambda: writer.status().recording)
+        assert not writer.status().armed
+    (session,) = tmp_path.iterdir()
+    assert read_manifest(session).counts.frames == 1
 
 
 def test_another_rig_ends_the_session(tmp_path: Path) -> None:
