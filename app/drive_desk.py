@@ -37,7 +37,7 @@ _ACT_OF = {
 class DrivePanels(Protocol):
     """What the desk shows things on."""
 
-    def show_drive(self, view: DriveView | None, bus: BusStatus | None) -> None: ...
+    def show_drive(self, view: DriveView | None, bus: BusStatus | None, *, has_rig: bool = True) -> None: ...
     def show_alerts(self, alerts: tuple[Alert, ...]) -> None: ...
     def log(self, kind: EventKind, text: str) -> None: ...
 
@@ -62,7 +62,7 @@ class DriveDesk(QObject):
         self._shown: DriveView | None = None
         self._speed = 1.0
         self.has_rig = False
-        """Whether a rig runs: before, nobody knows whether there is something to drive."""
+        """Whether a rig runs, or has run to its end: else nobody knows whether there is something to drive."""
         self._timer = QTimer(self)
         self._timer.setInterval(_LOOK_EVERY_MS)
         self._timer.timeout.connect(self._look)
@@ -215,9 +215,9 @@ class DriveDesk(QObject):
     def _look(self) -> None:
         pilot = self._thread.pilot
         if pilot is None:
-            self._shown = None
-            if self.has_rig:
-                self._panels.show_drive(None, None)
+            # A pilot that has just gone belonged to a rig that is over, even where nobody has told so yet.
+            has_rig, self._shown = self.has_rig and self._shown is None, None
+            self._panels.show_drive(None, None, has_rig=has_rig)
             return
         pilot.window_alive()
         pilot.hand_speed(self._speed)

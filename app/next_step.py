@@ -75,10 +75,10 @@ NO_ROBOT = NextStep(Step.SERVOS_ON, False, mark("This rig has no robot"), mark("
 NOT_YET = NextStep(Step.SERVOS_ON, False, mark("Waiting for the rig"), "")
 
 
-def who_drives(view: DriveView | None) -> str:
-    """In few words, for the badge."""
+def who_drives(view: DriveView | None, *, has_rig: bool = True) -> str:
+    """In few words, for the badge; without a rig nobody knows yet whether there will be something to drive."""
     if view is None:
-        return tr("pictures only")
+        return tr("pictures only") if has_rig else tr("waiting for the rig")
     if view.mode is Mode.HOLD:
         return tr("interrupted")
     if view.mode is Mode.STOPPED:

@@ -110,14 +110,14 @@ class OperatorPanels(ScenePanels):
         self.gauge.show_pose(scene.pose)
         self.bars.show_pose(scene.pose)
 
-    def show_drive(self, view: DriveView | None, bus: BusStatus | None) -> None:
-        """Show who drives, and what the servos say; None: there is nothing to drive."""
+    def show_drive(self, view: DriveView | None, bus: BusStatus | None, *, has_rig: bool = True) -> None:
+        """Show who drives, and what the servos say; None: there is nothing to drive, or no rig is open."""
         before, self._blanked = self._blanked, view.blanked if view is not None else ""
         if self._blanked and not before:  # at once, and not with the next picture: it may be long in coming
             self.live.drop_ghost()
             self.advice.show_advice(None, None, self._blanked)
-        self.mode.show_view(view)
-        self.mode_bar.show_view(view)
+        self.mode.show_view(view, has_rig=has_rig)
+        self.mode_bar.show_view(view, has_rig=has_rig)
         if view is not None:
             self.alerts.show_view(view)
         self.servos.show_status(bus, self._servo_config)

@@ -344,10 +344,12 @@ class OperatorWindow(WindowFrame):
         self._is_stale = False
         if phase in (Phase.ENDED, Phase.FAULT):
             self._desk.reset()
+        if phase is not Phase.RUNNING:
             panels.jog.show_status(None)
         panels.forget()
         panels.alerts.clear()
-        self._desk.has_rig = phase is Phase.RUNNING
+        # A recording that is over has been seen to have no robot, and F5 plays no other one.
+        self._desk.has_rig = phase is Phase.RUNNING or (phase is Phase.ENDED and self._kind is RigKind.PLAYBACK)
         self.phase_changed.emit(phase)
         if phase is Phase.STARTING:
             self._last_tick = None

@@ -51,7 +51,7 @@ class ModeBadge(QWidget):
         self._who = ""
         self.setFixedSize(_SIZE)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.show_view(None)
+        self.show_view(None, has_rig=False)
 
     @property
     def mode(self) -> Mode:
@@ -65,9 +65,9 @@ class ModeBadge(QWidget):
     def sizeHint(self) -> QSize:
         return _SIZE
 
-    def show_view(self, view: DriveView | None) -> None:
-        """The newest view; None: this rig has no robot."""
-        mode, who = view.mode if view is not None else Mode.ADVISORY, who_drives(view)
+    def show_view(self, view: DriveView | None, *, has_rig: bool = True) -> None:
+        """The newest view; None: this rig has no robot, or no rig is open."""
+        mode, who = view.mode if view is not None else Mode.ADVISORY, who_drives(view, has_rig=has_rig)
         if (mode, who) == (self._mode, self._who):
             return
         self._mode, self._who = mode, who

@@ -85,12 +85,12 @@ class ModeBar(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(_NARROW, HEIGHT)
 
-    def show_view(self, view: DriveView | None) -> None:
-        """The newest view; None: this rig has no robot."""
+    def show_view(self, view: DriveView | None, *, has_rig: bool = True) -> None:
+        """The newest view; None: this rig has no robot, or no rig is open."""
         usable, mode = view is not None, view.mode if view is not None else None
         if usable is not self.deadman.isEnabled():
             self._set_usable(usable)
-        step = NO_ROBOT if view is None else next_step(view)
+        step = next_step(view) if view is not None else NO_ROBOT if has_rig else NOT_YET
         matters = mode in ARMED_MODES
         self.deadman.show_deadman(view.deadman if view is not None else None, matters=matters)
         if (step, mode) == (self._shown, self._mode) or (view is not None and self._too_soon(step, view)):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -9,6 +12,7 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.engine_thread import Phase
 from app.operator_window import OperatorWindow
 from core.config import Config
 from core.control.alerts import ALERTS, Alert
@@ -16,9 +20,11 @@ from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.gate_checks import Source
 from core.control.modes import Act, Mode
+from core.devices import DeviceError, EndOfStream
 from hardware.rig import RigKind
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, until
+from tests.app.test_servo_widgets import bus
 
 Key = Qt.Key
 
@@ -101,6 +107,70 @@ def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBen
     qtbot.keyClick(window, Key.Key_Space)
     qtbot.wait(120)
     assert window.desk.view is None
+
+
+# ---- once the pilot is gone
+
+
+def fails(_window: OperatorWindow, engine: FakeEngine) -> None:
+    engine.fail_with = DeviceError("the camera is gone")
+
+
+def is_opened_anew(window: OperatorWindow, _engine: FakeEngine) -> None:
+    window.restart()
+
+
+def is_another_one(window: OperatorWindow, _engine: FakeEngine) -> None:
+    window.use_config(window.config.model_copy(update={"rig": window.config.rig.model_copy(update={"name": "bench 2"})}))
+
+
+def is_lent(window: OperatorWindow, _engine: FakeEngine) -> None:
+    window.lend("the wizard has camera and servos")
+
+
+@pytest.mark.parametrize("end", [fails, is_opened_anew, is_another_one, is_lent])
+def test_nothing_says_who_drives_once_the_rig_is_over(
+    end: Callable[[OperatorWindow, FakeEngine], None], make_window: MakeWindow, bench: FakeBench, qtbot: QtBot
+) -> None:
+    engine, may_open = FakeEngine(bench), threading.Event()
+    engine.bus_status = lambda: bus(time_s=time.monotonic())  # type: ignore[assignment,return-value]
+    rigs = iter([engine])
+
+    def open_engine(_config: Config) -> FakeEngine:
+        if (first := next(rigs, None)) is not None:
+            return first
+        may_open.wait(20.0)
+        return FakeEngine(bench)
+
+    window = make_window(open_engine)
+    window.start()
+    engine.pilot.view = drive_view(mode=Mode.AUTONOMOUS, permitted=Source.PROGRAM, deadman=True)
+    panels = window.panels
+    until(qtbot, lambda: panels.mode.who == "the program drives" and panels.mode_bar.deadman.is_lit)
+    until(qtbot, lambda: "20.0 ms" in panels.servos.bus_text)
+    try:
+        end(window, engine)
+        until(qtbot, lambda: panels.mode.who == "waiting for the rig")
+        assert panels.mode.mode is Mode.ADVISORY
+        assert panels.mode_bar.text == "Waiting for the rig."
+        assert not any(part.isEnabled() for part in (panels.mode_bar.main, panels.mode_bar.second, panels.mode_bar.deadman))
+        assert not panels.mode_bar.deadman.is_lit
+        assert panels.servos.bus_text.startswith("no servo bus")
+        assert window.desk.view is None
+    finally:
+        may_open.set()
+
+
+def test_a_recording_that_is_over_still_has_no_robot(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    engine = FakeEngine(bench)
+    engine.pilot = None  # type: ignore[assignment]
+    window = make_window(lambda _config: engine, kind=RigKind.PLAYBACK)
+    window.start()
+    until(qtbot, lambda: window.panels.mode.who == "pictures only")
+    engine.fail_with = EndOfStream("the last picture was shown")
+    until(qtbot, lambda: window.phase is Phase.ENDED)
+    qtbot.wait(120)  # two looks
+    assert window.panels.mode.who == "pictures only"
 
 
 def test_servo_requests_of_the_table_reach_the_servos(running: OperatorWindow, engine: FakeEngine) -> None:

@@ -104,6 +104,20 @@ def test_badge_names_the_mode_and_who_drives(qtbot: QtBot, view: DriveView | Non
     assert badge.who == who_drives(view)
 
 
+def test_without_a_rig_nobody_knows_whether_there_is_something_to_drive(qtbot: QtBot, bar: ModeBar) -> None:
+    badge = ModeBadge()
+    qtbot.addWidget(badge)
+    assert badge.who == "waiting for the rig"
+    badge.show_view(None)
+    assert badge.who == "pictures only"
+    for shown in (badge, bar):
+        shown.show_view(DRIVING)
+        shown.show_view(None, has_rig=False)
+    assert (badge.mode, badge.who) == (Mode.ADVISORY, "waiting for the rig")
+    assert bar.text == "Waiting for the rig."
+    assert not bar.main.isEnabled()
+
+
 def grey(badge: ModeBadge, view: DriveView) -> QImage:
     badge.show_view(view)
     return badge.grab().toImage().convertToFormat(QImage.Format.Format_Grayscale8)
