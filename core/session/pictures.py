@@ -130,6 +130,11 @@ class Pictures:
 
     def picture(self, video: int, pts_ms: int) -> Image | None:
         """The picture of file number `video` at exactly this time; None when it is lost or damaged."""
+        frame = self.decoded(video, pts_ms)
+        return to_rgb(frame) if frame is not None else None
+
+    def decoded(self, video: int, pts_ms: int) -> av.VideoFrame | None:
+        """The same as it was decoded."""
         with self._lock:
             key = video, pts_ms
             if key not in self._cache and key not in self._missing:
@@ -139,7 +144,7 @@ class Pictures:
                 self._miss(video, pts_ms)
                 return None
             self._cache.move_to_end(key)
-            return to_rgb(frame)
+            return frame
 
     def close(self) -> None:
         with self._lock:

@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import IO
 
 import numpy as np
+from av import VideoFrame
 
 from core.session.checked import Damaged
 from core.session.events import Event, event_from_json
@@ -198,6 +199,10 @@ class SessionReader:
     def loose_picture(self, video: int, pts_ms: int) -> Image | None:
         """A picture by file and time."""
         return self._pictures.picture(video, pts_ms)
+
+    def decoded(self, video: int, pts_ms: int) -> VideoFrame | None:
+        """A picture by file and time, as it was decoded; None when it is lost or damaged."""
+        return self._pictures.decoded(video, pts_ms)
 
 
 def check_is_session(folder: Path) -> None:

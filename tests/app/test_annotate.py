@@ -6,10 +6,12 @@ import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import av
+import cv2
 import numpy as np
 import pytest
 
@@ -28,6 +30,7 @@ from core.study.annotations import Annotation, MaskPolygon, MaskTarget, View, me
 from core.study.evaluation import read_measurements
 from core.types import PoseState
 from hardware.twin.world import TwinWorld
+from tests.core.session_data import number_in, record, tick_of
 
 MAIN = Path(__file__).resolve().parents[2] / "main.py"
 BOXES = (
@@ -212,21 +215,80 @@ def test_an_empty_name_is_no_model() -> None:
         _config(AnnotateOptions(paths=(), model=""))
 
 
-def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
-    video = tmp_path / "run.mkv"
+def film(video: Path, greys: Sequence[int], options: dict[str, str] | None = None) -> Path:
     with av.open(str(video), "w") as container:
-        stream = container.add_stream("libx264", rate=30)
+        stream = container.add_stream("libx264", rate=30, options=options or {})
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for k in range(31):
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 8 * k, np.uint8), format="rgb24")
+        for grey in greys:
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), grey, np.uint8), format="rgb24")
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
+    return video
+
+
+def grey_of(path: Path) -> float:
+    return float(cv2.imread(str(path)).mean())
+
+
+def test_videos_whose_names_differ_in_their_endings_have_pictures_of_their_own(tmp_path: Path) -> None:
+    film(tmp_path / "run.mkv", [40] * 5)
+    film(tmp_path / "run.mp4", [200] * 5)
+    files = image_files([tmp_path], 2)
+    assert [path.parent.name for path in files] == ["run.mkv_frames"] * 2 + ["run.mp4_frames"] * 2
+    assert [round(grey_of(path), -1) for path in files] == [40, 40, 200, 200]
+
+
+def test_pictures_of_an_older_video_of_its_name_are_not_taken_for_its_own(tmp_path: Path) -> None:
+    video = film(tmp_path / "take.mp4", [40] * 5)
+    files = image_files([video], 2)
+    film(video, [200] * 5)
+    for taken in (False, True):
+        with pytest.raises(UserError, match=r"take_frames: holds pictures of another video than take.mp4 is now; move it away"):
+            image_files([video], 2, taken=taken)
+    assert round(grey_of(files[0]), -1) == 40
+    (video.with_name("take_frames") / "video.json").unlink()  # as folders were before they knew whose they are
+    with pytest.raises(UserError, match="holds pictures of another video"):
+        image_files([video], 2)
+    film(video, [40] * 5)
+    assert image_files([video], 2) == files
+    assert (files[0].parent / "video.json").is_file()
+
+
+def test_a_damaged_frame_is_left_out_and_no_neighbour_taken_for_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    video = film(tmp_path / "run.mkv", [8 * k for k in range(31)], {"g": "1", "bf": "0"})
+    with av.open(str(video)) as container:
+        packets = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
+    data = bytearray(video.read_bytes())
+    position, size = packets[10]
+    data[position + 4 : position + size] = bytes(size - 4)
+    video.write_bytes(data)
+    assert [path.name for path in image_files([video], 4)] == ["run_000000.png", "run_000020.png", "run_000030.png"]
+    assert "run.mkv: 1 of 4 chosen frames are lost or damaged: left out" in capsys.readouterr().err
+
+
+def test_what_a_decoder_conceals_in_a_session_is_not_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    session = record(tmp_path, (tick_of(index, 100.0 + index / 30) for index in range(60)))
+    video = session / "video_0000.mkv"
+    with av.open(str(video)) as container:
+        packets = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
+    data = bytearray(video.read_bytes())
+    position, size = packets[20]
+    data[position + size // 2] ^= 0xFF
+    video.write_bytes(data)
+    files = image_files([session], 60)
+    assert 20 <= len(files) < 60
+    assert {path.stem for path in files} & {f"video_0000_{place:06d}" for place in range(20, 30)} == set()
+    assert "chosen frames are lost or damaged: left out" in capsys.readouterr().err
+    for path in files:
+        assert number_in(cv2.imread(str(path))[:, :, ::-1]) == int(path.stem[-6:])
+
+
+def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
+    video = film(tmp_path / "run.mkv", [8 * k for k in range(31)])
     files = image_files([video], 4)
     assert [path.name for path in files] == ["run_000000.png", "run_000010.png", "run_000020.png", "run_000030.png"]
     assert image_files([video], 4) == files, "written once"
-    import cv2
-
-    assert [round(float(cv2.imread(str(path)).mean()) / 8) for path in files] == [0, 10, 20, 30]
+    assert [round(grey_of(path) / 8) for path in files] == [0, 10, 20, 30]
     assert default_store([video]) == tmp_path / DEFAULT_NAME
     assert image_files([video], 48, taken=True) == files, "who evaluates finds what was annotated, however many those are"
     for path in files:

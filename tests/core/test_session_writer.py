@@ -266,7 +266,8 @@ def test_the_destination_that_was_chosen_before_is_told_at_the_start(tmp_path: P
             writer.put(tick)
         writer.stop()
         wait_for(lambda: writer.status().saved is not None)
-        assert targets_of(first := writer.status().saved) == [(1000.0, (30.0, 40.0))]
+        first = writer.status().saved
+        assert targets_of(first) == [(1000.0, (30.0, 40.0))]
         writer.save_last()
         wait_for(lambda: writer.status().saved != first)
         assert targets_of(writer.status().saved) == [(1000.0, (30.0, 40.0))]

@@ -1,0 +1,204 @@
+"""Pictures taken of a video, once: in a folder beside it that knows whose they are, so that annotations find them again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from glob import escape
+from pathlib import Path
+
+import av
+import av.error
+import numpy as np
+
+from app.learning_commands import progress_bar
+from app.sources import is_video
+from core.images import ImageError, read_image
+from core.learning.dataset import write_png
+from core.session.manifest import FRAMES, SessionError
+from core.session.pictures import packet_times, video_number
+from core.session.reader import SessionReader, check_is_session
+from core.session.video_in import open_video
+from core.study.annotations import AnnotationError
+from core.types import Image
+
+_WHOSE = "video.json"
+_END_BYTES = 1_000_000
+_SAME_LEVELS = 8.0
+"""By so many grey levels two decoders' pictures of one frame differ at most, on average."""
+
+_Take = Callable[[int], Image | None]
+"""The n-th picture of a video, RGB uint8 (H, W, 3); None: it is lost or damaged."""
+
+
+def taken_of(video: Path) -> list[Path]:
+    """The pictures that were taken of a video before. Raises AnnotationError where they are those of another one of its name."""
+    folder = _folder_of(video)
+    found = _pictures_in(folder, video)
+    if found:
+        _check_owner(folder, video)
+    return found
+
+
+def take_frames(video: Path, count: int, tell: Callable[[str], object]) -> list[Path]:
+    """Take `count` pictures of a video evenly over time; those that were taken before stay as they are.
+
+    A frame that is lost or damaged is left out, and `tell` hears how many: decoders conceal damage, and what they show must not be
+    measured.
+
+    Raises
+    ------
+    AnnotationError
+        The video cannot be read, the folder beside it cannot be written, or holds another video's pictures.
+    """
+    folder = _folder_of(video)
+    written: list[Path] = []
+    try:
+        with _opened(video) as (total, take), progress_bar() as bar:
+            chosen = sorted({round(place) for place in np.linspace(0, total - 1, min(count, total))})
+            folder.mkdir(exist_ok=True)
+            _own(folder, video, take)
+            for index in bar.track(chosen, description=f"frames of {video.stem}"):
+                path = folder / f"{video.stem}_{index:06d}.png"
+                if not path.is_file():
+                    image = take(index)
+                    if image is None:
+                        continue
+                    write_png(path, image)
+                written.append(path)
+    except av.error.FFmpegError as error:
+        raise AnnotationError(f"{video}: cannot be read as a video ({error.strerror or error})") from None
+    except OSError as error:
+        raise AnnotationError(
+            f"{error.filename or folder}: cannot be written ({error.strerror}); copy the video elsewhere"
+        ) from None
+    if len(written) < len(chosen):
+        tell(f"{video}: {len(chosen) - len(written)} of {len(chosen)} chosen frames are lost or damaged: left out")
+    return written
+
+
+def _folder_of(video: Path) -> Path:
+    """Beside the video and called as it is, with its ending where others are called so, too: run.mp4 and run.mkv."""
+    twins = [path for path in video.parent.glob(f"{escape(video.stem)}.*") if is_video(path) and path.name != video.name]
+    return video.with_name(f"{video.name if twins else video.stem}_frames")
+
+
+def _pictures_in(folder: Path, video: Path) -> list[Path]:
+    return sorted(folder.glob(f"{escape(video.stem)}_*.png"))
+
+
+def _own(folder: Path, video: Path, take: _Take) -> None:
+    """Write into the folder whose pictures it holds; those that lie in it without a word are compared with the video's."""
+    _check_owner(folder, video)
+    if (folder / _WHOSE).exists() or _is_of_session(video):
+        return
+    for path in _pictures_in(folder, video)[:1]:
+        number = path.stem.removeprefix(f"{video.stem}_")
+        if not _is_alike(path, take(int(number)) if number.isascii() and number.isdigit() else None):
+            raise _of_another(folder, video)
+    with suppress(OSError):  # where all pictures are there nothing need be written
+        (folder / _WHOSE).write_text(json.dumps(_fingerprint(video)) + "\n", encoding="utf-8")
+
+
+def _check_owner(folder: Path, video: Path) -> None:
+    """Raise AnnotationError where the folder says that its pictures are of another video."""
+    try:
+        told = json.loads((folder / _WHOSE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return
+    if told != _fingerprint(video):
+        raise _of_another(folder, video)
+
+
+def _of_another(folder: Path, video: Path) -> AnnotationError:
+    return AnnotationError(f"{folder}: holds pictures of another video than {video.name} is now; move it away, or rename the video")
+
+
+def _fingerprint(video: Path) -> dict[str, object]:
+    """What tells a video from another one of its name, without reading all of it."""
+    size = video.stat().st_size
+    with video.open("rb") as file:
+        digest = hashlib.sha256(file.read(_END_BYTES))
+        file.seek(max(0, size - _END_BYTES))
+        digest.update(file.read(_END_BYTES))
+    return {"bytes": size, "sha256_of_ends": digest.hexdigest()}
+
+
+def _is_alike(path: Path, image: Image | None) -> bool:
+    try:
+        written = read_image(path)
+    except ImageError:
+        return True  # it is told when it is to be shown
+    if image is None or written.shape != image.shape:
+        return image is None
+    return float(np.abs(written.astype(np.int16) - image).mean()) <= _SAME_LEVELS
+
+
+def _is_of_session(video: Path) -> bool:
+    """Whether it is the video of a recorded session: its rows know how each of its pictures was."""
+    if video_number(video) is None or not video.name.startswith("video_"):
+        return False
+    try:
+        check_is_session(video.absolute().parent)
+    except SessionError:
+        return False
+    return (video.absolute().parent / FRAMES).is_file()
+
+
+@contextmanager
+def _opened(video: Path) -> Iterator[tuple[int, _Take]]:
+    """How many pictures a video has, and how to take one. Raises AnnotationError, av.error.FFmpegError, OSError."""
+    with _session_opened(video) if _is_of_session(video) else _video_opened(video) as (total, take):
+        if not total:
+            raise AnnotationError(f"{video}: no frame in it can be read")
+        yield total, take
+
+
+@contextmanager
+def _session_opened(video: Path) -> Iterator[tuple[int, _Take]]:
+    number = video_number(video)
+    assert number is not None
+    with SessionReader(video.absolute().parent) as reader:
+        reader.wait()
+        times_ms = sorted({pts_ms for pts_ms, _ in packet_times(video)})
+
+        def take(index: int) -> Image | None:
+            frame = reader.decoded(number, times_ms[index]) if index < len(times_ms) else None
+            return _rgb(frame) if frame is not None else None
+
+        yield len(times_ms), take
+
+
+@contextmanager
+def _video_opened(video: Path) -> Iterator[tuple[int, _Take]]:
+    with open_video(video) as container:
+        if not container.streams.video:
+            raise AnnotationError(f"{video}: has no video in it")
+        stream = container.streams.video[0]
+        times = sorted({packet.pts for packet in container.demux(stream) if packet.pts is not None})
+        yield len(times), lambda index: _decoded(container, stream, times[index]) if index < len(times) else None
+
+
+def _decoded(container: av.container.InputContainer, stream: av.VideoStream, pts: int) -> Image | None:
+    """The picture of exactly this time, not a neighbour's instead."""
+    container.seek(pts, stream=stream, backward=True)
+    packets = container.demux(stream)
+    while True:
+        try:
+            frames = next(packets).decode()
+        except (StopIteration, EOFError):
+            return None
+        except av.error.FFmpegError:
+            continue
+        for frame in frames:
+            if frame.pts == pts and not frame.is_corrupt:
+                return _rgb(frame)
+            if frame.pts is not None and frame.pts > pts:
+                return None
+
+
+def _rgb(frame: av.VideoFrame) -> Image:
+    """As pictures of videos have always been taken here: another conversion would make other files of them."""
+    return np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
