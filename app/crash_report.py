@@ -77,7 +77,8 @@ class CrashWatch:
     ----------
     folder : where reports go.
     config : the configuration in force, as plain values, for the report; asked when there is something to report.
-    on_first : called once, at the first error, in the thread that met it, before the report is written: make the robot safe.
+    on_error : called at each error, in the thread that met it, before the report is written, with whether it is the first one of
+        this run: make the robot safe.
     on_report : called once, after the report was written, in the same thread.
     """
 
@@ -85,11 +86,11 @@ class CrashWatch:
         self,
         folder: Path,
         config: Callable[[], dict[str, Any]],
-        on_first: Callable[[], None] = lambda: None,
+        on_error: Callable[[bool], None] = lambda _is_first: None,
         on_report: Callable[[Crash], None] = lambda _: None,
     ) -> None:
         self._folder = folder
-        self._config, self.on_first, self.on_report = config, on_first, on_report
+        self._config, self.on_error, self.on_report = config, on_error, on_report
         self._lock = threading.Lock()
         self._count = 0
         self._report: Path | None = None
@@ -138,16 +139,15 @@ class CrashWatch:
             self.take((args.exc_type, args.exc_value, args.exc_traceback), name)
 
     def take(self, error: _Error, thread: str) -> None:
-        """An error that nobody foresaw; the first one of a run is told, later ones are added to its report."""
+        """An error that nobody foresaw. All make the robot safe; the first one is told, later ones are added to its report."""
         with self._lock:
             self._count += 1
             number = self._count
         text = "".join(traceback.format_exception(*error))
         if number <= _MOST_REPORTED:  # one that comes with every repaint must not fill the disk
             _log.error("unforeseen error in thread %s\n%s", thread, text)
-        if number == 1:
-            with _never_again():
-                self.on_first()
+        with _never_again():  # later ones, too: the operator may have gone on driving
+            self.on_error(number == 1)
         if number <= _MOST_REPORTED:
             self._write(number, thread, text)
         if number == 1:

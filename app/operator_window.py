@@ -70,6 +70,8 @@ class OperatorWindow(WindowFrame):
         """Asked before a step of the operator goes to the pilot; whoever says no tells why."""
         self.amend_config: Callable[[Config], Config] = lambda config: config
         """Asked before a rig is opened: settings that waited for it."""
+        self.stop_lent: Callable[[], bool] = lambda: False
+        """STOP for whoever the rig is lent to; False: nothing of it moves. From any thread."""
         self._last_tick: Tick | None = None
         self._tick: Tick | None = None
         self._is_stale = False

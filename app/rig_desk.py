@@ -89,6 +89,7 @@ class RigDesk(QObject):
         self._menu.aboutToShow.connect(self.renew)
         self._cameras.aboutToShow.connect(self._renew_cameras)
         window.phase_changed.connect(self._on_phase)
+        window.stop_lent = self.stop
         self.renew()
 
     @property
@@ -96,12 +97,10 @@ class RigDesk(QObject):
         """The rigs as they are listed."""
         return [action.text() for action in self._rigs]
 
-    @Slot()
-    def stop(self) -> None:
-        """STOP while the wizard has the servos; from any thread."""
+    def stop(self) -> bool:
+        """STOP while the wizard has the servos; False: it moves none. From any thread."""
         wizard = self.wizard or self._leaving
-        if wizard is not None:
-            wizard.desk.stop()
+        return wizard is not None and wizard.desk.stop()
 
     @Slot()
     def close(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from functools import partial
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from app.after_session import AfterSession, open_file
 from app.annotate_sources import default_store
 from app.crash_report import Crash, CrashWatch, crash_of_last_run
 from app.engine_thread import Phase
-from app.language import tr
+from app.language import mark, tr
 from app.menus import MenuEntry, add_menu
 from app.model_menu import ModelMenu
 from app.next_step import Step
@@ -23,13 +24,22 @@ from app.training_dialog import TrainingDialog
 from app.training_source import collect_from_file
 from app.widgets.offer_strip import Answer, Offer
 from app.widgets.preflight_list import PreflightList
-from core.control.modes import ARMED_MODES, Act
+from core.control.modes import ARMED_MODES, Act, Mode
 from core.record_config import sessions_folder
 from core.session.record_status import RecordStatus
 
 _LOOK_AFTER_MS = 1500
 """The window is open and its rig is being started; a search must not delay that."""
 _CRASH = "crash"
+
+
+class Stopped(Enum):
+    """What the STOP after an unforeseen error has reached, in the words of its box."""
+
+    SERVOS = mark("The servos were stopped")
+    OPENING = mark("The rig that is being opened starts stopped")
+    NOTHING = mark("No servos were in use, so there was nothing to stop")
+    UNKNOWN = mark("It is not certain that the servos were stopped: press Space")
 
 
 class SideWork(QObject):
@@ -43,6 +53,7 @@ class SideWork(QObject):
     """
 
     _crashed = Signal(object)
+    _stopped_again = Signal()
 
     def __init__(self, window: OperatorWindow, state: Path, watch: CrashWatch | None = None) -> None:
         super().__init__(window)
@@ -59,12 +70,14 @@ class SideWork(QObject):
         self.training: TrainingDialog | None = None
         self._saved: Path | None = None
         self._is_recording = False
+        self._stopped = Stopped.UNKNOWN
         self._wire()
         self._add_menus()
         if watch is not None:
-            watch.on_first, watch.on_report = self.make_safe, self._crashed.emit
+            watch.on_error, watch.on_report = self.make_safe, self._crashed.emit
             # also from the window's own thread not before the slot that failed has returned
             self._crashed.connect(self._show_crash, Qt.ConnectionType.QueuedConnection)
+            self._stopped_again.connect(self._tell_stopped_again, Qt.ConnectionType.QueuedConnection)
 
     def _wire(self) -> None:
         window = self._window
@@ -193,12 +206,38 @@ class SideWork(QObject):
 
     # ---- crashes
 
-    def make_safe(self) -> None:
-        """After an unforeseen error, from any thread: the servos stop, and the recording ends as a whole session."""
+    def make_safe(self, is_first: bool = True) -> None:
+        """After an unforeseen error, from any thread: the servos stop, and at the first one the recording ends as a whole session.
+
+        Later ones find an operator who was told and went on: they stop what he drives.
+        """
+        if is_first:
+            self._stopped = self._stop_whoever_moves()
+            self._window.recorder.stop("the program met an unforeseen error")
+        elif not self._is_at_rest() and self._stop_whoever_moves() is Stopped.SERVOS:
+            self._stopped_again.emit()
+
+    def _is_at_rest(self) -> bool:
+        """Whether the rig would not move anyway: an error may come with every repaint, and each STOP is told."""
         pilot = self._window.pilot
-        if pilot is not None:
+        return pilot is not None and (not pilot.can_move or pilot.view.mode is Mode.STOPPED)
+
+    def _stop_whoever_moves(self) -> Stopped:
+        """STOP to the rig's pilot, to a rig that is being opened, and to whoever the rig is lent to."""
+        window = self._window
+        before = window.pilot
+        if before is not None:
+            before.ask(Act.STOP)
+        is_opening, is_lent = window.stop_opening(), window.stop_lent()
+        pilot = window.pilot
+        if pilot is not None and pilot is not before:  # opened between the questions
             pilot.ask(Act.STOP)
-        self._window.recorder.stop("the program met an unforeseen error")
+        if before is not None or pilot is not None or is_lent:
+            return Stopped.SERVOS
+        return Stopped.OPENING if is_opening else Stopped.NOTHING
+
+    def _tell_stopped_again(self) -> None:
+        self._window.say(tr("Another unforeseen error: the servos were stopped again"), True)
 
     def _show_crash(self, crash: Crash) -> None:
         where = (
@@ -212,8 +251,9 @@ class SideWork(QObject):
         )
         box.setInformativeText(
             tr(
-                "The servos were stopped, and a recording that ran was ended and is whole.\n\n{where}.\n\nBest close the program "
+                "{stopped}. A recording that ran was ended and is whole.\n\n{where}.\n\nBest close the program "
                 "and start it again. Space is still STOP.",
+                stopped=tr(self._stopped.value),
                 where=where,
             )
         )

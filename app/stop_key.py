@@ -48,7 +48,7 @@ class StopKeys(QObject):
     stop : what STOP does.
     """
 
-    def __init__(self, owner: QWidget, can_move: Callable[[], bool], stop: Callable[[], None]) -> None:
+    def __init__(self, owner: QWidget, can_move: Callable[[], bool], stop: Callable[[], object]) -> None:
         super().__init__(owner)
         self._owner, self._can_move, self._stop = owner, can_move, stop
         application = QApplication.instance()

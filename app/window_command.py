@@ -113,7 +113,7 @@ def run_window(
 
     def stop() -> None:  # whoever has the servos, or is about to
         window.stop_opening()
-        rigs.stop()
+        window.stop_lent()
 
     devices = OperatorDevices(config, lambda: window.pilot, window, stop)
     devices.said.connect(window.say)

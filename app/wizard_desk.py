@@ -112,10 +112,13 @@ class WizardDesk(QObject):
         return self._known.model_copy(update=lost)
 
     @Slot()
-    def stop(self) -> None:
-        """STOP: reaches the servos at once, from whatever thread."""
-        if self._bench is not None:
-            self._bench.stop.press()
+    def stop(self) -> bool:
+        """STOP: reaches the servos at once, from whatever thread. False: no step is running that could move them."""
+        bench = self._bench  # asked once: the thread may be closing it
+        if bench is None:
+            return False
+        bench.stop.press()
+        return self.is_busy
 
     def save(self, rig: RigFile) -> str:
         """Save the rig; returns where. Raises RigFileError."""

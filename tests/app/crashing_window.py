@@ -45,11 +45,14 @@ def main() -> None:
     window.show()
     window.start()
 
+    asked: list[bool] = []
+
     def look() -> None:
         status, boxes = window.recorder.status, window.findChildren(QMessageBox)
         if status.frames < 5 and status.saved is None:
-            if not status.recording and window.shown_tick is not None:
-                window.recorder.toggle()
+            if not asked and window.shown_tick is not None:
+                asked.append(True)
+                window.recorder.toggle()  # once: until its first picture it does not record yet
         elif not boxes:
             if where == "fault":
                 sys.stdout.write("going\n")

@@ -90,7 +90,7 @@ def error(text: str = "broken") -> Any:
 
 def test_the_robot_is_made_safe_before_the_report_is_written(watch: CrashWatch, tmp_path: Path) -> None:
     seen: list[object] = []
-    watch.on_first = lambda: seen.append(list(tmp_path.glob("*.txt")))
+    watch.on_error = lambda _is_first: seen.append(list(tmp_path.glob("*.txt")))
     watch.on_report = seen.append
     watch.take(error(), "gui")
     assert seen[0] == []
@@ -102,12 +102,20 @@ def test_the_robot_is_made_safe_before_the_report_is_written(watch: CrashWatch, 
 def test_what_fails_while_it_is_made_safe_hinders_no_report(watch: CrashWatch) -> None:
     told: list[Crash] = []
 
-    def also_broken() -> None:
+    def also_broken(_is_first: bool) -> None:
         raise ValueError("no pilot")
 
-    watch.on_first, watch.on_report = also_broken, told.append
+    watch.on_error, watch.on_report = also_broken, told.append
     watch.take(error(), "gui")
     assert told[0].report is not None
+
+
+def test_later_errors_make_the_robot_safe_as_well(watch: CrashWatch) -> None:
+    asked: list[bool] = []
+    watch.on_error = asked.append
+    for _ in range(30):  # more than are reported
+        watch.take(error(), "gui")
+    assert asked == [True] + 29 * [False]
 
 
 def test_without_a_folder_it_is_still_told(tmp_path: Path) -> None:
