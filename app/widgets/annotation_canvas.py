@@ -300,7 +300,8 @@ class AnnotationCanvas(PictureCanvas):
             step *= 10.0 if modifiers & Qt.KeyboardModifier.ShiftModifier else 1.0
             self._go(_ARROWS[key][0] * step, _ARROWS[key][1] * step)
         elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            self.end_line()
+            if not event.isAutoRepeat():  # one that is held a little too long would take a state and go on, unseen
+                self.end_line()
         elif key in (Qt.Key.Key_Insert, Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
             if key == Qt.Key.Key_Delete and modifiers & Qt.KeyboardModifier.ShiftModifier:
                 self._tell(self._hand.clear())

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QEvent, QPoint, Qt
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -138,6 +139,21 @@ def test_an_image_in_at_most_twelve_events_with_the_angle_of_the_method(rater: R
     # clicks lie on whole screen pixels, up to 0.45 image pixels off: 40 px turn by about a degree then
     assert one.theta_deg == pytest.approx(asked.theta_deg, abs=math.degrees(2 * 0.45 / 40))
     assert one.content.state is asked.state
+
+
+def test_an_enter_that_is_held_ends_one_thing(rater: Rater) -> None:
+    rater.click(*ROBOT)
+    rater.press(Key.Key_Return)
+    rater.click(*VESSEL)
+    for is_repeat in (False, True, True, True):
+        for key in (Key.Key_Return, Key.Key_Enter) if is_repeat else (Key.Key_Return,):
+            press = QKeyEvent(QEvent.Type.KeyPress, key, Qt.KeyboardModifier.NoModifier, "\r", is_repeat)
+            QApplication.sendEvent(rater.canvas, press)
+    assert len(drawn(rater).vessel) == 2
+    assert drawn(rater).state is None, "the line is ended; nobody has chosen a state"
+    assert rater.desk.index == 0
+    rater.press(Key.Key_Return)
+    assert drawn(rater).state is not None
 
 
 def test_the_readout_is_live_and_says_what_is_missing(rater: Rater) -> None:
