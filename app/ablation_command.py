@@ -17,9 +17,9 @@ from app.ablation_streams import measure_streams
 from app.ablation_tables import difference_table, markdown, stream_table, value_table
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
-from app.outputs import name_as_text
 from core.config import PerceptionConfig, choose_model, load_config
 from core.errors import UserError
+from core.names import name_as_text
 from core.study.ablation import OURS, PAPER, STEPS, TRACKING, SameMasks, Variant, make_variants
 from core.study.ablation_figures import draws_groups, figures, frame_rows, refusals
 from core.study.accuracy import FrameScore, TrueMasks, score_frame

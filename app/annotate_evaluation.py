@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from app.learning_commands import progress_bar
-from app.outputs import name_as_text
 from core.config import Config
+from core.names import name_as_text
 from core.study.annotation_images import FoundImage
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotation_report import agreement_report, choose_study, manual_measurements

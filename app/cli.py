@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import faulthandler
+import io
 import os
 import sys
 from contextlib import suppress
@@ -51,6 +52,9 @@ def main() -> None:
         sys.stdout = open(os.devnull, "w")
     if sys.stderr is None:
         sys.stderr = open(os.devnull, "w")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")  # a file's name need not be text that this terminal has
     try:
         try:
             code = app(prog_name="main.py", standalone_mode=False)

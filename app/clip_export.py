@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, QThread, Signal
 from app.language import tr
 from app.overlay_picture import draw_overlay
 from core.errors import UserError
+from core.names import name_of
 from core.session.export import export_mp4
 from core.session.reader import SessionReader
 from core.types import Image, Tick
@@ -95,7 +96,7 @@ class ClipExporter(QThread):
 
 def clip_path(folder: Path, session: Path, first_s: float, last_s: float) -> Path:
     """A file name that tells what is in it and is not there yet."""
-    name = f"{session.name}_{round(first_s * 1000)}-{round(last_s * 1000)}ms"
+    name = f"{name_of(session)}_{round(first_s * 1000)}-{round(last_s * 1000)}ms"
     path, k = folder / f"{name}.mp4", 1
     while path.exists():
         k += 1

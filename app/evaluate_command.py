@@ -14,13 +14,15 @@ from app.annotate_tables import print_agreement
 from app.evaluation_report import print_tables, render_report
 from app.learning_commands import progress_bar
 from app.left_out import LeftOut
-from app.outputs import check_no_input, name_as_text
+from app.outputs import check_no_input
 from app.progress_lines import asked_teller
 from core.config import Config, choose_model, load_config
+from core.names import name_as_text, name_of
 from core.study.annotation_report import write_measures
 from core.study.evaluation import EvaluationError, Measurement, angle_pairs, evaluate, read_measurements, write_measurements
 from core.study.paper_study import PAPER, against_paper, choose_images, measure_twice, wanted_images
 from core.types import Frame
+from core.whole_file import write_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,17 +146,19 @@ def _written_names() -> list[str]:
 def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
     from app.evaluation_figures import ENDINGS, FIGURES, draw_figures, save_figure
 
-    (out / "metrics.json").write_text(json.dumps(metrics, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    told = json.dumps(metrics, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    write_whole(out / "metrics.json", told.encode())
     write_measurements(out / "measurements.csv", rows)
+    (out / "raters.csv").unlink(missing_ok=True)  # of an earlier evaluation, as figures below; it would belie this one
     figures = draw_figures(angle_pairs(rows), metrics)
     for name in FIGURES:
         for ending in ENDINGS:
             path = out / f"{name}{ending}"
             if name in figures:
                 save_figure(figures[name], path)
-            else:  # of an earlier evaluation; it would belie this one
+            else:
                 path.unlink(missing_ok=True)
-    (out / "report.html").write_text(render_report(metrics, figures), encoding="utf-8")
+    write_whole(out / "report.html", render_report(metrics, figures).encode())
 
 
 def _annotation_file(given: Path, study: str | None) -> Path | None:
@@ -183,7 +187,7 @@ def _perceive_annotated(
     rows, reasons, engine, missed = compared_rows(answers, images, config, study, str(annotations))
     source: dict[str, Any] = {
         "kind": "annotated by hand",
-        "name": name_as_text(annotations.parent.name),
+        "name": name_as_text(name_of(annotations.parent)),
         "model": config.perception.segmentation.model,
     }
     unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
@@ -248,7 +252,7 @@ def _perceive_set(
 ) -> _Study:
     """Perceive each image by itself; the truth (or two noisy measures of it) stands for the manual measure."""
     notes: list[str] = []
-    source: dict[str, Any] = {"kind": "labelled set", "name": name_as_text(folder.name)}
+    source: dict[str, Any] = {"kind": "labelled set", "name": name_as_text(name_of(folder))}
     measured: dict[str, tuple[float, float | None]] = {t.stem: (t.theta_deg, None) for t in truth if t.theta_deg is not None}
     if like_paper is not None:
         states = {t.stem: t.state for t in truth if t.state is not None}

@@ -18,11 +18,6 @@ def is_same(first: Path, second: Path) -> bool:
         return os.path.realpath(first) == os.path.realpath(second)  # Path.resolve raises on links in a loop
 
 
-def name_as_text(name: str | Path) -> str:
-    """A name as files, figures and terminals can hold it: what is no UTF-8 in it, as in old archives, is shown as bytes."""
-    return os.fsencode(name).decode("utf-8", "backslashreplace")
-
-
 def check_no_input(output: Path, inputs: Iterable[Path], option: str) -> None:
     """Raise UserError when `output`, given by `option`, is one of the `inputs`."""
     if any(is_same(output, path) for path in inputs):

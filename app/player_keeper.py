@@ -13,6 +13,7 @@ from app.language import tr
 from app.replayed import Replayed
 from app.snapshot import Origin, SnapshotWriter
 from app.work_thread import WorkThread
+from core.names import name_of
 from core.session.events import Event
 from core.session.files import add_event, is_being_written
 from core.session.manifest import SessionError
@@ -64,7 +65,7 @@ class PlayerKeeper(QObject):
 
     def read_replayed(self, path: Path) -> None:
         """Results of a replay of this session."""
-        self._work.submit("replayed", lambda: Replayed(path, self._reader.folder.name))
+        self._work.submit("replayed", lambda: Replayed(path, name_of(self._reader.folder)))
 
     def add_note(self, event: Event) -> None:
         """Into the session's own file."""

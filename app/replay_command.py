@@ -14,12 +14,13 @@ from pydantic import ValidationError
 
 from app.learning_commands import Interrupt, progress_bar
 from app.line_output import LineOutput
-from app.outputs import check_apart, check_no_input, check_no_session, name_as_text
+from app.outputs import check_apart, check_no_input, check_no_session
 from app.perceive_command import _make_folder
 from app.scene_json import scene_to_json, unread_to_json
 from core.config import Config, choose_model, load_config, merge
 from core.errors import UserError
 from core.learning.model_file import model_folder, read_model_info
+from core.names import name_as_text, name_of
 from core.session.manifest import Manifest, SessionError
 from core.session.reader import SessionReader
 from core.study.replay import Change, RecordedTargets, changed_most, seen, summarise
@@ -85,7 +86,7 @@ def run_replay(options: ReplayOptions) -> None:
     before = dict(reader.manifest.model) if reader.manifest is not None else {}
     result = _result(options, done, before, after, notes, problems)
     if options.out is not None:
-        _write(options.out, name_as_text(options.session.name), done.changes, result)
+        _write(options.out, name_as_text(name_of(options.session)), done.changes, result)
     _tell(options, result, done.changes)
     if done.interrupted:
         raise KeyboardInterrupt
@@ -154,7 +155,7 @@ def replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None =
             first_s = row.captured_s if first_s is None else first_s
             target = targets.of(row)
             frame = reader.frame(place)
-            name = f"{reader.folder.name}#{row.row}"
+            name = f"{name_of(reader.folder)}#{row.row}"
             if frame is None:
                 done.no_picture += 1
                 record = unread_to_json(name, "the picture is lost")

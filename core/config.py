@@ -307,6 +307,8 @@ def _allowed(error: dict[str, Any]) -> str:
 
 def _field_range(location: tuple[Any, ...]) -> str:
     """The allowed range of a setting as text, read from the model, so that one error line shows both ends."""
+    if not location:  # it is nothing of one setting: nested too deeply, perhaps
+        return ""
     model: Any = Config
     for part in location[:-1]:
         fields = getattr(model, "model_fields", {})
@@ -334,8 +336,9 @@ def _one_line(path: str, error: ValidationError) -> str:
     bounds = _field_range(first["loc"])
     what = f"must be {bounds}" if bounds and first["type"] != "extra_forbidden" else _allowed(first)
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    got = "" if first["type"] == "extra_forbidden" or isinstance(first["input"], dict | BaseModel) else f", got {first['input']!r}"
-    return f"{path}: {key}: {what}{got}{more}"
+    says_no_value = not key or first["type"] == "extra_forbidden" or isinstance(first["input"], dict | BaseModel)
+    got = "" if says_no_value else f", got {first['input']!r}"
+    return f"{path}: {key + ': ' if key else ''}{what}{got}{more}"
 
 
 def load_config(path: Path | None = None, preset: str | None = None, overrides: dict[str, Any] | None = None) -> Config:
@@ -372,6 +375,16 @@ def load_config(path: Path | None = None, preset: str | None = None, overrides: 
 def _validate(data: dict[str, Any], source: str) -> Config:
     try:
         # As JSON, strictly: true is no number there, nor is "6", and a list is a tuple all the same.
-        return Config.model_validate_json(json.dumps(data, default=str), strict=True)
+        return Config.model_validate_json(json.dumps(data, default=str, ensure_ascii=False).encode(), strict=True)
+    except UnicodeEncodeError as error:
+        raise ConfigError(f"{source}: {_around(error)!r} is no text in UTF-8; rename that file or folder") from None
+    except RecursionError:
+        raise ConfigError(f"{source}: nested too deeply") from None
     except ValidationError as error:
         raise ConfigError(_one_line(source, error)) from None
+
+
+def _around(error: UnicodeEncodeError) -> str:
+    """The quoted text that the error is in."""
+    text, at = str(error.object), error.start
+    return text[text.rfind('"', 0, at) + 1 :].partition('"')[0]

@@ -172,14 +172,14 @@ def check_model(name: str) -> None:
 def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
     """The torch network in evaluation mode with its weights; raises ModelError."""
     from safetensors import SafetensorError
-    from safetensors.torch import load_file
+    from safetensors.torch import load
 
     from core.perception.unet import DualUNet, UNetShape
 
     info = read_model_info(folder, verify=(WEIGHTS,))
     try:
         network = DualUNet(UNetShape.from_json(info.shape))
-        network.load_state_dict(load_file(folder / WEIGHTS))
+        network.load_state_dict(load((folder / WEIGHTS).read_bytes()))
     except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
         reason = str(error).splitlines()[0]
         raise ModelError(f"{folder / WEIGHTS}: does not fit the shape in {INFO} ({reason}); restore the model folder") from None
@@ -205,16 +205,11 @@ def save_model(
     ModelError
         The folder is something else than a model, or cannot be written.
     """
-    from safetensors import SafetensorError
-    from safetensors.torch import save_file
+    from safetensors.torch import save
 
     with _put_in_place(folder) as scratch:
         state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
-        try:
-            save_file(state, scratch / WEIGHTS)
-        except SafetensorError as error:  # it has its own for a full disk
-            raise _cannot_write(folder, str(error).strip().splitlines()[-1]) from None
-        (scratch / WEIGHTS).chmod(0o644)  # others at the same machine may use it, too; by itself it is the writer's alone
+        (scratch / WEIGHTS).write_bytes(save(state))
         export_onnx(network, network.shape.stride, scratch / ONNX)
         cuts = whole_strides(examples, network.shape.stride)
         if cuts:
@@ -253,13 +248,10 @@ def _put_in_place(folder: Path) -> Iterator[Path]:
         places = [Path(os.fsdecode(name)) for name in (error.filename, error.filename2) if name is not None]
         if places and not any(place in (scratch, folder) or scratch in place.parents for place in places):
             raise  # a file that is read is at fault
-        raise _cannot_write(folder, error.strerror or str(error)) from None
+        reason = error.strerror or str(error)
+        raise ModelError(f"{folder}: cannot be written ({reason}); make room, or choose another folder") from None
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
-
-
-def _cannot_write(folder: Path, reason: str) -> ModelError:
-    return ModelError(f"{folder}: cannot be written ({reason}); make room, or choose another folder")
 
 
 def _put(scratch: Path, folder: Path) -> None:

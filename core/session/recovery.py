@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from core.names import name_as_text
 from core.session.checked import Damaged
 from core.session.events import event_from_json, was_added_later
 from core.session.files import alone_in, is_being_written
@@ -280,7 +281,7 @@ def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:
     if len(found.problems) > _PROBLEMS_KEPT:
         problems.append(f"and {len(found.problems) - _PROBLEMS_KEPT} more")
     return Loss(
-        origin=str(session),
+        origin=name_as_text(session),
         recovered_utc=datetime.now(UTC).isoformat(timespec="seconds"),
         seconds=round(seconds, 3),
         rows=rows,

@@ -21,16 +21,18 @@ from core.study.annotations import AnnotationError, MaskPolygon, MaskTarget, mea
 from core.study.mask_areas import area_polygon
 from core.study.mask_polygons import fill
 from core.types import Mask, Vector
+from core.whole_file import write_whole
 
 
 def mask_source(annotations: Iterable[StoredAnnotation]) -> dict[str, StoredAnnotation]:
-    """By image, the annotation whose masks count: of those with any, the one changed last."""
-    newest: dict[str, StoredAnnotation] = {}
+    """By image, the annotation whose masks count: of those with both of them, or else with any, the one changed last."""
+    best: dict[str, tuple[int, str]] = {}
+    chosen: dict[str, StoredAnnotation] = {}
     for one in annotations:
-        before = newest.get(one.key.sha256)
-        if one.content.masks and (before is None or one.changed_utc >= before.changed_utc):
-            newest[one.key.sha256] = one
-    return newest
+        worth = len({mask.target for mask in one.content.masks}), one.changed_utc
+        if one.content.masks and worth >= best.get(one.key.sha256, worth):
+            best[one.key.sha256], chosen[one.key.sha256] = worth, one
+    return chosen
 
 
 def export_training_set(
@@ -164,11 +166,10 @@ def export_coco(annotations: Iterable[StoredAnnotation], images: Sequence[FoundI
             content["annotations"].append(ids | row)
     if not content["images"]:
         raise AnnotationError("no image has a mask; draw them, or take the model's over, in annotate")
+    if out.exists():
+        raise AnnotationError(f"{out}: is there already; choose another --out")
     try:
-        with out.open("x", encoding="utf-8") as file:
-            json.dump(content, file, allow_nan=False)
-    except FileExistsError:
-        raise AnnotationError(f"{out}: is there already; choose another --out") from None
+        write_whole(out, json.dumps(content, allow_nan=False).encode())
     except OSError as error:
         raise AnnotationError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
     return len(content["images"])

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
+import tempfile
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,25 +37,66 @@ def salvage(damaged: Path, target: Path) -> tuple[int, list[str]]:
         raise AnnotationError(f"{damaged}: no such annotation file")
     if target.exists():
         raise AnnotationError(f"{target}: is there already; choose another --out")
-    problems: list[str] = []
-    tables: dict[str, list[tuple[Any, ...]]] = {}
-    columns: dict[str, list[str]] = {}
-    try:
-        with closing(sqlite3.connect(f"{damaged.resolve().as_uri()}?mode=ro", uri=True, isolation_level=None)) as source:
-            source.execute("PRAGMA writable_schema = ON")  # without it a file that was cut short is not looked into at all
-            source.text_factory = lambda data: data.decode("utf-8", errors="replace")
-            for table in _TABLES:
-                columns[table], tables[table] = _readable(source, table, problems)
-    except (sqlite3.Error, UnicodeDecodeError) as error:
-        raise AnnotationError(f"{damaged}: nothing in it can be read ({error})") from None
-    if not tables["images"] and not tables["annotations"]:
-        raise AnnotationError(f"{damaged}: nothing in it can be read")
+    found = _read(damaged)
+    if not found.rows:
+        raise AnnotationError(f"{damaged}: nothing in it can be read{f' ({found.why})' if found.why else ''}")
+    columns, tables, problems = found.columns, found.tables, found.problems
     with AnnotationStore(target) as store:
         store.take_rows(columns, tables, problems)
     with AnnotationStore(target, read_only=True) as store:
         kept = len(store.annotations())
         problems += store.problems
     return kept, problems
+
+
+@dataclass(slots=True)
+class _Found:
+    """What of a file can be read; ``why`` not more of it can."""
+
+    columns: dict[str, list[str]] = field(default_factory=dict)
+    tables: dict[str, list[tuple[Any, ...]]] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+    why: str = ""
+
+    @property
+    def rows(self) -> int:
+        """Of images and annotations."""
+        return len(self.tables.get("images", [])) + len(self.tables.get("annotations", []))
+
+
+def _read(damaged: Path) -> _Found:
+    """Read copies of a file: the database itself takes back in them what a crash has left half done, as its journal says.
+
+    That may be damaged, too: then the file is read without.
+    """
+    found = _Found()
+    for endings in (("", "-journal", "-wal"), ("",)):
+        with tempfile.TemporaryDirectory() as scratch:
+            copy = Path(scratch) / "damaged.sqlite"
+            try:
+                for ending in endings:
+                    if (beside := damaged.with_name(damaged.name + ending)).is_file():
+                        shutil.copyfile(beside, copy.with_name(copy.name + ending))
+            except OSError as error:
+                raise AnnotationError(f"{error.filename or damaged}: cannot be read ({error.strerror})") from None
+            again = _read_copy(copy)
+        found = again if again.rows > found.rows or not found.tables else found
+        if not any(damaged.with_name(damaged.name + ending).is_file() for ending in endings[1:]) or not found.problems:
+            break
+    return found
+
+
+def _read_copy(path: Path) -> _Found:
+    found = _Found()
+    try:
+        with closing(sqlite3.connect(path, isolation_level=None)) as source:
+            source.execute("PRAGMA writable_schema = ON")  # without it a file that was cut short is not looked into at all
+            source.text_factory = lambda data: data.decode("utf-8", errors="replace")
+            for table in _TABLES:
+                found.columns[table], found.tables[table] = _readable(source, table, found.problems)
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        found.why = str(error)
+    return found
 
 
 def _readable(source: sqlite3.Connection, table: str, problems: list[str]) -> tuple[list[str], list[tuple[Any, ...]]]:

@@ -19,8 +19,10 @@ import pytest
 
 from app.replay_command import ReplayOptions, change_to_json, model_note, replay_config, run_replay
 from app.replay_figure import draw_replay
+from app.replayed import Replayed
 from core.config import Config
 from core.errors import UserError
+from core.names import name_of
 from core.session.manifest import read_manifest
 from core.study.replay import Change, Seen, summarise
 from core.types import PoseState, Reason
@@ -202,3 +204,14 @@ def test_another_second_look_is_another_model() -> None:
     assert "weights differ" in model_note(manifest, Config(), now | {"second_look_sha256": "c" * 64})[0]
     older = manifest.model_copy(update={"model": {"name": "default", "sha256": "a" * 64}})
     assert "weights differ" not in " ".join(model_note(older, Config(), now)), "it is not known"
+
+
+def test_a_session_that_is_given_as_here_keeps_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = record(tmp_path, (tick_of(index, 1000.0 + index / 30) for index in range(3)))
+    monkeypatch.chdir(session)
+    run_replay(options(Path("."), jsonl=tmp_path / "r.jsonl"))
+    assert [json.loads(line)["image"] for line in (tmp_path / "r.jsonl").read_text().splitlines()] == [
+        f"{session.name}#{row}" for row in range(3)
+    ]
+    for given in (Path("."), session):
+        assert Replayed(tmp_path / "r.jsonl", name_of(given)).skipped == 0

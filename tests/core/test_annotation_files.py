@@ -243,3 +243,20 @@ def test_what_a_place_touches() -> None:
     assert touched(drawn, [VESSEL], (30.0, 21.0), 3.0, 2.0) is None
     assert touched(drawn, [0], (10.0, 20.0), 3.0, 2.0) == Touch(0, 4, is_edge=True), "an outline is closed"
     assert touched(drawn, [], (10.0, 10.0), 3.0, 2.0) is None
+
+
+def test_the_whole_masks_of_one_rater_count_more_than_newer_half_of_anothers(image: FoundImage, tmp_path: Path) -> None:
+    whole = stored(with_masks(VESSEL_BOX, ROBOT_BOX), changed="2026-01-01")
+    half = stored(with_masks(VESSEL_BOX), "bob", "2026-01-02")
+    assert export_training_set([whole, half], [image], tmp_path / "set") == (1, [])
+
+
+def test_a_coco_file_is_whole_or_not_there(image: FoundImage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path, _data: bytes) -> None:
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr("core.study.annotation_export.write_whole", full)
+    with pytest.raises(AnnotationError, match="No space left on device"):
+        export_coco([stored(with_masks(VESSEL_BOX, ROBOT_BOX))], [image], tmp_path / "coco.json")
+    monkeypatch.undo()
+    assert export_coco([stored(with_masks(VESSEL_BOX, ROBOT_BOX))], [image], tmp_path / "coco.json") == 1

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import signal
 import sqlite3
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -370,3 +372,20 @@ def test_rows_within_a_table_that_cannot_be_read_are_named(sixty: bytes, tmp_pat
     (span,) = [problem for problem in problems if problem.endswith("of annotations cannot be read")]
     first, last = (int(word) for word in span.split() if word.isdigit())
     assert last - first + 1 == 60 - kept
+
+
+def test_what_a_crash_has_left_half_done_is_taken_back_before_salvage(sixty: bytes, tmp_path: Path) -> None:
+    """A journal lies beside the file then, and without it the file cannot be read at all."""
+    path, damaged = tmp_path / "a.sqlite", tmp_path / "damaged.sqlite"
+    path.write_bytes(sixty)
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        database.execute("PRAGMA cache_size = 1")
+        database.execute("BEGIN")
+        database.execute("UPDATE images SET name = name || hex(zeroblob(3000))")
+        for ending in ("", "-journal"):
+            shutil.copyfile(f"{path}{ending}", f"{damaged}{ending}")
+        database.execute("ROLLBACK")
+    before = {file.name: file.read_bytes() for file in tmp_path.glob("damaged.sqlite*")}
+    assert len(before) == 2
+    assert salvage(damaged, tmp_path / "b.sqlite") == (60, [])
+    assert {file.name: file.read_bytes() for file in tmp_path.glob("damaged.sqlite*")} == before
