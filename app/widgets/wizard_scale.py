@@ -35,6 +35,7 @@ class ScalePage(WizardPage):
         super().__init__(desk, picture)
         self.square = _length(18.0, 2.0, 100.0, tr("Side of a square"))
         self.length = _length(100.0, 1.0, 2000.0, tr("Length between the two clicks"))
+        self.length.valueChanged.connect(self._on_length)
         self.take_button = button(tr("&Take a picture"), self._take)
         self.solve_button = button(tr("&Calculate"), self._solve)
         self.forget_button = button(tr("Begin &anew"), self._forget)
@@ -171,6 +172,12 @@ class ScalePage(WizardPage):
         if self.clicks_button.isChecked():
             self.desk.said.emit(tr("click on both ends of the known length"))
         self.desk.changed.emit()
+
+    def _on_length(self, _length_mm: float) -> None:
+        """The length is corrected after the clicks: what stands in the field is what they are apart."""
+        if len(self._clicks) == 2 and self.desk.draft is not None and not self.desk.is_busy:
+            self._solve_clicks()
+            self.desk.changed.emit()
 
     def _solve_clicks(self) -> None:
         draft = self.desk.draft

@@ -173,6 +173,26 @@ def test_two_clicks_give_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
     assert page.shapes() == []
 
 
+def test_a_length_that_is_corrected_after_the_two_clicks_counts(opened: RigWizard, qtbot: QtBot) -> None:
+    page, draft = opened.scale_page, opened.desk.draft
+    assert draft is not None
+    _to(opened, page)
+    page.length.setValue(50.0)
+    qtbot.mouseClick(page.clicks_button, Qt.MouseButton.LeftButton)
+    page.click(100.0, 100.0)
+    page.length.setValue(60.0)
+    assert draft.scale is None, "one click is no length yet"
+    page.click(500.0, 100.0)
+    page.length.selectAll()
+    qtbot.keyClicks(page.length, "80")
+    assert draft.scale is not None
+    assert draft.scale.mm_per_px == pytest.approx(0.2)
+    assert page.result.text().startswith("Scale: 0.2000 mm per pixel")
+    page.leave()  # the next page, and back: the picture may have moved since
+    page.length.setValue(100.0)
+    assert draft.scale.mm_per_px == pytest.approx(0.2)
+
+
 def _point(x: float, y: float) -> object:
     from PySide6.QtCore import QPoint
 
