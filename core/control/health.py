@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from core.control.bus_watch import BusReport, BusWatch, bus_faults, checked, excused, see_bus
+from core.control.deadman import Deadman, DeadmanReport, is_held, see_deadman
 from core.control.faults import AREA, Area, Cause, Fault
 from core.control.frame_watch import (
     FrameArrived,
@@ -34,17 +36,6 @@ class Beat:
     """A sign of life."""
 
     part: Part
-
-
-@dataclass(frozen=True, slots=True)
-class DeadmanReport:
-    """The deadman key or pedal as it is; repeated many times a second, for silence counts as released.
-
-    ``said_s`` is when it was said, which may be a turn of the pilot earlier (None: now).
-    """
-
-    pressed: bool
-    said_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,21 +103,12 @@ _BROKEN = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
-class Deadman:
-    """``pressed`` is None before the first report and after a long silence; ``counts``: the press began while armed."""
-
-    pressed: bool | None = None
-    reported_s: float = 0.0
-    counts: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class Health:
-    """What the reports so far say. ``servo_problems`` is None while the servos are not checked."""
+    """What the reports so far say, of the ``deadmen`` by source. ``servo_problems`` is None while the servos are not checked."""
 
     frames: FrameWatch = field(default_factory=FrameWatch)
     bus: BusWatch = field(default_factory=BusWatch)
-    deadman: Deadman = field(default_factory=Deadman)
+    deadmen: Mapping[Hashable, Deadman] = field(default_factory=dict)
     window_s: float | None = None
     worker_s: float | None = None
     model: ModelReport = field(default_factory=lambda: ModelReport(False, "not checked yet"))
@@ -155,9 +137,9 @@ def take(health: Health, report: Report, *, armed: bool, now_s: float, servos: S
             return replace(health, window_s=now_s)
         case Beat():
             return replace(health, worker_s=now_s)
-        case DeadmanReport(pressed, said_s):
-            at_s = now_s if said_s is None else min(said_s, now_s)
-            return replace(health, deadman=_see_deadman(health.deadman, pressed, armed, at_s, safety))
+        case DeadmanReport(pressed, _, source):
+            seen = see_deadman(health.deadmen.get(source, Deadman()), pressed, report.at_s(now_s), armed=armed)
+            return replace(health, deadmen={**health.deadmen, source: seen})
         case ModelReport():
             return replace(health, model=report)
         case ServosChecked(problems):
@@ -183,13 +165,6 @@ def _see_bus(health: Health, safety: SafetyConfig) -> Health:
     return replace(health, servo_problems=None, reported=(*health.reported, ended))
 
 
-def _see_deadman(deadman: Deadman, pressed: bool, armed: bool, said_s: float, safety: SafetyConfig) -> Deadman:
-    # after a long silence nobody knows whether the key was let go meanwhile: it is as at the start
-    before = None if said_s - deadman.reported_s > safety.hold_clear_s else deadman.pressed
-    counts = pressed and ((before is True and deadman.counts) or (before is False and armed))
-    return Deadman(pressed, said_s, counts)
-
-
 def _see_gate(health: Health, rejection: RejectReason | None) -> Health:
     if rejection in _NOT_THE_PROGRAMS_FAULT:
         return replace(health, rejection=None)
@@ -198,14 +173,20 @@ def _see_gate(health: Health, rejection: RejectReason | None) -> Health:
 
 
 def disarmed(health: Health) -> Health:
-    """A press of the deadman from before, and rejected commands, do not count for the next time."""
-    return replace(health, deadman=replace(health.deadman, counts=False), rejection=None, rejected_run=0)
+    """A press of a deadman from before, and rejected commands, do not count for the next time."""
+    deadmen = {source: replace(deadman, counts=False) for source, deadman in health.deadmen.items()}
+    return replace(health, deadmen=deadmen, rejection=None, rejected_run=0)
 
 
 def deadman_held(health: Health, now_s: float, safety: SafetyConfig) -> bool:
-    """Is the deadman held, by a press that began while armed?"""
-    deadman = health.deadman
-    return deadman.pressed is True and deadman.counts and now_s - deadman.reported_s <= safety.deadman_timeout_s
+    """Is a deadman held, by a press that began while armed?"""
+    return is_held(health.deadmen.values(), now_s, safety.deadman_timeout_s)
+
+
+def deadman_down(health: Health, now_s: float, safety: SafetyConfig) -> bool | None:
+    """Is a deadman down, whenever that began? None: none has ever reported."""
+    deadmen = health.deadmen.values()
+    return any(deadman.is_down(now_s, safety.deadman_timeout_s) for deadman in deadmen) if deadmen else None
 
 
 def driving_faults(health: Health, now_s: float, safety: SafetyConfig) -> list[Fault]:

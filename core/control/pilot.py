@@ -16,6 +16,7 @@ from dataclasses import replace
 from core.config import Config
 from core.control.alerts import ALERTS, Alert, AlertKey, AlertQueue, Note, raise_alerts
 from core.control.command_latency import CommandLatency
+from core.control.deadman import DeadmanReport
 from core.control.drive import Drive
 from core.control.drive_view import DriveNews, DriveView, LeftOver
 from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
@@ -25,7 +26,7 @@ from core.control.frame_watch import FrameArrived, RouteState
 from core.control.gate_checks import RejectReason, Source
 from core.control.guarded_robot import GuardedRobot, SentMotion
 from core.control.hand import AT_REST, Hand, Jog
-from core.control.health import Beat, DeadmanReport, FrameLate, GateReport, ModelReport, Part, ServosBusy
+from core.control.health import Beat, FrameLate, GateReport, ModelReport, Part, ServosBusy, deadman_down
 from core.control.inbox import Inbox, Inputs, Seen
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Hindrance, Latched, Mode, SupervisorState
 from core.control.policies import Policy
@@ -164,9 +165,9 @@ class Pilot:
         """The share of full speed, 0..1, at which all controls together move the robot."""
         self._hand_speed = max(0.0, min(1.0, share))
 
-    def deadman(self, source: Hashable, pressed: bool) -> None:
-        """A deadman as it is now; to be repeated many times a second."""
-        self._inbox.deadman(source, pressed, self._clock())
+    def deadman(self, source: Hashable, pressed: bool | None) -> None:
+        """A deadman as it is now (None: it cannot tell); to be repeated many times a second. One that is held is enough."""
+        self._inbox.post(DeadmanReport(pressed, self._clock(), source))
 
     def window_alive(self) -> None:
         """A sign of life of the window's thread."""
@@ -290,8 +291,6 @@ class Pilot:
         if self._requests.busy:
             self._busy_s = now_s
             events.append(ServosBusy())
-        if inputs.deadman_news is not None:
-            events.append(DeadmanReport(inputs.deadman_news, inputs.deadman_said_s))
         if not inputs.jog.is_rest:
             events.append(Act.INPUT)
             self._asked_s = now_s
@@ -395,7 +394,7 @@ class Pilot:
             active=decision.active,
             against_arming=arming,
             against_hand_over=hand_over,
-            deadman=inputs.deadman,
+            deadman=deadman_down(self._state.health, now_s, safety),
             servos_on=self._state.health.servos_ready,
             busy=self._requests.busy,
             asked=self._asked,

@@ -21,10 +21,11 @@ import math
 from collections.abc import Collection, Sequence, Set
 from dataclasses import replace
 
+from core.control.deadman import DeadmanReport
 from core.control.faults import AREA, CAUSES, REACTION, RECHECK, Area, Cause, Fault, Reaction, worst
 from core.control.frame_watch import RouteState
 from core.control.gate_checks import Source
-from core.control.health import DeadmanReport, Health, Report, deadman_held, disarmed, driving_faults, faults_now, take
+from core.control.health import Health, Report, deadman_down, deadman_held, disarmed, driving_faults, faults_now, take
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Latched, Mode, Refused, SupervisorState
 from core.safety_config import SafetyConfig
 from core.servo_config import ServosConfig
@@ -100,7 +101,9 @@ def _listen(
         health = take(health, report, armed=state.mode in ARMED_MODES, now_s=now_s, servos=servos, safety=safety)
         before, active = active, faults(health)
         brought |= {cause: fault for cause, fault in active.items() if cause not in before}
-        if driving and isinstance(report, DeadmanReport) and not report.pressed:
+        # another one may be held: as of when this was said, for in a late tick that one's next word is still to come
+        is_let_go = isinstance(report, DeadmanReport) and not (report.pressed or deadman_held(health, report.at_s(now_s), safety))
+        if driving and is_let_go:
             brought[Cause.DEADMAN] = Fault(Cause.DEADMAN)
     return health, tuple((brought | active).values())
 
@@ -217,7 +220,7 @@ def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfi
     if state.health.frames.route is RouteState.BEHIND:
         reasons.append(Hindrance.DESTINATION_BEHIND)
     if not deadman_held(state.health, now_s, safety):
-        down = state.health.deadman.pressed is True and not state.health.deadman.counts
+        down = deadman_down(state.health, now_s, safety)
         reasons.append(Hindrance.DEADMAN_HELD_BEFORE if down else Hindrance.DEADMAN_NOT_HELD)
     if state.input_s is not None and now_s - state.input_s < safety.operator_quiet_s:
         reasons.append(Hindrance.OPERATOR_DRIVING)

@@ -16,7 +16,7 @@ __all__ = ["Pedal", "PedalError", "PedalReport"]
 _START_UP_S = 3.0
 """Opening the port resets many boards; they talk again when their boot loader has waited in vain."""
 _PATIENCE_S = 0.5
-"""Silence of a pedal that has talked before, until people are told. The deadman is released long before that."""
+"""Silence of a pedal that has talked before, until people are told. Nobody holds its deadman long before that."""
 _PAUSE_S = PERIOD_S / 10
 """Who had to wait so long for bytes has read all that waited."""
 
@@ -28,9 +28,9 @@ class Pedal:
     ----------
     config : section `pedal`; its port must be set.
     on_report : gets every report, in order, from the pedal's thread, some 50 a second while the pedal talks and one every
-        ``silence_s`` while it is silent; one with the deadman released comes first after every opening, and last before the port is
-        given up. It should return within some milliseconds, and must not call ``close``. Without a pedal nothing is reported:
-        silence, too, is a released deadman.
+        ``silence_s`` while it is silent; one with a deadman of which nobody knows comes first after every opening, and last before
+        the port is given up. It should return within some milliseconds, and must not call ``close``. Without a pedal nothing is
+        reported: nobody holds a silent deadman either.
     on_problem : gets the newest ``problem`` when it changes, from the same thread.
 
     Notes
@@ -65,7 +65,7 @@ class Pedal:
         self._thread.start()
 
     def close(self) -> None:
-        """Report the deadman released, give the port back; may be called twice."""
+        """Report that nobody knows of the deadman any more, give the port back; may be called twice."""
         self._thread.close()
 
     def _serve(self) -> None:
@@ -81,7 +81,7 @@ class Pedal:
             try:
                 self._listen(port)
             finally:
-                self._on_report(PedalReport(False, False, time.monotonic()))
+                self._on_report(PedalReport(None, False, time.monotonic()))
 
     def _listen(self, port: PedalPort) -> None:
         """From opening to the loss of the port, or to ``close``."""

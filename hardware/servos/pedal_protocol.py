@@ -42,10 +42,11 @@ class PedalLine:
 class PedalReport:
     """What the pedal means now, at ``time_s`` on the monotonic clock.
 
-    ``deadman`` is True only while unbroken reports say so. ``stop`` is what a whole report said; it is never guessed.
+    ``deadman`` is True only while unbroken reports say so, False only when a whole one in its turn says that the foot is up, and
+    None otherwise: the foot may be up or down. ``stop`` is what a whole report said; it is never guessed.
     """
 
-    deadman: bool
+    deadman: bool | None
     stop: bool
     time_s: float
 
@@ -107,9 +108,12 @@ class PedalWatch:
     next number in time: damage, silence, a number again or left out. After that it takes two reports in a row again, and after an
     interruption longer than ``resume_s``, or a new connection, a lifted foot first: who has looked away may have stepped down.
 
+    What ends a press without a lifted foot is no release: nobody knows, and that holds the robot as well. Told as a release, it
+    would make a new press of a pedal that has been down all the time, since before arming for instance.
+
     A STOP counts at once, from any whole line, even one that comes late or with a wrong number: a false STOP costs a restart, a
-    missed one more. But damage and silence are none. They say that nobody knows, for which a released deadman is the answer: it
-    holds the robot. A STOP is latched and may switch the torque off, so an unplugged cable must not cause it.
+    missed one more. But damage and silence are none. They say that nobody knows, and a deadman that nobody holds is the answer to
+    that: it holds the robot. A STOP is latched and may switch the torque off, so an unplugged cable must not cause it.
     """
 
     def __init__(self, config: PedalConfig) -> None:
@@ -133,15 +137,16 @@ class PedalWatch:
         self._number, self._heard_s = line.number, now_s
         if not in_order:
             self._run = 0
-            return PedalReport(False, line.stop, now_s)
+            return PedalReport(None, line.stop, now_s)
         if now_s - self._sound_s > self._config.resume_s:
             self._lifted = False
         self._sound_s = now_s
         self._lifted = self._lifted or not line.down
         self._run = self._run + 1 if line.down and self._lifted else 0
-        return PedalReport(self._run >= self._config.press_reports, line.stop, now_s)
+        is_press = self._run >= self._config.press_reports
+        return PedalReport((is_press or None) if line.down else False, line.stop, now_s)
 
     def silence(self, now_s: float) -> PedalReport:
         """Nothing whole has come for too long."""
         self._run = 0
-        return PedalReport(False, False, now_s)
+        return PedalReport(None, False, now_s)

@@ -213,7 +213,7 @@ class FakePilot:
     def __init__(self) -> None:
         self.jogs: list[Jog] = []
         self.acts: list[Act] = []
-        self.deadman_said: list[bool] = []
+        self.deadman_said: list[bool | None] = []
         self.beats = 0
         self.speed = 0.0
         self.asked: list[str] = []
@@ -250,7 +250,7 @@ class FakePilot:
     def ask(self, act: Act) -> None:
         self.acts.append(act)
 
-    def deadman(self, source: object, pressed: bool) -> None:
+    def deadman(self, source: object, pressed: bool | None) -> None:
         self.deadman_said.append(pressed)
 
     def window_alive(self) -> None:

@@ -69,7 +69,7 @@ def test_a_pedal_on_its_line_is_deadman_and_stop(qtbot: QtBot, pedal: SoftPedal)
         until(qtbot, lambda: Act.STOP in pilot.acts)
         pedal.vanish()
         until(qtbot, lambda: any(bad for _, bad in said))
-        assert pilot.deadman_said[-1] is False
+        assert pilot.deadman_said[-1] is None
     finally:
         devices.close()
 

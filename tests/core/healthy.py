@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from core.control.bus_watch import BusReport
+from core.control.deadman import DeadmanReport
 from core.control.frame_watch import FrameReport, RouteState
-from core.control.health import Beat, DeadmanReport, ModelReport, Part, ServosChecked
+from core.control.health import Beat, ModelReport, Part, ServosChecked
 from core.control.supervisor import Act, Decision, Event, Mode, SupervisorState, supervise
 from core.safety_config import SafetyConfig
 from core.servo_config import ServosConfig

@@ -15,7 +15,6 @@ from core.control.frame_watch import FrameReport, FrameWatch, RouteState, frame_
 from core.control.gate import RejectReason
 from core.control.health import (
     Beat,
-    DeadmanReport,
     GateReport,
     Health,
     Part,
@@ -398,14 +397,6 @@ def test_a_row_of_broken_commands_begins_with_none(ends: Callable[[Health], Heal
     again = _take(ends(_take(Health(), *broken)), *broken)
     assert Cause.COMMANDS_REJECTED not in _host_faults(again, 0.0)
     assert Cause.COMMANDS_REJECTED in _host_faults(_take(again, broken[0]), 0.0)
-
-
-@pytest.mark.parametrize(("silence_s", "counts"), [(SAFETY.hold_clear_s, True), (SAFETY.hold_clear_s + 0.0078125, False)])
-def test_the_longest_silence_after_which_a_held_deadman_still_counts(silence_s: float, counts: bool) -> None:
-    health = Health()
-    for pressed, now_s in ((False, 1.0), (True, 1.0), (True, 1.0 + silence_s)):
-        health = take(health, DeadmanReport(pressed), armed=True, now_s=now_s, servos=SERVOS, safety=SAFETY)
-    assert health.deadman.counts is counts
 
 
 def test_only_servos_that_are_as_configured_are_no_longer_restarted() -> None:

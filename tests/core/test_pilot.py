@@ -491,6 +491,72 @@ def test_a_deadman_held_since_before_arming_does_not_count_after_a_hiccup_either
     assert Hindrance.DEADMAN_HELD_BEFORE in bench.alerts()
 
 
+@pytest.mark.parametrize("what", ["damaged", "damaged for long", "late", "beside a tap of the key", "late beside a tap of the key"])
+def test_a_pedal_that_is_stuck_since_before_arming_never_counts(bench: Bench, what: str) -> None:
+    def turn(pedal: bool | None, count: int = 1) -> None:
+        for _ in range(count):
+            bench.pilot.deadman("pedal", pedal)
+            bench.turn()
+
+    turn(False)
+    bench.on()
+    turn(True, 3)
+    bench.pilot.ask(Act.ARM)
+    turn(True)
+    if "key" in what:
+        bench.held = True
+        turn(True, 3)
+        bench.held = False
+    if "late" in what:
+        bench.turn()
+    if "damaged" in what:
+        turn(None, 40 if "long" in what else 1)
+    turn(True, 3)
+    bench.pilot.ask(Act.HAND_OVER)
+    turn(True, 3)
+    assert bench.mode is Mode.ARMED
+    assert Hindrance.DEADMAN_HELD_BEFORE in bench.alerts()
+    assert bench.pilot.view.deadman is True  # what it says, which is another question
+    turn(False)
+    turn(True, 2)
+    bench.pilot.ask(Act.HAND_OVER)
+    turn(True)
+    assert bench.mode is Mode.AUTONOMOUS
+
+
+def test_a_tap_of_the_key_beside_a_held_pedal_holds_nothing(bench: Bench) -> None:
+    bench.armed().pilot.deadman("pedal", False)
+    for turn in range(40):
+        if turn % 3 != 2:  # its reports and the pilot's turns keep no common time
+            bench.pilot.deadman("pedal", True)
+        if turn == 3:
+            bench.pilot.ask(Act.HAND_OVER)
+        bench.held = turn in {10, 11, 12, 20, 30}
+        bench.turn()
+        assert turn < 3 or bench.mode is Mode.AUTONOMOUS, turn
+    assert Cause.DEADMAN not in bench.alerts()
+
+
+def test_a_held_deadman_that_cannot_tell_for_a_moment_holds_at_once_and_goes_on(bench: Bench) -> None:
+    def turn(pedal: bool | None) -> Mode:
+        bench.pilot.deadman("pedal", pedal)
+        bench.turn()
+        return bench.mode
+
+    bench.armed()
+    turn(False)
+    turn(True)
+    bench.pilot.ask(Act.HAND_OVER)
+    assert turn(True) is Mode.AUTONOMOUS
+    assert turn(None) is Mode.HOLD
+    assert bench.pilot.view.deadman is False
+    assert turn(True) is Mode.HOLD
+    assert bench.pilot.view.deadman is True
+    modes = [turn(True) for _ in range(7)]
+    assert modes == sorted(modes, key=[Mode.HOLD, Mode.AUTONOMOUS].index)
+    assert modes[-1] is Mode.AUTONOMOUS
+
+
 def test_a_control_held_since_before_must_be_let_go_first(bench: Bench) -> None:
     bench.jog = Jog(advance=1.0)
     bench.on()

@@ -115,6 +115,7 @@ class PilotMachine:
         self.touched = False
         self.talking: set[str] = set()
         self.deadmen: dict[str, bool] = {}
+        self.unsure: set[str] = set()
         self.said_s: dict[str, float] = {}
         self.pressed_s: dict[str, float] = {}
         self.is_on = self.handed_over = False
@@ -137,6 +138,7 @@ class PilotMachine:
             (self.touch, 1),
             (self.deadman, 4),
             (self.a_deadman_falls_silent, 1),
+            (self.a_deadman_cannot_tell, 2),
             (self.perception, 4),
             (self.servos_fail, 1),
             (self.servos_recover, 2),
@@ -246,6 +248,18 @@ class PilotMachine:
         self.talking.discard(self.draw.choice(("key", "pedal")))
         self.time_passes()
 
+    def a_deadman_cannot_tell(self) -> None:
+        """A damaged report in its place, which is no release; or its report is late, for a turn or some."""
+        source = self.draw.choice(("key", "pedal"))
+        speaks = source in self.talking
+        self.talking.discard(source)
+        if self.draw.random() < 0.5:
+            self.unsure.add(source)
+            self.bench.pilot.deadman(source, None)
+        self.time_passes(self.draw.choice((1, 1, 2, 5)))
+        if speaks:
+            self._say(source, self.deadmen[source])
+
     def perception(self) -> None:
         kinds = ("well", "well", "well", *SCENES)
         self.bench.scene, self.policy.advice = SCENES[self.draw.choice(kinds)], self.draw.choice((ADVICE, ADVICE, *ADVICES))
@@ -312,6 +326,7 @@ class PilotMachine:
         elif self.deadmen.get(source) is False:
             self.pressed_s[source] = self.bench.now_s
         self.talking.add(source)
+        self.unsure.discard(source)
         self.deadmen[source] = pressed
         self.said_s[source] = self.bench.now_s
         self.bench.pilot.deadman(source, pressed)
@@ -372,7 +387,8 @@ class PilotMachine:
         assert abs(command.bend - before.bend) <= reach and abs(command.pitch - before.pitch) <= reach, "the head jumps"
         if source is Source.PROGRAM:
             assert not touched, "the operator's input wins in the same turn"
-            ages_s = [now_s - self.said_s[source] for source, pressed in self.deadmen.items() if pressed]
+            held = [source for source, at_s in self.pressed_s.items() if at_s >= self.armed_s - CLOSE and source not in self.unsure]
+            ages_s = [now_s - self.said_s[source] for source in held]
             assert min(ages_s, default=math.inf) <= HELD_S + CLOSE, "the program drives and nobody holds the deadman"
             advice = self.policy.given
             whole = advice is None or math.isfinite(advice.advance_mm_s + advice.steer_deg)

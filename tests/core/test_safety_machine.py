@@ -15,10 +15,11 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
 from core.control.bus_watch import BusReport
+from core.control.deadman import DeadmanReport
 from core.control.faults import Cause, Fault
 from core.control.frame_watch import FrameReport, RouteState
 from core.control.gate import GateState, GateStep, GoalRequest, Measurement, Source, gate_step
-from core.control.health import Beat, DeadmanReport, GateReport, ServosChecked
+from core.control.health import Beat, GateReport, ServosChecked
 from core.control.joints import joint_goals
 from core.control.supervisor import Act, Decision, Event, Mode
 from core.types import Command, Reason
@@ -249,10 +250,10 @@ class Drive(RuleBasedStateMachine):
         if self.bench.state.latched is not None:
             assert after in {Mode.ADVISORY, Mode.STOPPED}
         if decision.permitted is Source.PROGRAM:
-            deadman = self.bench.state.health.deadman
+            deadmen = self.bench.state.health.deadmen.values()
             assert after is Mode.AUTONOMOUS
             assert self.bench.held
-            assert now_s - deadman.reported_s <= 0.1
+            assert all(now_s - deadman.reported_s <= 0.1 for deadman in deadmen)
             frame_s = self.bench.state.health.frames.pose_captured_s
             assert frame_s is not None
             assert now_s - frame_s <= 0.15

@@ -10,10 +10,11 @@ from dataclasses import replace
 import pytest
 
 from core.control.bus_watch import BusReport
+from core.control.deadman import DeadmanReport
 from core.control.faults import AFTER_SOME, AREA, AT_ONCE, CAUSES, REACTION, Area, Cause, Fault, Reaction
 from core.control.frame_watch import FrameArrived, FrameReport, RouteState
 from core.control.gate import RejectReason, Source
-from core.control.health import Beat, DeadmanReport, FrameLate, GateReport, ModelReport, Part, ServosChecked
+from core.control.health import Beat, FrameLate, GateReport, ModelReport, Part, ServosChecked
 from core.control.supervisor import Act, Decision, Event, Hindrance, Mode, SupervisorState, supervise
 from core.types import Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, TICK_S, Bench
@@ -653,6 +654,38 @@ def test_a_release_in_a_late_tick_is_a_loss_too(benches: dict[Mode, Bench]) -> N
     late.now_s += 0.125
     reports = [event for event in late.reports() if not isinstance(event, DeadmanReport)]
     assert late.raw([DeadmanReport(False), DeadmanReport(True), *reports], late.now_s).mode is H
+
+
+def test_a_deadman_that_is_let_go_is_no_loss_while_another_is_held(benches: dict[Mode, Bench]) -> None:
+    bench = benches[U].copy()  # which holds the nameless one
+    for pressed in (False, True, False, None):
+        assert bench.tick(DeadmanReport(pressed, source="key")).mode is U
+    late = benches[U].copy()
+    first_s = late.now_s + 0.0625  # the other is heard of again only after it
+    key = [DeadmanReport(pressed, first_s, "key") for pressed in (True, False)]
+    assert late.raw([*key, *late.reports()], late.now_s + 0.125).mode is U
+
+
+@pytest.mark.parametrize("pressed", [False, None])
+def test_the_last_deadman_that_is_let_go_or_cannot_tell_is_a_loss(benches: dict[Mode, Bench], pressed: bool | None) -> None:
+    bench = benches[U].copy()
+    bench.tick(DeadmanReport(False, source="key"))
+    bench.tick(DeadmanReport(True, source="key"))
+    bench.held = False
+    assert bench.tick().mode is U
+    assert bench.tick(DeadmanReport(pressed, source="key")).mode is H
+
+
+def test_a_press_of_one_deadman_says_nothing_of_another_that_was_down_before_arming() -> None:
+    bench = Bench()
+    bench.held = True
+    bench.in_mode(R)
+    assert _refused(bench.copy().tick(Act.HAND_OVER), Act.HAND_OVER) == {Hindrance.DEADMAN_HELD_BEFORE}
+    bench.tick(DeadmanReport(False, source="key"))
+    bench.tick(DeadmanReport(True, source="key"))
+    assert bench.copy().tick(DeadmanReport(True, source="key"), Act.HAND_OVER).mode is U
+    bench.tick(DeadmanReport(False, source="key"))
+    assert _refused(bench.tick(Act.HAND_OVER), Act.HAND_OVER) == {Hindrance.DEADMAN_HELD_BEFORE}
 
 
 def test_silence_of_the_deadman_holds_within_100_ms() -> None:
