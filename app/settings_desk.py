@@ -54,7 +54,8 @@ class SettingsDesk(QObject):
         self._window, self._file, self._perceive_again = window, file, perceive_again
         self._profiles = profiles or Profiles()
         self._saved = self._at_rig_start = file.config
-        self._tried: Config | None = None
+        self._drafted: Config | None = None
+        """The dialog's settings while some of them are tried out, else None."""
         self._wants_back = False
         self.dialog: SettingsDialog | None = None
         self._stills = WorkThread("preview", self)
@@ -73,7 +74,7 @@ class SettingsDesk(QObject):
     @property
     def is_trying(self) -> bool:
         """Whether the picture shows thresholds that are not saved."""
-        return self._tried is not None
+        return self._drafted is not None
 
     def start(self) -> None:
         """Say what was wrong with the settings file."""
@@ -126,22 +127,30 @@ class SettingsDesk(QObject):
 
     def _try(self, config: Config) -> None:
         """Show the picture, and the windows' colours, as they would be."""
-        wanted = with_changes(self._window.config, self._saved, config, _NOW)
-        shown = self._tried or self._window.config
-        self._tried = wanted if wanted != self._window.config else None
+        shown = self._shown_config()
+        self._drafted = config
+        wanted = self._shown_config()
+        if wanted == self._window.config:
+            self._drafted = None
         _take_theme(wanted)
         if wanted.perception != shown.perception:
             self._show(wanted.perception)
 
+    def _shown_config(self) -> Config:
+        """The window's configuration with what is tried out. Worked out anew: a model or a rig may have been chosen meanwhile."""
+        config = self._window.config
+        return config if self._drafted is None else with_changes(config, self._saved, self._drafted, _NOW)
+
     def _put_back(self) -> None:
         """As it was before something was tried out; not within a session, which is to have one set of thresholds."""
-        if self._tried is None:
+        if self._drafted is None:
             return
         if self._window.recorder.status.recording:
             self._wants_back = True
             self._window.say(tr("The session goes on with the thresholds that it was begun with"))
             return
-        tried, self._tried, self._wants_back = self._tried, None, False
+        tried = self._shown_config()
+        self._drafted, self._wants_back = None, False
         _take_theme(self._window.config)
         if tried.perception != self._window.config.perception:
             self._show(self._window.config.perception)
@@ -161,8 +170,8 @@ class SettingsDesk(QObject):
     @Slot(object)
     def _on_phase(self, phase: Phase) -> None:
         """A rig that was started again knows nothing of what is being tried out."""
-        if phase is Phase.RUNNING and self._tried is not None:
-            self._window.preview(self._tried.perception)
+        if phase is Phase.RUNNING and self._drafted is not None:
+            self._window.preview(self._shown_config().perception)
 
     def _may_take(self, others: Callable[[Step], bool], step: Step) -> bool:
         if self.is_trying and step in (Step.ARM, Step.HAND_OVER):
@@ -181,7 +190,7 @@ class SettingsDesk(QObject):
         before, note = self._saved, self._keep(config)
         if note is None:
             return
-        self._tried = None
+        self._drafted = None
         self._stills.forget()
         self._window.take_settings(with_changes(self._window.config, before, config, _NOW))
         self._window.show_still(None)  # of a rig that is over, what was tried out on its last picture must not stay: it looks alive

@@ -113,6 +113,24 @@ def test_thresholds_act_at_once_and_cancel_puts_them_back(at: Bench) -> None:
     assert not at.path.exists()
 
 
+def test_a_session_names_the_model_that_was_chosen_while_something_was_tried_out(
+    at: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[PerceptionConfig] = []
+    monkeypatch.setattr(at.window.recorder, "open_rig", lambda config, _kind: told.append(config.perception))
+    at.edit(D_ALLOW, "12")
+    config = at.window.config
+    segmentation = config.perception.segmentation.model_copy(update={"model": "own_1"})
+    perception = config.perception.model_copy(update={"segmentation": segmentation})
+    at.window.use_config(config.model_copy(update={"perception": perception}))
+    until(qtbot, lambda: at.tried() == [12.0] and len(at.engines) == 2)
+    assert [(one.segmentation.model, one.pose.d_allow_px) for one in told] == [("default", 12.0), ("own_1", 6.0), ("own_1", 12.0)]
+    assert at.engine.perceptions[0].segmentation.model == "own_1"
+    assert at.desk.dialog is not None
+    at.desk.dialog.reject()
+    assert at.engine.perceptions[-1] == perception
+
+
 def test_settings_of_the_rig_are_not_tried_out(at: Bench) -> None:
     at.edit("advice.fast_mm_s", "9")
     assert at.tried() == []
