@@ -423,8 +423,7 @@ class OperatorWindow(WindowFrame):
             why = tr("the picture is not live") if has_old else tr("there is no picture yet")
             self._panels.toast.show_message(tr("No snapshot: {why}", why=why), is_fault=True)
             return
-        picker = self._panels.picker
-        phantom = picker.name if picker is not None and self._kind is RigKind.SIM else None
+        phantom = self._config.twin.phantom if self._kind is RigKind.SIM else None
         self._snapshots.write(self._tick, Origin(self._kind.value, phantom, self._config.perception.segmentation.model))
 
     @Slot(str)

@@ -62,11 +62,10 @@ class PhantomPicker(QWidget):
     def show_name(self, name: str) -> None:
         """Show `name` without choosing it again."""
         kind, _, seed = name.partition(":")
-        with QSignalBlocker(self._combo), QSignalBlocker(self._seed):
-            index = self._combo.findData(kind if kind == _RANDOM else name)
-            self._combo.setCurrentIndex(index)
-            if kind == _RANDOM and seed.isdecimal():
-                self._seed.setValue(int(seed))
+        with QSignalBlocker(self._combo):
+            self._combo.setCurrentIndex(self._combo.findData(kind if kind == _RANDOM else name))
+        if kind == _RANDOM and seed.isdecimal():
+            self._seed.show_seed(int(seed))
         self._show_seed()
 
     def menu_entries(self) -> tuple[MenuEntry, ...]:
@@ -93,9 +92,9 @@ class PhantomPicker(QWidget):
         """The random phantom of the next seed; nothing while a rig without phantoms is open."""
         if not self.isEnabled():
             return
-        with QSignalBlocker(self._combo), QSignalBlocker(self._seed):
-            if self._combo.currentData() == _RANDOM:
-                self._seed.setValue(self._seed.value() % _SEED_MAX + 1)
+        if self._combo.currentData() == _RANDOM:
+            self._seed.show_seed(self._seed.value() % _SEED_MAX + 1)
+        with QSignalBlocker(self._combo):
             self._combo.setCurrentIndex(self._combo.findData(_RANDOM))
         self._on_choice()
 
@@ -142,6 +141,12 @@ class _SeedBox(QSpinBox):
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
+
+    def show_seed(self, seed: int) -> None:
+        """Show a seed that nobody has to confirm; the one before it, typed again, is another one from here on."""
+        with QSignalBlocker(self):
+            self.setValue(seed)
+        self._last = self.value()
 
     def abandon(self) -> None:
         """Show the value again instead of what was typed; leaving the field would count it otherwise."""

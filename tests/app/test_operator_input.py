@@ -264,6 +264,15 @@ def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow,
     assert (record["rig"], record["phantom"], record["model"]) == ("SIM", "s_curve", "default")
 
 
+def test_a_snapshot_names_the_phantom_that_runs(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    assert running.panels.picker is not None
+    running.panels.picker.show_name("tree")  # chosen, and not opened
+    qtbot.keyClick(running, Key.Key_P)
+    until(qtbot, running.panels.toast.isVisible)
+    (told,) = (tmp_path / "shots").glob("*.json")
+    assert json.loads(told.read_text())["phantom"] == "s_curve"
+
+
 def test_no_snapshot_of_a_picture_that_is_not_live(
     running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path
 ) -> None:

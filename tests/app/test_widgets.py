@@ -328,6 +328,25 @@ def test_seed_counts_when_confirmed_not_at_each_digit(qtbot: QtBot) -> None:
     assert chosen == ["random:42"]
 
 
+@pytest.mark.parametrize("came_by", ["key", "configuration"])
+def test_the_seed_before_this_one_can_be_typed_again(qtbot: QtBot, came_by: str) -> None:
+    picker = PhantomPicker([("tree", "Tree")], "random:1")
+    qtbot.addWidget(picker)
+    picker.show()
+    chosen: list[str] = []
+    picker.chosen.connect(chosen.append)
+    if came_by == "key":
+        picker.roll()
+    else:
+        picker.show_name("random:2")
+    assert picker.name == "random:2"
+    picker._seed.setFocus()
+    picker._seed.selectAll()
+    QTest.keyClicks(picker._seed, "1")
+    QTest.keyClick(picker._seed, Qt.Key.Key_Return)
+    assert chosen[-1:] == ["random:1"]
+
+
 def test_key_caps_light_up_and_can_be_held_with_the_mouse(qtbot: QtBot) -> None:
     panel = JogPanel(2.0)
     qtbot.addWidget(panel)
