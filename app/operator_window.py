@@ -271,6 +271,8 @@ class OperatorWindow(WindowFrame):
         self._first_rig.start()
 
     def _start_rig(self) -> None:
+        self._thread.announce_engine()
+        self._thread.end_engine()  # before the recorder hears of the new rig: no picture of the old one is kept as one of it
         self._prepare_rig()
         self._open_rig()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,9 +14,11 @@ from app.operator_window import OperatorWindow
 from core.config import Config
 from core.control.alerts import ALERTS, Alert
 from core.control.faults import Cause
+from core.control.modes import Act
 from core.session.events import EventKind
 from core.session.reader import SessionReader
 from core.study.replay import event_target
+from core.types import Tick
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, until
 
@@ -119,3 +123,45 @@ def test_a_folder_that_cannot_be_written_stops_the_recording_visibly(
     assert "Recording stopped" in running.panels.toast.text()
     assert engine.pilot.faults[-1].cause is Cause.DISK_FULL
     assert running.shown_tick is not None, "the rig goes on"
+
+
+def restart(window: OperatorWindow) -> None:
+    window.restart()
+
+
+def choose_phantom(window: OperatorWindow) -> None:
+    window._choose_phantom("tree")
+
+
+@pytest.mark.parametrize("again", [restart, choose_phantom])
+def test_no_picture_of_the_old_rig_is_kept_as_one_of_the_new(
+    again: Callable[[OperatorWindow], None],
+    make_window: MakeWindow,
+    bench: FakeBench,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    engines: list[FakeEngine] = []
+
+    def open_engine(_config: Config) -> FakeEngine:
+        engines.append(FakeEngine(bench))
+        return engines[-1]
+
+    window = make_window(open_engine)
+    window.start()
+    until(qtbot, lambda: window.shown_tick is not None)
+    kept: list[Tick] = []
+    stopped: list[bool] = []
+    monkeypatch.setattr(window._thread, "on_tick", kept.append)
+
+    def open_rig(*_about: object) -> None:
+        kept.clear()
+        time.sleep(0.15)  # several pictures long
+        assert kept == []
+        stopped.append(window.stop_opening())
+
+    monkeypatch.setattr(window.recorder, "open_rig", open_rig)
+    again(window)
+    assert stopped == [True], "a STOP in between is kept for the new rig"
+    until(qtbot, lambda: len(engines) == 2 and bool(kept))
+    assert engines[1].pilot.acts == [Act.STOP]
