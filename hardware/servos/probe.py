@@ -125,13 +125,18 @@ class ProbeLimits:
 def probe_config(
     servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1] = 1, ids: tuple[int, ...] | None = None
 ) -> ServosConfig:
-    """The bus with `servo_id` in the place of the joint under test.
+    """The bus with `servo_id` in the place of the joint under test, of which it takes nothing but the place.
 
     Parameters
     ----------
     servos : port, speed, model, millimetres per turn.
     sign : the servo's direction that counts as positive.
-    ids : all seven on the line; default those of `servos`.
+    ids : all seven on the line while nobody knows which is which; default those of `servos`, which are known by their joints.
+
+    Notes
+    -----
+    A servo that is known turns its own joint's millimetres per turn. One that is not may drive any of the seven: with the largest
+    of theirs its wire or screw never moves farther, nor faster, than it is asked to.
 
     Raises
     ------
@@ -143,9 +148,11 @@ def probe_config(
         raise ProbeFailed(f"servo {servo_id} cannot be moved: seven servos are needed, there are {', '.join(map(str, every))}")
     every.remove(servo_id)
     every.insert(_PLACE, servo_id)
+    known = {} if ids is not None else {joint.id: joint.mm_per_turn for joint in servos.joints}
+    largest = max(joint.mm_per_turn for joint in servos.joints)
     joints = tuple(
-        _joint(joint, servo_id=every[place], sign=sign if place == _PLACE else 1, limits=limits)
-        for place, joint in enumerate(servos.joints)
+        _joint(joint, one, sign if one == servo_id else 1, known.get(one, largest), limits)
+        for joint, one in zip(servos.joints, every, strict=True)
     )
     return patient(servos).model_copy(update={"joints": joints, "pretension_mm": 0.0})
 
@@ -163,11 +170,12 @@ def patient(servos: ServosConfig) -> ServosConfig:
     return servos.model_copy(update=calm)
 
 
-def _joint(joint: JointConfig, servo_id: int, sign: Literal[-1, 1], limits: ProbeLimits) -> JointConfig:
+def _joint(joint: JointConfig, servo_id: int, sign: Literal[-1, 1], mm_per_turn: float, limits: ProbeLimits) -> JointConfig:
     return joint.model_copy(
         update={
             "id": servo_id,
             "sign": sign,
+            "mm_per_turn": mm_per_turn,
             "low_mm": limits.low_mm - _MARGIN_MM,
             "high_mm": limits.high_mm + _MARGIN_MM,
             "warn_margin_mm": _MARGIN_MM / 2,

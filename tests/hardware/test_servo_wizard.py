@@ -16,6 +16,7 @@ from core.servo_config import JOINT_NAMES, ServosConfig
 from core.types import Command
 from hardware import servo_wizard
 from hardware.servo_wizard import Bench
+from hardware.servos import units
 from hardware.servos.probe import ProbeFailed, ProbeLimits, Stopped, probe_config
 from tests.hardware.lock_bench import LockTwin, lock_bench
 
@@ -212,3 +213,39 @@ def test_the_servo_under_test_has_bounds_and_the_others_stand() -> None:
         probe_config(ServosConfig(), 9, limits, 1, IDS)
     with pytest.raises(ProbeFailed, match="seven servos are needed"):
         probe_config(ServosConfig(), 1, limits, 1, IDS[:6])
+
+
+def _with_turns(*mm_per_turn: float) -> ServosConfig:
+    plain = ServosConfig()
+    turns = zip(plain.joints, mm_per_turn, strict=True)
+    return plain.model_copy(update={"joints": tuple(joint.model_copy(update={"mm_per_turn": mm}) for joint, mm in turns)})
+
+
+def _way_mm(servos: ServosConfig, made: ServosConfig, servo_id: int, asked_mm: float) -> float:
+    """How far the real joint of a servo moves when the probe is asked for so much."""
+    tested, real = made.joints[JOINT_NAMES.index("advance")], next(joint for joint in servos.joints if joint.id == servo_id)
+    assert tested.id == servo_id
+    return units.to_mm(real, units.to_ticks(tested, asked_mm, 0), 0)
+
+
+@pytest.mark.parametrize("servo_id", range(1, 8))
+def test_a_small_step_of_a_servo_that_is_known_is_one_of_its_own_joint(servo_id: int) -> None:
+    servos = _with_turns(40.0, 38.0, 25.0, 25.0, 5.0, 60.0, 62.0)  # tendons on drums, a lead screw, rollers
+    made = probe_config(servos, servo_id, ProbeLimits(-2.25, 4.0))
+    for asked_mm in (0.25, -1.0, 4.0):
+        assert _way_mm(servos, made, servo_id, asked_mm) == pytest.approx(asked_mm, abs=0.02)
+    real = next(joint for joint in servos.joints if joint.id == servo_id)
+    tested = made.joints[JOINT_NAMES.index("advance")]
+    assert units.velocity_mm_s(real, units.profile_velocity(tested)) <= 4.0
+    turns = {joint.id: joint.mm_per_turn for joint in servos.joints}
+    assert all(joint.mm_per_turn == turns[joint.id] for joint in made.joints)  # those that only hold, too
+
+
+@pytest.mark.parametrize("servo_id", range(1, 8))
+def test_a_servo_that_nobody_knows_yet_moves_nothing_farther_or_faster_than_asked(servo_id: int) -> None:
+    servos = _with_turns(40.0, 38.0, 25.0, 25.0, 5.0, 60.0, 62.0)
+    made = probe_config(servos, servo_id, ProbeLimits(), ids=(1, 2, 3, 4, 5, 6, 7))
+    for asked_mm in (0.75, 3.0):
+        assert 0.0 < _way_mm(servos, made, servo_id, asked_mm) <= asked_mm + 0.01
+    real = next(joint for joint in servos.joints if joint.id == servo_id)
+    assert units.velocity_mm_s(real, units.profile_velocity(made.joints[JOINT_NAMES.index("advance")])) <= 4.0
