@@ -175,7 +175,7 @@ class Recording:
             self._files.write_event(next(events_between(None, self._drive)))
             for fault in drive.active:
                 self._files.write_event(Event(first_s, EventKind.FAULT, str(fault.cause), {"detail": fault.detail}))
-        if self._target is not None and self._target not in self._early:
+        if self._target is not None and self._target.data and self._target not in self._early:
             self._files.write_event(replace(self._target, time_s=first_s))
         early, self._early = self._early, []
         for event in early:
@@ -203,9 +203,11 @@ class Recording:
     def change_rig(self, about: About, dropped: int) -> None:
         """A session never mixes two rigs, and neither does the ring."""
         self.end("another rig was opened", dropped)
-        self._about, self._drive, self._target, self._lost = about, None, None, None
+        self._about, self._drive, self._lost = about, None, None
         if self._ring is not None:
             self._ring.clear()
+            if self._target is not None:  # under other thresholds the rig and its destination are the same
+                self._ring.add_event(self._target)
 
     def save_ring(self) -> None:
         """Write what the ring holds, in the background."""

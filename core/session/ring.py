@@ -70,7 +70,7 @@ class Ring:
             return [], []
         first_s = frames[0].captured_s
         chosen = [event for event in self._events if event.kind is EventKind.TARGET and event.time_s < first_s]
-        before = [replace(event, time_s=first_s) for event in chosen[-1:]]
+        before = [replace(event, time_s=first_s) for event in chosen[-1:] if event.data]
         return frames, before + [event for event in self._events if event.time_s >= first_s]
 
     def clear(self) -> None:

@@ -271,10 +271,16 @@ def test_the_destination_that_was_chosen_before_is_told_at_the_start(tmp_path: P
         writer.save_last()
         wait_for(lambda: writer.status().saved != first)
         assert targets_of(writer.status().saved) == [(1000.0, (30.0, 40.0))]
-        writer.add_event(event_of_target(None, 1000.5))
-        writer.set_about(About("LIVE", "bench"))
+        writer.set_about(About("SIM", "twin", {"perception": "under other thresholds"}))
+        second = writer.status().saved
         writer.start()
         writer.put(tick_of(9, 1001.0))
+        writer.stop()
+        wait_for(lambda: writer.status().saved != second)
+        assert targets_of(writer.status().saved) == [(1001.0, (30.0, 40.0))]
+        writer.add_event(event_of_target(None, 1001.5))
+        writer.start()
+        writer.put(tick_of(10, 1002.0))
     assert targets_of(writer.status().saved) == []
 
 
