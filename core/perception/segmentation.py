@@ -6,9 +6,9 @@ import functools
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import cv2
 import numpy as np
@@ -20,6 +20,7 @@ from core.perception.familiarity import Signature, signature_of
 from core.types import Image
 
 Probability = NDArray[np.float32]
+_Taken = TypeVar("_Taken")
 _AT_ONCE = 2
 """Two windows of 160 px in one call take 2.1 instead of 2.8 ms on two cores."""
 
@@ -155,7 +156,10 @@ def _core() -> Any:
 
 
 class OpenVinoSegmenter:
-    """The ONNX network on the CPU through OpenVINO, in int8 where the model has it; compiled once per image size and number."""
+    """The ONNX network on the CPU through OpenVINO, in int8 where the model has it; compiled once per image size and number.
+
+    Several threads may ask: the feed's, and one that looks at a still again. They take turns, picture by picture.
+    """
 
     _MAX_SIZES = 6
 
@@ -179,6 +183,7 @@ class OpenVinoSegmenter:
         if deepest is not None:
             self._model.add_outputs(deepest)
         self._requests: dict[tuple[int, int, int], Any] = {}
+        self._asking = threading.Lock()
 
     @property
     def is_eight_bit(self) -> bool:
@@ -193,25 +198,35 @@ class OpenVinoSegmenter:
 
     def together(self, images: Sequence[Image]) -> list[tuple[Probability, Probability]]:
         """Of each of the images, by twos: that keeps two cores busier than one after the other does."""
-        return [_cropped(one, image) for image, (one, _) in zip(images, self._infer(images), strict=True)]
+        return self._infer(images, lambda image, probabilities, _deepest: _cropped(probabilities, image))
 
     def recognise(self, images: Sequence[Image]) -> list[Recognised]:
         """The same, and each image's signature."""
-        return [
-            (*_cropped(one, image), signature_of(deepest, one[0]) if deepest is not None else None)
-            for image, (one, deepest) in zip(images, self._infer(images), strict=True)
-        ]
 
-    def _infer(self, images: Sequence[Image]) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32] | None]]:
-        """Of images of one size: probabilities (2, H, W) with padding, and the deepest level; valid until the next is asked for."""
+        def take(image: Image, probabilities: Probability, deepest: NDArray[np.float32] | None) -> Recognised:
+            return (*_cropped(probabilities, image), signature_of(deepest, probabilities[0]) if deepest is not None else None)
+
+        return self._infer(images, take)
+
+    def _infer(
+        self, images: Sequence[Image], take: Callable[[Image, Probability, NDArray[np.float32] | None], _Taken]
+    ) -> list[_Taken]:
+        """What `take` makes of each image (of one size), its probabilities (2, H, W) with padding, and the deepest level.
+
+        `take` keeps copies: the next question, maybe another thread's, overwrites both.
+        """
+        taken: list[_Taken] = []
         for first in range(0, len(images), _AT_ONCE):
-            padded = np.stack([_padded(image, self.info.stride) for image in images[first : first + _AT_ONCE]])
-            results = self._request(padded.shape[:3]).infer({0: padded}, share_inputs=True, share_outputs=True)
-            for place, probabilities in enumerate(results[0]):
-                yield probabilities, results[1][place] if self._recognises else None
+            some = images[first : first + _AT_ONCE]
+            padded = np.stack([_padded(image, self.info.stride) for image in some])
+            with self._asking:
+                results = self._request(padded.shape[:3]).infer({0: padded}, share_inputs=True, share_outputs=True)
+                deepest = results[1] if self._recognises else [None] * len(some)
+                taken += map(take, some, results[0], deepest)
+        return taken
 
     def _request(self, key: tuple[int, int, int]) -> Any:
-        """To be asked about so many images of this height and width."""
+        """To be asked about so many images of this height and width, with `_asking` held."""
         if key not in self._requests:
             if len(self._requests) >= self._MAX_SIZES:
                 self._requests.pop(next(iter(self._requests)))

@@ -393,9 +393,9 @@ def test_the_configuration_says_what_is_seen_in_all_orientations(
     seen: list[tuple[int, ...]] = []
     infer = OpenVinoSegmenter._infer
 
-    def counted(self: OpenVinoSegmenter, images: list[np.ndarray]) -> object:
+    def counted(self: OpenVinoSegmenter, images: list[np.ndarray], *take: object) -> object:
         seen.extend(image.shape for image in images)
-        return infer(self, images)
+        return infer(self, images, *take)  # type: ignore[arg-type]
 
     monkeypatch.setattr(OpenVinoSegmenter, "_infer", counted)
     image = np.random.default_rng(0).integers(60, 200, (120, 160, 3), dtype=np.uint8)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,19 @@ def test_what_is_seen_together_is_what_is_seen_alone(undecided: Path, precision:
         # In eight bits a value at the middle of a step may be rounded to either side.
         assert np.abs(one - other).mean() < 0.0005
     assert np.abs(alone[0] - alone[1]).mean() > 0.005, "another picture, another answer"
+
+
+def test_several_threads_may_ask_one_network(undecided: Path) -> None:
+    """A picture that stands is looked at again in a thread of its own, while a rig that was opened meanwhile has the network."""
+    segment = OpenVinoSegmenter(undecided, 1)
+    alone = [segment.recognise([image])[0] for image in pictures()[:3]]
+
+    def same(picture: int) -> bool:
+        found = segment.recognise([pictures()[picture]])[0]
+        return all(np.array_equal(one, other) for one, other in zip(found, alone[picture], strict=True))
+
+    with ThreadPoolExecutor(3) as threads:
+        assert all(threads.map(same, [0, 1, 2] * 40))
 
 
 def test_who_cannot_see_together_is_asked_one_by_one() -> None:
