@@ -28,7 +28,8 @@ class DriveView:
     Attributes
     ----------
     time_s : monotonic.
-    mode, permitted : the supervisor's decision; `permitted` None: nobody's orders leave.
+    mode : the supervisor's decision.
+    permitted : whose orders leave; None: nobody's, also while the robot could not yet be told anything.
     latched, active : first cause of the last disarming until it is acknowledged; all faults now.
     against_arming, against_hand_over : why either request would be refused now; empty: it would be granted. Hand-over's reasons do
         not name the deadman, which the operator takes when he hands over.

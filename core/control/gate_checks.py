@@ -147,12 +147,18 @@ def mistrust(measurement: Measurement | None, now_s: float, servos: ServosConfig
         return Rejection(RejectReason.FROM_THE_FUTURE, f"measured positions, by {-age_s:.3f} s")
     if age_s > safety.measurement_max_age_s:
         return Rejection(RejectReason.STALE_MEASUREMENT, _age(age_s, safety.measurement_max_age_s))
-    for joint, position_mm in zip(servos.joints, measurement.positions_mm, strict=True):
+    outside = outside_envelope(measurement.positions_mm, servos)
+    return Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, outside[0]) if outside else None
+
+
+def outside_envelope(positions_mm: Sequence[float], servos: ServosConfig) -> tuple[str, ...]:
+    """The joints farther outside their envelope than one bounded step brings them back, with their positions."""
+    found = []
+    for joint, position_mm in zip(servos.joints, positions_mm, strict=True):
         low_mm, high_mm = joint_room(position_mm, joint)
         if low_mm > high_mm:
-            detail = f"{joint.name} at {position_mm:.2f} mm ({joint.low_mm:g} to {joint.high_mm:g} mm)"
-            return Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, detail)
-    return None
+            found.append(f"{joint.name} at {position_mm:.2f} mm ({joint.low_mm:g} to {joint.high_mm:g} mm)")
+    return tuple(found)
 
 
 def too_far(request: GoalRequest, base_mm: Joints, servos: ServosConfig, safety: SafetyConfig) -> Rejection | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from core.control.bus_watch import BusReport
-from core.control.gate_checks import RejectReason, Source
+from core.control.gate_checks import Rejection, RejectReason, Source
 from core.devices import Robot
 from core.servo_config import JointName
 from core.types import Command
@@ -34,7 +34,8 @@ class GuardedRobot(Robot, Protocol):
     """All methods may be called from any thread. ``stop`` never waits and never fails.
 
     ``connect``, ``arm``, ``disarm``, ``acknowledge``, ``zero``, ``reboot`` and ``torque_off`` may take seconds and raise
-    ``DeviceError``; all the others are quick.
+    ``DeviceError``; all the others are quick. ``kept_back`` is why nothing at all has left the gate since arming, not even a hold:
+    while it is not None there is no ``sent_motion`` either, and nobody can drive.
     """
 
     @property
@@ -50,3 +51,4 @@ class GuardedRobot(Robot, Protocol):
     def torque_off(self) -> None: ...
     def report(self) -> BusReport | None: ...
     def sent_motion(self) -> SentMotion | None: ...
+    def kept_back(self) -> Rejection | None: ...

@@ -23,7 +23,7 @@ from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
 from core.control.follow import Follow
 from core.control.frame_reports import FrameReports, is_finite, is_sound
 from core.control.frame_watch import FrameArrived, RouteState
-from core.control.gate_checks import RejectReason, Source
+from core.control.gate_checks import Rejection, RejectReason, Source
 from core.control.guarded_robot import GuardedRobot, SentMotion
 from core.control.hand import AT_REST, Hand, Jog
 from core.control.health import Beat, FrameLate, GateReport, ModelReport, Part, ServosBusy, deadman_down
@@ -235,10 +235,11 @@ class Pilot:
         inputs = self._inbox.take(now_s)
         seen = inputs.seen
         sent = self._robot.sent_motion()
+        kept_back = self._robot.kept_back() if sent is None else None
         is_news = sent is not None and sent.cycle != self._told_cycle
         self._told_cycle = sent.cycle if sent is not None else -1
         self._latency.see(sent)
-        self._hear(inputs, sent if is_news else None, seen, now_s)
+        self._hear(inputs, sent if is_news else None, kept_back, now_s)
         before = self._state
         self._state, decision = supervise(before, inputs.events, now_s, self._config.servos, self._config.safety)
         if decision.mode is Mode.STOPPED and before.mode is not Mode.STOPPED:
@@ -247,7 +248,7 @@ class Pilot:
         if self._halted:
             decision = replace(decision, permitted=None)
         commanded = self._send(decision, inputs.jog, seen, sent, now_s)
-        self._tell(before, decision, inputs.jog, sent if is_news else None, now_s)
+        self._tell(before, decision, inputs.jog, sent if is_news else None, kept_back, now_s)
         view = self._look(decision, inputs, seen, commanded, sent, now_s)
         with self._lock:
             if _has_changed(self._view, view):
@@ -281,7 +282,7 @@ class Pilot:
             self._alerts.append(Alert(reason, ALERTS[reason], busy if reason is Hindrance.SERVOS_BUSY else ""))
         return False
 
-    def _hear(self, inputs: Inputs, sent: SentMotion | None, seen: Seen | None, now_s: float) -> None:
+    def _hear(self, inputs: Inputs, sent: SentMotion | None, kept_back: Rejection | None, now_s: float) -> None:
         """Add to the events what servos, controls and the way say now."""
         events = inputs.events
         if (failure := self._robot.failure) is not None:
@@ -298,7 +299,9 @@ class Pilot:
             events.append(GateReport(RejectReason.NOT_ARMED))  # nothing is asked for meanwhile, so nothing is wrong with it
         elif sent is not None and self._permitted is Source.PROGRAM and sent.rejection is not RejectReason.NO_COMMAND:
             events.append(GateReport(sent.rejection))
-        if self._has_arrived(seen, now_s):
+        elif self._state.mode is Mode.AUTONOMOUS and kept_back is not None:
+            events.append(GateReport(kept_back.reason))
+        if self._has_arrived(inputs.seen, now_s):
             events.append(Act.TAKE_BACK)
             self._raise([(Note.REACHED, "")], now_s, armed=True)
 
@@ -353,7 +356,15 @@ class Pilot:
             with self._lock:
                 self._forget = True
 
-    def _tell(self, before: SupervisorState, decision: Decision, jog: Jog, sent: SentMotion | None, now_s: float) -> None:
+    def _tell(
+        self,
+        before: SupervisorState,
+        decision: Decision,
+        jog: Jog,
+        sent: SentMotion | None,
+        kept_back: Rejection | None,
+        now_s: float,
+    ) -> None:
         """Alerts of this turn."""
         raised: list[tuple[AlertKey, str]] = [(f.cause, f.detail) for f in decision.raised if _matters(f, before)]
         raised += [(reason, "") for refused in decision.refused for reason in refused.reasons]
@@ -364,6 +375,9 @@ class Pilot:
                 raised.append((sent.rejection, ""))
             if sent.at_end and not jog.is_rest:
                 raised.append((Note.AT_END, ", ".join(sent.at_end)))
+        is_tried = not jog.is_rest or decision.mode in DRIVING_MODES
+        if kept_back is not None and decision.permitted is not None and is_tried and kept_back.reason not in _NOT_WORTH_A_WORD:
+            raised.append((kept_back.reason, kept_back.detail))
         self._raise(raised, now_s, armed=before.mode in ARMED_MODES)
 
     def _raise(self, raised: list[tuple[AlertKey, str]], now_s: float, *, armed: bool) -> None:
@@ -385,11 +399,11 @@ class Pilot:
         is_fresh = seen is not None and now_s - seen.captured_s <= safety.pose_disarm_s
         advice = seen.advice if seen is not None and is_fresh and decision.blanked is None else None
         arming, hand_over = hindrances(self._state, now_s, safety)
-        by_hand = decision.permitted is Source.OPERATOR
+        by_hand = self._permitted is Source.OPERATOR
         return DriveView(
             time_s=now_s,
             mode=decision.mode,
-            permitted=decision.permitted,
+            permitted=self._permitted,
             latched=decision.latched,
             active=decision.active,
             against_arming=arming,

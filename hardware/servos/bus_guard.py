@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from core.control.bus_watch import BusReport, BusWatch, bus_faults, see_bus
 from core.control.faults import REACTION, Cause, Fault, Reaction, worst
 from core.control.gate import Clamp, GateState, GateStep, GoalRequest, Measurement, Rejection, RejectReason, Source, gate_step
+from core.control.gate_checks import mistrust, outside_envelope
 from core.control.joints import Joints, joint_goals
 from core.safety_config import SafetyConfig
 from core.servo_config import JointName, ServosConfig
@@ -126,8 +127,17 @@ class BusGuard:
         if self.armed:
             reasons.append("already armed")
         hinder = [f for f in self.active if REACTION[f.cause] >= Reaction.HOLD and f.cause not in _MENDED_BY_ARMING]
-        if reasons := reasons + [_text(fault) for fault in hinder]:
+        if reasons := reasons + [_text(fault) for fault in hinder] + self._astray():
             raise NotReady(f"not armed: {'; '.join(reasons)}")
+
+    def _astray(self) -> list[str]:
+        """Joints from where no goal leads: the gate would believe no position of theirs, and nothing would ever move."""
+        at = self._measurement
+        # joints without a zero have no positions: that the driver finds
+        if at is None or self._cycle_s - at.measured_s > self._safety.measurement_max_age_s:
+            return []
+        outside = outside_envelope(at.positions_mm, self._servos)
+        return [f"outside its envelope: {joint}: move it back by hand, or zero it again" for joint in outside]
 
     def set_armed(self, now_s: float) -> None:
         """The driver has armed the servos. Orders from before do not count."""
@@ -147,10 +157,13 @@ class BusGuard:
         step = gate_step(self._gate, request, self._measurement, permitted, now_s, self._servos, self._safety)
         self._gate = step.state
         self.rejection, self.clamps = step.rejection, step.clamps
+        if step.goals_mm is None:
+            # There is not even a hold, whoever may drive; and before there was one, nobody is permitted to. So this comes first.
+            self.rejection = mistrust(self._measurement, now_s, self._servos, self._safety) or step.rejection
         self.at_end = () if step.is_hold else at_end
         self.clamp_count += len(step.clamps)
-        if step.rejection is not None:
-            self.rejections[step.rejection.reason] += 1
+        if self.rejection is not None:
+            self.rejections[self.rejection.reason] += 1
         return step
 
     def _order_of(self, permitted: Source | None, newest: Order | None, now_s: float) -> Order | None:

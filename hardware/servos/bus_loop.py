@@ -108,12 +108,16 @@ class BusLoop:
         self._publish(time.monotonic())
         self._times.note(started_s, time.monotonic())
 
-    def _talk(self) -> None:
-        """Read, decide, write."""
+    def _look(self) -> Fault | None:
+        """Read all servos; the fault that ends the motion, when one is going on and must end."""
         self._readings = self._bus.read()
         errors = self._new_errors()
         now_s = time.monotonic()
-        fault = self._guard.see(self._readings, errors, self._end.heartbeat(), now_s)
+        return self._guard.see(self._readings, errors, self._end.heartbeat(), now_s)
+
+    def _talk(self) -> None:
+        """Read, decide, write."""
+        fault = self._look()
         if fault is not None:
             self._end_motion(fault)
         elif self._guard.armed:
@@ -205,6 +209,8 @@ class BusLoop:
     def _arm(self) -> None:
         if not self._bus.is_open:
             raise NotReady("not armed: the servo port is not open")
+        if not self._guard.armed:
+            self._look()  # a quiet bus was not read for long, and after a zero the last positions mean nothing
         self._guard.check_arming()
         self._bus.arm()
         self._settle = 0

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from core.control.bus_watch import BusReport
 from core.control.faults import Cause, Fault
-from core.control.gate_checks import Source
+from core.control.gate_checks import Rejection, Source
 from core.control.guarded_robot import SentMotion
 from core.safety_config import SafetyConfig
 from core.servo_config import JOINT_NAMES, JointName, ServosConfig
@@ -109,6 +109,9 @@ class LockStepServos:
 
     def arm(self) -> None:
         """Raises NotReady."""
+        if not self._guard.armed:
+            now_s = self._clock()
+            self._guard.see(self._readings(now_s), 0, self._beat, now_s)
         self._guard.check_arming()
         self._torque = True
         self._guard.set_armed(self._clock())
@@ -152,6 +155,9 @@ class LockStepServos:
             rejection=rejection.reason if rejection is not None else None,
             at_end=self._guard.at_end,
         )
+
+    def kept_back(self) -> Rejection | None:
+        return self._guard.rejection if self._guard.armed and self._guard.sent is None else None
 
     def status(self) -> RobotStatus:
         at = self._at_mm

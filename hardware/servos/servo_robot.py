@@ -12,7 +12,7 @@ from dataclasses import replace
 from core.calibration.kept_zero import zero_advice
 from core.calibration_config import ZeroConfig
 from core.control.bus_watch import BusReport
-from core.control.gate import Source
+from core.control.gate import Rejection, Source
 from core.control.guarded_robot import SentMotion
 from core.safety_config import SafetyConfig
 from core.servo_config import JointConfig, JointName, ServosConfig
@@ -276,6 +276,11 @@ class ServoRobot:
             rejection=status.rejection.reason if status.rejection is not None else None,
             at_end=status.at_end,
         )
+
+    def kept_back(self) -> Rejection | None:
+        """Why nothing at all has left the gate since it was armed; None when something has, and when it is not armed."""
+        status = self.bus_status()
+        return status.rejection if status is not None and status.armed and status.sent is None else None
 
     def close(self) -> None:
         """Hold, end the bus process and give the port back. The torque stays on."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from core.control.bus_watch import BusReport
-from core.control.gate import RejectReason, Source
+from core.control.gate import Rejection, RejectReason, Source
 from core.control.guarded_robot import SentMotion
 from core.safety_config import SafetyConfig
 from core.servo_config import JOINT_NAMES, JointName
@@ -98,6 +98,10 @@ class DirectRobot:
     def sent_motion(self) -> SentMotion | None:
         with self._lock:
             return self._sent if self._armed else None
+
+    def kept_back(self) -> Rejection | None:
+        """There is no gate: what is sent is done."""
+        return None
 
     def status(self) -> RobotStatus:
         return self._robot.status()

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.config import Config
 from core.control.bus_watch import BusReport
-from core.control.gate_checks import Source
+from core.control.gate_checks import Rejection, Source
 from core.control.guarded_robot import SentMotion
 from core.control.hand import AT_REST
 from core.control.health import ModelReport
@@ -51,6 +51,7 @@ class Robot:
         self.ordered: Source | None = None
         self.sent: list[tuple[Source, Command, float | None]] = []
         self.motion = SentMotion(0, 0.0, Command())
+        self.keeps_back: Rejection | None = None
         self.edit: Callable[[SentMotion], SentMotion] = lambda motion: motion
 
     def connect(self) -> None:
@@ -101,7 +102,10 @@ class Robot:
         return self.bus
 
     def sent_motion(self) -> SentMotion | None:
-        return self.motion
+        return self.motion if self.keeps_back is None else None
+
+    def kept_back(self) -> Rejection | None:
+        return self.keeps_back
 
     def status(self) -> RobotStatus:
         return RobotStatus(0.0, 10.0, 0.0, (0.0,) * 4, (0.0,) * 4)

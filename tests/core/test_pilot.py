@@ -15,7 +15,7 @@ from core.config import Config
 from core.control.alerts import Note
 from core.control.drive_view import LeftOver
 from core.control.faults import Cause, Fault
-from core.control.gate_checks import RejectReason, Source
+from core.control.gate_checks import Rejection, RejectReason, Source
 from core.control.hand import AT_REST, Jog
 from core.control.health import ModelReport
 from core.control.modes import Act, Hindrance, Mode
@@ -711,6 +711,45 @@ def test_a_late_frame_is_counted_and_told_and_changes_nothing(bench: Bench) -> N
     assert bench.mode is Mode.AUTONOMOUS
     assert Fault(Cause.OUT_OF_ORDER, "1 until now") in bench.pilot.view.active
     assert bench.alerts() == {Cause.OUT_OF_ORDER}
+
+
+# ---- a robot that nobody can drive, though its servos are on
+
+
+OUTSIDE = Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, "advance at -7.00 mm (-5 to 400 mm)")
+
+
+def test_a_robot_that_keeps_all_back_is_told_to_who_moves_the_controls_and_nobody_is_shown_as_driving(bench: Bench) -> None:
+    bench.robot.keeps_back = OUTSIDE
+    bench.on().alerts()
+    assert bench.seconds(0.2).alerts() == set()  # nobody has tried
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.permitted is None
+    bench.jog = Jog(advance=1.0)
+    bench.turn()
+    told = {alert.key: alert.detail for alert in bench.pilot.news().alerts}
+    assert told == {RejectReason.MEASURED_OUT_OF_ENVELOPE: "advance at -7.00 mm (-5 to 400 mm)"}
+    bench.robot.keeps_back = None
+    bench.turn()
+    assert bench.pilot.view.permitted is Source.OPERATOR
+
+
+def test_a_robot_that_keeps_all_back_is_not_driven_by_the_program_either(bench: Bench) -> None:
+    bench.robot.keeps_back = OUTSIDE
+    bench.handed_over()
+    bench.seconds(1.0)
+    assert bench.mode is Mode.HOLD
+    assert bench.pilot.view.permitted is None
+    assert bench.alerts() >= {RejectReason.MEASURED_OUT_OF_ENVELOPE, Cause.COMMAND_REJECTED}
+    assert all(source is Source.OPERATOR for source, _, _ in bench.robot.sent)
+
+
+@pytest.mark.parametrize("reason", [RejectReason.NOT_ARMED, RejectReason.NO_COMMAND])
+def test_the_first_turns_after_switching_on_are_not_worth_a_word(bench: Bench, reason: RejectReason) -> None:
+    bench.on().alerts()
+    bench.robot.keeps_back = Rejection(reason)
+    bench.jog = Jog(advance=1.0)
+    assert bench.turn(3).alerts() == set()
 
 
 # ---- orders of events that are seldom

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.control.faults import Cause
-from core.control.gate import RejectReason, Source
+from core.control.gate import Rejection, RejectReason, Source
 from core.safety_config import SafetyConfig
 from core.servo_config import ServosConfig
 from core.types import Command
@@ -27,6 +27,7 @@ from hardware.servos.bus_messages import (
 )
 from hardware.servos.errors import NotReady
 from hardware.servos.jam import JamWatch
+from hardware.servos.lock_step import LockStepServos
 from hardware.servos.one_step import OneStep
 from hardware.servos.shared_slot import SharedSlot
 from hardware.servos.status_block import HardwareError, MissingServo, ServoReading, ServoState
@@ -228,6 +229,65 @@ def test_an_order_from_before_the_arming_does_not_count() -> None:
     bench.cycle()
     assert bench.guard.rejection is not None
     assert bench.guard.rejection.reason is RejectReason.NO_COMMAND
+
+
+def test_a_joint_from_where_no_goal_leads_hinders_arming_and_is_named() -> None:
+    bench = Bench()
+    bench.positions[0], bench.positions[4] = 4.0, -7.0
+    with pytest.raises(NotReady) as told:
+        bench.arm()
+    assert str(told.value) == (
+        "not armed: outside its envelope: right at 4.00 mm (-2.4 to 2.8 mm): move it back by hand, or zero it again; "
+        "outside its envelope: advance at -7.00 mm (-5 to 400 mm): move it back by hand, or zero it again"
+    )
+    assert not bench.guard.armed
+    bench.positions[0], bench.positions[4] = 2.8, -6.0  # one bounded step brings it back
+    bench.arm()
+    bench.cycle()
+    assert bench.guard.sent is not None
+    assert bench.guard.sent.goals_mm[4] == -5.0
+
+
+def test_positions_from_long_ago_and_unknown_ones_hinder_no_arming() -> None:
+    bench = Bench()
+    bench.positions[4] = -7.0
+    bench.cycle()
+    bench.alter = lambda state: replace(state, position_mm=None)  # a lost zero, of which the driver tells
+    for _ in range(6):
+        bench.cycle()
+    bench.guard.check_arming()
+
+
+def test_why_not_even_a_hold_leaves_is_told_also_while_nobody_may_drive() -> None:
+    bench = Bench()
+    bench.permitted = None
+    bench.arm()
+    bench.positions[4] = -7.0  # moved between the check and the first cycle
+    bench.cycle()
+    assert bench.guard.sent is None
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.MEASURED_OUT_OF_ENVELOPE
+    assert bench.guard.rejection.detail == "advance at -7.00 mm (-5 to 400 mm)"
+    bench.positions[4] = 0.0
+    bench.cycle()
+    assert bench.guard.sent is not None
+    assert bench.guard.rejection.reason is RejectReason.NOT_ARMED
+
+
+def test_in_lock_step_the_guard_looks_before_it_arms() -> None:
+    servos = LockStepServos(SERVOS, SAFETY, lambda: 100.0)
+    servos.cycle()
+    servos._at_mm = (0.0, 0.0, 0.0, 0.0, -7.0, 0.0, 0.0)
+    with pytest.raises(NotReady, match=r"advance at -7\.00 mm"):
+        servos.arm()
+    servos.zero(["advance"])
+    servos.arm()
+    servos._at_mm = (0.0, 0.0, 0.0, 0.0, -7.0, 0.0, 0.0)
+    servos.cycle()
+    assert servos.sent_motion() is None
+    assert servos.kept_back() == Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, "advance at -7.00 mm (-5 to 400 mm)")
+    servos.disarm()
+    assert servos.kept_back() is None
 
 
 def test_a_dead_application_moves_a_joint_by_one_step_then_it_holds_then_it_is_disarmed(bench: Bench) -> None:

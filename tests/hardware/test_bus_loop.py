@@ -16,7 +16,7 @@ from hardware.servos.errors import NotReady, ServoError, TorqueStillOn
 from hardware.servos.guard_end import Request
 from hardware.servos.line import LineCounts
 from hardware.servos.servo_robot import ServoRobot
-from hardware.servos.status_block import MissingServo
+from hardware.servos.status_block import HardwareError, MissingServo, ServoState
 
 
 class PaperBus:
@@ -31,6 +31,9 @@ class PaperBus:
 
     def disarm(self) -> None:
         self.told.append("hold")
+
+    def arm(self) -> None:
+        self.told.append("arm")
 
     def read(self) -> tuple[MissingServo, ...]:
         return tuple(MissingServo(joint.name, joint.id, 0.0, 1, "silent") for joint in ServosConfig().joints)
@@ -187,6 +190,29 @@ def test_a_port_that_comes_back_owes_the_torque_off(monkeypatch: pytest.MonkeyPa
     paper.loop._lose_port()
     paper.turn()
     assert paper.bus.told == ["torque off"]
+
+
+def test_arming_looks_where_the_joints_are_now(paper: Paper) -> None:
+    """A quiet bus was not read for long: meanwhile somebody has turned a joint by hand."""
+
+    def reads(advance_mm: float) -> None:
+        places = zip(ServosConfig().joints, (0.0, 0.0, 0.0, 0.0, advance_mm, 0.0, 0.0), strict=True)
+        states = tuple(
+            ServoState(joint.name, joint.id, paper.now_s, 0, 0, at_mm, 0.0, 0.0, 8.0, 12.0, 30.0, HardwareError(0), False, False)
+            for joint, at_mm in places
+        )
+        paper.bus.read = lambda: states  # type: ignore[method-assign]
+
+    paper.end.heartbeat = lambda: None  # type: ignore[attr-defined]
+    for before_mm, now_mm, told in ((0.0, -7.0, []), (-7.0, 0.0, ["arm"])):
+        reads(before_mm)
+        paper.loop._talk()
+        reads(now_mm)
+        paper.hear(request="arm")
+        assert paper.bus.told == told
+    refused, armed = (error for _, error in paper.end.answers)
+    assert "advance at -7.00 mm (-5 to 400 mm)" in str(refused)
+    assert armed is None
 
 
 def test_a_robot_that_is_closed_while_it_connects_keeps_no_bus_process(monkeypatch: pytest.MonkeyPatch) -> None:
