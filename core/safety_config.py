@@ -1,4 +1,7 @@
-"""Thresholds of the gate and of the supervisor. The safety rules' own numbers are the upper ends: they may be tightened only."""
+"""Thresholds of the gate and of the supervisor. The safety rules' own numbers are the upper ends: they may be tightened only.
+
+Nor may they be tightened below what it takes to repeat a thing: a control or deadman that is held would be let go again and again.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,16 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+_REPEATED_S = 0.05
+"""Half as long again as a held key takes to be repeated (33 ms), and twice as long as a held deadman (25 ms)."""
+
 
 class SafetyConfig(BaseModel):
     """When the program holds, disarms or stops. Ages count from the capture of the frame, not from its arrival."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    command_max_age_s: float = Field(0.1, ge=0.02, le=0.1, description="an older command is dropped")
+    command_max_age_s: float = Field(0.1, ge=_REPEATED_S, le=0.1, description="an older command is dropped")
     measurement_max_age_s: float = Field(0.1, ge=0.02, le=0.1, description="older positions of the servos are not believed")
     margin_speed_share: float = Field(0.25, gt=0.0, lt=1.0, description="of max_speed_mm_s, inside the envelope's warn margin")
     pose_hold_s: float = Field(0.15, ge=0.05, le=0.15, description="no pose for so long holds")
@@ -28,7 +34,9 @@ class SafetyConfig(BaseModel):
     hold_clear_s: float = Field(0.5, ge=0.0, le=0.5, description="after that a hold no longer clears itself")
     hold_dwell_s: float = Field(0.1, ge=0.0, le=0.5, description="all must be well for so long before a hold clears itself")
     hold_repeat_s: float = Field(1.0, ge=1.0, le=10.0, description="a hold so soon after the last one is the same hold")
-    deadman_timeout_s: float = Field(0.08, ge=0.03, le=0.08, description="silence that counts as released; with a tick < 100 ms")
+    deadman_timeout_s: float = Field(
+        0.08, ge=_REPEATED_S, le=0.08, description="silence that counts as released; with a tick < 100 ms"
+    )
     operator_quiet_s: float = Field(0.3, ge=0.05, le=2.0, description="no hand-over so shortly after the operator's last input")
     equal_frames: int = Field(5, ge=2, le=5, description="identical pictures in a row that mean a frozen camera")
     dark_frames: int = Field(3, ge=1, le=3, description="black or overexposed pictures in a row that hold")

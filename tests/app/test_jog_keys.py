@@ -11,9 +11,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QSpinBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.jog_keys import KEYS, JogKeys, Motion
+from app.deadman_key import REPEAT_MS
+from app.jog_keys import KEYS, PERIOD_MS, JogKeys, Motion
 from app.widgets.setting_field import NumberEdit
 from core.control.hand import AT_REST, Jog
+from core.safety_config import SafetyConfig
 
 Key = Qt.Key
 NONE = Qt.KeyboardModifier.NoModifier
@@ -241,3 +243,11 @@ def test_every_motion_has_a_key_and_no_key_two_motions() -> None:
     assert set(KEYS) == set(Motion)
     keys = [key for group in KEYS.values() for key in group]
     assert len(keys) == len(set(keys))
+
+
+def test_no_setting_lets_go_of_a_key_or_deadman_before_it_is_repeated() -> None:
+    """With a late timer to spare: it is the window's."""
+    for name, repeat_ms in (("command_max_age_s", PERIOD_MS), ("deadman_timeout_s", REPEAT_MS)):
+        for share in (0.5, 1.0, 1.4):
+            with pytest.raises(ValueError, match=name):
+                SafetyConfig.model_validate({name: share * repeat_ms / 1000.0})

@@ -479,6 +479,13 @@ def test_the_rules_numbers_may_be_tightened_never_loosened(changes: dict[str, fl
         load_config(overrides={"safety": changes})
 
 
+@pytest.mark.parametrize("changes", [{"command_max_age_s": 0.04}, {"deadman_timeout_s": 0.04}])
+def test_nor_may_they_be_tightened_below_what_it_takes_to_repeat_a_thing(changes: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=rf"safety.{next(iter(changes))}.* 0.05") as told:
+        load_config(overrides={"safety": changes})
+    assert "\n" not in str(told.value)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

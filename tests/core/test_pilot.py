@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from core.control.health import ModelReport
 from core.control.modes import Act, Hindrance, Mode
 from core.control.pilot import PERIOD_S, Pilot
 from core.control.policies import make_policy
+from core.safety_config import SafetyConfig
 from core.types import Advice, Points, Reason, Refusal, Route, Scene, Speed
 from tests.core.pilot_bench import ADVICE, WELL, Bench, Policy, scene_at
 
@@ -30,6 +31,20 @@ def bench() -> Iterator[Bench]:
     bench = Bench()
     yield bench
     bench.pilot.close()
+
+
+@pytest.fixture
+def strict() -> Iterator[Callable[..., Bench]]:
+    """Benches with tightened thresholds."""
+    made: list[Bench] = []
+
+    def make(**safety: float) -> Bench:
+        made.append(Bench(Config(safety=SafetyConfig.model_validate(safety))))
+        return made[-1]
+
+    yield make
+    for bench in made:
+        bench.pilot.close()
 
 
 def test_nothing_is_sent_before_the_servos_were_switched_on(bench: Bench) -> None:
@@ -522,6 +537,37 @@ def test_a_pedal_that_is_stuck_since_before_arming_never_counts(bench: Bench, wh
     bench.pilot.ask(Act.HAND_OVER)
     turn(True)
     assert bench.mode is Mode.AUTONOMOUS
+
+
+def test_a_hold_that_never_clears_itself_takes_no_press_away(strict: Callable[..., Bench]) -> None:
+    bench = strict(hold_clear_s=0.0, deadman_timeout_s=0.05)
+    bench.handed_over()
+    assert bench.seconds(0.5).mode is Mode.AUTONOMOUS
+    bench.held = False
+    bench.turn()
+    bench.held = True
+    assert bench.seconds(0.5).mode is Mode.HOLD  # which is what was asked for
+    bench.pilot.ask(Act.HAND_OVER)
+    assert bench.turn().mode is Mode.AUTONOMOUS
+
+
+@pytest.mark.parametrize("phase_s", [0.0, 0.007, 0.013])
+def test_the_soonest_that_a_command_may_be_too_old_is_later_than_a_held_key_is_repeated(
+    strict: Callable[..., Bench], phase_s: float
+) -> None:
+    period_s = 0.033  # app/jog_keys.py
+    bench = strict(command_max_age_s=0.05)
+    bench.on()
+    said_s = bench.now_s + phase_s
+    for turn in range(30):
+        now_s = bench.now_s
+        while said_s <= now_s + PERIOD_S:
+            bench.now_s = said_s
+            bench.pilot.jog("keys", Jog(advance=1.0))
+            said_s += period_s
+        bench.now_s = now_s
+        bench.turn()
+        assert turn < 2 or bench.pilot.view.asked.advance_mm_s > 0.0, turn
 
 
 def test_a_tap_of_the_key_beside_a_held_pedal_holds_nothing(bench: Bench) -> None:

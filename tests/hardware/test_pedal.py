@@ -173,6 +173,12 @@ def test_more_reports_for_a_press_can_be_asked_for() -> None:
     assert play("--DDDDD-", PedalConfig(port="pedal", press_reports=4)) == "?0???110"
 
 
+def test_a_press_counts_however_soon_a_foot_must_be_lifted_after_an_interruption() -> None:
+    config = PedalConfig(port="pedal", resume_s=0.06)
+    assert play("--DDD_DDD", config) == "?0?11 111"
+    assert play("--DDD____DDD-DD", config) == "?0?11    ???0?1"
+
+
 def test_stop_counts_from_any_whole_report_and_from_nothing_else() -> None:
     watch = PedalWatch(CONFIG)
     assert watch.hear(PedalLine(7, False, True), 1.0) == PedalReport(None, True, 1.0)
@@ -501,9 +507,10 @@ def test_a_file_is_no_port(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["silence_s = 0.5", "silence_s = nan", "press_reports = 1", "resume_s = 2", "port = ''", "prot = 'x'"]
+    "text",
+    ["silence_s = 0.5", "silence_s = nan", "press_reports = 1", "resume_s = 2", "resume_s = 0.05", "port = ''", "prot = 'x'"],
 )
-def test_the_configuration_cannot_be_loosened(tmp_path: Path, text: str) -> None:
+def test_the_configuration_cannot_be_loosened_nor_tightened_until_no_press_counts(tmp_path: Path, text: str) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(f"[pedal]\n{text}\n", encoding="utf-8")
     with pytest.raises(ConfigError, match=rf"pedal\.{text.partition(' ')[0]}"):
