@@ -159,6 +159,7 @@ FIXED = (
     "feeds the catheter",
     "seen by eye",
     "up and down are assumed by the order of their ids: one camera cannot tell them apart; swap them if it is wrong",
+    "zero and steering were found with the servos in other places: find them anew",
     "every servo must have one name, and every name one servo",
     "the robot's head is not seen: move the robot until all of its last centimetres are in the picture",
     "too little of the robot is seen: feed it farther into the vessel",
@@ -248,6 +249,8 @@ TEMPLATES = (
     "{joint} by {a} mm (at most {b} mm)",
     "{joint} at {a} mm, sent to {b} mm",
     "restarting servo {a}",
+    "not armed: {why}",
+    "outside its envelope: {where}: move it back by hand, or zero it again",
     # checks before driving
     "QT_QPA_PLATFORM={name}: nothing is shown on a screen",
     "{engine}, first frame in {a} ms: state {state} (true {truth}), theta off by {b} deg, head by {c} px",

@@ -182,13 +182,26 @@ class RigDraft:
         self.set_assignments([replace(one, seen="seen by eye", assumed=False) if one.assumed else one for one in self.assignments])
 
     def set_assignments(self, assignments: Sequence[Assignment]) -> None:
-        """Take over who is who. Raises NotIdentified when a servo has two names, or a name no servo."""
+        """Take over who is who. Raises NotIdentified when a servo has two names, or a name no servo.
+
+        Zero and steering are those of joints: where another servo is one of them, or turns the other way, they are unknown again.
+        """
         names = [one.name for one in assignments]
         ids = {one.id for one in assignments}
         if sorted(names) != sorted(JOINT_NAMES) or len(ids) != len(JOINT_NAMES):
             raise NotIdentified("every servo must have one name, and every name one servo")
         self.assignments = tuple(assignments)
+        before = _wiring(self.config.servos)
         self._set_servos(servo_wizard.identified(self.servos, assignments))
+        if _wiring(self.config.servos) != before:
+            self._forget_motion()
+
+    def _forget_motion(self) -> None:
+        """What was found out by moving the servos, with others in their places."""
+        had = (self.zero, self.zeros, self.steering)
+        self.zero = self.zeros = self.steering = self._head_px = None
+        if any(one is not None for one in had):
+            self.say("zero and steering were found with the servos in other places: find them anew")
 
     def find_zeros(self) -> servo_wizard.Zeros:
         """Leave every tendon where it just becomes taut."""
@@ -246,6 +259,11 @@ class RigDraft:
     def rig_file(self, name: str) -> RigFile:
         """The rig under this name, not saved yet; raises RigFileError."""
         return make_rig(self.config, name, self.calibration())
+
+
+def _wiring(servos: ServosConfig) -> tuple[tuple[int, int], ...]:
+    """Which servo each joint has, and which way it turns."""
+    return tuple((joint.id, joint.sign) for joint in servos.joints)
 
 
 def _most_bent_px(lens: LensConfig) -> float:

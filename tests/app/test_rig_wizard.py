@@ -17,14 +17,15 @@ from app.rig_wizard import RigWizard
 from app.widgets import wizard_servos
 from app.wizard_desk import WizardDesk
 from core.calibration.identify import Assignment
-from core.calibration_config import CalibrationConfig, ScaleConfig
+from core.calibration_config import CalibrationConfig, ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
 from core.config import Config, load_config
 from core.devices import DeviceError
 from core.rig_file import find_rig, list_rigs
-from core.servo_config import JOINT_NAMES
+from core.servo_config import JOINT_NAMES, TENDONS
 from core.types import Frame
 from hardware import calibration_bench
 from hardware.calibration_bench import CalibrationBench
+from hardware.servo_wizard import Zeros
 from hardware.servos.search import FoundPort, FoundServo, FoundServos
 from tests.app.fakes import make_scene, until
 
@@ -264,6 +265,31 @@ def test_servos_are_told_apart_by_hand(opened: RigWizard, qtbot: QtBot) -> None:
     page._ids[0].activated.emit(1)
     assert "every servo must have one name" in opened.message
     assert draft.assignments[0].id == 1
+
+
+@pytest.mark.parametrize("change", ["another servo", "the other way"])
+def test_zero_and_steering_are_of_the_servos_they_were_found_with(opened: RigWizard, qtbot: QtBot, change: str) -> None:
+    _to(opened, opened.identify_page)
+    _with_servos(opened)
+    page, draft = opened.identify_page, opened.desk.draft
+    assert draft is not None
+    named = [Assignment(joint.name, joint.id, joint.sign, "seen") for joint in draft.config.servos.joints]
+    draft.zero = ZeroConfig(ticks=tuple(range(7)), slack_mm=(0.1, 0.2, 0.3, 0.4), pretension_mm=0.3)
+    draft.zeros = Zeros((0.1, 0.2, 0.3, 0.4))
+    tendons = tuple(TendonConfig.model_validate({"name": name, "moved_px": 9.0, "px_per_mm": 6.0}) for name in TENDONS)
+    draft.steering = SteeringConfig(heading_deg=0.0, roll_deg=0.0, disagreement_deg=1.0, tendons=tendons)
+    draft.set_assignments(named)
+    assert opened.zero_page.is_done and opened.steering_page.is_done, "the servos are where they were"
+    if change == "another servo":
+        qtbot.mouseClick(page.swap_button, Qt.MouseButton.LeftButton)
+    else:
+        other = 1 - page._signs[0].currentIndex()
+        page._signs[0].setCurrentIndex(other)
+        page._signs[0].activated.emit(other)
+    assert (draft.zero, draft.zeros, draft.steering, draft.head_px) == (None, None, None, None)
+    assert not opened.zero_page.is_done
+    assert not opened.steering_page.is_done
+    assert "find them anew" in opened.message
 
 
 def test_the_person_is_asked_which_of_two_is_up(opened: RigWizard, qtbot: QtBot) -> None:
