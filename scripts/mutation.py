@@ -74,6 +74,11 @@ EXPLAINED = {
         "Mult -> Div of speed_mm_s * direction",
     ): "a direction is 1 or -1",
     ("joint_limits", "return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit", "Gt -> GtE"): TIE,
+    (
+        "joint_limits",
+        "found.append((kept_mm, Limit.TOGETHER) if abs(kept_mm - goal_mm) > _ROUNDING_MM else (goal_mm, limit))",
+        "Gt -> GtE",
+    ): TIE,
     ("deadman", "reported_s: float = 0.0", "0.0 -> 1.0"): "before the first report nothing is pressed, whenever that was",
 }
 

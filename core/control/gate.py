@@ -10,7 +10,8 @@ every rejection is a hold of all seven joints.
 
 *Limited*, and put on record, because timing, lag and inertia of an honest run do produce it: a step longer than this tick allows at
 the joint's speed and acceleration or inside the warn margin, a rounding error at the envelope's end, and a goal farther than
-``max_step_mm`` from the measured position, which happens whenever a servo lags.
+``max_step_mm`` from the measured position, which happens whenever a servo lags. Joints that move the same catheter share the
+tightest limit of one of them.
 
 No limit ever keeps a joint moving: the acceleration bounds how a joint gets faster, never how it slows down or stops; and when the
 servo falls behind, the goal goes back towards it at up to full speed.
@@ -27,8 +28,8 @@ from dataclasses import dataclass
 
 from core.control import gate_checks as checks
 from core.control.gate_checks import GoalRequest, Measurement, Rejection, RejectReason, Source
-from core.control.joint_limits import Limit, limited_goal
-from core.control.joints import Joints, SentGoals
+from core.control.joint_limits import Goal, Limit, limited_goal, together
+from core.control.joints import ONE_CATHETER, Joints, SentGoals
 from core.safety_config import SafetyConfig
 from core.servo_config import JOINT_NAMES, JointName, ServosConfig
 
@@ -143,12 +144,18 @@ def _move(
     safety: SafetyConfig,
 ) -> GateStep:
     passed_s = min(now_s - base.time_s, safety.command_max_age_s)
+    limited: list[Goal] = [
+        limited_goal(asked_mm, from_mm, speed_mm_s, at_mm, passed_s, joint, safety.margin_speed_share)
+        for asked_mm, from_mm, speed_mm_s, at_mm, joint in zip(
+            request.goals_mm, base.goals_mm, state.speeds_mm_s, measured_mm, servos.joints, strict=True
+        )
+    ]
+    pair = ONE_CATHETER
+    limited[pair] = together(limited[pair], base.goals_mm[pair], measured_mm[pair], servos.joints[pair])
     goals: list[float] = []
     clamps: list[Clamp] = []
-    for place, joint in enumerate(servos.joints):
-        asked_mm, from_mm = request.goals_mm[place], base.goals_mm[place]
-        speed_mm_s, at_mm = state.speeds_mm_s[place], measured_mm[place]
-        goal_mm, limit = limited_goal(asked_mm, from_mm, speed_mm_s, at_mm, passed_s, joint, safety.margin_speed_share)
+    for place, (joint, (goal_mm, limit)) in enumerate(zip(servos.joints, limited, strict=True)):
+        asked_mm, from_mm, at_mm = request.goals_mm[place], base.goals_mm[place], measured_mm[place]
         if abs(goal_mm - from_mm) > joint.max_speed_mm_s * passed_s + _RECORDED_MM:
             detail = f"{joint.name} at {at_mm:.2f} mm, sent to {from_mm:.2f} mm"
             return _hold(state, measured_mm, now_s, Rejection(RejectReason.OFF_COURSE, detail), servos)

@@ -1,7 +1,8 @@
-"""The limits of one joint: how far its goal may go in one tick."""
+"""The limits of one joint, and of those that move the same thing: how far a goal may go in one tick."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 
 from core.servo_config import JointConfig
@@ -10,7 +11,7 @@ _ROUNDING_MM = 1e-9
 
 
 class Limit(StrEnum):
-    """What bounded a goal. ENTRY: the first goal is the measured position; STEP: distance from the measured position."""
+    """What bounded a goal. ENTRY: the first goal is the measured position; STEP: distance from it; TOGETHER: another's limit."""
 
     ENTRY = "bumpless start"
     ENVELOPE = "end of the envelope"
@@ -18,6 +19,11 @@ class Limit(StrEnum):
     RATE = "speed"
     ACCELERATION = "acceleration"
     STEP = "step from the measured position"
+    TOGETHER = "the other servo of the same catheter"
+
+
+Goal = tuple[float, Limit | None]
+"""A joint's goal (mm), and the tightest limit that was applied."""
 
 
 def joint_room(measured_mm: float, joint: JointConfig) -> tuple[float, float]:
@@ -33,7 +39,7 @@ def limited_goal(
     passed_s: float,
     joint: JointConfig,
     margin_speed_share: float,
-) -> tuple[float, Limit | None]:
+) -> Goal:
     """The goal nearest to `asked_mm` that the joint's limits allow, and the tightest limit that was applied.
 
     Parameters
@@ -68,3 +74,29 @@ def limited_goal(
     low_mm, high_mm = joint_room(measured_mm, joint)
     inside_mm = min(max(goal_mm, low_mm), high_mm)
     return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit
+
+
+def together(
+    goals: Sequence[Goal], last_mm: Sequence[float], measured_mm: Sequence[float], joints: Sequence[JointConfig]
+) -> list[Goal]:
+    """The goals of joints that move the same thing: the tightest limit of one of them holds for all, so that none pulls ahead.
+
+    Parameters
+    ----------
+    goals : of each joint by its own limits.
+    last_mm : last goals.
+
+    Returns
+    -------
+    list
+        All go as far as the one that goes least far, and where they would part, none goes. What the step from its measured position
+        demands of a joint, as when it was pushed, comes before that; no joint ever goes farther than by its own limits.
+    """
+    steps = [goal - last for (goal, _), last in zip(goals, last_mm, strict=True)]
+    common_mm = max(0.0, min(steps)) + min(0.0, max(steps))  # forwards or backwards; neither where they would part
+    found: list[Goal] = []
+    for (goal_mm, limit), last, at_mm, joint in zip(goals, last_mm, measured_mm, joints, strict=True):
+        low_mm, high_mm = joint_room(at_mm, joint)
+        kept_mm = min(max(last + common_mm, low_mm), high_mm)
+        found.append((kept_mm, Limit.TOGETHER) if abs(kept_mm - goal_mm) > _ROUNDING_MM else (goal_mm, limit))
+    return found

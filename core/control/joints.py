@@ -18,8 +18,11 @@ Joints = tuple[float, ...]
 """One value per joint, in the order of JOINT_NAMES; millimetres unless said otherwise."""
 NO_GOALS: Joints = (math.nan,) * len(JOINT_NAMES)
 
+ONE_CATHETER = slice(JOINT_NAMES.index("delivery_1"), JOINT_NAMES.index("delivery_2") + 1)
+"""Places of the joints that move the same catheter: driven apart they would stretch or buckle it."""
+
 _TOUCHING_MM = 1e-9
-_ADVANCE, _DELIVERY = JOINT_NAMES.index("advance"), JOINT_NAMES.index("delivery_1")
+_ADVANCE = JOINT_NAMES.index("advance")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +66,8 @@ def joint_goals(
         return JointRequest(tuple(measured_mm))
     elapsed_s = min(max(0.0, now_s - last.time_s), safety.command_max_age_s)
     wanted = [*_tendon_goals(command, last.goals_mm, elapsed_s, servos)]
-    wanted += _fed([last.goals_mm[_ADVANCE]], command.advance_mm_s, elapsed_s, servos.joints[_ADVANCE:_DELIVERY])
-    wanted += _fed(last.goals_mm[_DELIVERY:], command.delivery_mm_s, elapsed_s, servos.joints[_DELIVERY:])
+    wanted += _fed([last.goals_mm[_ADVANCE]], command.advance_mm_s, elapsed_s, servos.joints[_ADVANCE : _ADVANCE + 1])
+    wanted += _fed(last.goals_mm[ONE_CATHETER], command.delivery_mm_s, elapsed_s, servos.joints[ONE_CATHETER])
     goals = tuple(goal for goal, _ in wanted)
     return JointRequest(goals, tuple(joint.name for joint, (_, ended) in zip(servos.joints, wanted, strict=True) if ended))
 

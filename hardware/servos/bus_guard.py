@@ -162,8 +162,8 @@ class BusGuard:
             self.rejection = mistrust(self._measurement, now_s, self._servos, self._safety) or step.rejection
         self.at_end = () if step.is_hold else at_end
         self.clamp_count += len(step.clamps)
-        if self.rejection is not None:
-            self.rejections[self.rejection.reason] += 1
+        if step.rejection is not None:
+            self.rejections[step.rejection.reason] += 1
         return step
 
     def _order_of(self, permitted: Source | None, newest: Order | None, now_s: float) -> Order | None:

@@ -11,8 +11,10 @@ import pytest
 
 from core.control.gate import Clamp, GateState, GateStep, GoalRequest, Measurement, RejectReason, Source, gate_step
 from core.control.joint_limits import Limit
+from core.control.joints import joint_goals
 from core.safety_config import SafetyConfig
 from core.servo_config import JOINT_NAMES, JointConfig, JointName, ServosConfig
+from core.types import Command
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 AT = (0.3, 0.3, 0.3, 0.3, 10.0, 20.0, 20.0)
@@ -491,8 +493,8 @@ def test_a_long_tick_counts_as_no_more_than_a_commands_life() -> None:
 
 
 def test_the_speed_is_remembered_for_the_next_tick() -> None:
-    step = _step(_running(speeds=(0.0,) * 4 + (20.0, 0.0, -20.0)), _ask(_moved(advance=10.3, delivery_2=19.8)))
-    assert step.state.speeds_mm_s == pytest.approx((0.0, 0.0, 0.0, 0.0, 15.0, 0.0, -10.0))
+    step = _step(_running(speeds=(0.0,) * 4 + (20.0, -20.0, -20.0)), _ask(_moved(advance=10.3, delivery_1=19.8, delivery_2=19.8)))
+    assert step.state.speeds_mm_s == pytest.approx((0.0, 0.0, 0.0, 0.0, 15.0, -10.0, -10.0))
     assert step.state.time_s == NOW
     assert step.state.goals_mm == step.goals_mm
 
@@ -506,11 +508,74 @@ def test_asking_twice_at_the_same_time_moves_once_and_keeps_the_speed() -> None:
 
 
 def test_every_clamp_of_a_tick_is_on_record() -> None:
-    step = _step(request=_ask(_moved(right=0.5, delivery_1=20.3)))
+    step = _step(request=_ask(_moved(right=0.5, advance=10.3)))
     assert step.clamps == (
         Clamp("right", 0.5, pytest.approx(0.38), Limit.ACCELERATION),
-        Clamp("delivery_1", 20.3, pytest.approx(20.08), Limit.ACCELERATION),
+        Clamp("advance", 10.3, pytest.approx(10.08), Limit.ACCELERATION),
     )
+
+
+def _delivered(
+    asked_mm: tuple[float, float], last: tuple[float, float], at: tuple[float, float] | None, speed: float
+) -> tuple[tuple[float, float], dict[str, Limit]]:
+    """How far the two joints of the delivery catheter are sent, with the limits on record."""
+    goals = _moved(delivery_1=last[0], delivery_2=last[1])
+    here = _moved(delivery_1=(at or last)[0], delivery_2=(at or last)[1])
+    asked = _moved(delivery_1=last[0] + asked_mm[0], delivery_2=last[1] + asked_mm[1])
+    step = _step(_running(goals, speeds=(0.0,) * 5 + (speed, speed)), _ask(asked), _at(here))
+    assert step.goals_mm is not None
+    assert step.rejection is None
+    moved = step.goals_mm[5] - last[0], step.goals_mm[6] - last[1]
+    return moved, {clamp.joint: clamp.limit for clamp in step.clamps}
+
+
+@pytest.mark.parametrize(
+    ("asked", "last", "at", "moved", "limits"),
+    [
+        ((-0.4, -0.4), (20.0, 120.0), None, (-0.4, -0.4), {}),  # one was zeroed anew: it is the same catheter all the same
+        # near an end at a quarter of the speed, both, whichever of them is near it
+        ((-0.4, -0.4), (-4.0, 96.0), None, (-0.1, -0.1), {"delivery_1": Limit.MARGIN, "delivery_2": Limit.TOGETHER}),
+        ((-0.4, -0.4), (96.0, -4.0), None, (-0.1, -0.1), {"delivery_1": Limit.TOGETHER, "delivery_2": Limit.MARGIN}),
+        ((-0.005, -0.005), (-5.0, 95.0), None, (0.0, 0.0), {"delivery_1": Limit.ENVELOPE, "delivery_2": Limit.TOGETHER}),
+        ((0.4, 0.4), (-5.0, 95.0), None, (0.4, 0.4), {}),  # and away from it both go
+        # one lags by 0.9 mm, or is stuck: the other waits for it
+        ((-0.4, -0.4), (20.0, 20.0), (20.9, 20.0), (-0.1, -0.1), {"delivery_1": Limit.STEP, "delivery_2": Limit.TOGETHER}),
+        ((-0.4, -0.4), (20.0, 20.0), (21.0, 20.0), (0.0, 0.0), {"delivery_1": Limit.STEP, "delivery_2": Limit.TOGETHER}),
+        # pushed back: its goal follows it, and the other stands still
+        ((-0.4, -0.4), (20.0, 20.0), (21.2, 20.0), (0.2, 0.0), {"delivery_1": Limit.STEP, "delivery_2": Limit.TOGETHER}),
+        ((0.0, -0.4), (20.0, 20.0), None, (0.0, 0.0), {"delivery_2": Limit.TOGETHER}),
+        ((0.3, -0.4), (20.0, 20.0), None, (0.0, 0.0), {"delivery_1": Limit.TOGETHER, "delivery_2": Limit.TOGETHER}),
+    ],
+)
+def test_the_two_servos_of_one_catheter_share_the_tightest_limit(
+    asked: tuple[float, float],
+    last: tuple[float, float],
+    at: tuple[float, float] | None,
+    moved: tuple[float, float],
+    limits: dict[str, Limit],
+) -> None:
+    found, by = _delivered(asked, last, at, speed=20.0 if asked[0] > 0 else -20.0)
+    assert found == pytest.approx(moved, abs=1e-9)
+    assert by == limits
+
+
+@pytest.mark.parametrize("speed_mm_s", [-20.0, -10.0, 10.0, 20.0])
+@pytest.mark.parametrize("apart_mm", [-100.0, -1.5, 1.5, 100.0])
+def test_a_catheter_is_never_stretched_on_its_way_to_an_end(speed_mm_s: float, apart_mm: float) -> None:
+    end, way = (-5.0, 1.0) if speed_mm_s < 0 else (400.0, -1.0)
+    near, far = end + 8.0 * way, end + (8.0 + abs(apart_mm)) * way
+    at = _moved(delivery_1=near, delivery_2=far) if apart_mm > 0 else _moved(delivery_1=far, delivery_2=near)
+    state, now_s = GateState(NOW, at, moving=True), NOW
+    for _ in range(150):
+        now_s += TICK
+        assert state.sent is not None
+        goals = joint_goals(Command(delivery_mm_s=speed_mm_s), state.sent, at, now_s, SERVOS, SAFETY).goals_mm
+        request = GoalRequest(goals, Source.OPERATOR, now_s)
+        step = gate_step(state, request, Measurement(at, now_s), Source.OPERATOR, now_s, SERVOS, SAFETY)
+        assert step.goals_mm is not None
+        assert step.goals_mm[5] - step.goals_mm[6] == pytest.approx(at[5] - at[6], abs=1e-9)
+        at, state = step.goals_mm, step.state
+    assert min(abs(at[5] - end), abs(at[6] - end)) < 0.01
 
 
 def test_a_joint_without_a_margin_is_not_slowed() -> None:
