@@ -94,28 +94,29 @@ class PlayerPanels(ScenePanels):
             self._show_values(row)
 
     def show_lost(self, row: RecordedRow | None, place: int) -> None:
-        """A row that cannot be read, or whose picture is lost."""
+        """A row that cannot be read, or whose picture is lost: then its values are shown without it."""
         title = tr("This picture is lost") if row is not None else tr("This row is damaged")
-        self._blank(title, tr("Row {row}; the problems page names it", row=place + 1))
+        self._blank(title, tr("Row {row}; the problems page names it", row=place + 1), row)
         self.notice.show_notice(NoticeKind.WARNING, title, tr("Go on with the arrow keys"))
-        if row is not None:
-            self._show_drive(row)
 
     def show_nothing(self, title: str, detail: str, kind: NoticeKind = NoticeKind.PROGRESS) -> None:
         """No row at all, or not yet."""
         self._blank(title, detail)
         self.notice.show_notice(kind, title, detail)
 
-    def _blank(self, title: str, why: str) -> None:
+    def _blank(self, title: str, why: str, row: RecordedRow | None = None) -> None:
+        """No picture, and nothing of the row before; of `row` what is known without its picture."""
         self.live.clear()
         self.live.show_target(None)
         if self.other is not None:
             self.other.clear()
             self.compared.setText("")
         self._blank_dials(title, why)
+        self._show_drive(row)
+        self._show_values(row)
 
-    def _show_drive(self, row: RecordedRow) -> None:
-        view = row.drive
+    def _show_drive(self, row: RecordedRow | None) -> None:
+        view = row.drive if row is not None else None
         for widget in (self._mode_note, self.mode):
             widget.setVisible(view is not None)
         if view is not None:
@@ -123,10 +124,10 @@ class PlayerPanels(ScenePanels):
         latency_ms = 1000.0 * view.latency_s if view is not None and view.latency_s is not None else None
         self.commands.show_rows(self._provenance.rows(view), latency_ms, view.follow_share if view is not None else None)
 
-    def _show_values(self, row: RecordedRow) -> None:
+    def _show_values(self, row: RecordedRow | None) -> None:
         bar = self.values.verticalScrollBar()
         at = bar.value()
-        self.values.setPlainText("\n".join(value_lines(row)))
+        self.values.setPlainText("\n".join(value_lines(row)) if row is not None else "")
         bar.setValue(at)
 
     def show_problems(self, problems: Sequence[str]) -> None:

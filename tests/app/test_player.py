@@ -500,6 +500,20 @@ def test_a_lost_picture_is_said_and_nothing_of_another_is_shown(open_player: Ope
     assert "No snapshot" in window.panels.toast.text()
 
 
+def test_of_a_lost_picture_the_values_of_its_own_row_are_shown(player: PlayerWindow, qtbot: QtBot) -> None:
+    panels = player.panels
+    player.go(25)
+    at(qtbot, player, 25)
+    until(qtbot, lambda: panels.values.toPlainText().startswith("frame 25 of the camera"))
+    row = player._reader.row(58)
+    panels.show_lost(row, 58)
+    assert panels.values.toPlainText().startswith("frame 58 of the camera")
+    assert (panels.mode.mode, panels.mode.isVisible()) == (Mode.ARMED, True)
+    panels.show_lost(None, 59)
+    assert panels.values.toPlainText() == "", "nobody knows what stood in a damaged row"
+    assert not panels.mode.isVisible()
+
+
 def test_a_session_without_rows_says_what_to_do(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
     folder = record(tmp_path, [tick_of(0, FIRST_S)])
     (folder / "frames.jsonl").unlink()
