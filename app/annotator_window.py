@@ -156,9 +156,10 @@ class AnnotatorWindow(WindowFrame):
     def _on_failed(self, line: str, is_edit: bool) -> None:
         if is_edit:
             self.panels.header.show_unsaved(self._desk.unsaved, line)
-        elif not self._desk.is_open:
-            self.panels.readout.show_annotation(Annotation(), Readout(missing=tr("this image cannot be shown")))
-        self.panels.bar.set_switch("H", False)
+        else:
+            if not self._desk.is_open:
+                self.panels.readout.show_annotation(Annotation(), Readout(missing=tr("this image cannot be shown")))
+            self.panels.bar.set_switch("H", False)
         self.say(line, is_fault=True)
 
     # ---- edits
@@ -290,10 +291,10 @@ class AnnotatorWindow(WindowFrame):
         self._desk.propose()
 
     def _show_proposal(self) -> None:
+        """The answer, if the rater still wants it: it biases him. One that he has switched off is kept for the next time."""
         proposal, item = self._desk.proposal, self._desk.item
-        if proposal is None or item is None or not self._desk.is_open:
+        if proposal is None or item is None or not self._desk.is_open or not self.panels.bar.is_on("H"):
             return
-        self.panels.bar.set_switch("H", True)
         self.panels.canvas.show_proposal(turn_annotation(proposal.annotation, item.view, item.image.record.size))
         if proposal.pose is not None:
             pose = proposal.pose
@@ -314,7 +315,8 @@ class AnnotatorWindow(WindowFrame):
         """Lines with a line tool, the tool's masks with a mask tool; undo brings the own ones back."""
         proposal, item = self._desk.proposal, self._desk.item
         if self._desk.blind or item is None or proposal is None:
-            self.toggle_proposal()
+            if self._desk.blind or not self.panels.bar.is_on("H"):  # else the answer is waited for
+                self.toggle_proposal()
             return
         shown = turn_annotation(proposal.annotation, item.view, item.image.record.size)
         annotation, target = self._desk.annotation, self.panels.canvas.tool.value.target

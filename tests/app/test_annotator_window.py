@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -27,7 +28,8 @@ from core.study.annotation_proposal import Proposal, proposal_of
 from core.study.annotation_records import ItemKey, StoredAnnotation
 from core.study.annotation_store import AnnotationStore
 from core.study.annotations import Annotation, AnnotationError, MaskPolygon, MaskTarget, View, measure_lines
-from core.types import Frame, Point, PoseState
+from core.types import Frame, Point, PoseState, Scene
+from tests.app.fakes import make_scene
 
 Key = Qt.Key
 SIZE = (640, 480)
@@ -356,6 +358,28 @@ def test_the_algorithms_answer_is_shown_and_taken_over_on_demand(rater: Rater) -
     assert (drawn(rater).robot, drawn(rater).vessel, drawn(rater).state, drawn(rater).masks) == (ROBOT, VESSEL, None, ())
     rater.press(Key.Key_4, Key.Key_G)
     assert drawn(rater).masks == (box,)
+
+
+def test_an_answer_that_comes_after_it_was_switched_off_is_not_shown(rater: Rater) -> None:
+    may_answer, pose = threading.Event(), measure_lines(Annotation(ROBOT, VESSEL), SIZE, PerceptionConfig()).pose
+
+    def perceive(_frame: Frame) -> Scene:
+        may_answer.wait(20.0)
+        return make_scene(pose)
+
+    rater.desk._perceive = perceive
+    bar = rater.window.panels.bar
+    rater.press(Key.Key_H)
+    rater.press(Key.Key_G)
+    assert bar.is_on("H"), "what is waited for cannot be taken over yet, and is waited for"
+    rater.press(Key.Key_H)
+    may_answer.set()
+    rater.qtbot.waitUntil(lambda: rater.desk.proposal is not None)
+    assert not bar.is_on("H")
+    assert rater.canvas.proposal is None
+    assert "Algorithm:" not in rater.window.panels.toast.text()
+    rater.press(Key.Key_H)
+    assert rater.canvas.proposal is not None, "the answer was kept"
 
 
 def test_without_an_answer_of_the_algorithm_it_says_why(rater: Rater) -> None:
