@@ -205,7 +205,8 @@ def _find_zero(bench: Bench, servos: ServosConfig, name: str, then_mm: float, ma
     Raises NeverTaut, HeadNotSeen, DeviceError: it is where it was.
     """
     joint = servos.joints[JOINT_NAMES.index(name)]
-    limits = ProbeLimits(-_SLACK_MM - _PARK_MM, _REACH_MM, max_current_ma=max_current_ma)
+    # A wire that stood too tight is taut below where it was let go to, and hangs lower still: a probe stops at its limits.
+    limits = ProbeLimits(-_SLACK_MM - 2.0 * _PARK_MM, _REACH_MM, max_current_ma=max_current_ma)
     with bench.hands.probe(servos, joint.id, limits, joint.sign) as probe, _or_back(lambda: probe.move_to(0.0)):
         probe.move_to(-_SLACK_MM)
         rest = _look(bench, probe)

@@ -23,7 +23,7 @@ _STARTS = 401
 
 
 class NeverTaut(UserError):
-    """The head did not follow the wire."""
+    """The head did not follow the wire, or the wire was never slack: nobody can tell where it becomes taut."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +54,7 @@ def taut_at_mm(steps: Sequence[Step]) -> float:
     Raises
     ------
     NeverTaut
-        Fewer than two steps moved the head.
+        Fewer than two steps moved the head, or all of them did: then it was taut somewhere before the first.
     """
     sideways = max(abs(step.move.lateral_px) for step in steps) >= _ENOUGH_SIDEWAYS_PX
     least = _LEAST_SIDEWAYS_PX if sideways else math.sqrt(_LEAST_SHORTENING_PX)
@@ -65,11 +65,13 @@ def taut_at_mm(steps: Sequence[Step]) -> float:
         first -= 1
     if len(ways) - first < _LEAST_POINTS:
         raise NeverTaut("the head does not follow the wire: is it hung in, does the head lie free? Or zero it by eye")
+    if first == 0:
+        raise NeverTaut("the wire was taut before it was pulled: loosen it, then try again, or zero it by eye")
     at = np.array([step.position_mm for step in steps])
     if np.polyfit(at[first:], np.array(ways[first:]), 1)[0] <= 0.0:
         raise NeverTaut("the head does not follow the wire's pull: pull it by hand, or zero it by eye")
     # A root makes much of the little that noise does while the wire is slack; and the last step before may show some of its way.
-    slack = max(0, first - 1)
+    slack = first - 1
     told = np.array([0.0] * slack + ways[first:])
     return _start_of_line(np.concatenate([at[:slack], at[first:]]), told, float(at[first]))
 

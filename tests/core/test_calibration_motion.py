@@ -241,6 +241,12 @@ def test_a_head_that_goes_by_half_pixels_is_followed_back_by_what_it_did_before(
     assert taut_at_mm(steps) == pytest.approx(1.5, abs=0.25)
 
 
+def test_a_wire_that_was_never_slack_is_told() -> None:
+    steps = [Step(at, _move(-20.0 * (at - 0.2))) for at in (0.3, 0.36, 0.42, 0.48)]  # taut at 0.2 mm, before the first of them
+    with pytest.raises(NeverTaut, match="taut before it was pulled: loosen it"):
+        taut_at_mm(steps)
+
+
 def test_a_wire_that_is_hung_out_is_told() -> None:
     with pytest.raises(NeverTaut):
         taut_at_mm([Step(at, _move(0.2)) for at in (0.0, 0.5, 1.0)])

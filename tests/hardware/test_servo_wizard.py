@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
 
 from core.calibration.identify import NotIdentified
-from core.calibration.look import HeadNotSeen, Look, angle_deg, turn_deg
+from core.calibration.look import HeadMove, HeadNotSeen, Look, angle_deg, turn_deg
 from core.config import Config
 from core.devices import DeviceError
-from core.servo_config import JOINT_NAMES, ServosConfig
+from core.servo_config import JOINT_NAMES, TENDONS, ServosConfig
 from core.types import Command
 from hardware import servo_wizard
 from hardware.servo_wizard import Bench
 from hardware.servos import units
-from hardware.servos.probe import ProbeFailed, ProbeLimits, Stopped, probe_config
+from hardware.servos.probe import ProbeFailed, ProbeLimits, Stopped, StopSwitch, probe_config
 from tests.hardware.lock_bench import LockTwin, lock_bench
 
 WIRING = "3,-7,1,-12,-5,2,-4"  # tendons right, left, up, down; advance; two of the catheter
@@ -249,3 +249,73 @@ def test_a_servo_that_nobody_knows_yet_moves_nothing_farther_or_faster_than_aske
         assert 0.0 < _way_mm(servos, made, servo_id, asked_mm) <= asked_mm + 0.01
     real = next(joint for joint in servos.joints if joint.id == servo_id)
     assert units.velocity_mm_s(real, units.profile_velocity(made.joints[JOINT_NAMES.index("advance")])) <= 4.0
+
+
+class _Wires:
+    """Four tendons and a head that goes 20 px with each millimetre of a taut one; a probe goes nowhere beyond its limits."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, **taut_mm: float) -> None:
+        self.servos = ServosConfig()
+        self.taut_mm = {joint.id: taut_mm.get(joint.name, 0.2) for joint in self.servos.joints[:4]}
+        self.at_mm = dict.fromkeys(self.taut_mm, 0.0)
+        self._pulled = 0
+        monkeypatch.setattr(servo_wizard, "_look", lambda _bench, _mover: self._pulls_mm())
+        monkeypatch.setattr(servo_wizard, "head_move", self._head_move)
+
+    def _pulls_mm(self) -> dict[int, float]:
+        return {servo_id: max(0.0, at - self.taut_mm[servo_id]) for servo_id, at in self.at_mm.items()}
+
+    def _head_move(self, rest: dict[int, float], now: dict[int, float]) -> HeadMove:
+        lateral_px = 20.0 * (now[self._pulled] - rest[self._pulled])
+        return HeadMove(np.array([lateral_px, 0.0]), lateral_px, longer_px=0.0)
+
+    @contextmanager
+    def probe(
+        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: int, ids: tuple[int, ...] | None = None
+    ) -> Iterator[_WireProbe]:
+        self._pulled = servo_id
+        yield _WireProbe(self.at_mm, servo_id, limits)
+
+    def find(self) -> servo_wizard.Zeros:
+        return servo_wizard.find_zeros(Bench(None, self, StopSwitch()), self.servos, lambda _: None)  # type: ignore[arg-type]
+
+    def too_tight_mm(self) -> list[float]:
+        return [self.at_mm[servo_id] - taut for servo_id, taut in self.taut_mm.items()]
+
+
+class _WireProbe:
+    def __init__(self, at_mm: dict[int, float], servo_id: int, limits: ProbeLimits) -> None:
+        self._at_mm, self._id, self._limits, self._zero_mm = at_mm, servo_id, limits, at_mm[servo_id]
+
+    @property
+    def position_mm(self) -> float:
+        return self._at_mm[self._id] - self._zero_mm
+
+    def move_to(self, target_mm: float) -> None:
+        self._at_mm[self._id] = self._zero_mm + max(self._limits.low_mm, min(self._limits.high_mm, target_mm))
+
+    def pause(self, seconds: float) -> None: ...
+    def alive(self) -> None: ...
+
+
+@pytest.mark.parametrize("name", ["right", "left", "up", "down"])
+@pytest.mark.parametrize("too_tight_mm", [-1.0, 0.0, 0.8, 1.2, 1.4, 1.6, 1.75])
+def test_a_wire_that_stood_too_tight_is_left_where_it_is_taut(
+    monkeypatch: pytest.MonkeyPatch, name: str, too_tight_mm: float
+) -> None:
+    wires = _Wires(monkeypatch, **{name: -too_tight_mm})
+    found = wires.find()
+    assert found.problems == ()
+    assert wires.too_tight_mm() == pytest.approx([0.0] * 4, abs=0.1)
+    assert found.slack_mm[TENDONS.index(name)] == pytest.approx(-too_tight_mm, abs=0.1)
+
+
+@pytest.mark.parametrize("too_tight_mm", [1.85, 1.9, 2.0, 2.5, 4.0])
+def test_a_wire_that_stood_far_too_tight_is_named_and_left_where_it_was(
+    monkeypatch: pytest.MonkeyPatch, too_tight_mm: float
+) -> None:
+    wires = _Wires(monkeypatch, right=-too_tight_mm)
+    found = wires.find()
+    assert [problem.partition(":")[0] for problem in found.problems] == ["right"]
+    assert found.slack_mm[0] == 0.0
+    assert wires.too_tight_mm() == pytest.approx([too_tight_mm, 0.0, 0.0, 0.0], abs=0.1)
