@@ -104,6 +104,7 @@ class RealSenseSensor:
         self._sensor: Any = None
         self._queue: Any = None
         self._clock = CaptureClock()
+        self._own_serial: str | None = None
         self.info: RealSenseInfo | None = None
 
     @property
@@ -122,6 +123,7 @@ class RealSenseSensor:
             sensor.open(profile)
             self._sensor = sensor
             sensor.start(self._queue)
+            self._own_serial = self.info.serial
         except RuntimeError as error:
             self.stop()
             raise DeviceError(f"{self.name} cannot be started ({_short(error)}): close other programs that use it") from None
@@ -164,11 +166,16 @@ class RealSenseSensor:
 
     def _find(self) -> Any:
         devices = list(self._context.query_devices())
-        wanted = self._config.serial
+        wanted = self._config.serial if self._config.serial is not None else self._own_serial
         chosen = [device for device in devices if wanted in {None, _info(device, rs.camera_info.serial_number)}]
         if len(chosen) == 1:
             return chosen[0]
         serials = ", ".join(sorted(_info(device, rs.camera_info.serial_number) for device in devices))
+        if devices and self._own_serial is not None:
+            # Another camera's pictures must not take the place of a lost one's: somebody is driving by them.
+            raise DeviceError(
+                f"{self.name} {wanted} is not there any more (there are: {serials}): plug it in, or start again with another one"
+            )
         if len(chosen) > 1:
             raise DeviceError(f"{len(chosen)} RealSense cameras ({serials}): set camera.serial to one of them")
         if devices:

@@ -347,6 +347,42 @@ def test_of_two_cameras_one_must_be_chosen() -> None:
     assert chosen.info is not None and chosen.info.serial == "f2"
 
 
+def test_another_realsense_camera_does_not_take_the_place_of_a_lost_one() -> None:
+    """Somebody is driving by the pictures of the first."""
+    own, other = SoftRealSense("f1"), SoftRealSense("f2")
+    there = [own]
+
+    def plugged() -> object:
+        context = rs.context()
+        for camera in there:
+            camera.device.add_to(context)
+        return context
+
+    sensor = RealSenseSensor(CONFIG, plugged)
+    sensor.start()
+    sensor.stop()
+    there[:] = [other]
+    with pytest.raises(DeviceError, match=r"RealSense L515 f1 is not there any more \(there are: f2\): plug it in"):
+        sensor.start()
+    there[:] = []
+    with pytest.raises(DeviceError, match="no RealSense camera: plug it"):
+        sensor.start()
+    there[:] = [other, own]  # no choice to be made either: it is known which one
+    sensor.start()
+    sensor.stop()
+    assert sensor.info is not None and sensor.info.serial == "f1"
+
+
+def test_a_realsense_camera_that_was_never_started_may_be_another_one() -> None:
+    soft = SoftRealSense("f1")
+    sensor = RealSenseSensor(CONFIG.model_copy(update={"width_px": 8}), soft.context)
+    with pytest.raises(DeviceError, match="has no 8x"):
+        sensor.start()
+    sensor._make_context = SoftRealSense("f2").context
+    with pytest.raises(DeviceError, match="has no 8x"):
+        sensor.start()
+
+
 @pytest.mark.parametrize("how", ["unplugged", "stalled"])
 def test_a_realsense_camera_is_lost_and_found(how: str) -> None:
     with SoftRealSense() as soft:
