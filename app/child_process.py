@@ -18,6 +18,8 @@ from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 ROOT = Path(__file__).resolve().parent.parent
 LOW_PRIORITY = 14
+NOT_STARTED = 127
+"""Exit code of a process that there never was, as a shell has it."""
 _TAIL_BYTES = 8192
 
 
@@ -84,7 +86,7 @@ class ChildProcess(QObject):
         except OSError as error:
             if errors is not None:
                 errors.close()
-            self._over.emit(127, f"cannot be started ({error.strerror or error})")
+            self._over.emit(NOT_STARTED, f"cannot be started ({error.strerror or error})")
             return
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, self._process.pid, os.getpriority(os.PRIO_PROCESS, 0) + self._priority)

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from PySide6.QtCore import QObject, Signal
 
-from app.child_process import ChildProcess, command_of
+from app.child_process import NOT_STARTED, ChildProcess, command_of
 from app.language import tr, tr_text
 from app.widgets.offer_strip import Answer, Offer
 from app.work_thread import WorkThread
@@ -120,6 +120,9 @@ class RecoveryDesk(QObject):
     def _on_measured(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
         self._child = None
         lost = told.get("lost")
+        if _says_nothing(code):
+            self._offer_again(session, code, line, self._measure_next)
+            return
         if code != 0 or not isinstance(lost, dict):
             never = Answer(tr("Never"), lambda: self._decline(session), tr("Do not ask again for this one"))
             text = tr("A recording was cut, and it cannot be recovered")
@@ -145,6 +148,19 @@ class RecoveryDesk(QObject):
                 dismissed=self._next,
             )
         )
+
+    def _offer_again(self, session: Path, code: int, line: str, again: Callable[[], None]) -> None:
+        """The session may well be recovered, at another time; so nothing is said against it."""
+        if code == NOT_STARTED:
+            text = tr("A recording was cut; the program that recovers it could not be started")
+        else:
+            text = tr("A recording was cut; the program that recovers it was ended from outside")
+        why = f": {tr_text(line)}" if line else ""
+        answers = (
+            Answer(tr("Try again"), again, tr("Once there is memory and room on the disk, for instance")),
+            Answer(tr("Not now"), self._next, tr("Ask again at the next start")),
+        )
+        self._offers.offer(Offer(_KEY, text, f"{session.name}{why}", answers, is_fault=True, dismissed=self._next))
 
     def _next(self) -> None:
         self._waiting.pop(0)
@@ -176,6 +192,9 @@ class RecoveryDesk(QObject):
 
     def _on_recovered(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
         self._child = None
+        if _says_nothing(code):
+            self._offer_again(session, code, line, lambda: self._recover(session))
+            return
         self._offers.withdraw(_KEY)
         if code == 0 and "session" in told:
             words = loss_words(told["lost"])
@@ -192,6 +211,11 @@ class RecoveryDesk(QObject):
         self._child.told.connect(on_told)
         self._child.ended.connect(on_ended)
         self._child.start()
+
+
+def _says_nothing(code: int) -> bool:
+    """Whether a process never began, or a signal ended it: that tells nothing of the session."""
+    return code == NOT_STARTED or code < 0
 
 
 def loss_words(lost: dict[str, Any]) -> str:

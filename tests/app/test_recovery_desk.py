@@ -12,6 +12,7 @@ import pytest
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
+from app import recovery_desk
 from app.recovery_desk import Declined, RecoveryDesk, loss_words
 from app.widgets.offer_strip import OfferStrip
 from core.session.files import is_being_written
@@ -134,6 +135,66 @@ def test_what_cannot_be_recovered_is_said_and_can_be_declined(
     assert "nothing left to recover" in strip.text
     strip.answers["Never"].click()
     assert Declined(tmp_path / "state" / "declined.json").names() == {session.name}
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        (["/nowhere/python"], "could not be started"),
+        (["/bin/sh", "-c", "kill -9 $$"], "was ended from outside"),
+    ],
+)
+@pytest.mark.parametrize("what", ["looking", "recovering"])
+def test_a_process_that_says_nothing_is_no_word_against_the_session_and_can_be_tried_again(
+    desk: RecoveryDesk,
+    strip: OfferStrip,
+    qtbot: QtBot,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    what: str,
+    command: list[str],
+    told: str,
+) -> None:
+    session = cut(tmp_path / "sessions")
+    copies: list[Path] = []
+    desk.recovered.connect(lambda copy, _words: copies.append(copy))
+    if what == "recovering":
+        desk.look()
+        qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
+    with monkeypatch.context() as broken:
+        broken.setattr(recovery_desk, "command_of", lambda *_: command)
+        if what == "recovering":
+            strip.answers["Recover"].click()
+        else:
+            desk.look()
+        qtbot.waitUntil(lambda: "Try again" in strip.answers, timeout=LONG_MS)
+        assert told in strip.text
+        assert session.name in strip.text
+        assert "cannot be recovered" not in strip.text
+        assert "Never" not in strip.answers  # nobody knows anything against it
+        strip.answers["Try again"].click()
+        qtbot.waitUntil(lambda: desk._child is None and "Try again" in strip.answers, timeout=LONG_MS)
+    strip.answers["Try again"].click()
+    if what == "looking":
+        qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
+        strip.answers["Recover"].click()
+    qtbot.waitUntil(lambda: bool(copies), timeout=LONG_MS)
+    assert not strip.isVisible()
+
+
+def test_a_session_that_could_not_be_looked_at_is_asked_for_again_at_the_next_start(
+    desk: RecoveryDesk, strip: OfferStrip, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cut(tmp_path / "sessions")
+    with monkeypatch.context() as broken:
+        broken.setattr(recovery_desk, "command_of", lambda *_: ["/nowhere/python"])
+        desk.look()
+        qtbot.waitUntil(lambda: "Not now" in strip.answers, timeout=LONG_MS)
+        strip.answers["Not now"].click()
+    assert not strip.isVisible()
+    assert not Declined(tmp_path / "state" / "declined.json").names()
+    desk.look()
+    qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
 
 
 def test_a_folder_that_is_not_there_and_whole_sessions_offer_nothing(
