@@ -166,6 +166,7 @@ FIXED = (
     "the robot's end has no direction: feed it farther into the vessel",
     "the head does not follow the wire: is it hung in, does the head lie free? Or zero it by eye",
     "the head does not follow the wire's pull: pull it by hand, or zero it by eye",
+    "the wire was taut before it was pulled: loosen it, then try again, or zero it by eye",
     "board",
     "two clicks",
     # what is still to be drawn in an annotation
@@ -338,6 +339,7 @@ TEMPLATES = (
     "{camera} is lost ({why}): check its cable",
     "{camera} is lost: check its cable",
     "{camera} ({node}) cannot be opened: close other programs that use it, or join the group video",
+    "{camera} {serial} is not there any more (there are: {serials}): plug it in, or start again with another one",
     "webcam {camera} is not there; webcams: {paths}: plug it in, or set camera.device",
     "the camera's picture is {kind} {shape}, not 8-bit RGB: set its colour format",
     "{path}: cannot be read as a video ({why})",
