@@ -22,7 +22,7 @@ class ProfileRow(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.combo = QuietCombo(tr("Profile"))
+        self.combo = QuietCombo(tr("Profile"), keeps_focus=True)
         self.combo.setMinimumWidth(190)
         self.combo.setToolTip(tr("Takes all settings from a profile; nothing is kept before you save"))
         self.save_button, self.delete_button = QPushButton(tr("Save as")), QPushButton(tr("Delete"))

@@ -19,11 +19,16 @@ class QuietCombo(QComboBox):
     """A click opens it, or Enter when Tab has come to it; in the open list the arrows choose, Enter takes and Escape leaves.
 
     Closed it takes no key and no turn of the wheel: neither may choose something by the way.
+
+    Parameters
+    ----------
+    name : for screen readers.
+    keeps_focus : in a dialog, which is gone through by keyboard. Else the keys are the robot's again once the list is closed.
     """
 
-    def __init__(self, name: str) -> None:
-        """`name` is for screen readers."""
+    def __init__(self, name: str, *, keeps_focus: bool = False) -> None:
         super().__init__()
+        self._keeps_focus = keeps_focus
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         name_list(self, name)
 
@@ -38,4 +43,5 @@ class QuietCombo(QComboBox):
 
     def hidePopup(self) -> None:
         super().hidePopup()
-        self.clearFocus()
+        if not self._keeps_focus:
+            self.clearFocus()

@@ -114,7 +114,7 @@ class SettingField(QFrame):
             editor = _Switch()
             editor.toggled.connect(lambda on: self.edited.emit(setting.key, on))
         elif setting.kind is Kind.CHOICE:
-            editor = QuietCombo(tr(setting.title))
+            editor = QuietCombo(tr(setting.title), keeps_focus=True)
             for choice in setting.choices:
                 editor.addItem(as_text(choice).replace("_", " "), choice)
             combo = editor

@@ -5,12 +5,13 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QLineEdit
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit
 from pytestqt.qtbot import QtBot
 
 from app.settings_dialog import SettingsDialog
 from app.settings_model import SettingsDraft
 from app.widgets.browse_button import WANTED
+from app.widgets.profile_row import ProfileRow
 from app.widgets.setting_field import NumberEdit, SettingField
 from core.config import RESOURCES, Config, load_config
 from core.config_schema import schema, settings_by_key
@@ -72,6 +73,21 @@ def test_a_field_shows_unit_default_range_and_meaning(dialog: SettingsDialog) ->
         assert words in texts
     assert shown.editor.accessibleName() == "Allowed distance, px"
     assert shown.toolTip() == D_ALLOW
+
+
+@pytest.mark.parametrize("where", ["setting", "profile"])
+def test_a_choice_by_keyboard_keeps_the_focus_where_it_was(dialog: SettingsDialog, qtbot: QtBot, where: str) -> None:
+    combo = field(dialog, "rig.robot").editor if where == "setting" else dialog.findChild(ProfileRow).combo
+    assert isinstance(combo, QComboBox)
+    combo.setFocus()
+    before = combo.currentText()
+    QTest.keyClick(combo, Key.Key_Return)
+    qtbot.waitUntil(combo.view().isVisible)
+    QTest.keyClick(combo.view(), Key.Key_Down)
+    QTest.keyClick(combo.view(), Key.Key_Return)
+    qtbot.waitUntil(lambda: not combo.view().isVisible())
+    assert combo.currentText() != before
+    assert dialog.focusWidget() is combo, "Tab goes on from here"
 
 
 def test_typing_is_checked_at_once_and_marked(dialog: SettingsDialog) -> None:
