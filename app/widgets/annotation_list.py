@@ -9,11 +9,17 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QListView, QSizePolicy, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QVBoxLayout, QWidget
 
 from app import palette, theme
-from app.language import tr
+from app.language import mark, tr
 from core.study.annotations import Status
 
 _ROW = 30
 _MARK = {Status.NEW: "", Status.BEGUN: "\N{HORIZONTAL ELLIPSIS}", Status.DONE: "\N{CHECK MARK}", Status.CANNOT_TELL: "?"}
+_WORD = {
+    Status.NEW: mark("new"),
+    Status.BEGUN: mark("begun"),
+    Status.DONE: mark("done"),
+    Status.CANNOT_TELL: mark("can't tell"),
+}
 _ROLE = {
     Status.NEW: "TEXT_FAINT",
     Status.BEGUN: "ORANGE",
@@ -52,7 +58,7 @@ class QueueModel(QAbstractListModel):
             return self._has_masks(row)
         if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
             masks = tr(", with masks") if self._has_masks(row) else ""
-            return f"{row + 1}: {self._names[row]}: {self._status(row).value}{masks}"
+            return f"{row + 1}: {self._names[row]}: {tr(_WORD[self._status(row)])}{masks}"
         return None
 
     def renew(self, row: int) -> None:

@@ -88,7 +88,7 @@ def _lines_of(status: RecordStatus) -> tuple[str, str]:
     if status.recording:
         minutes, seconds = divmod(int(status.elapsed_s), 60)
         size = f"{status.bytes / 1e6:.0f} MB" if status.bytes < 1e9 else f"{status.bytes / 1e9:.1f} GB"
-        return f"{minutes}:{seconds:02d}", f"{status.dropped} dropped" if status.dropped else size
+        return f"{minutes}:{seconds:02d}", tr("{count} dropped", count=status.dropped) if status.dropped else size
     if status.problem:
         return tr("Record"), tr("stopped: disk?")
     if status.armed:

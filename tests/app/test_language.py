@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QLocale, QTranslator
+from PySide6.QtCore import QCoreApplication, QLocale, Qt, QTranslator
 from PySide6.QtGui import QFontDatabase
 from PySide6.QtWidgets import QApplication, QDialogButtonBox, QMenu
 from pytestqt.qtbot import QtBot
@@ -23,13 +23,17 @@ from app.menus import plain
 from app.operator_window import OperatorWindow
 from app.settings_desk import SettingsDesk
 from app.tool_tips import QUANTITY, tip
+from app.widgets.annotation_list import QueueModel
+from app.widgets.record_bar import RecordBar
 from app.wording import advice_headline
 from core.config import Config, QualityConfig
 from core.config_schema import Bounds
 from core.control.alerts import ALERTS
 from core.perception.quality import check_kind, hinted
 from core.profiles import Profiles
+from core.session.record_status import RecordStatus
 from core.settings_file import read_settings
+from core.study.annotations import Status
 from core.types import Advice, Reason, Refusal, Speed
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine
@@ -327,6 +331,17 @@ def test_the_window_opens_in_chinese(
     assert panels.pages.tabText(0) == "驾驶"
     panels.help.toggle()
     assert all(HAN.search(title) and all(HAN.search(text) for _, text in rows) for title, rows in panels.help.tables)
+
+
+def test_counts_of_the_record_bar_and_statuses_of_the_queue_are_looked_up(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(language._IN_USE, "lookup", lambda text: f"<{text}>")
+    bar = RecordBar()
+    qtbot.addWidget(bar)
+    bar.show_status(RecordStatus(recording=True, dropped=5))
+    assert "<5 dropped>" in bar.text
+    for status in Status:
+        queue = QueueModel(["a.png"], lambda _row, status=status: status, lambda _row: False)
+        assert queue.index(0).data(Qt.ItemDataRole.ToolTipRole) == f"1: a.png: <{status.value}>"
 
 
 def test_what_is_recorded_meanwhile_is_english(
