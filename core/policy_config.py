@@ -43,6 +43,7 @@ class PursuitConfig(_Section):
     retry_mm: float = Field(9.0, gt=0.0, le=50.0, description="way back from where a missed branch lies beside the head")
     arrive_px: float = Field(8.0, ge=1.0, le=100.0, description="way left at which the target counts as reached")
     most_misses: int = Field(2, ge=1, le=100, description="after missing a branch so often it gives up and stops")
+    most_tries: int = Field(4, ge=1, le=100, description="backed off so often without coming farther: it gives up and stops")
 
     @model_validator(mode="after")
     def _check_limits(self) -> Self:

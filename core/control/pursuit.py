@@ -9,15 +9,17 @@ from __future__ import annotations
 import math
 
 from core.config import AdviceConfig
-from core.control.stall import BackOff, ContactLimit, Lean, Misses, Stall
+from core.control.stall import BackOff, ContactLimit, Feed, Lean, Misses, Stall, Tries
 from core.control.way import Way, limited, look_ahead
 from core.policy_config import PursuitConfig
 from core.types import Advice, RobotStatus, Scene, Speed
 
 _UNFOLLOWED_S = 1.0
 """Who does not take the robot back for so long meant something else; if the reason is gone, the advice is, too."""
-_STILL_MM_S = 0.3
-"""Servos at rest measure a little motion, too."""
+_LONGEST_S = 0.15
+"""A frame counts for no longer than this, so that after a pause no single one decides."""
+_PAUSE_S = 0.5
+"""What was watched before such a pause says nothing of what comes after it."""
 
 
 class Pursuit:
@@ -37,10 +39,11 @@ class Pursuit:
         self._contact = ContactLimit(self._config)
         self._lean = Lean(self._config)
         self._misses = Misses()
+        self._tries = Tries()
+        self._feed = Feed()
         self._back: BackOff | None = None
         self._behind_s = 0.0
         self._unfollowed_s = 0.0
-        self._insertion_mm: float | None = None
 
     def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
         """Advice for a scene; `status` adds the contact force and how fast the robot is really fed. None when there is no pose."""
@@ -50,29 +53,24 @@ class Pursuit:
         way = look_ahead(scene, ahead_px, config, self._misses.count * config.rounding_px)
         if way is None:
             return None
-        elapsed_s = 0.0 if self._last_s is None else max(0.0, scene.captured_s - self._last_s)
+        since_s = 0.0 if self._last_s is None else max(0.0, scene.captured_s - self._last_s)
         self._last_s = scene.captured_s
+        elapsed_s = min(since_s, _LONGEST_S)
+        if since_s > _PAUSE_S:
+            self._stall.forget()
+            self._behind_s = 0.0
         contact_n = status.wall_contact_n if status is not None else None
         # Counted down, not forgotten: where head and branch lie in a wide bifurcation, single frames still see the way ahead.
         self._behind_s = max(0.0, self._behind_s + (elapsed_s if way.behind else -elapsed_s))
-        self._smooth(way.error_deg, elapsed_s)
-        fed_mm_s = self._fed(status, elapsed_s)
+        self._smooth(way.error_deg, since_s)
+        fed_mm_s, fed_mm = self._feed.update(status, self._speed_mm_s, elapsed_s)
         stuck = self._stall.update(way.left_px, way.head, fed_mm_s, elapsed_s)
-        gave_up = self._back is None and self._misses.count >= config.most_misses
+        self._tries.see(way)
+        gave_up = self._back is None and (self._misses.count >= config.most_misses or self._tries.count >= config.most_tries)
         otherwise = fed_mm_s >= 0.0 if self._back is not None else gave_up and fed_mm_s != 0.0
         self._unfollowed_s = self._unfollowed_s + elapsed_s if otherwise else 0.0
-        rises = self._lean.rises(contact_n, fed_mm_s * elapsed_s)
-        return self._backing(way, contact_n, rises, stuck, fed_mm_s * elapsed_s) or self._given_up(way) or self._forward(way, rises)
-
-    def _fed(self, status: RobotStatus | None, elapsed_s: float) -> float:
-        """The robot's feed in mm/s: as measured, since who is advised may do otherwise; as advised where nothing is measured."""
-        before_mm, self._insertion_mm = self._insertion_mm, status.insertion_mm if status is not None else None
-        if self._insertion_mm is None:
-            return self._speed_mm_s
-        if before_mm is None or elapsed_s <= 0.0:
-            return 0.0
-        fed_mm_s = (self._insertion_mm - before_mm) / elapsed_s
-        return fed_mm_s if abs(fed_mm_s) > _STILL_MM_S else 0.0
+        rises = self._lean.rises(contact_n, fed_mm)
+        return self._backing(way, contact_n, rises, stuck, fed_mm) or self._given_up(way) or self._forward(way, rises)
 
     def _backing(self, way: Way, contact_n: float | None, rises: bool, stuck: bool, fed_mm: float) -> Advice | None:
         """Backwards while there is a reason to, which one picture alone never is; None to go on. `fed_mm` since the last frame."""
@@ -84,9 +82,12 @@ class Pursuit:
                 self._misses.add(way)
                 self._back = BackOff("the way to the target branches off behind the head", config.retry_mm)
             elif self._contact.exceeded(contact_n, rises, way.left_px):
+                self._tries.add()
                 self._back = BackOff(f"the robot presses against the wall with {contact_n or 0.0:.2f} N", config.back_off_mm / 2)
             elif stuck:
-                self._back = BackOff("the robot is fed but its head does not move", config.back_off_mm)
+                self._tries.add()
+                # All that was fed in vain lies bent behind the head.
+                self._back = BackOff("the robot is fed but its head does not move", max(config.back_off_mm, self._stall.lost_mm))
             else:
                 return None
         is_unfollowed = self._unfollowed_s > _UNFOLLOWED_S and not way.behind
@@ -100,10 +101,12 @@ class Pursuit:
     def _given_up(self, way: Way) -> Advice | None:
         if self._unfollowed_s > _UNFOLLOWED_S:
             self._misses.forget()  # the operator goes on by hand
-        count = self._misses.at(way)
-        if count < self._config.most_misses:
-            return None
-        return self._advise(0.0, 0.0, f"missed the branch {count} times: take over, or choose another destination")
+            self._tries.forget()
+        if (count := self._misses.at(way)) >= self._config.most_misses:
+            return self._advise(0.0, 0.0, f"missed the branch {count} times: take over, or choose another destination")
+        if (count := self._tries.count) >= self._config.most_tries:
+            return self._advise(0.0, 0.0, f"came no farther in {count} tries: take over, or choose another destination")
+        return None
 
     def _forward(self, way: Way, rises: bool) -> Advice:
         config, words = self._config, self._words

@@ -7,12 +7,19 @@ from dataclasses import dataclass, field
 
 from core.control.way import Way
 from core.policy_config import PursuitConfig
-from core.types import Point
+from core.types import Point, RobotStatus
 
 _FAR_MM = 60.0
 """Farther than this the robot is not taken back for a branch that it missed."""
 _RAISE = 1.25
 _FORGET_PX = 60.0
+_STILL_MM_S = 0.3
+"""Servos at rest measure a little motion, too."""
+_STATUS_GAP_S = 0.5
+"""What happened between two statuses farther apart is not known."""
+_REST_S = 0.3
+"""Who is not fed for so long rests; a shorter pause is one of the measurement."""
+_FARTHER_PX = 6.0
 _SAME_BRANCH_PX = 100.0
 """The way left jumps by the lumen's width where the head changes from one branch's centerline to the other's."""
 
@@ -61,6 +68,37 @@ class ContactLimit:
         return True
 
 
+class Feed:
+    """How fast the robot is fed, and how far since the last frame: measured between two of its statuses, by their own times.
+
+    Frames and statuses do not come in step. A frame that finds the status of the one before knows nothing new of the feed; taken
+    for a rest, it would hide for ever that a robot is fed and does not move.
+    """
+
+    def __init__(self) -> None:
+        self._known: tuple[float, float] | None = None
+        self._speed_mm_s = 0.0
+        self._silent_s = 0.0
+
+    def update(self, status: RobotStatus | None, advised_mm_s: float, elapsed_s: float) -> tuple[float, float]:
+        """Speed in mm/s and way in mm since the frame before, `elapsed_s` ago; as advised where nothing is measured."""
+        if status is None:
+            self._known = None
+            return advised_mm_s, advised_mm_s * elapsed_s
+        before, self._known = self._known, (status.time_s, status.insertion_mm)
+        since_s, fed_mm = (0.0, 0.0) if before is None else (status.time_s - before[0], status.insertion_mm - before[1])
+        if since_s == 0.0 and fed_mm:
+            since_s = elapsed_s  # of several servos one was late, and its time is that of all
+        self._silent_s = self._silent_s + elapsed_s if since_s == 0.0 else 0.0
+        if not 0.0 <= since_s <= _STATUS_GAP_S or self._silent_s > _STATUS_GAP_S:
+            self._speed_mm_s = 0.0
+            return 0.0, 0.0
+        if since_s == 0.0:
+            return self._speed_mm_s, 0.0
+        self._speed_mm_s = fed_mm / since_s if abs(fed_mm) > _STILL_MM_S * since_s else 0.0
+        return self._speed_mm_s, fed_mm if self._speed_mm_s else 0.0
+
+
 class Stall:
     """Notices that the robot is fed but neither the way left shrinks nor the head moves.
 
@@ -70,28 +108,62 @@ class Stall:
     def __init__(self, config: PursuitConfig) -> None:
         self._config = config
         self._start: tuple[float, Point] | None = None
-        self._fed_px = 0.0
+        self._fed_mm = 0.0
         self._watched_s = 0.0
+        self._rested_s = 0.0
+        self.lost_mm = 0.0
+        """What was fed in vain when it was last told."""
 
     def update(self, left_px: float | None, head: Point, speed_mm_s: float, elapsed_s: float) -> bool:
         """Take in one frame; True when there was no progress for the configured time. Without a target it cannot tell."""
-        if left_px is None or speed_mm_s <= 0.0:
-            self._watch(None)
+        self._rested_s = 0.0 if speed_mm_s else self._rested_s + elapsed_s
+        if left_px is None or speed_mm_s < 0.0 or self._rested_s >= _REST_S:
+            self.forget()
             return False
         if self._start is None:
-            self._watch((left_px, head))
-        assert self._start is not None
-        self._fed_px += speed_mm_s * elapsed_s * self._config.pixels_per_mm
+            if speed_mm_s:
+                self._start = left_px, head
+            return False
+        self._fed_mm += speed_mm_s * elapsed_s
         self._watched_s += elapsed_s
         if self._watched_s < self._config.stuck_s:
             return False
         before_px, before = self._start
-        stuck = max(before_px - left_px, math.dist(before, head)) < self._config.stuck_share * self._fed_px
-        self._watch((left_px, head))
+        self.lost_mm = self._fed_mm
+        fed_px = self._fed_mm * self._config.pixels_per_mm
+        stuck = max(before_px - left_px, math.dist(before, head)) < self._config.stuck_share * fed_px
+        self.forget()
+        self._start = left_px, head
         return stuck
 
-    def _watch(self, start: tuple[float, Point] | None) -> None:
-        self._start, self._fed_px, self._watched_s = start, 0.0, 0.0
+    def forget(self) -> None:
+        """Watch anew, from the next frame on."""
+        self._start, self._fed_mm, self._watched_s = None, 0.0, 0.0
+
+
+class Tries:
+    """How often the robot was taken back without its head having come farther since; feeding on would only press and buckle it."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._nearest_px: float | None = None
+        self._target: Point | None = None
+
+    def forget(self) -> None:
+        """It may be tried again."""
+        self.count, self._nearest_px = 0, None
+
+    def see(self, way: Way) -> None:
+        """Take in where the head is. Without a target nobody knows whether it comes farther, and nothing is counted."""
+        if way.left_px is None or way.target != self._target:
+            self.forget()
+        self._target = way.target
+        if way.left_px is not None and (self._nearest_px is None or way.left_px < self._nearest_px - _FARTHER_PX):
+            self.count, self._nearest_px = 0, way.left_px
+
+    def add(self) -> None:
+        """Taken back once more."""
+        self.count += 1
 
 
 class Misses:

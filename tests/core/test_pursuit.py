@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -202,6 +203,49 @@ def test_a_head_that_is_fed_and_does_not_move_is_taken_back() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
     advised = [pursuit(scene_at(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)) for k in range(20)]
     assert [a for a in advised if a is not None and a.advance_mm_s < 0 and "does not move" in a.why]
+
+
+def _blocked(pursuit: Pursuit, seconds: float, contact_n: float | None = None, fps: float = 30.0) -> tuple[list[str], list[float]]:
+    """What is advised while the head does not move, and how far the robot was fed: by servos that tell of it 50 times a second."""
+    said, fed_mm, told, insertion_mm = [], [], status(contact_n, 50.0), 50.0
+    for k in range(round(seconds * fps)):
+        time_s = 10.0 + k / fps
+        if math.floor(time_s / 0.02) * 0.02 > told.time_s:
+            told = replace(status(contact_n, insertion_mm), time_s=math.floor(time_s / 0.02) * 0.02)
+        advice = pursuit(scene_at(STRAIGHT, (100, 100), (380, 100), time_s=time_s), told)
+        assert advice is not None
+        insertion_mm += advice.advance_mm_s / fps
+        said.append(advice.why)
+        fed_mm.append(insertion_mm - 50.0)
+    return said, fed_mm
+
+
+@pytest.mark.parametrize("fps", [20.0, 30.0, 60.0, 90.0])
+def test_a_head_that_is_blocked_is_not_fed_on_for_ever(fps: float) -> None:
+    said, fed_mm = _blocked(Pursuit(CONFIG, WORDS), 60.0, fps=fps)
+    assert said[-1] == f"came no farther in {CONFIG.most_tries} tries: take over, or choose another destination"
+    assert max(fed_mm) < 1.5 * WORDS.fast_mm_s * CONFIG.stuck_s
+    assert abs(fed_mm[-1]) < 0.5 * WORDS.fast_mm_s * CONFIG.stuck_s, "what was fed in vain is taken back"
+
+
+def test_a_head_that_presses_and_comes_no_farther_is_given_up_too() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    said, _ = _blocked(pursuit, 60.0, CONFIG.contact_limit_n + 0.1)
+    assert "take over" in said[-1]
+    pursuit.reset()
+    assert "take over" not in " ".join(_blocked(pursuit, 1.0, 0.0)[0]), "taken over, it may try again"
+
+
+def test_after_a_pause_no_single_frame_decides() -> None:
+    pursuit = Pursuit(CONFIG, WORDS)
+    for k, x in ((0, 100.0), (1, 103.0), (40, 200.0)):  # seen again after a while, far on
+        at = replace(status(None, 50.0 + x / 3), time_s=0.1 * k)
+        advice = pursuit(scene_at(STRAIGHT, (x, 100), (380, 100), time_s=0.1 * k), at)
+        assert advice is not None
+        assert advice.advance_mm_s > 0
+    behind = pursuit(scene_at(STRAIGHT, (200, 100), (20, 100), time_s=4.4))
+    assert behind is not None
+    assert "looking again" in behind.why
 
 
 def test_advice_that_nobody_follows_is_no_stall() -> None:

@@ -2,22 +2,71 @@
 
 from __future__ import annotations
 
-from core.control.stall import BackOff, ContactLimit, Stall
+import math
+
+import pytest
+
+from core.control.stall import BackOff, ContactLimit, Feed, Stall
 from core.policy_config import PursuitConfig
+from core.types import RobotStatus
 
 
 def test_stall_tells_only_after_its_time_and_only_without_progress() -> None:
     stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
+    assert not stall.update(100.0, (0, 0), 5.0, 5.0), "what was before it began to watch does not count"
     assert not stall.update(100.0, (0, 0), 5.0, 0.5)
     assert stall.update(98.0, (2, 0), 5.0, 0.5)  # 2 px of the 15 px that were fed
+    assert stall.lost_mm == pytest.approx(5.0)
     assert not stall.update(98.0, (2, 0), 5.0, 0.5)
     assert not stall.update(88.0, (2, 0), 5.0, 0.5)  # 10 of 15
     assert not stall.update(None, (2, 0), 5.0, 5.0)
 
 
+@pytest.mark.parametrize(("rest_s", "is_told"), [(0.2, True), (0.4, False)])
+def test_only_a_real_rest_lets_stall_watch_anew(rest_s: float, is_told: bool) -> None:
+    stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
+    told = []
+    for _ in range(4):
+        told += [stall.update(100.0, (0, 0), 5.0, 0.1) for _ in range(5)]
+        told += [stall.update(100.0, (0, 0), 0.0, 0.1) for _ in range(round(rest_s / 0.1))]
+    assert any(told) is is_told
+
+
+def fed(feed: Feed, frames_s: list[float], bus_s: float, speed_mm_s: float = 6.0) -> list[tuple[float, float]]:
+    """What is known of a feed of `speed_mm_s` at each frame, of statuses that come every `bus_s`."""
+    found, before_s = [], frames_s[0]
+    for now_s in frames_s:
+        stamp_s = bus_s * math.floor(now_s / bus_s)
+        at = RobotStatus(stamp_s, speed_mm_s * stamp_s, 0.0, (0.0,) * 4, (0.0,) * 4)
+        found.append(feed.update(at, 0.0, now_s - before_s))
+        before_s = now_s
+    return found
+
+
+@pytest.mark.parametrize("fps", [15.0, 30.0, 60.0, 90.0])
+@pytest.mark.parametrize("bus_s", [0.02, 0.04, 0.05])
+def test_the_feed_is_known_though_frames_and_statuses_do_not_come_in_step(fps: float, bus_s: float) -> None:
+    frames_s = [5.0 + 0.001 + k / fps for k in range(round(3 * fps))]
+    found = fed(Feed(), frames_s, bus_s)
+    known = found[round(0.2 * fps) :]
+    assert [speed for speed, _ in known] == pytest.approx([6.0] * len(known))
+    assert sum(way for _, way in found) == pytest.approx(6.0 * (frames_s[-1] - frames_s[0]), abs=6.0 * 2 * bus_s)
+
+
+def test_a_robot_that_tells_nothing_any_more_is_not_taken_to_be_fed() -> None:
+    feed = Feed()
+    fed(feed, [1.0, 1.1, 1.2], 0.1)
+    still = RobotStatus(1.2, 7.2, 0.0, (0.0,) * 4, (0.0,) * 4)
+    assert [feed.update(still, 0.0, 0.1)[0] for _ in range(8)][-1] == 0.0
+    late = RobotStatus(9.0, 70.0, 0.0, (0.0,) * 4, (0.0,) * 4)
+    assert feed.update(late, 0.0, 0.1) == (0.0, 0.0)
+    assert feed.update(None, 4.0, 0.1) == (4.0, 0.4)
+
+
 def test_a_head_that_slides_sideways_is_not_stuck() -> None:
     stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
     assert not stall.update(100.0, (50, 0), 5.0, 0.5)
+    assert not stall.update(100.0, (50, 1), 5.0, 0.5)
     assert not stall.update(99.0, (50, 4), 5.0, 0.5)
 
 
