@@ -4,13 +4,25 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QSize, Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QCloseEvent, QColor, QIcon, QKeyEvent, QPainter, QPen, QPixmap, QPolygonF
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QListWidgetItem, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QComboBox,
+    QDialog,
+    QHBoxLayout,
+    QLineEdit,
+    QListWidget,
+    QListWidgetItem,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app import palette, theme
 from app.language import tr, tr_text
 from app.stop_key import StopKeys
 from app.widgets.card import Card
 from app.widgets.enter_key import takes_enter
+from app.widgets.question_strip import QuestionStrip
 from app.widgets.stop_button import StopButton
 from app.widgets.wizard_camera import CameraPage
 from app.widgets.wizard_motion import SteeringPage, ZeroPage
@@ -29,13 +41,15 @@ _STEPS_PX, _CONTROLS_PX = 190, 450
 _STEP_LINE_PX, _SIGN_PX = 30, 16
 _TICK = QPolygonF([QPointF(2.5, 8.5), QPointF(6.5, 12.5), QPointF(13.5, 4.0)])
 _LOOK_EVERY_MS = 50
+_FIELDS = (QAbstractSpinBox, QLineEdit, QComboBox)
+"""Where something is typed or chosen: Esc leaves them, and not the dialog."""
 
 
 class RigWizard(QDialog):
     """Makes or calibrates a rig. ``saved`` carries its name.
 
     Next leads through the pages in their order, and is called Skip on a page whose step was not done. Space is STOP, except in a
-    text field while no job runs.
+    text field while no job runs. Whoever leaves with something found and not saved is asked; ``reject`` asks nobody.
 
     Parameters
     ----------
@@ -75,8 +89,10 @@ class RigWizard(QDialog):
         self.stack = QStackedWidget()
         self.stop_button = StopButton()
         self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
-        self.cancel_button = button(tr("Cancel"), self.reject)
+        self.cancel_button = button(tr("Cancel"), self.ask_to_leave)
         self.line = note("")
+        self.question = QuestionStrip()
+        self.question.closed.connect(self._on_answered)
         self._lay_out()
         self.stop_button.asked.connect(desk.stop)
         self._stop_keys = StopKeys(self, lambda: desk.is_busy, desk.stop)  # servos are open while a job runs only
@@ -117,6 +133,14 @@ class RigWizard(QDialog):
         """STOP, from whoever has one: key, button, pedal, gamepad."""
         self.desk.stop()
 
+    def ask_to_leave(self) -> None:
+        """Close the dialog; with something found and not saved only after a question in place of the line at the foot."""
+        if not self._has_news():
+            self.reject()
+        elif not self.question.text:
+            self._show_question(True)
+            self.question.ask(tr("Leave without saving what was found?"), tr("Leave"), self.reject)
+
     def done(self, result: int) -> None:
         """The dialog closes, whichever way: nothing moves any more, camera and port are free."""
         self._timer.stop()
@@ -128,14 +152,42 @@ class RigWizard(QDialog):
         self._refresh()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if not takes_enter(self, event):
+        if event.key() == Qt.Key.Key_Escape:
+            if not event.isAutoRepeat():
+                self._on_escape()
+        elif not takes_enter(self, event):
             super().keyPressEvent(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        self.reject()
-        event.accept()
+        if self.isVisible():
+            self.ask_to_leave()
+        event.setAccepted(not self.isVisible())
 
     # ---- inside
+
+    def _on_escape(self) -> None:
+        """Back by one step: the question, the field, the dialog."""
+        if self.question.text:
+            self.question.cancel()
+        elif isinstance(self.focusWidget(), _FIELDS):
+            self.setFocus()
+        else:
+            self.ask_to_leave()
+
+    def _has_news(self) -> bool:
+        draft = self.desk.draft
+        return draft is not None and draft.has_news
+
+    @Slot()
+    def _on_answered(self) -> None:
+        self._show_question(False)
+        self.setFocus()
+
+    def _show_question(self, on: bool) -> None:
+        """In place of the line and of Cancel: the question has one of its own, which goes on with the wizard."""
+        self.question.setVisible(on)
+        for part in (self.line, self.cancel_button):
+            part.setVisible(not on)
 
     def _lay_out(self) -> None:
         self.steps.setFixedWidth(_STEPS_PX)
@@ -158,9 +210,12 @@ class RigWizard(QDialog):
         foot.setSpacing(theme.GAP)
         foot.addWidget(self.stop_button)
         foot.addWidget(self.line, 1)
+        foot.addWidget(self.question, 1)
         for part in (self.cancel_button, self.back_button, self.next_button):
             foot.addWidget(part, 0, Qt.AlignmentFlag.AlignBottom)
-        self.line.setMinimumHeight(44)
+        for line in (self.line, self.question):
+            line.setMinimumHeight(44)
+        self.question.hide()
         column = QVBoxLayout(self)
         column.setContentsMargins(14, 12, 14, 12)
         column.setSpacing(theme.GAP)
@@ -169,6 +224,7 @@ class RigWizard(QDialog):
 
     def _go(self, index: int) -> None:
         self.page.leave()
+        self.question.cancel()
         self._say("")  # what was said belonged to the page before
         self.stack.setCurrentIndex(index)
         self.page.enter()
@@ -227,6 +283,8 @@ class RigWizard(QDialog):
 
     @Slot(str)
     def _say(self, text: str, is_fault: bool = False) -> None:
+        if is_fault:
+            self.question.cancel()  # what went wrong must be read
         theme.set_sheet(self.line, "color: @FAULT;" if is_fault else "color: @TEXT;")
         self.line.setText(tr_text(text))
         self.line.setAccessibleName(text)

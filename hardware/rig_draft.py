@@ -60,12 +60,22 @@ class RigDraft:
         self.zeros: servo_wizard.Zeros | None = None
         self.notes: list[str] = []
         self._head_px: Point | None = None
+        self._begun_with = self._findings()
         bench.set_lens(self.lens)
 
     @property
     def servos(self) -> ServosConfig:
         """As found out so far, on the bench's port."""
         return self.bench.servos_config(self.config.servos)
+
+    @property
+    def has_news(self) -> bool:
+        """Whether something was found since, or set by hand, that is gone if ``rig_file`` is not saved."""
+        return self._findings() != self._begun_with
+
+    def _findings(self) -> tuple[object, ...]:
+        known = (self.lens, self.scale, self.steering, self.zero, self.zeros, self.port)
+        return (self.config, *known, self.assignments, len(self.views), len(self.findings))
 
     # ---- lens and scale
 

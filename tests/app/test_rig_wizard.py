@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from app.rig_command import calibration_lines
@@ -17,6 +18,7 @@ from app.rig_wizard import RigWizard
 from app.widgets import wizard_servos
 from app.wizard_desk import WizardDesk
 from core.calibration.identify import Assignment
+from core.calibration.lens import BoardView
 from core.calibration_config import CalibrationConfig, ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
 from core.config import Config, load_config
 from core.devices import DeviceError
@@ -418,6 +420,87 @@ def test_the_ports_are_those_of_the_bench_that_is_open(
     monkeypatch.setattr(wizard_servos, "find_ports", lambda: (FoundPort("/dev/serial/by-id/u2d2", "U2D2"),))
     page.enter()
     assert [page.ports.itemData(k) for k in range(page.ports.count())] == ["/dev/serial/by-id/u2d2", None]
+
+
+def by_escape(wizard: RigWizard) -> None:
+    wizard.setFocus()
+    QTest.keyClick(wizard, Qt.Key.Key_Escape)
+
+
+def by_cancel(wizard: RigWizard) -> None:
+    wizard.cancel_button.click()
+
+
+def by_the_title_bar(wizard: RigWizard) -> None:
+    wizard.close()
+
+
+LEAVING = pytest.mark.parametrize("leave", [by_escape, by_cancel, by_the_title_bar])
+
+
+def _find_a_scale(wizard: RigWizard) -> None:
+    assert wizard.desk.draft is not None
+    wizard.desk.draft.solve_clicks((100.0, 100.0), (500.0, 100.0), 80.0)
+    wizard.desk.changed.emit()
+
+
+@LEAVING
+def test_what_was_found_is_not_thrown_away_without_a_question(
+    opened: RigWizard, qtbot: QtBot, leave: Callable[[RigWizard], None]
+) -> None:
+    _find_a_scale(opened)
+    leave(opened)
+    assert opened.isVisible()
+    assert opened.question.isVisible()
+    assert opened.question.text == "Leave without saving what was found?"
+    assert opened.desk.bench is not None, "camera and servos are still here"
+    qtbot.keyClick(opened, Qt.Key.Key_Space)
+    assert opened.isVisible(), "Space is STOP, and answers nothing"
+    assert opened.question.isVisible()
+    qtbot.keyClick(opened, Qt.Key.Key_Escape)
+    assert not opened.question.isVisible()
+    assert opened.cancel_button.isVisible()
+    leave(opened)
+    opened.question._yes.click()
+    assert not opened.isVisible()
+    until(qtbot, lambda: opened.desk.bench is None)
+
+
+@LEAVING
+def test_where_nothing_was_found_nobody_is_asked(opened: RigWizard, qtbot: QtBot, leave: Callable[[RigWizard], None]) -> None:
+    leave(opened)
+    assert not opened.isVisible()
+
+
+def test_escape_leaves_the_field_first(opened: RigWizard, qtbot: QtBot) -> None:
+    _to(opened, opened.scale_page)
+    opened.scale_page.length.setFocus()
+    qtbot.keyClick(opened.scale_page.length, Qt.Key.Key_Escape)
+    assert opened.isVisible()
+    assert opened.focusWidget() is not opened.scale_page.length
+    qtbot.keyClick(opened, Qt.Key.Key_Escape)
+    assert not opened.isVisible()
+
+
+def test_the_question_gives_way_to_another_page_and_to_what_went_wrong(opened: RigWizard) -> None:
+    _find_a_scale(opened)
+    for happens in (opened.next, lambda: opened.desk.failed.emit("the port is gone")):
+        opened.ask_to_leave()
+        assert opened.question.isVisible()
+        happens()
+        assert not opened.question.isVisible()
+    assert opened.message == "the port is gone"
+    assert opened.line.isVisible()
+
+
+def test_a_board_that_is_forgotten_again_leaves_nothing_to_ask_about(opened: RigWizard) -> None:
+    draft = opened.desk.draft
+    assert draft is not None
+    assert not draft.has_news
+    draft.views.append(BoardView(np.zeros((4, 2)), np.zeros((4, 2))))
+    assert draft.has_news
+    draft.forget_boards()
+    assert not draft.has_news
 
 
 def test_cancel_saves_nothing_and_gives_the_camera_back(opened: RigWizard) -> None:
