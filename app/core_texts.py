@@ -230,6 +230,7 @@ TEMPLATES = (
     "the robot presses against the wall with {a} N",
     "backing off: {why}",
     "missed the branch {a} times: take over, or choose another destination",
+    "came no farther in {a} tries: take over, or choose another destination",
     # faults, and what is being done
     "{joint} off by {a} mm (at most {b} mm)",
     "silent for {a} ms",

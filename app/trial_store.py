@@ -68,7 +68,7 @@ class KeptTrials:
         text = self._file.read_text(encoding="utf-8")
         if text and not text.endswith("\n"):
             text = text[: text.rfind("\n") + 1]
-            self._file.write_text(text, encoding="utf-8")
+            write_whole(self._file, text.encode())
         for line in text.splitlines():
             row = json.loads(line)
             if not row.keys() >= _KEYS:

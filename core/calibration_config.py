@@ -30,6 +30,14 @@ class LensConfig(_Section):
     residual_px: float = Field(ge=0.0, description="root mean square of what the model leaves over")
     pictures: int = Field(ge=1)
 
+    @model_validator(mode="after")
+    def _check_folds_nothing(self) -> Self:
+        """Farther out in the straight picture must be farther out in the seen one, or its corners would be mirrored content."""
+        squares = [place / 20 for place in range(21)]
+        if min(1 + 3 * self.k1 * square + 5 * self.k2 * square * square for square in squares) <= 0.0:
+            raise ValueError("k1 and k2 fold the picture's corners inwards; calibrate the lens again")
+        return self
+
 
 class ScaleConfig(_Section):
     """Millimetres per pixel of the straightened picture, in the plane in which the robot moves.

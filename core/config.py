@@ -217,7 +217,7 @@ class TwinConfig(_Section):
     roll_deg: float = Field(
         0.0, ge=-180.0, le=180.0, description="turn of the robot about its axis; 0: right and left act in the picture"
     )
-    lens_distortion: float = Field(0.0, ge=-0.2, le=0.3, description="of its camera's lens; negative: barrel, 0: none")
+    lens_distortion: float = Field(0.0, ge=-0.14, le=0.3, description="of its camera's lens; negative: barrel, 0: none")
 
 
 class RigConfig(_Section):

@@ -168,8 +168,10 @@ def read_rig(path: Path) -> RigFile:
         raise RigFileError(f"{path}: {_first_problem(error)}; the file is kept: mend it, or calibrate anew") from None
 
 
-def write_rig(rig: RigFile, path: Path | None = None) -> Path:
+def write_rig(rig: RigFile, path: Path | None = None, *, keeps_older: bool = True) -> Path:
     """Save a rig atomically; an older file of that name, whatever its case, stays beside it as NAME.older.toml.
+
+    Without `keeps_older` what lies there stays: the calibration before the present one outlives small changes of this.
 
     Raises
     ------
@@ -182,7 +184,7 @@ def write_rig(rig: RigFile, path: Path | None = None) -> Path:
     document.update(rig.model_dump(mode="json", exclude_none=True))
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        older = target.with_name(target.stem + _OLDER)
+        older = target.with_name(target.stem + _OLDER) if keeps_older else None
         write_whole(target, tomlkit.dumps(document).encode(), durable=True, older=older)
     except OSError as error:
         raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
@@ -281,7 +283,7 @@ def set_port(path: Path, port: PortConfig | None) -> None:
     """Keep the insertion port in a rig file; None: nobody knows it. Raises RigFileError."""
     rig = read_rig(path)
     known = rig.calibration or CalibrationConfig(made_utc=datetime.now(UTC).replace(microsecond=0))
-    write_rig(rig.model_copy(update={"calibration": known.model_copy(update={"port": port})}), path)
+    write_rig(rig.model_copy(update={"calibration": known.model_copy(update={"port": port})}), path, keeps_older=False)
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from core.calibration_config import LensConfig
 from core.errors import UserError
@@ -118,9 +119,12 @@ def fit_lens(views: Sequence[BoardView], size: tuple[int, int]) -> LensConfig:
     residual = float(np.sqrt(np.mean(np.sum(misses(found.x)[:-1].reshape(-1, 2) ** 2, axis=1))))
     if not (abs(k1) <= _MAX_K and abs(k2) <= _MAX_K and np.isfinite(residual)):
         raise LensError("no lens explains these pictures: print the board at 100 %, lay it flat, and take them again")
-    return LensConfig(
-        k1=k1, k2=k2, center_px=(float(center[0]), float(center[1])), size_px=size, residual_px=residual, pictures=len(views)
-    )
+    try:
+        return LensConfig(
+            k1=k1, k2=k2, center_px=(float(center[0]), float(center[1])), size_px=size, residual_px=residual, pictures=len(views)
+        )
+    except ValidationError:
+        raise LensError("the lens found would fold the picture's corners: show the board in them, too, and take more") from None
 
 
 def plane_of(view: BoardView) -> NDArray[np.float64]:

@@ -166,3 +166,10 @@ def test_working_pixels_are_scaled_too() -> None:
     assert mm_per_working_px(None, scene) is None
     width, height = scene.source_size
     assert mm_per_working_px(scale, replace(scene, source_size=(width, height * 3 // 4))) is None, "the camera shows another part"
+
+
+@pytest.mark.parametrize(("k1", "k2"), [(-0.34, 0.0), (-0.5, 0.1), (0.1, -0.3)])
+def test_a_lens_that_would_fold_the_corners_is_refused(k1: float, k2: float) -> None:
+    with pytest.raises(ValueError, match="fold the picture's corners"):
+        _lens(k1, k2)
+    assert _lens(-0.32).k1 == -0.32

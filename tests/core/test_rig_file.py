@@ -150,6 +150,14 @@ def test_a_recording_is_straight_already() -> None:
     assert calibration_of(config) is None
 
 
+def test_the_insertion_port_leaves_the_older_calibration_where_it_is() -> None:
+    write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    path = write_rig(make_rig(load_config(), "bench 1", None))
+    for share in (0.1, 0.2):
+        set_port(path, PortConfig(x_share=share, y_share=0.6))
+    assert read_rig(path.with_name("bench 1.older.toml")).calibration == KNOWN
+
+
 def test_saving_again_keeps_the_older_one() -> None:
     write_rig(make_rig(load_config(), "bench 1", None))
     path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
