@@ -84,6 +84,7 @@ class Pilot:
         self._told_cycle = -1
         self._asked_s: float | None = None
         self._arrived_since_s: float | None = None
+        self._is_handed_over = False
         self._queue = AlertQueue()
         self._lock = threading.Lock()  # of what follows: other threads read or write it
         self._forget = False
@@ -247,6 +248,7 @@ class Pilot:
             self._robot.stop()
         if self._halted:
             decision = replace(decision, permitted=None)
+        self._is_handed_over = self._is_handed_over and decision.mode in DRIVING_MODES
         commanded = self._send(decision, inputs.jog, seen, sent, now_s)
         self._tell(before, decision, inputs.jog, sent if is_news else None, kept_back, now_s)
         view = self._look(decision, inputs, seen, commanded, sent, now_s)
@@ -352,7 +354,9 @@ class Pilot:
         # a press that itself ended a hold is a new one
         self._must_rest = self._permitted is None and permitted is Source.OPERATOR and not self._was_at_rest
         self._permitted = permitted
-        if permitted is Source.PROGRAM:
+        if permitted is Source.PROGRAM and not self._is_handed_over:
+            # Not after a hold: how often it missed a branch, and that it was on its way back, is true as before.
+            self._is_handed_over = True
             with self._lock:
                 self._forget = True
 

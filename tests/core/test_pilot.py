@@ -189,6 +189,25 @@ def test_letting_the_deadman_go_holds(bench: Bench) -> None:
     assert len(bench.robot.sent) == count
 
 
+def test_a_policy_remembers_through_a_hold_and_forgets_at_the_next_hand_over(bench: Bench) -> None:
+    """Else a branch that it misses again and again would be new to it after every short hold."""
+    bench.handed_over().turn(3)
+    assert bench.policy.resets == 1
+    bench.held = False
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    bench.held = True
+    bench.seconds(0.5)
+    assert bench.mode is Mode.AUTONOMOUS
+    assert bench.robot.permitted is Source.PROGRAM
+    assert bench.policy.resets == 1
+    bench.pilot.ask(Act.TAKE_BACK)
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn(2)
+    assert bench.mode is Mode.AUTONOMOUS
+    assert bench.policy.resets == 2
+
+
 def test_a_deadman_that_falls_silent_is_let_go_within_a_tenth_of_a_second(bench: Bench) -> None:
     bench.handed_over()
     last_s = bench.now_s
