@@ -113,9 +113,10 @@ class SettingsDesk(QObject):
         config = with_value(self._saved.model_dump(mode="json"), "window.language", code)
         if self.dialog is not None:
             self._window.say(tr("Save or cancel the settings first"), is_fault=True)
-        elif self._keep(Config.model_validate(config)) is not None:
+        elif (note := self._keep(Config.model_validate(config))) is not None:
             problem = font_problem(wanted(code))
-            self._window.say(problem or next_start_text(code), is_fault=bool(problem))
+            said = problem or next_start_text(code)
+            self._window.say(f"{said}. {tr_text(note)}" if note else said, is_fault=bool(problem or note))
         self._languages.show_choice(self._saved.window.language)
 
     # ---- trying out
