@@ -1212,6 +1212,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>see the vendor libraries in main.py doctor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>switch the servos' 12 V on, check the cables, servos.baud and the joints' ids</source>
         <translation>接通舵机的 12 V 电源，检查线缆、servos.baud 和各关节的 id</translation>
     </message>
@@ -1262,6 +1267,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>zero and steering were found with the servos in other places: find them anew</source>
+        <translation>零位和转向是在舵机对应关系不同时找到的：请重新查找</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>every servo must have one name, and every name one servo</source>
         <translation>每个舵机必须有一个名称，每个名称对应一个舵机</translation>
     </message>
@@ -1289,6 +1299,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>the head does not follow the wire's pull: pull it by hand, or zero it by eye</source>
         <translation>头端不跟随驱动丝的牵拉：用手拉，或者目测归零</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the wire was taut before it was pulled: loosen it, then try again, or zero it by eye</source>
+        <translation>驱动丝在拉动之前已经绷紧：请先放松，然后重试，或目测归零</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -1562,6 +1577,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>came no farther in {a} tries: take over, or choose another destination</source>
+        <translation>尝试 {a} 次仍未前进：请接管，或另选目的地</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>{joint} off by {a} mm (at most {b} mm)</source>
         <translation>{joint}偏差 {a} mm（最多 {b} mm）</translation>
     </message>
@@ -1654,6 +1674,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>restarting servo {a}</source>
         <translation>正在重启舵机 {a}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>not armed: {why}</source>
+        <translation>未待命：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>outside its envelope: {where}: move it back by hand, or zero it again</source>
+        <translation>超出行程范围：{where}：请用手移回，或重新归零</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -2074,6 +2104,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>{camera} ({node}) cannot be opened: close other programs that use it, or join the group video</source>
         <translation>{camera}（{node}）无法打开：关闭使用它的其他程序，或加入 video 组</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{camera} {serial} is not there any more (there are: {serials}): plug it in, or start again with another one</source>
+        <translation>{camera} {serial} 已不在（现有：{serials}）：请插上，或换另一台重新启动</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -2617,11 +2652,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
-        <source>pictures only</source>
-        <translation>仅图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/next_step.py"/>
         <source>interrupted</source>
         <translation>已中断</translation>
     </message>
@@ -2694,6 +2724,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/next_step.py"/>
         <source> (+{count} more)</source>
         <translation> （另有 {count} 项）</translation>
+    </message>
+    <message>
+        <location filename="../../app/next_step.py"/>
+        <source>pictures only</source>
+        <translation>仅图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/next_step.py"/>
+        <source>waiting for the rig</source>
+        <translation>正在等待台架</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
@@ -3497,6 +3537,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/recovery_desk.py"/>
+        <source>A recording was cut; the program that recovers it could not be started</source>
+        <translation>一段录制被中断；恢复它的程序无法启动</translation>
+    </message>
+    <message>
+        <location filename="../../app/recovery_desk.py"/>
+        <source>A recording was cut; the program that recovers it was ended from outside</source>
+        <translation>一段录制被中断；恢复它的程序被外部终止</translation>
+    </message>
+    <message>
+        <location filename="../../app/recovery_desk.py"/>
         <source>No cut session in {folder}</source>
         <translation>{folder} 中没有中断的会话</translation>
     </message>
@@ -3514,6 +3564,26 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/recovery_desk.py"/>
         <source>{name}; {kept}. The damaged original stays as it is.</source>
         <translation>{name}；{kept}。受损的原件保持不变。</translation>
+    </message>
+    <message>
+        <location filename="../../app/recovery_desk.py"/>
+        <source>Try again</source>
+        <translation>重试</translation>
+    </message>
+    <message>
+        <location filename="../../app/recovery_desk.py"/>
+        <source>Once there is memory and room on the disk, for instance</source>
+        <translation>例如在有足够内存和磁盘空间之后</translation>
+    </message>
+    <message>
+        <location filename="../../app/recovery_desk.py"/>
+        <source>Not now</source>
+        <translation>暂不</translation>
+    </message>
+    <message>
+        <location filename="../../app/recovery_desk.py"/>
+        <source>Ask again at the next start</source>
+        <translation>下次启动时再问</translation>
     </message>
     <message>
         <location filename="../../app/recovery_desk.py"/>
@@ -3549,16 +3619,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/recovery_desk.py"/>
         <source>Make a whole copy beside {session}</source>
         <translation>在 {session} 旁生成完整副本</translation>
-    </message>
-    <message>
-        <location filename="../../app/recovery_desk.py"/>
-        <source>Not now</source>
-        <translation>暂不</translation>
-    </message>
-    <message>
-        <location filename="../../app/recovery_desk.py"/>
-        <source>Ask again at the next start</source>
-        <translation>下次启动时再问</translation>
     </message>
     <message>
         <location filename="../../app/replayed.py"/>
@@ -3799,6 +3859,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/rig_wizard.py"/>
         <source>&amp;Save</source>
         <translation>保存(&amp;S)</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard.py"/>
+        <source>Leave without saving what was found?</source>
+        <translation>不保存已找到的结果就离开吗？</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard.py"/>
+        <source>Leave</source>
+        <translation>离开</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard.py"/>
@@ -4362,6 +4432,26 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/side_work.py"/>
+        <source>The servos were stopped</source>
+        <translation>舵机已停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/side_work.py"/>
+        <source>The rig that is being opened starts stopped</source>
+        <translation>正在打开的台架将以停止状态启动</translation>
+    </message>
+    <message>
+        <location filename="../../app/side_work.py"/>
+        <source>No servos were in use, so there was nothing to stop</source>
+        <translation>没有正在使用的舵机，因此无需停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/side_work.py"/>
+        <source>It is not certain that the servos were stopped: press Space</source>
+        <translation>无法确定舵机是否已停止：请按空格键</translation>
+    </message>
+    <message>
+        <location filename="../../app/side_work.py"/>
         <source>The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}</source>
         <translation>装置将重新打开：几秒内没有图像，且须重新开启舵机。{ends}</translation>
     </message>
@@ -4407,6 +4497,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/side_work.py"/>
+        <source>Another unforeseen error: the servos were stopped again</source>
+        <translation>又发生了意外错误：舵机已再次停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/side_work.py"/>
         <source>The report is {report}</source>
         <translation>报告位于 {report}</translation>
     </message>
@@ -4427,16 +4522,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/side_work.py"/>
-        <source>The servos were stopped, and a recording that ran was ended and is whole.
+        <source>{stopped}. A recording that ran was ended and is whole.
 
 {where}.
 
 Best close the program and start it again. Space is still STOP.</source>
-        <translation>舵机已停止；正在进行的录制已结束且完整。
+        <translation>{stopped}。正在进行的录制已结束，且保存完整。
 
 {where}。
 
-最好关闭程序后重新启动。空格键仍是停止。</translation>
+建议关闭程序后重新启动。空格键仍是急停。</translation>
     </message>
     <message>
         <location filename="../../app/side_work.py"/>
@@ -5267,6 +5362,16 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/annotation_help.py"/>
         <source>In the picture</source>
         <translation>在图像中</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/annotation_list.py"/>
+        <source>new</source>
+        <translation>未开始</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/annotation_list.py"/>
+        <source>begun</source>
+        <translation>已开始</translation>
     </message>
     <message>
         <location filename="../../app/widgets/annotation_list.py"/>
@@ -6387,6 +6492,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/record_bar.py"/>
         <source>Recording</source>
         <translation>录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/record_bar.py"/>
+        <source>{count} dropped</source>
+        <translation>丢弃 {count} 帧</translation>
     </message>
     <message>
         <location filename="../../app/widgets/recorded_plate.py"/>
@@ -10211,6 +10321,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>after missing a branch so often it gives up and stops</source>
         <translation>错过同一分支达此次数后放弃并停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Most tries</source>
+        <translation>最多尝试次数</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>backed off so often without coming farther: it gives up and stops</source>
+        <translation>后退这么多次仍未前进：放弃并停止</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
