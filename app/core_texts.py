@@ -148,6 +148,7 @@ FIXED = (
     "plug the USB adapter in, or set servos.port (ls /dev/serial/by-id)",
     "unplug the USB adapter and plug it in again",
     "see the servo port",
+    "see the vendor libraries in main.py doctor",
     "switch the servos' 12 V on, check the cables, servos.baud and the joints' ids",
     "find the reason (jam, heat, supply), then restart that servo in the servo table",
     # calibration

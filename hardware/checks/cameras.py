@@ -12,12 +12,14 @@ from core.config import Config
 from core.devices import Camera, DeviceError
 from core.types import Frame
 from hardware.checks.check import Check, one_line
+from hardware.checks.program import realsense_problem
 from hardware.rig import RigKind, kind_of, real_camera
 from hardware.usb import DEV, SYS, USB3_MBIT_S, realsense_on_usb, video_devices
 
 if TYPE_CHECKING:
     from hardware.cameras.realsense import RealSenseInfo
 
+_SEE_LIBRARIES = "see the vendor libraries in main.py doctor"
 _FIRST_WITHIN_S, _WATCHED_S = 6.0, 1.5
 _FEWEST = 3
 _LEAST_RATE = 0.8
@@ -28,9 +30,22 @@ _UDEV = (
 
 
 def _realsense() -> Sequence[RealSenseInfo]:
+    _check_realsense_library()
     from hardware.cameras.realsense import find_cameras
 
     return find_cameras()
+
+
+def _check_realsense_library() -> None:
+    """Raises ImportError. A library cut short ends whoever loads it with a memory fault, and all checks with it."""
+    if problem := realsense_problem():
+        raise ImportError(f"the library of RealSense cameras cannot be used: {problem}")
+
+
+def _camera_of(config: Config) -> Camera:
+    if config.rig.camera == "realsense":
+        _check_realsense_library()
+    return real_camera(config)
 
 
 def check_camera(
@@ -52,7 +67,7 @@ def _check_realsense(config: Config, found: Callable[[], Sequence[RealSenseInfo]
     try:
         cameras = list(found())
     except (ImportError, DeviceError) as error:
-        return Check("camera", False, one_line(error), "rm -f .venv/.ready && make setup")
+        return Check("camera", False, one_line(error), _SEE_LIBRARIES)
     chosen = [camera for camera in cameras if wanted in {None, camera.serial}]
     if not chosen:
         return _no_realsense(wanted, cameras, sys)
@@ -99,7 +114,7 @@ def _check_webcam(config: Config, dev: Path, sys: Path) -> Check:
     return Check("camera", True, note)
 
 
-def check_picture(config: Config, make_camera: Callable[[Config], Camera] = real_camera, watched_s: float = _WATCHED_S) -> Check:
+def check_picture(config: Config, make_camera: Callable[[Config], Camera] = _camera_of, watched_s: float = _WATCHED_S) -> Check:
     """A real camera is opened for a moment: it gives frames, at its rate, and they are neither black nor white nor blurred."""
     name = "picture"
     if kind_of(config.rig) is not RigKind.LIVE:
@@ -112,7 +127,7 @@ def check_picture(config: Config, make_camera: Callable[[Config], Camera] = real
         finally:
             camera.close()
     except ImportError as error:
-        return Check(name, False, one_line(error), "rm -f .venv/.ready && make setup")
+        return Check(name, False, one_line(error), _SEE_LIBRARIES)
     except DeviceError as error:
         return Check(name, False, one_line(error), "see the camera; close other programs that use it (fuser -v /dev/video*)")
     if len(frames) < _FEWEST:

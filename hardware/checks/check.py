@@ -20,6 +20,8 @@ class Check:
 
 
 NOT_CONFIGURED = "not configured"
+RENEW = "make clean && make setup"
+"""Mends damaged and missing files of installed packages. `make setup` alone leaves them: pip looks at versions, not at files."""
 
 
 def one_line(text: object, limit: int = 300) -> str:

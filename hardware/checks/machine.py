@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from core.record_config import RecordConfig, sessions_folder
-from hardware.checks.check import Check, one_line
+from hardware.checks.check import RENEW, Check, one_line
 
 _CORES = 2
 _MEMORY_GB, _FREE_GB = 3.5, 1.0
@@ -34,7 +34,7 @@ def check_machine(cores: int | None = None, memory: Callable[[], tuple[float, fl
     try:
         total_gb, free_gb = memory()
     except ImportError as error:
-        return Check(name, False, one_line(error), "rm -f .venv/.ready && make setup")
+        return Check(name, False, one_line(error), RENEW)
     detail = f"{cores} core{'s' * (cores > 1)}, {total_gb:.1f} GB of memory, {free_gb:.1f} GB free"
     if cores < _CORES:
         return Check(name, False, detail, f"use a computer with {_CORES} cores or more, or allow this program more of them")

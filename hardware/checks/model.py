@@ -24,7 +24,7 @@ from core.learning.model_file import (
     second_look_of,
 )
 from core.types import Image, Mask, Scene
-from hardware.checks.check import Check, one_line
+from hardware.checks.check import RENEW, Check, one_line
 
 if TYPE_CHECKING:
     from hardware.twin.truth import Truth
@@ -86,7 +86,7 @@ def check_self_test(config: PerceptionConfig) -> Check:
     except ModelError as error:
         return Check(name, False, f"not run: {one_line(error)}", _advice(config.segmentation.model))
     except (ImportError, RuntimeError, ValueError, OSError) as error:
-        return Check(name, False, f"{type(error).__name__}: {one_line(error)}", "rm -f .venv/.ready && make setup")
+        return Check(name, False, f"{type(error).__name__}: {one_line(error)}", RENEW)
     if off is not None:
         detail = f"{info.name}: on this processor the eight-bit network is off by {off}"
         return Check(name, False, detail, "set perception.segmentation.precision to fp32, or train the model on with this version")

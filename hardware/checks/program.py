@@ -5,13 +5,14 @@ from __future__ import annotations
 import ctypes
 import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from importlib import metadata
 from pathlib import Path
 
-from hardware.checks.check import Check, one_line
+from hardware.checks.check import RENEW, Check, one_line
 
 LOCK = Path(__file__).resolve().parents[2] / "requirements.lock"
 
@@ -45,10 +46,11 @@ LIBRARIES = {
 }
 """Shared library -> the Debian package that has it; the same list as in ``scripts/set_up.sh``."""
 
+_REALSENSE = "RealSense"
 _BINARIES = (
     ("Qt's window plugin (xcb)", "PySide6_Essentials", "**/plugins/platforms/libqxcb.so"),
     ("OpenCV", "opencv-python-headless", "cv2/cv2*.so"),
-    ("RealSense", "pyrealsense2", "pyrealsense2/pyrealsense2*.so"),
+    (_REALSENSE, "pyrealsense2", "pyrealsense2/pyrealsense2*.so"),
 )
 _LOAD = "import ctypes, sys\ntry: ctypes.CDLL(sys.argv[1])\nexcept OSError as error: sys.exit(str(error))\n"
 _LOAD_WITHIN_S = 60.0
@@ -114,7 +116,15 @@ def load_elsewhere(path: Path) -> str:
         )
     except subprocess.TimeoutExpired:
         return "does not load within a minute"
+    if done.returncode < 0:
+        return f"loading it ends with a fault ({signal.Signals(-done.returncode).name})"
     return "" if done.returncode == 0 else one_line(done.stderr or f"loading it ends with code {done.returncode}")
+
+
+def realsense_problem() -> str:
+    """Why the RealSense library cannot be loaded, "" when it can. Asked for in a process of its own, in a tenth of a second."""
+    path = dict(_binaries())[_REALSENSE]
+    return load_elsewhere(path) if path is not None else "is not installed"
 
 
 def _binaries() -> list[tuple[str, Path | None]]:
@@ -129,12 +139,21 @@ def _binaries() -> list[tuple[str, Path | None]]:
     return found
 
 
+def _is_packaged(library: str) -> bool:
+    """Whether an installed Python package brings this file, so that no package of the system could."""
+    return any(file.name == library for package in metadata.distributions() for file in package.files or [])
+
+
 def check_binaries(
-    binaries: Iterable[tuple[str, Path | None]] | None = None, load: Callable[[Path], str] = load_elsewhere
+    binaries: Iterable[tuple[str, Path | None]] | None = None,
+    load: Callable[[Path], str] = load_elsewhere,
+    is_packaged: Callable[[str], bool] = _is_packaged,
 ) -> Check:
     """The vendors' own libraries with all that they need in turn, which no list can keep up with."""
-    name, fix = "vendor libraries", ""
+    name = "vendor libraries"
     problems, fine = [], []
+    packages: dict[str, None] = {}
+    unknown, is_damaged = "", False
     for title, path in _binaries() if binaries is None else binaries:
         problem = load(path) if path is not None else "is not installed"
         if not problem:
@@ -143,12 +162,18 @@ def check_binaries(
         problems.append(f"{title}: {problem}")
         needed = re.search(r"(lib[\w.+-]+?\.so[.\d]*): cannot open shared object", problem)
         if needed and (package := LIBRARIES.get(needed[1])):
-            fix = f"sudo apt-get install --yes --no-install-recommends {package}"
-        elif needed:
-            fix = fix or f"find and install the package of {needed[1]}: apt-file search {needed[1]}"
-    if problems:
-        return Check(name, False, "; ".join(problems), fix or "rm -f .venv/.ready && make setup")
-    return Check(name, True, f"{', '.join(fine)} can be loaded")
+            packages[package] = None
+        elif needed and not is_packaged(needed[1]):
+            unknown = unknown or needed[1]
+        else:
+            is_damaged = True
+    if not problems:
+        return Check(name, True, f"{', '.join(fine)} can be loaded")
+    commands = [f"sudo apt-get install --yes --no-install-recommends {' '.join(packages)}"] if packages else []
+    commands += [RENEW] if is_damaged else []
+    fixes = [" && ".join(commands)] if commands else []
+    fixes += [f"find and install the package of {unknown}: apt-file search {unknown}"] if unknown else []
+    return Check(name, False, "; ".join(problems), "; ".join(fixes))
 
 
 def x_server_answers(display: str) -> bool:

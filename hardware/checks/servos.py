@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from core.servo_config import ServosConfig
-from hardware.checks.check import NOT_CONFIGURED, Check, one_line
+from hardware.checks.check import NOT_CONFIGURED, RENEW, Check, one_line
 from hardware.usb import SYS, latency_timer
 
 _MAX_LATENCY_MS = 2
@@ -81,7 +81,7 @@ def check_servos(config: ServosConfig) -> Check:
         from hardware.servos.line import ServoLine
         from hardware.servos.setup import identify
     except ImportError as error:
-        return Check(name, False, one_line(error), "rm -f .venv/.ready && make setup")
+        return Check(name, False, one_line(error), RENEW)
     line = ServoLine(config.port, config.baud)
     try:
         line.open()

@@ -102,11 +102,48 @@ def test_vendor_libraries_are_really_loaded(tmp_path: Path) -> None:
     broken = tmp_path / "libbroken.so"
     broken.write_bytes(b"\x7fELF but no more")
     check = program.check_binaries([("OpenCV", broken), ("Qt", None)])
-    _bad(check, r"OpenCV: .*libbroken\.so.*; Qt: is not installed", "make setup")
+    _bad(check, r"OpenCV: .*libbroken\.so.*; Qt: is not installed", "^make clean && make setup$")
     lacking = "libxcb-icccm.so.4: cannot open shared object file: No such file or directory"
     _bad(program.check_binaries([("Qt", broken)], lambda _: lacking), "libxcb-icccm", "apt-get install .* libxcb-icccm4$")
     _bad(program.check_binaries([("Qt", broken)], lambda _: lacking.replace("icccm", "new")), "libxcb-new", "apt-file search")
     _good(program.check_binaries([("Qt", broken)], lambda _: ""), "Qt can be loaded")
+
+
+def test_what_an_installed_package_brings_is_mended_by_a_new_venv(tmp_path: Path) -> None:
+    """No package of the system has it, and set-up by itself would find the version that it wants."""
+
+    def load(path: Path) -> str:
+        return f"{path.name}: cannot open shared object file: No such file or directory"
+
+    gone, needed, system = (tmp_path / name for name in ("libqxcb.so", "libQt6Core.so.6", "libxcb-shape.so.0"))
+    _bad(program.check_binaries([("Qt", gone)], load), "libqxcb", "^make clean && make setup$")
+    _bad(program.check_binaries([("Qt", needed)], load), "libQt6Core", "^make clean && make setup$")
+    check = program.check_binaries([("Qt", system), ("OpenCV", needed)], load)
+    _bad(check, "libxcb-shape.*libQt6Core", "^sudo apt-get install .* libxcb-shape0 && make clean && make setup$")
+
+
+def _cut_short(tmp_path: Path) -> Path:
+    """A library whose process dies of a bus error when it is loaded, as one does that a full disk has cut."""
+    package = metadata.distribution("pyrealsense2")
+    whole = next(file for file in package.files or [] if file.match("pyrealsense2/pyrealsense2*.so"))
+    cut = tmp_path / "pyrealsense2.so"
+    cut.write_bytes(Path(str(whole.locate())).read_bytes()[:200_000])
+    return cut
+
+
+def test_a_library_cut_short_is_damaged() -> None:
+    damaged = "loading it ends with a fault (SIGBUS)"
+    _bad(program.check_binaries([("RealSense", Path("x.so"))], lambda _: damaged), "SIGBUS", "^make clean && make setup$")
+
+
+def test_a_realsense_library_cut_short_ends_no_other_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cut = _cut_short(tmp_path)
+    assert "SIGBUS" in program.load_elsewhere(cut)
+    monkeypatch.setattr(program, "_binaries", lambda: [("RealSense", cut)])
+    config = _rig(camera="realsense")
+    for check in (cameras.check_camera(config), cameras.check_picture(config)):
+        _bad(check, "library of RealSense cameras cannot be used: .*SIGBUS", "see the vendor libraries in main.py doctor")
+    _good(cameras.list_cameras(dev=tmp_path, sys=tmp_path), "RealSense: the library .*SIGBUS")
 
 
 def test_a_display(tmp_path: Path) -> None:
