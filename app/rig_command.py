@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +15,18 @@ from app.window_command import window_config
 from core.calibration.board import BoardError, BoardSpec
 from core.config import Config
 from core.errors import UserError
-from core.rig_file import RESERVED, RigFile, check_rig_name, find_rig, has_rig, list_rigs, rigs_folder, with_rig, write_rig
+from core.rig_file import (
+    RESERVED,
+    RigFile,
+    check_can_save,
+    check_rig_name,
+    find_rig,
+    has_rig,
+    list_rigs,
+    rigs_folder,
+    with_rig,
+    write_rig,
+)
 
 if TYPE_CHECKING:
     from hardware.calibration_bench import See
@@ -70,29 +83,47 @@ def run_board(out: Path, spec: BoardSpec) -> None:
 
 
 def run_calibrate(options: CalibrateOptions) -> None:
-    """Calibrate without help, and save the rig; raises UserError with what went wrong. Nothing is saved then."""
+    """Calibrate without help, and save the rig; raises UserError with what went wrong, and KeyboardInterrupt.
+
+    Steps that were done until then are saved, as if no others had been asked for.
+    """
     from hardware.calibration_bench import open_bench
     from hardware.rig_draft import RigDraft
 
     config, earlier = _start(options)
+    check_can_save(options.name)
     bench = open_bench(config, quick_sight(config))
+    done: list[str] = []
+    ended: UserError | KeyboardInterrupt | None = None
     try:
         draft = RigDraft(bench, config, earlier.calibration if earlier is not None else None, _say)
         draft.spec = options.spec
         bench.warm_up()
-        calibrate(draft, options.steps, options.pictures)
-        rig = draft.rig_file(options.name)
+        for step in calibrate(draft, options.steps, options.pictures):
+            done.append(step)
+    except (UserError, KeyboardInterrupt) as error:
+        if not done:
+            raise
+        ended = error
     finally:
         bench.close()
+    rig = draft.rig_file(options.name)
     path = write_rig(rig)
+    if ended is not None:
+        left = ",".join(step for step in STEPS if step in options.steps and step not in done)
+        kept = f"{' and '.join(done)} saved in {path}; go on: rig calibrate {shlex.quote(rig.name)} --auto --steps {left}"
+        if isinstance(ended, UserError):
+            raise UserError(f"{ended}; {kept}")
+        _say(kept)
+        raise ended
     if options.as_json:
         sys.stdout.write(json.dumps({"path": str(path), "notes": draft.notes, **rig.model_dump(mode="json")}) + "\n")
         return
     sys.stdout.write("\n".join([f"{rig.name} ({path})", describe(rig), *calibration_lines(rig), *draft.notes]) + "\n")
 
 
-def calibrate(draft: RigDraft, steps: tuple[str, ...], pictures: int) -> None:
-    """The steps in their order; each raises what the draft raises."""
+def calibrate(draft: RigDraft, steps: tuple[str, ...], pictures: int) -> Iterator[str]:
+    """The steps in their order, each named when what it found can be kept; each raises what the draft raises."""
     if "board" in steps:
         draft.forget_boards()
         failures: list[BoardError] = []
@@ -104,14 +135,19 @@ def calibrate(draft: RigDraft, steps: tuple[str, ...], pictures: int) -> None:
                 if len(failures) > _BOARD_TRIES:
                     raise
         draft.solve_boards()
+        yield "board"
     if set(steps) & {"servos", "zero", "steering"}:
         draft.search_servos()
     if "servos" in steps:
         draft.identify()
+        yield "servos"
     if "zero" in steps:
         draft.find_zeros()
+        if "steering" not in steps:
+            yield "zero"
     if "steering" in steps:
-        draft.learn_steering()
+        draft.learn_steering()  # it stores where the tendons were left, too
+        yield from [step for step in ("zero", "steering") if step in steps]
 
 
 def quick_sight(config: Config) -> See:

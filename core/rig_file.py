@@ -5,11 +5,14 @@ A file that cannot be used is told in one line and left as it is; a rig that is 
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import tomllib
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, Literal, Self
 
 import tomlkit
@@ -189,6 +192,19 @@ def write_rig(rig: RigFile, path: Path | None = None, *, keeps_older: bool = Tru
     except OSError as error:
         raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
     return target
+
+
+def check_can_save(name: str) -> None:
+    """Raise RigFileError when a rig of this name could not be saved: said before minutes of calibration, and not after them."""
+    target = rig_path(name)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=target.parent):
+            pass  # permissions alone do not tell of a disk that is mounted to be read only
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    except OSError as error:
+        raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
 
 
 def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -> RigFile:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import cast
 
 import cv2
 import numpy as np
@@ -12,11 +13,15 @@ from typer.testing import CliRunner
 
 from app import cli
 from app.board_print import BoardPrintError, paper_for
+from app.rig_command import CalibrateOptions, run_calibrate
 from core.calibration.board import BoardError, BoardSpec, find_board
-from core.calibration_config import CalibrationConfig
+from core.calibration.lens import BoardView
+from core.calibration_config import CalibrationConfig, ScaleConfig
 from core.config import load_config
+from core.devices import DeviceError
 from core.errors import UserError
 from core.rig_file import find_rig, make_rig, rig_path, write_rig
+from hardware.rig_draft import RigDraft
 
 runner = CliRunner()
 
@@ -105,6 +110,87 @@ def test_a_calibration_without_servos_finds_the_scale() -> None:
     assert rig.calibration.scale is not None
     assert rig.calibration.scale.mm_per_px == pytest.approx(1 / 3.1, rel=0.01)
     assert rig.calibration.steering is None
+
+
+class _Bench:
+    """Opened where none must be, or moves nothing."""
+
+    def __init__(self) -> None:
+        self.closed = False
+
+    def set_lens(self, lens: object) -> None: ...
+    def warm_up(self) -> None: ...
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> _Bench:
+    made = _Bench()
+    monkeypatch.setattr("hardware.calibration_bench.open_bench", lambda *_: made)
+    monkeypatch.setattr("app.rig_command.quick_sight", lambda _: None)
+    return made
+
+
+def test_a_rig_that_cannot_be_saved_is_told_before_the_bench_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def open_bench(*_: object) -> None:
+        raise AssertionError("opened")
+
+    monkeypatch.setattr("hardware.calibration_bench.open_bench", open_bench)
+    monkeypatch.setattr("app.rig_command.quick_sight", lambda _: None)
+    rig_path("bench 1").mkdir(parents=True)
+    with pytest.raises(UserError, match=r"bench 1.toml: cannot be saved \(Is a directory\)"):
+        _run("calibrate", "bench 1", "--auto", "--from", "twin")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
+    (tmp_path / "file").touch()
+    with pytest.raises(UserError, match=r"bench 1.toml: cannot be saved \(Not a directory\)"):
+        _run("calibrate", "bench 1", "--auto")
+
+
+@pytest.fixture
+def board_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of all steps only the board succeeds."""
+
+    def solve_boards(draft: RigDraft) -> None:
+        draft.scale = ScaleConfig(mm_per_px=0.32, size_px=(640, 480), method="board", uncertainty_share=0.001)
+
+    monkeypatch.setattr(RigDraft, "take_board", lambda draft: draft.views.append(cast("BoardView", None)))
+    monkeypatch.setattr(RigDraft, "solve_boards", solve_boards)
+
+
+@pytest.mark.usefixtures("board_alone")
+def test_steps_that_were_done_before_one_failed_are_saved(bench: _Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def search_servos(_: RigDraft) -> None:
+        raise DeviceError("6 servos answer, seven are needed")
+
+    monkeypatch.setattr(RigDraft, "search_servos", search_servos)
+    go_on = "rig calibrate 'bench 1' --auto --steps servos,zero,steering$"
+    with pytest.raises(UserError, match=f"^6 servos answer, seven are needed; board saved in .*bench 1.toml; go on: {go_on}"):
+        _run("calibrate", "bench 1", "--auto")
+    assert bench.closed
+    _, rig = find_rig("bench 1")
+    assert rig.calibration is not None
+    assert rig.calibration.scale is not None
+    with pytest.raises(UserError, match=r"^6 servos answer, seven are needed$"):
+        _run("calibrate", "bench 2", "--auto", "--steps", "servos")
+    assert not rig_path("bench 2").exists()
+
+
+@pytest.mark.usefixtures("board_alone", "bench")
+def test_an_interruption_keeps_what_was_done_and_tendons_are_kept_with_the_steering(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def learn_steering(_: RigDraft) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(RigDraft, "search_servos", lambda _: None)
+    monkeypatch.setattr(RigDraft, "find_zeros", lambda _: None)
+    monkeypatch.setattr(RigDraft, "learn_steering", learn_steering)
+    with pytest.raises(KeyboardInterrupt):
+        run_calibrate(CalibrateOptions("bench 1", None, None, ("board", "zero", "steering")))
+    assert "board saved in " in (told := capsys.readouterr().err)
+    assert told.endswith("--steps zero,steering\n")
+    assert find_rig("bench 1")[1].calibration is not None
 
 
 @pytest.mark.parametrize(
