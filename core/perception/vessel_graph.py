@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from core.config import CleaningConfig
 from core.perception import bundle, pixel_graph, polyline
+from core.perception.border_cuts import by_wall_in_view
 from core.perception.bundle import Bundle
 from core.perception.junctions import are_together, rebuild
 from core.perception.lumen import RadiusMap, sharp_walls
@@ -231,8 +232,9 @@ def _merged(lines: list[_Line]) -> list[_Line]:
 def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -> None:
     """All lines made even, smooth and centred in the lumen, with the radius along them.
 
-    Twice: by the map of distances, which knows the middle to some half a pixel from anywhere in the lumen, and then between both
-    walls, to a fraction of a pixel. Where one of these is not to be seen, beside an opening, the first result stays.
+    Twice: by the map of distances, which knows the middle to some half a pixel from anywhere in the lumen (where both walls are in
+    the picture), and then between both walls, to a fraction of a pixel. Where one of these is not to be seen, beside an opening,
+    the first result stays.
     """
     even = bundle.smooth(
         bundle.resample(Bundle.of([line.points for line in lines]), STEP_PX), SMOOTHING_PX / STEP_PX, keeps_bends=True
@@ -241,9 +243,11 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
     inner = np.ones(len(even.points), np.bool_)
     inner[even.starts[:-1]] = inner[even.starts[1:] - 1] = False
     normal = bundle.normals(even)
-    probe = 0.5 * radius.at(even.points)[:, None] * normal
+    reach = radius.at(even.points)
+    probe = 0.5 * reach[:, None] * normal
     wider, narrower = np.split(radius.at(np.concatenate([even.points + probe, even.points - probe])), 2)
-    centred = _moved(even, normal, np.where(inner, 0.5 * (wider - narrower), 0.0))
+    shift = by_wall_in_view(even, STEP_PX, normal, reach, 0.5 * (wider - narrower), level.shape)
+    centred = _moved(even, normal, np.where(inner, shift, 0.0))
     normal = bundle.normals(centred)
     shift, half_width = _between_walls(centred, normal, radius.at(centred.points), level)
     centred = _moved(centred, normal, np.where(inner, shift, 0.0))

@@ -182,6 +182,25 @@ def test_where_one_wall_is_soft_the_other_one_and_the_width_around_count() -> No
     assert aside[1] < 0.6
 
 
+@pytest.mark.parametrize(("radius", "row"), [(12.0, 9.0), (30.0, 29.0), (30.0, 27.0), (45.0, 40.0)])
+@pytest.mark.parametrize("turned", [False, True])
+def test_of_a_vessel_whose_one_wall_is_out_of_the_picture_the_middle_of_what_is_in_it_counts(
+    radius: float, row: float, turned: bool
+) -> None:
+    line = np.array([[-20.0, row], [660.0, row]])
+    (edge,) = perceived((np.array([[SIZE[0] - 1.0, 0.0]]) + line[:, ::-1] * (-1.0, 1.0) if turned else line, radius)).edges
+    beside = SIZE[0] - 1 - edge.points[:, 0] if turned else edge.points[:, 1]
+    assert np.abs(beside[15:-15] - 0.5 * (row + radius)).max() < 2.0
+
+
+def test_where_the_border_cuts_off_one_wall_for_a_while_the_line_stays_as_far_from_the_other_one() -> None:
+    line = curve((-30, 70), (150, 40), (320, 16), (490, 40), (670, 70))  # 24 px wide to each side, 8 px of them out of the picture
+    (edge,) = perceived((line, 24.0)).edges
+    gaps = [polyline.nearest(line, (float(x), float(y)))[0] for x, y in edge.points[15:-15]]
+    assert max(gaps) < 2.5
+    assert np.mean(gaps) < 0.8
+
+
 def test_a_branch_bends_into_its_trunk_as_its_walls_do() -> None:
     trunk = curve((40.0, 200.0), (320.0, 200.0), (600.0, 200.0))
     branch = curve((260.0, 200.0), (290.0, 222.0), (325.0, 262.0), (340.0, 330.0), (335.0, 440.0))
