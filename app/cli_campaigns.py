@@ -99,7 +99,7 @@ def faults(
 
 
 def soak(
-    hours: Annotated[float, typer.Option(min=0.005, max=1000.0, help="Ctrl-C ends it sooner, with the figures so far")] = 2.0,
+    hours: Annotated[float, typer.Option(min=0.005, max=1000.0, help="Ctrl-C ends it sooner and tells the figures so far")] = 2.0,
     seed: Annotated[int, typer.Option(min=0, help="of faults and operator")] = 0,
     out: Annotated[Path | None, typer.Option(help="file for the samples and the summary, one JSON object a line")] = None,
     true_masks: Annotated[

@@ -18,27 +18,37 @@ from app.learning_commands import Interrupt, progress_bar
 def run_faults(only: list[int], out: Path | None, *, quick: bool, as_json: bool) -> int:
     """Run the campaign, or the faults that are named; returns 0 when all went as listed, 1 when not.
 
-    Raises CampaignError.
+    Raises CampaignError, and KeyboardInterrupt once the results so far are told.
     """
     cases = _chosen(only, quick=quick)
     if out is not None and len(cases) < COUNT:
         raise CampaignError("--out writes the whole list: leave --only and --quick out")
     if out is not None:
-        try:
-            out.touch()  # now, and not after the whole campaign
-        except OSError as error:
-            raise CampaignError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
+        _check_can_write(out)
     os.environ["QT_QPA_PLATFORM"] = "offscreen"  # windows are opened and closed; nobody shall see them
     logging.disable(logging.CRITICAL)  # what is logged of injected faults is what is looked for anyway
     try:
         results = list(_with_progress(cases, live=not quick, as_json=as_json))
     finally:
         logging.disable(logging.NOTSET)
-    if out is not None and len(results) == COUNT:
-        out.write_text(page_of(results, live=not quick), encoding="utf-8")
     if not as_json:
         sys.stdout.write(f"{summary_of(results)}\n")
-    return 0 if len(results) == len(cases) and all(result.seen.ok for result in results) else 1
+    if out is not None and results:
+        out.write_text(page_of(results, live=not quick), encoding="utf-8")
+    if len(results) < len(cases):
+        raise KeyboardInterrupt
+    return 0 if all(result.seen.ok for result in results) else 1
+
+
+def _check_can_write(out: Path) -> None:
+    """Now, and not after the whole campaign; a file that is not there yet is not made before there is something to write."""
+    try:
+        is_new = not out.exists()
+        out.open("a").close()
+        if is_new:
+            out.unlink()
+    except OSError as error:
+        raise CampaignError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
 
 
 def _chosen(only: list[int], *, quick: bool) -> list[FaultCase]:
@@ -56,12 +66,15 @@ def _with_progress(cases: list[FaultCase], *, live: bool, as_json: bool) -> Iter
     with Interrupt() as interrupt, progress_bar() as bar:
         task = bar.add_task("faults", total=len(cases))
         for case in cases:
-            if interrupt.asked:
-                return
             bar.update(task, description=f"{case.number} {case.name}")
             result = run_case(case, live=live)
+            interrupted = interrupt.asked
+            if interrupted and not result.seen.ok:
+                return  # Ctrl-C reaches the processes of the case, too: what went wrong may be its doing
             result = replace(result, seen=tidy(result.seen, Path.cwd()))
             sys.stdout.write((json.dumps(to_json(result)) if as_json else line_of(result)) + "\n")
             sys.stdout.flush()
             bar.advance(task)
             yield result
+            if interrupted:
+                return

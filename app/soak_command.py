@@ -6,8 +6,9 @@ import json
 import logging
 import sys
 from dataclasses import asdict
+from io import FileIO
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from app.learning_commands import Interrupt, progress_bar
 from app.soak import Soak
@@ -16,44 +17,71 @@ from core.errors import UserError
 
 
 def run_soak(hours: float, seed: int, out: Path | None, *, true_masks: bool, as_json: bool) -> int:
-    """Soak; returns 0 when nothing unsafe was sent, no record was lost and nothing grew, else 1. Ctrl-C ends it early."""
+    """Soak; returns 0 when nothing unsafe was sent, no record was lost and nothing grew, else 1.
+
+    Raises UserError, and KeyboardInterrupt once the figures so far are told.
+    """
+    seconds = 3600.0 * hours
+    with _SampleFile(out) as file:
+        summary = _soak(seconds, seed, file, true_masks=true_masks)
+        # Told first: what cannot be written must not cost what hours have shown.
+        sys.stdout.write((json.dumps(summary) if as_json else _text(summary)) + "\n")
+        sys.stdout.flush()
+        file.add({"summary": summary})
+    if summary["interrupted"]:
+        raise KeyboardInterrupt
+    if summary["ok"] and file.problem:
+        raise UserError(f"{file.problem}; lines at its end are missing")
+    return 0 if summary["ok"] else 1
+
+
+def _soak(seconds: float, seed: int, file: _SampleFile, *, true_masks: bool) -> dict[str, Any]:
+    """The summary, with ``interrupted`` in it."""
     logging.disable(logging.CRITICAL)  # breakdowns are injected; what was not is in the summary
     soak = Soak(seed, true_masks=true_masks)
-    seconds = 3600.0 * hours
+    told = False
     try:
-        with _SampleFile(out) as file, Interrupt() as interrupt, progress_bar() as bar:
+        with Interrupt() as interrupt, progress_bar() as bar:
             task = bar.add_task("seconds", total=round(seconds))
 
             def go_on(now: Soak) -> bool:
+                nonlocal told
                 seen, sample = now.watch.seen, now.tally.samples[-1] if now.tally.samples else None
                 memory = f"{sample.memory_mb:.0f} MB, {sample.threads} threads, {sample.files} files" if sample else "starting"
                 text = f"s, {seen.goals} goals, {seen.unsafe} unsafe, {now.tally.lost} lost, {memory}"
                 bar.update(task, completed=int(now.elapsed_s), description=text)
                 file.follow(now.tally.samples)
+                if file.problem and not told:
+                    told = True
+                    bar.console.print(f"note: {file.problem}; the soak goes on, and tries again", soft_wrap=True)
                 return not interrupt.asked
 
             soak.run(seconds, go_on)
+            return soak.summary() | {"interrupted": interrupt.asked}
     finally:
         logging.disable(logging.NOTSET)
-    summary = soak.summary()
-    if out is not None:
-        with out.open("a", encoding="utf-8") as lines:
-            lines.write(json.dumps({"summary": summary}) + "\n")
-    sys.stdout.write((json.dumps(summary) if as_json else _text(summary)) + "\n")
-    return 0 if summary["ok"] else 1
 
 
 class _SampleFile:
-    """Writes the samples as they come: a soak that breaks down after an hour has to tell what it saw until then."""
+    """Writes the samples as they come: a soak that breaks down after an hour has to tell what it saw until then.
+
+    ``problem`` says why lines still wait to be written, a disk that is full for a while; "": none does.
+    """
 
     def __init__(self, path: Path | None) -> None:
-        self._file: TextIO | None = None
+        self.problem = ""
+        self._path = path
+        self._file: FileIO | None = None
         self._written = 0
+        self._waiting = b""
         if path is not None:
             try:
-                self._file = path.open("w", encoding="utf-8", buffering=1)
+                self._file = path.open("wb", buffering=0)  # what was not written is known to the byte, and comes later
             except OSError as error:
-                raise UserError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
+                raise UserError(f"{self._said(error)}; choose another --out") from None
+
+    def _said(self, error: OSError) -> str:
+        return f"{self._path}: cannot be written ({error.strerror})"
 
     def __enter__(self) -> _SampleFile:
         return self
@@ -64,18 +92,30 @@ class _SampleFile:
 
     def follow(self, samples: list[Sample]) -> None:
         """Write those that are new."""
-        if self._file is not None:
-            for sample in samples[self._written :]:
-                self._file.write(json.dumps(asdict(sample)) + "\n")
-            self._written = len(samples)
+        for sample in samples[self._written :]:
+            self.add(asdict(sample))
+        self._written = len(samples)
+
+    def add(self, record: dict[str, Any]) -> None:
+        """Write one line, after those that wait; raises nothing."""
+        if self._file is None:
+            return
+        self._waiting += json.dumps(record).encode() + b"\n"
+        try:
+            while self._waiting:
+                self._waiting = self._waiting[self._file.write(self._waiting) :]
+            self.problem = ""
+        except OSError as error:
+            self.problem = self._said(error)
 
 
 def _text(summary: dict[str, Any]) -> str:
     flat, records = summary["flatness"], summary["records"]
     shares = ", ".join(f"{mode} {100 * share:.0f} %" for mode, share in summary["mode_shares"].items())
     steady = {True: "flat", False: "GROWS", None: "too short to tell"}[flat["flat"]]
+    when = "until it was interrupted after" if summary["interrupted"] else "after"
     lines = [
-        f"{'OK' if summary['ok'] else 'NOT OK'} after {summary['seconds']:.0f} s (seed {summary['seed']})",
+        f"{'OK' if summary['ok'] else 'NOT OK'} {when} {summary['seconds']:.0f} s (seed {summary['seed']})",
         f"wire: {summary['packets']} packets, {summary['goals']} goals, {summary['unsafe']} unsafe",
         f"records: {records['rows']} rows in {records['sessions']} sessions, {records['lost']} lost",
         f"use: {steady}, from {flat['before']} to {flat['after']}",

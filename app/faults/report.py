@@ -66,6 +66,8 @@ def page_of(results: Sequence[Result], *, live: bool) -> str:
     """The page in Markdown."""
     lines = [_HEAD, f"{_WAYS[live]}\n"]
     lines.append(f"**{summary_of(results)}**, {datetime.now(UTC):%Y-%m-%d}.\n")
+    if len(results) < COUNT:
+        lines.append("The campaign was interrupted: the faults that are missing here were not brought about.\n")
     lines.append("| # | fault | injected | wanted | seen | alerts | in the session | |")
     lines.append("|---|---|---|---|---|---|---|---|")
     for result in results:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from app.faults.registry import COUNT, CampaignError, Kit, Seen, all_cases, fault, run_case
+from app.faults.registry import COUNT, CampaignError, FaultCase, Kit, Result, Seen, all_cases, fault, run_case
 from app.faults.report import page_of, to_json
 from app.faults_command import run_faults
 from core.session.recording import Recording
@@ -59,6 +60,48 @@ def test_what_makes_no_sense_is_refused(tmp_path: Path) -> None:
         run_faults([44], None, quick=False, as_json=False)
     with pytest.raises(CampaignError, match="whole list"):
         run_faults([1], tmp_path / "page.md", quick=False, as_json=False)
+
+
+@pytest.fixture
+def interrupted(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, Seen], None]:
+    """Ctrl-C comes during the fault of this number, of which this is seen; all before it go well."""
+
+    def at(number: int, seen: Seen) -> None:
+        def run(case: FaultCase, *, live: bool) -> Result:
+            if case.number == number:
+                signal.raise_signal(signal.SIGINT)
+            return Result(case, seen if case.number == number else Seen("HOLD"), 0.1, 1)
+
+        monkeypatch.setattr("app.faults_command.run_case", run)
+
+    return at
+
+
+def test_ctrl_c_keeps_the_results_so_far_and_is_no_verdict(
+    interrupted: Callable[[int, Seen], None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "f.md"
+    interrupted(3, Seen("STOP"))
+    with pytest.raises(KeyboardInterrupt):
+        run_faults([], page, quick=False, as_json=False)
+    assert capsys.readouterr().out.splitlines()[-1] == f"3 of 3 as listed ({COUNT} in the list)"
+    assert "was interrupted" in page.read_text()
+    assert "| 3 | " in page.read_text()
+
+
+def test_what_ctrl_c_itself_may_have_broken_is_not_told(
+    interrupted: Callable[[int, Seen], None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    interrupted(1, Seen("", problems=("a process is gone",)))
+    with pytest.raises(KeyboardInterrupt):
+        run_faults([], tmp_path / "f.md", quick=False, as_json=True)
+    assert capsys.readouterr().out == ""
+    assert not (tmp_path / "f.md").exists()  # nothing to write, and no empty page
+
+
+def test_a_page_that_cannot_be_written_is_told_before_the_campaign(tmp_path: Path) -> None:
+    with pytest.raises(CampaignError, match="choose another --out"):
+        run_faults([], tmp_path / "no folder" / "f.md", quick=False, as_json=False)
 
 
 def test_a_fault_that_is_not_brought_about_is_not_ok() -> None:
