@@ -24,6 +24,7 @@ from core.types import Frame, Image, Scene
 
 if TYPE_CHECKING:
     from core.perception.pipeline import Pipeline
+    from core.study.accuracy import FrameScore
     from core.study.paper_baseline import PaperBaseline
 
 _BASELINE_EVERY = 8
@@ -184,6 +185,7 @@ def run_accuracy(
     """Perceive every frame of a synth set as a single image and compare with its truth.
 
     `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network: not both.
+    An interruption (Ctrl-C) tells the figures of the frames until then, and stores nothing.
     """
     from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.model_file import model_folder, sha256_of, trained_without, write_figures
@@ -195,16 +197,29 @@ def run_accuracy(
     samples, truth = find_labelled(folder, POSE_KEYS)
     masks, left_out = TrueMasks(), LeftOut()
     pipeline = Pipeline(masks, config.perception) if true_masks else open_pipeline(config.perception)
+    scores: list[FrameScore] = []
+    interrupted = False
     with progress_bar() as bar:
         found = score_set(samples, truth, pipeline, masks, left_out.add)
-        scores = list(bar.track(found, total=len(samples), description="frames"))
+        try:
+            for score in bar.track(found, total=len(samples), description="frames"):
+                scores.append(score)
+        except KeyboardInterrupt:
+            interrupted = True
+    if interrupted and not scores:
+        raise KeyboardInterrupt
     left_out.tell(len(scores))
     figures = summarise(scores) | describe_confidence(scores) | ({"left_out": len(left_out)} if left_out else {})
+    if interrupted:
+        figures |= {"interrupted": True, "frames_of_set": len(samples)}
     looks = {stem: str(row["family"]) for stem, row in truth.items() if row.get("family") is not None}
     if scores and all(score.stem in looks for score in scores):
         without = [] if true_masks else trained_without(model_folder(config.perception.segmentation.model))
         figures |= summarise_looks(scores, looks, without)
-    _print(figures, as_json, f"accuracy on {folder}")
+    part = f", interrupted after {len(scores)} of {len(samples)} frames" if interrupted else ""
+    _print(figures, as_json, f"accuracy on {folder}{part}")
+    if interrupted:
+        raise KeyboardInterrupt
     if store:
         described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
         write_figures(model_folder(config.perception.segmentation.model), described | figures)

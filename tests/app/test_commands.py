@@ -10,17 +10,22 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from ctypes.util import find_library
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from app.application import check_display
+from app.benchmark_command import run_accuracy
 from core.errors import UserError
 from core.learning.crops import _Order
 from core.learning.dataset import find_samples, read_truth
 from core.learning.model_file import read_model_info
+from core.study.accuracy import FrameScore, score_set
 from tests.app.golden_session import GOLDEN
 
 MAIN = Path(__file__).resolve().parents[2] / "main.py"
@@ -151,6 +156,29 @@ def test_accuracy_goes_on_after_a_damaged_picture(model: Path, frames: Path, tmp
     figures = json.loads(done.stdout)
     assert (figures["frames"], figures["left_out"]) == (5, 1)
     assert f"note: 1 of 6 frames could not be read and are left out; the first: {cut}" in done.stderr
+
+
+def test_an_interrupted_accuracy_tells_the_frames_until_then_and_stores_nothing(
+    model: Path, frames: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = Path(shutil.copytree(model, tmp_path / "model"))
+    before = (own / "model.json").read_bytes()
+
+    def measure(done: int, *, as_json: bool = True) -> str:
+        def cut(*given: Any) -> Iterator[FrameScore]:
+            yield from islice(score_set(*given), done)
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("core.study.accuracy.score_set", cut)
+        with pytest.raises(KeyboardInterrupt):
+            run_accuracy(frames, model=str(own), preset=None, config_path=None, as_json=as_json, store=True)
+        return capsys.readouterr().out
+
+    figures = json.loads(measure(2))
+    assert (figures["interrupted"], figures["frames"], figures["frames_of_set"]) == (True, 2, 6)
+    assert "interrupted after 2 of 6 frames" in " ".join(measure(2, as_json=False).split())
+    assert measure(0) == ""
+    assert (own / "model.json").read_bytes() == before
 
 
 def test_accuracy_is_one_json_object_and_tells_by_look(model: Path, frames: Path, tmp_path: Path) -> None:
