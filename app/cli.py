@@ -35,7 +35,9 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-SourceOption = Annotated[Path | None, typer.Option("--source", help="video, picture or folder to look at instead of a camera")]
+SourceOption = Annotated[
+    Path | None, typer.Option("--source", help="video, picture or folder to look at instead of a rig's camera")
+]
 
 
 _INTERRUPTED = 130

@@ -8,8 +8,10 @@ from typing import Annotated
 
 import typer
 
-from app.cli_options import ConfigOption, JsonOption, ModelOption, PresetOption
+from app.cli_options import ConfigOption, JsonOption, ModelOption, PresetOption, check_masks
 from core.errors import UserError
+
+_FRAMES = 120
 
 
 def trial(
@@ -31,6 +33,7 @@ def trial(
     """Closed-loop trials in the bench twin: a policy drives the robot to a target that it has never seen."""
     from app.trial_command import run_trials
 
+    check_masks(model, true_masks=true_masks)
     run_trials(
         seeds,
         policy or [],
@@ -49,14 +52,18 @@ def trial(
 def benchmark(
     json: JsonOption = False,
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
-    window: Annotated[float | None, typer.Option(min=5.0, help="run the window for so many seconds and measure its pace")] = None,
+    window: Annotated[
+        float | None, typer.Option(min=5.0, max=3600.0, help="run the window for so many seconds and measure its pace")
+    ] = None,
     recording: Annotated[bool, typer.Option("--recording", help="how much a recording slows perception down, in turns")] = False,
     player: Annotated[
         float | None, typer.Option(min=0.5, max=600.0, help="open a session of so many minutes in the player and seek in it")
     ] = None,
     true_masks: Annotated[bool, typer.Option("--true-masks", help="accuracy of the geometry alone, without the network")] = False,
     store: Annotated[bool, typer.Option("--store", help="keep the accuracy in the model's model.json")] = False,
-    frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
+    frames: Annotated[
+        int | None, typer.Option(min=3, max=10_000, help="frames to time, also with --recording; default: 120")
+    ] = None,
     model: ModelOption = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
@@ -72,6 +79,11 @@ def benchmark(
         raise UserError(f"{'--store' if store else '--true-masks'} is for --accuracy SET")
     if store and (true_masks or preset is not None or config is not None):
         raise UserError("--store keeps figures of the model as it is shipped: leave --true-masks, --preset and --config out")
+    check_masks(model, true_masks=true_masks)
+    others = [name for name, given in asked.items() if given and name != "--recording"]
+    if frames is not None and others:
+        raise UserError(f"--frames is for speed and --recording: leave it out with {others[0]}")
+    frames = _FRAMES if frames is None else frames
     if window is not None and (model is not None or preset is not None):
         raise UserError("--window runs with the settings of --config: leave --model and --preset out")
     if window is not None:

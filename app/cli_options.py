@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from core.errors import UserError
+
 ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file; keys that differ from the defaults are enough")]
 PresetOption = Annotated[str | None, typer.Option("--preset", help="'paper' takes the paper literally")]
 ModelOption = Annotated[str | None, typer.Option(help="model name or folder")]
@@ -19,6 +21,12 @@ ProgressOption = Annotated[
     bool, typer.Option("--progress-json", help="progress as JSON objects on standard output, one a line, for other programs")
 ]
 SessionArgument = Annotated[Path, typer.Argument(metavar="SESSION", help="folder of a recorded session")]
+
+
+def check_masks(model: str | None, *, true_masks: bool) -> None:
+    """Raise UserError for a model that ``--true-masks`` would never look through."""
+    if true_masks and model is not None:
+        raise UserError("--true-masks looks through no network: leave --model out")
 
 
 def tell_asked_progress(asked: bool) -> None:

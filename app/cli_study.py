@@ -8,7 +8,15 @@ from typing import Annotated
 
 import typer
 
-from app.cli_options import ConfigOption, JsonOption, ModelOption, PresetOption, ProgressOption, tell_asked_progress
+from app.cli_options import (
+    ConfigOption,
+    JsonOption,
+    ModelOption,
+    PresetOption,
+    ProgressOption,
+    check_masks,
+    tell_asked_progress,
+)
 from core.errors import UserError
 
 
@@ -128,5 +136,6 @@ def ablation(
     """What each step is worth: from the paper taken literally to ours, on the same masks of the same frames."""
     from app.ablation_command import Plan, run_ablation
 
+    check_masks(model, true_masks=true_masks)
     plan = Plan(labelled, model, config, true_masks, sequence, tuple(phantom or ()), seed, out)
     run_ablation(plan, as_json=json)

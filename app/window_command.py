@@ -14,6 +14,9 @@ from app.rig_engine import EngineMaker
 from app.sources import VIDEO_ENDINGS
 from core.config import Config, load_config, merge
 from core.devices import DeviceError
+from core.errors import UserError
+from core.images import ImageError, read_image
+from core.learning.dataset import IMAGE_ENDINGS
 from core.profiles import settings_of_windows
 from core.rig_file import RESERVED, find_rig, with_rig
 from core.types import Reason
@@ -32,11 +35,13 @@ _REALSENSE_ENDING = ".bag"
 def window_config(
     rig: str | None, config_path: Path | None, source: Path | None, own: dict[str, Any] | None = None
 ) -> tuple[Config, RigKind]:
-    """The configuration of a rig or of a recorded source, and what the banner says. Raises ConfigError, DeviceError.
+    """The configuration of a rig or of a recorded source, and what the banner says; raises UserError.
 
     Without `rig` it is the one that the configuration names; with it, the configuration says how that rig is set. `own` is what the
     user has set, over the defaults.
     """
+    if rig is not None and source is not None:
+        raise UserError("--source is looked at instead of a rig's camera: leave --rig out")
     if source is None:
         config = load_config(config_path, overrides=own)
         if rig is not None:
@@ -50,9 +55,22 @@ def window_config(
             raise DeviceError(f"{source}: no such file or folder")
         camera = "video_file" if source.suffix.lower() in VIDEO_ENDINGS else "image_folder"
         camera = "realsense" if source.suffix.lower() == _REALSENSE_ENDING else camera
+        if camera == "image_folder" and source.is_file():
+            _check_picture(source)
         chosen = {"rig": {"camera": camera, "robot": "none", "source": str(source)}}
         config = load_config(config_path, overrides=merge(own or {}, chosen))
     return config, kind_of(config.rig)
+
+
+def _check_picture(file: Path) -> None:
+    """A file that is no video by its name must be a picture: said here, and not in a window that would show nothing."""
+    try:
+        read_image(file)
+    except ImageError as error:
+        if file.suffix.lower() in IMAGE_ENDINGS:
+            raise
+        endings = ", ".join((*IMAGE_ENDINGS, *VIDEO_ENDINGS, _REALSENSE_ENDING))
+        raise UserError(f"{error}; --source takes a folder of pictures, or a file that ends in {endings}") from None
 
 
 def _from_file(config: Config, name: str) -> Config:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer import TyperException
 
 from app.cli import app
 from app.learning_commands import TrainInputs, TrainOutputs, run_train
@@ -198,6 +199,13 @@ def test_training_refuses_what_could_have_no_effect(labelled: Path, tmp_path: Pa
         (("benchmark", "--accuracy", "set", "--store", "--true-masks"), "--store keeps figures of the model as it is shipped"),
         (("benchmark", "--accuracy", "set", "--store", "--preset", "paper"), "--store keeps figures of the model as it is shipped"),
         (("benchmark", "--window", "5", "--model", "x"), "leave --model and --preset out"),
+        (("benchmark", "--window", "5", "--frames", "5"), "--frames is for speed and --recording: leave it out with --window"),
+        (("benchmark", "--player", "5", "--frames", "120"), "leave it out with --player"),
+        (("benchmark", "--accuracy", "set", "--frames", "5"), "leave it out with --accuracy"),
+        (("benchmark", "--accuracy", "set", "--true-masks", "--model", "x"), "--true-masks looks through no network"),
+        (("trial", "--seeds", "0:2", "--true-masks", "--model", "x"), "--true-masks looks through no network"),
+        (("ablation", "set", "--true-masks", "--model", "x"), "--true-masks looks through no network"),
+        (("gui", "--rig", "twin", "--source", "photo.png"), "--source is looked at instead of a rig's camera: leave --rig out"),
         (("evaluate", "set", "--out", "out", "--manual-sd", "3"), "--manual-sd is for --like-paper"),
         (("evaluate", "set", "--out", "out", "--json", "--progress-json"), "both write to standard output"),
         (("faults", "--only", "40", "--quick"), "fault 40 needs a line, a process or a window"),
@@ -210,6 +218,11 @@ def test_training_refuses_what_could_have_no_effect(labelled: Path, tmp_path: Pa
 def test_options_that_contradict_each_other_are_refused(arguments: tuple[str, ...], why: str) -> None:
     with pytest.raises(UserError, match=why):
         call(*arguments)
+
+
+def test_a_window_is_not_measured_for_ever() -> None:
+    with pytest.raises(TyperException, match="less than or equal to 3600"):
+        call("benchmark", "--window", "inf")
 
 
 def test_what_a_recovered_copy_loses_later_is_told_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

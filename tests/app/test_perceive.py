@@ -251,6 +251,8 @@ def test_what_cannot_be_written_is_told_and_the_rest_goes_on(picture: Path, tmp_
         (["perceive", "{picture}", "--config", "{tmp}/bad.toml"], "perception.pose.d_allow_px: must be > 0 and <= 200"),
         (["gui", "--rig", "nope"], "unknown rig 'nope'"),
         (["gui", "--source", "{tmp}/none.mp4"], "no such file"),
+        (["gui", "--source", "{tmp}/bad.toml"], "--source takes a folder of pictures, or a file that ends in .png, "),
+        (["gui", "--source", "{tmp}/cut.png"], "cut.png: "),
         (["train", "--out", "{tmp}/model"], "nothing to train on"),
         (["train", "--data", "{tmp}/empty_folder", "--out", "{tmp}/model"], "needs images/NAME.png"),
         (["benchmark", "--accuracy", "{tmp}/empty_folder"], "no labelled frames"),
@@ -260,6 +262,7 @@ def test_bad_input_is_one_clear_line_and_exit_code_2(arguments: list[str], words
     (tmp_path / "empty_folder").mkdir()
     (tmp_path / "file").write_text("a file where a folder is wanted")
     (tmp_path / "bad.json").write_text("{")
+    (tmp_path / "cut.png").write_bytes(picture.read_bytes()[:100])
     (tmp_path / "odd.json").write_text('{"photo": [1, "x"]}')
     (tmp_path / "bad.toml").write_text("[perception.pose]\nd_allow_px = 0\n")
     done = run(*(a.format(tmp=tmp_path, picture=picture) for a in arguments))
