@@ -8,8 +8,8 @@ SHELL := /bin/bash
 
 # Tools are started as modules, so that a checkout that was moved still works (the scripts in .venv/bin name their old place).
 PY := .venv/bin/python
-# Those of a ROS set-up, say, would hide the packages of .venv.
-unexport PYTHONPATH PYTHONHOME
+# Those of a ROS set-up, say, would hide the packages of .venv; and PYTHONSAFEPATH would hide the program itself.
+unexport PYTHONPATH PYTHONHOME PYTHONSAFEPATH
 
 help:  ## this list
 	@echo "usage: make TARGET [ARGS='...'] [PYTHON=/path/to/python3.11]"

@@ -8,6 +8,7 @@ venv=.venv
 stamp=$venv/.ready # holds what .venv was made from; written last, so an interrupted set-up leaves none
 half=$venv/.half # there from the beginning of a .venv until its packages are in: only such a one is thrown away
 unset PYTHONPATH PYTHONHOME # of a ROS set-up, say: its packages would hide those of .venv
+export PIP_USER=0 # a pip.conf that says user=true would end every installation into .venv
 
 # Shared library that is missing on a bare Debian 12 -> the package that has it.
 libraries="
@@ -32,19 +33,29 @@ stop() {
     exit 1
 }
 
-is_python_311() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; }
+is_python_311() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' </dev/null 2>/dev/null; }
+
+# Whether a program lies in .venv, which may be activated: what is about to be deleted cannot make the next one.
+is_own() {
+    local folder own
+    folder=$(cd "$(dirname "$1")" && pwd -P) && own=$(cd "$venv" 2>/dev/null && pwd -P) && [[ $folder/ == "$own"/* ]]
+}
 
 find_python() {
-    local candidate candidates=(python3.11 python3)
-    [[ -z ${PYTHON:-} ]] || candidates=("$PYTHON")
-    for candidate in "${candidates[@]}"; do
-        if is_python_311 "$candidate"; then
-            command -v "$candidate"
+    local candidate candidates
+    if [[ -n ${PYTHON:-} ]]; then
+        candidates=$(type -P "$PYTHON" || true)
+    else
+        candidates=$(type -aP python3.11 python3 || true)
+    fi
+    while IFS= read -r candidate; do
+        if [[ -n $candidate ]] && ! is_own "$candidate" && is_python_311 "$candidate"; then
+            echo "$candidate"
             return
         fi
-    done
+    done <<<"$candidates"
     stop "Python 3.11 is needed (the last RealSense library that knows the L515 camera has no build for 3.12), but
-  ${PYTHON:-python3.11 or python3} is not one. Debian 12: sudo apt-get install python3.11 python3.11-venv
+  ${PYTHON:-python3.11 or python3} is not one outside $venv. Debian 12: sudo apt-get install python3.11 python3.11-venv
   Elsewhere install it beside your own, then: make PYTHON=/path/to/python3.11 run"
 }
 
@@ -90,9 +101,30 @@ and run make again."
     [[ -z $missing ]] || stop "still missing after installation: $missing"
 }
 
+is_whole() { [[ ! -f $half ]] && is_python_311 "$venv/bin/python"; }
+
+# Installed packages that requirements.lock does not list, one line; nor does it list what installs them.
+unlisted_packages() {
+    "$venv/bin/python" - <<'PYTHON_CODE'
+import re
+import sysconfig
+from importlib import metadata
+
+
+def plain(name):
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+with open("requirements.lock", encoding="utf-8") as lock:
+    listed = {plain(name) for name in re.findall(r"^([\w.-]+)==", lock.read(), re.MULTILINE)}
+found = {plain(package.metadata["Name"]) for package in metadata.distributions(path=[sysconfig.get_path("purelib")])}
+print(*sorted(found - listed - {"pip", "setuptools", "wheel"}))
+PYTHON_CODE
+}
+
 install_python_packages() {
-    local python=$1
-    if [[ -f $half ]] || ! is_python_311 "$venv/bin/python"; then
+    local python=$1 unlisted
+    if ! is_whole; then
         say "set-up: making $venv with $python (the first time takes some minutes)"
         mkdir -p "$venv"
         find "$venv/" -mindepth 1 -delete # what is in it: it may be a link to a larger disk
@@ -105,6 +137,13 @@ install_python_packages() {
     rm -f "$half"
     # openvino brings this package and reports every import with it; without it, openvino falls back to its own silent stub.
     "$venv/bin/python" -m pip uninstall --quiet --yes --disable-pip-version-check openvino-telemetry
+    # What an earlier lock listed may stand in the way of what this one does; nothing is tested with it any more.
+    unlisted=$(unlisted_packages)
+    if [[ -n $unlisted ]]; then
+        say "set-up: taking out what requirements.lock does not list: $unlisted"
+        # shellcheck disable=SC2086
+        "$venv/bin/python" -m pip uninstall --quiet --yes --disable-pip-version-check $unlisted
+    fi
 }
 
 main() {
@@ -119,7 +158,8 @@ main() {
         return
     fi
     local python
-    python=$(find_python)
+    python=$venv/bin/python # to renew what works no other one is needed
+    is_whole || python=$(find_python)
     install_system_packages "$python"
     install_python_packages "$python"
     echo "$wanted" >"$stamp"
