@@ -10,6 +10,9 @@ from core.types import Points
 
 WIDTH_RADII = 4.0
 """A width that was seen so many radii away is believed by a third (1/e): a vessel that the picture cuts lengthwise may taper."""
+ALONG = 0.87
+"""Cosine of the angle to the border up to which a vessel is cut lengthwise. One that runs out of the picture lacks a wall for a
+short way only: its end is led anew (``vessel_ends``), and until there the map tells more than a skeleton that turns aside."""
 END_RADII = 1.5
 """So near to its ends a line runs into a corner, or through a junction's opening, where no width is the vessel's."""
 MAP_PX = 2.0
@@ -35,7 +38,9 @@ def by_wall_in_view(
     shape : of the picture, (h, w).
     """
     ahead, behind = _to_border(lines.points, normal, shape), _to_border(lines.points, -normal, shape)
-    is_cut = np.minimum(ahead, behind) < (1.0 + MAP_SHARE) * reach + MAP_PX
+    across = np.minimum(ahead, behind)
+    is_cut = across < (1.0 + MAP_SHARE) * reach + MAP_PX
+    is_cut &= _to_nearest_border(lines.points, shape) >= ALONG * across
     if not is_cut.any():
         return shift
     is_plain = ~is_cut & (step_px * _to_ends(lines) > END_RADII * reach)
@@ -50,7 +55,12 @@ def _to_border(points: Points, direction: Points, shape: tuple[int, ...]) -> NDA
     """How far it is from places in the picture (N, 2) along unit vectors (N, 2) to its border: to the last pixels' centres."""
     limit = np.array([shape[1] - 1.0, shape[0] - 1.0])
     room = np.where(direction > 0.0, limit - points, points)
-    return np.maximum((room / np.maximum(np.abs(direction), 1e-9)).min(axis=1), 0.0)
+    return np.asarray(np.maximum((room / np.maximum(np.abs(direction), 1e-9)).min(axis=1), 0.0))
+
+
+def _to_nearest_border(points: Points, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """How far it is from places in the picture (N, 2) to its nearest side, to the last pixels' centres."""
+    return np.asarray(np.minimum(points, (shape[1] - 1.0, shape[0] - 1.0) - points).min(axis=1))
 
 
 def _to_ends(lines: Bundle) -> NDArray[np.int64]:
