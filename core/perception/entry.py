@@ -10,7 +10,7 @@ import numpy as np
 
 from core.config import PathConfig
 from core.perception import polyline
-from core.types import Masks, Point, Points, RobotPath, VesselGraph
+from core.types import Mask, Masks, Point, Points, RobotPath, VesselGraph
 
 END_PART_PX = 20.0
 """How much of each end is compared for thickness."""
@@ -38,11 +38,18 @@ class Surroundings:
 
 def is_entry(place: Points, around: Surroundings) -> bool:
     """Whether a place (2,) lies at the image border or at the insertion port."""
-    height, width = around.masks.robot.shape
+    return _is_at_border(place, around.masks.robot, around.config) or _at_port(place, around)
+
+
+def may_go_on_outside(place: Points, mask: Mask, config: PathConfig) -> bool:
+    """Whether the robot's mask meets the image border at a place (2,), so that nobody can tell whether the robot ends there."""
+    return _is_at_border(place, mask, config) and _meets_border(place, mask)
+
+
+def _is_at_border(place: Points, mask: Mask, config: PathConfig) -> bool:
+    height, width = mask.shape
     x, y = float(place[0]), float(place[1])
-    if min(x, y, width - 1 - x, height - 1 - y) <= around.config.border_px:
-        return True
-    return _at_port(place, around)
+    return bool(min(x, y, width - 1 - x, height - 1 - y) <= config.border_px)
 
 
 def _at_port(place: Points, around: Surroundings) -> bool:
@@ -80,13 +87,12 @@ def _entry(points: Points, around: Surroundings) -> float:
         return 0.0
     # An end that stops short of the border, of a robot whose other end comes from outside the vessel, is a head about to leave.
     ahead_px = _outside_vessel(points[::-1], around) - _outside_vessel(points, around)
-    return float(ahead_px <= OUTSIDE_LEAD_PX or _at_port(points[0], around) or _meets_border(points[0], around))
+    return float(ahead_px <= OUTSIDE_LEAD_PX or _at_port(points[0], around) or _meets_border(points[0], around.masks.robot))
 
 
-def _meets_border(place: Points, around: Surroundings) -> bool:
+def _meets_border(place: Points, mask: Mask) -> bool:
     """Whether the robot's mask reaches the image border near a place, as a robot does that comes from beyond it."""
     x, y = (int(value) for value in place)
-    mask = around.masks.robot
     height, width = mask.shape
     rows, columns = (slice(max(v - NEAR_PX, 0), v + NEAR_PX + 1) for v in (y, x))
     sides = (mask[:2, columns], mask[-2:, columns], mask[rows, :2], mask[rows, -2:])

@@ -23,7 +23,7 @@ from core.perception.route import route_or_reason
 from core.perception.route_memory import RouteMemory
 from core.perception.second_look import MOST_LOOKS, SecondLook
 from core.perception.segmentation import Segmenter, Turned, open_second_look, open_segmenter, recognise, to_working
-from core.perception.tracking import Memory, check_jump, recall
+from core.perception.tracking import Memory, check_in_view, check_jump, recall, remember
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
 from core.types import Frame, Image, Mask, Masks, Point, Reason, Refusal, RobotPath, Scene, Skeletons, VesselGraph, Window
@@ -160,13 +160,16 @@ class Pipeline:
         if past.memory is not None and tracking.memory_s and recall(past.memory, frame.captured_s, tracking) is None:
             self._states.update(None)  # after a pause, or wound back: the state of then says nothing of now
         if scene.pose is not None and scene.path is not None:
-            jump = check_jump(scene.path, past.memory, frame.captured_s, tracking)
-            if jump is None:
-                past.memory = Memory(scene.path, frame.captured_s)
+            refusal = check_jump(scene.path, past.memory, frame.captured_s, tracking)
+            if refusal is None:
+                assert scene.masks is not None
+                past.memory = remember(scene.path, scene.masks.robot, past.memory, frame.captured_s, self._config)
                 past.lookalikes.learn(scene.path, frame.captured_s)
+                refusal = check_in_view(past.memory, self._config)
             else:
                 past.lookalikes.forget()  # the camera was moved, perhaps
-                scene = replace(scene, pose=None, refusal=jump)
+            if refusal is not None:
+                scene = replace(scene, pose=None, refusal=refusal)
         if self._glance is not None:
             past.glances.remember(scene)
         return watch.finish(replace(scene, pose=self._states.update(scene.pose)))

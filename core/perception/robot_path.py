@@ -88,7 +88,7 @@ def find(
         return _why_no_candidate(graph, config.path)
     eligible = candidates if previous is None else [*candidates, *rivals]
     best = max(eligible, key=lambda candidate: candidate.score + candidate.continuity)
-    must_show_head = config.quality.enabled and previous is None
+    must_show_head = config.quality.enabled and previous is None  # in a stream it may have just arrived there: ``check_in_view``
     if must_show_head and all(is_entry(place, around) for place in best.trail.points[[0, -1]]):
         return Refusal(Reason.AMBIGUOUS_PATH, "both of its ends lie at the image border, so its head may be out of view")
     points = tail_first(best.trail.points, around)

@@ -1,4 +1,4 @@
-"""What the last frames say about this one (METHOD section 4): a memory that fades, and a head that cannot jump."""
+"""What the last frames say about this one (METHOD section 4): a memory that fades, a head that cannot jump, or has left."""
 
 from __future__ import annotations
 
@@ -6,19 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.config import TrackingConfig
-from core.types import Reason, Refusal, RobotPath
+from core.config import PerceptionConfig, TrackingConfig
+from core.perception.entry import may_go_on_outside
+from core.types import Mask, Reason, Refusal, RobotPath
 
 SLACK_PX = 12.0
 """A still head may be found this far off from frame to frame: noise of the mask's tip."""
+HEAD_AT_BORDER_S = 0.3
+"""A head that has just arrived at the image border is there. One that stays so long may have gone on beyond it for all one sees."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Memory:
-    """The last path that was accepted, and when its frame was captured."""
+    """The last path that was believed, and when its frame was captured. ``border_s``: since when the robot's mask has met the image
+    border at its head; None where it does not."""
 
     path: RobotPath
     captured_s: float
+    border_s: float | None = None
 
 
 def recall(memory: Memory | None, captured_s: float, config: TrackingConfig) -> RobotPath | None:
@@ -42,3 +47,23 @@ def check_jump(path: RobotPath, memory: Memory | None, captured_s: float, config
     if jump_px <= limit_px:
         return None
     return Refusal(Reason.HEAD_JUMP, f"{jump_px:.0f} px since the last frame (at most {limit_px:.0f} px)")
+
+
+def remember(path: RobotPath, mask: Mask, memory: Memory | None, captured_s: float, config: PerceptionConfig) -> Memory:
+    """A path that was believed, found in the robot's mask (h, w), beside what is remembered of the frames before."""
+    if not may_go_on_outside(path.points[-1], mask, config.path):
+        return Memory(path, captured_s)
+    is_known = memory is not None and recall(memory, captured_s, config.tracking) is not None
+    before_s = memory.border_s if memory is not None and is_known else None
+    return Memory(path, captured_s, captured_s if before_s is None else before_s)
+
+
+def check_in_view(memory: Memory, config: PerceptionConfig) -> Refusal | None:
+    """AMBIGUOUS_PATH, when the robot has met the image border at its head for longer than ``HEAD_AT_BORDER_S``.
+
+    Where it does, the border is all that is found of the head, however far outside it is. The refused path stays the memory: so its
+    head remains the head, and not the tail of a robot that comes in there, and is known again when it comes back into view.
+    """
+    if not config.quality.enabled or memory.border_s is None or memory.captured_s - memory.border_s <= HEAD_AT_BORDER_S:
+        return None
+    return Refusal(Reason.AMBIGUOUS_PATH, "it reaches the image border at its head, which may be out of view")

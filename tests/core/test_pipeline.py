@@ -228,6 +228,28 @@ def test_a_jump_is_refused_until_the_memory_has_faded(pipeline: Pipeline, networ
     assert reason(pipeline(frame(2 * FRAME_S + CONFIG.tracking.memory_s + 0.01))) is None
 
 
+@pytest.mark.parametrize("first_x", [-30.0, 60.0])  # comes in at the border; or from a fitting at the vessel's end in the picture
+def test_a_head_that_has_left_the_picture_is_refused_within_half_a_second_until_it_comes_back(
+    pipeline: Pipeline, network: DrawnNetwork, first_x: float
+) -> None:
+    network.vessel = probability(depth(VESSEL[VESSEL[:, 0] >= first_x], 22.0))
+    robot = VESSEL[VESSEL[:, 0] >= first_x + 5.0] + [0.0, 3.0]
+    told = []
+    for step, head_x in enumerate([*range(600, 680, 8), *[680] * 30, *range(660, 600, -8)]):
+        network.draw(robot[robot[:, 0] <= head_x])
+        scene = pipeline(frame(0.05 * step))
+        told.append((head_x, scene))
+        if scene.pose is not None:
+            assert scene.path is not None
+            assert scene.path.head[0] == pytest.approx(min(head_x, SIZE[0] - 1), abs=3.0), "the tail was never taken for it"
+    answered = [scene.pose is not None for _, scene in told]
+    arrived = next(index for index, (head_x, _) in enumerate(told) if head_x > SIZE[0])
+    assert all(answered[: arrived + 4]), "a head that has just arrived is there"
+    assert not any(answered[arrived + 10 : 40])
+    assert {reason(scene) for _, scene in told[arrived + 10 : 40]} == {Reason.AMBIGUOUS_PATH}
+    assert all(answered[-3:])
+
+
 def test_a_single_image_leaves_the_streams_memory_alone(pipeline: Pipeline, network: DrawnNetwork) -> None:
     pipeline(frame(0.0))
     network.draw_up_to(450)

@@ -7,8 +7,9 @@ import pytest
 from core.config import PerceptionConfig, QualityConfig
 from core.perception import quality
 from core.perception.evidence import wall_blur_px
-from core.perception.tracking import Memory, check_jump, recall
+from core.perception.tracking import Memory, check_in_view, check_jump, recall, remember
 from core.types import Centerline, GraphEdge, Masks, Points, Reason, Refusal, RobotPath, VesselGraph
+from tests.core.drawing import depth, probability
 
 CONFIG = PerceptionConfig()
 LIMITS = CONFIG.quality
@@ -245,3 +246,25 @@ def test_a_head_cannot_jump_farther_than_the_robot_moves() -> None:
     far = path(LINE + [70.0, 0.0])
     assert check_jump(far, MEMORY, 11.0, TRACKING) is None  # the memory has faded: the new place is accepted
     assert check_jump(far, None, 10.0, TRACKING) is None
+
+
+def test_a_head_that_has_met_the_border_for_longer_than_a_moment_may_be_out_of_view() -> None:
+    inside, outside = (np.array([[20.0, 240.0], [tip, 240.0]]) for tip in (600.0, 639.0))
+    memory: Memory | None = None
+    told = []
+    for step, line in enumerate([inside, *[outside] * 5, inside, *[outside] * 3]):
+        mask = probability(depth(line + [[0.0, 0.0], [2.0, 0.0]], 4.0)) >= 0.5
+        memory = remember(path(line), mask, memory, 0.09 * step, CONFIG)
+        refusal = check_in_view(memory, CONFIG)
+        assert refusal is None or refusal.reason is Reason.AMBIGUOUS_PATH
+        told.append(refusal is None)
+    assert told == [True, True, True, True, True, False, True, True, True, True]
+    # After a pause it has arrived anew.
+    assert remember(path(outside), mask, memory, 9.0, CONFIG).border_s == 9.0
+    assert check_in_view(Memory(path(outside), 9.0, 5.0), PerceptionConfig(quality=QualityConfig(enabled=False))) is None
+
+
+def test_a_head_beside_the_border_that_does_not_meet_it_is_in_view() -> None:
+    line = np.array([[20.0, 6.0], [600.0, 6.0]])  # runs along the border, 2 px of background beside it
+    mask = probability(depth(line, 3.6)) >= 0.5
+    assert remember(path(line), mask, Memory(path(line), 0.0, 0.0), 0.1, CONFIG).border_s is None
