@@ -137,6 +137,7 @@ def run_train(
     from app.teaching import Classroom, second_plan, teach_second_look
     from core.learning.dataset import DatasetError, find_samples
     from core.learning.model_file import INFO, check_can_write, check_outside, model_folder
+    from hardware.twin.synth import SynthFolderError
 
     if second_look and outputs.held_out is not None:
         raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
@@ -159,7 +160,11 @@ def run_train(
     if inputs.synthetic:
         folder = out.with_name(out.name + "_frames")
         first = 1_000_000 + plan.seed % 10 * 100_000  # trials have the seeds from 2000000 on
-        run_synth(folder, inputs.synthetic, first, (640, 480), looks, None, 1)
+        try:
+            run_synth(folder, inputs.synthetic, first, (640, 480), looks, None, 1)
+        except SynthFolderError as error:  # the folder goes with --out, and the set in it with these options
+            made = "frames are made there: give --seed, --without and their number as before, or choose another --out"
+            raise DatasetError(f"{error.problem}; {made}") from None
         folders.append(folder)
         if plan.keeps_statistics:  # few frames of a new look, shown as often as all that is to be remembered
             samples *= max(1, round(inputs.synthetic / len(samples)))

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _TOLD_EVERY = 2
 """Steps between two lines for another program: a step takes half a second and more."""
+_SHOWN_EVERY = 50
+"""Steps between two moves of the bar, and lines in the log, at most."""
 _MAY_BE_LOST = 20
 """Steps that may be lost when the last, whole copy of the network cannot be made."""
 _KEPT_EVERY = 1000
@@ -91,6 +93,8 @@ class Classroom:
                     self.bar.console.print(f"step {step} could not be kept, the training goes on: {error}", soft_wrap=True)
 
         def keep_at_once(network: DualUNet, step: int) -> None:
+            if self.teller is None:  # who has pressed Ctrl-C sees that it was heard
+                self.bar.update(task, completed=step, description="saving ...", refresh=True)
             # Hours of learning must not hang on the eight-bit copy, which takes a while; nor either of them on the workers' end.
             if step > _MAY_BE_LOST:
                 keep(network, step, whole=False)
@@ -105,7 +109,8 @@ class Classroom:
             on_last=keep_at_once,
             # a window that has gone can no longer ask for the end
             should_stop=lambda: self.interrupt.asked or (self.teller is not None and not self.teller.is_heard),
-            report_every=50 if self.teller is None else _TOLD_EVERY,
+            # a bar of few steps moves, too
+            report_every=max(1, min(_SHOWN_EVERY, plan.steps // 10)) if self.teller is None else _TOLD_EVERY,
             checkpoint_every=_KEPT_EVERY if not self.watch.is_on else max(_TOLD_EVERY, plan.steps // _LOOKS),
         )
         self.steps_before += done

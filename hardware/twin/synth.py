@@ -154,6 +154,14 @@ class SynthError(UserError):
     """The set cannot be written; the message is one line and says what to do."""
 
 
+class SynthFolderError(SynthError):
+    """The folder holds something else; ``problem`` says what, for those who cannot just choose another one."""
+
+    def __init__(self, problem: str, advice: str = "choose another folder") -> None:
+        super().__init__(f"{problem}; {advice}")
+        self.problem = problem
+
+
 def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int], None] = lambda _: None) -> int:
     """Write the set; frames that are there already are kept. Returns the number of frames in it.
 
@@ -216,13 +224,13 @@ def _prepare(plan: SynthPlan) -> None:
     path = plan.out / "plan.json"
     try:
         if not path.is_file() and plan.out.is_dir() and not all(map(is_aside, plan.out.iterdir())):
-            raise SynthError(f"{plan.out}: holds something that synth did not write; choose another folder")
+            raise SynthFolderError(f"{plan.out}: holds something that synth did not write")
         plan.out.mkdir(parents=True, exist_ok=True)
         if any(int(image.stem) >= plan.count for image in (plan.out / "images").glob("*.png") if image.stem.isdecimal()):
-            raise SynthError(f"{plan.out}: holds more than {plan.count} frames; ask for as many, or choose another folder")
+            raise SynthFolderError(f"{plan.out}: holds more than {plan.count} frames", "ask for as many, or choose another folder")
         if path.is_file():
             if json.loads(path.read_text(encoding="utf-8")) != described:
-                raise SynthError(f"{plan.out}: holds a set with other settings ({path.name}); choose another folder")
+                raise SynthFolderError(f"{plan.out}: holds a set with other settings ({path.name})")
         else:
             write_whole(path, f"{json.dumps(described)}\n".encode())  # first: it says whose folder this is
         folders = [plan.out / name for name in ("images", "masks", "episodes")]

@@ -144,6 +144,17 @@ def test_frames_are_not_made_into_somebody_elses_folder(labelled: Path) -> None:
     assert contents(labelled) == before
 
 
+def test_frames_made_for_a_training_name_the_options_that_they_hang_on(tmp_path: Path) -> None:
+    """Their folder has no option of its own."""
+    plan = SynthPlan(tmp_path / "m_frames", 4, 1_000_000)
+    (tmp_path / "m_frames").mkdir()
+    (tmp_path / "m_frames" / "plan.json").write_text("{}")
+    with pytest.raises(SynthError, match=r"other settings .*; choose another folder"):
+        write_set(plan)
+    with pytest.raises(UserError, match=r"m_frames: holds a set with other .*: give --seed, .*, or choose another --out$"):
+        run_train(TrainOutputs(tmp_path / "m"), TrainInputs(synthetic=4), None, 4, TrainingPlan(steps=1, seed=3))
+
+
 def test_frames_within_the_model_that_is_trained_are_not_learnt_from(labelled: Path, tmp_path: Path) -> None:
     model = Path(shutil.copytree(MODELS / "default", tmp_path / "model"))
     frames = Path(shutil.copytree(labelled, model / "frames"))

@@ -81,6 +81,19 @@ def test_a_checkpoint_that_cannot_be_written_does_not_end_the_training(tmp_path:
     assert [line for line in told if "step 7 could not be kept: " in line and "cannot be written (no space)" in line]
 
 
+def test_the_bar_moves_in_a_short_training_and_says_that_it_saves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lesson, shown = _Lesson(), list[tuple[int, str]]()
+    monkeypatch.setattr(lesson, "save", lambda *_, **__: None)
+    watch = HeldOutWatch(None, tmp_path / "out", None, lambda _: None)
+    with Progress(disable=True) as bar:
+        monkeypatch.setattr(bar, "update", lambda _, completed, description, **__: shown.append((completed, description)))
+        room = Classroom(tmp_path / "out", {}, lambda _: None, None, bar, Interrupt(), watch)
+        room.teach(lesson, TrainingPlan(steps=_STEPS, batch=1, crop=(64, 64), workers=0, warmup_steps=1))
+    *moves, last = shown
+    assert [step for step, _ in moves] == [*range(2, _STEPS, 2), _STEPS]
+    assert last == (_STEPS, "saving ...")
+
+
 def test_a_training_that_is_interrupted_before_its_first_step_is_no_success(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
