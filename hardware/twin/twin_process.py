@@ -70,8 +70,12 @@ def _serve(world: TwinWorld, frames: SharedSlot, status: SharedSlot, wake: int, 
         status.put(pack_status(world.physics.status()))
         if frame is not None:
             frames.put(pack_frame(frame))
-            with contextlib.suppress(BlockingIOError):  # a full pipe wakes as well
+            try:
                 os.write(wake, b".")
+            except BlockingIOError:
+                pass  # a full pipe wakes as well
+            except BrokenPipeError:
+                return  # the application was ended at this moment, before its end of the input is seen
 
 
 def _await_end(ended: threading.Event) -> None:

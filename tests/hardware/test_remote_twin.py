@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import psutil
@@ -16,7 +19,10 @@ from core.control.gate import Source
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
 from hardware.rig import RigKind, open_rig
+from hardware.servos.shared_slot import SharedSlot
 from hardware.twin.remote_twin import RemoteTwin, pack_frame, pack_status, unpack_frame, unpack_status
+from hardware.twin.twin_process import _serve
+from hardware.twin.world import TwinWorld
 
 CONFIG = Config.model_validate({"twin": {"image_width_px": 160, "image_height_px": 120}})
 
@@ -77,6 +83,22 @@ def test_closing_ends_the_process(twin: RemoteTwin) -> None:
     twin.close()
     assert not psutil.pid_exists(pid)
     twin.close()
+
+
+def test_an_application_that_was_ended_is_no_error_of_the_twin() -> None:
+    """Its pipe may be closed before its end of standard input is seen."""
+    image = np.zeros((2, 2, 3), np.uint8)
+    status = RobotStatus(1.0, 2.0, 3.0, (0.1, 0.2, 0.3, 0.4), (1.0, 2.0, 3.0, 4.0), None)
+    world = SimpleNamespace(
+        failure=None, frames=SimpleNamespace(take=lambda _: Frame(0, 0.0, image)), physics=SimpleNamespace(status=lambda: status)
+    )
+    slot = SimpleNamespace(put=lambda _: None)
+    listening, wake = os.pipe()
+    os.close(listening)
+    try:
+        _serve(cast("TwinWorld", world), cast("SharedSlot", slot), cast("SharedSlot", slot), wake, threading.Event())
+    finally:
+        os.close(wake)
 
 
 def test_what_is_wrong_is_said_in_one_line() -> None:
