@@ -187,12 +187,15 @@ def extend_ends(skeleton: Mask, mask: Mask) -> Mask:
     extended = skeleton.copy()
     trim = round(mean_radius(skeleton, mask))
     walker = Walker(skeleton)
-    for end in end_pixels(skeleton):
-        walked = walker.back(end, trim + TANGENT_PX)
+    ends = end_pixels(skeleton)
+    for end in ends:
+        walked = walker.back(end, 2 * trim + TANGENT_PX)
         if len(walked) < 4:
             continue
-        hook = min(trim, len(walked) - 4)
-        direction = _direction(walked[hook:])
+        # A short branch is taken off at both of its ends. A third of it stays between them, which has its direction.
+        is_whole = walked[-1] in ends
+        hook = min(trim, len(walked) // 3 if is_whole else len(walked) - 4)
+        direction = _direction(walked[hook : min(len(walked) - hook if is_whole else len(walked), hook + TANGENT_PX + 1)])
         if direction is None:
             continue
         for x, y in walked[:hook]:

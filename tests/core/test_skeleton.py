@@ -143,6 +143,24 @@ def test_ends_are_extended_to_the_masks_edge() -> None:
     assert not (extended & ~mask).any()
 
 
+@pytest.mark.parametrize(("radius", "length_px", "angle_deg"), [(10, 26, 53), (12, 41, 39), (16, 44, 37), (12, 30, 6), (16, 60, 6)])
+def test_a_short_thick_robot_stays_in_one_piece_from_end_to_end(radius: float, length_px: float, angle_deg: float) -> None:
+    along = np.array([np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))])
+    middle = np.array([200.0, 200.0])
+    x, y = np.meshgrid(np.arange(400.0), np.arange(400.0))
+    places = np.stack([x, y], axis=-1) - middle
+    reach = np.clip(places @ along, -0.5 * length_px, 0.5 * length_px)
+    mask = np.hypot(*np.moveaxis(places - reach[..., None] * along, -1, 0)) < radius  # with round ends
+    masks = masks_of(everywhere((400, 400)), mask.astype(np.float32))
+    skeleton = thin_masks(masks, PerceptionConfig()).robot
+    assert label(skeleton, EIGHT)[1] == 1
+    ends = np.array(sorted(end_pixels(skeleton)), float)
+    assert len(ends) == 2
+    chord = ends[1] - ends[0]
+    assert np.hypot(*chord) == pytest.approx(length_px + 2 * radius, abs=3.0)
+    assert np.degrees(np.arctan2(chord[1], chord[0])) == pytest.approx(angle_deg, abs=4.0)
+
+
 def test_the_fork_at_a_broken_end_is_pruned() -> None:
     mask = np.zeros((60, 160), bool)
     mask[25:36, 20:140] = True
