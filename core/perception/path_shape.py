@@ -48,7 +48,10 @@ def _centred(line: Points, probability: NDArray[np.float32], radius_px: float) -
     offsets = np.arange(-side, side + 1, dtype=np.float64)
     across = polyline.normals(line)
     x, y = (line[:, axis] + offsets[:, None] * across[:, axis] for axis in (0, 1))
-    weight = polyline.sample_at(probability, x, y)
+    # What lies beyond the image's border is not seen. Sampled as what is beside it, a robot there would be drawn outwards.
+    height, width = probability.shape
+    inside = (x > -0.5) & (x < width - 0.5) & (y > -0.5) & (y < height - 0.5)
+    weight = np.where(inside, polyline.sample_at(probability, x, y), 0.0)
     # Looking outwards the weight may only fall: another stretch of robot close by does not pull.
     weight[side:] = np.minimum.accumulate(weight[side:])
     weight[side::-1] = np.minimum.accumulate(weight[side::-1])
@@ -56,8 +59,8 @@ def _centred(line: Points, probability: NDArray[np.float32], radius_px: float) -
     seen = total > 1.0
     shift = np.where(seen, (offsets @ weight) / np.maximum(total, 1e-6), 0.0)
     shift = np.minimum(np.maximum(shift, -radius_px), radius_px)
-    width = polyline.median(total[seen]) if seen.any() else 2.0 * radius_px
-    return line + shift[:, None] * across, 0.5 * width
+    thickness = polyline.median(total[seen]) if seen.any() else 2.0 * radius_px
+    return line + shift[:, None] * across, 0.5 * thickness
 
 
 def _to_edge(line: Points, masks: Masks, radius_px: float) -> Points:

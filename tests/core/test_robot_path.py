@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.config import PathConfig, PerceptionConfig, load_config
+from core.config import PathConfig, PerceptionConfig, QualityConfig, load_config
 from core.perception import gaps, masks, polyline, robot_path, skeleton
 from core.perception.pixel_graph import PixelGraph
 from core.perception.trails import Trail
@@ -395,6 +395,15 @@ def test_the_papers_score_chooses_among_all_pieces() -> None:
     robot = probability(depth(S_CURVE, 4.0), straight)
     literal = PerceptionConfig(path=PathConfig(outlier_share=0.0))
     assert path_of(robot, config=literal).head[0] > 550  # shorter and straighter: why outliers are put aside before scoring
+
+
+@pytest.mark.parametrize(("row", "off_px"), [(6.0, 0.05), (4.0, 0.2), (3.0, 0.6)])
+def test_a_robot_beside_the_border_is_not_drawn_out_of_the_picture(row: float, off_px: float) -> None:
+    whatever_it_is = PerceptionConfig(quality=QualityConfig(enabled=False))
+    line = np.array([[-20.0, 60.0], [60.0, 60.0], [120.0, row], [300.0, row]])
+    path = path_of(probability(depth(line, 4.0)), config=whatever_it_is)
+    assert path.head == pytest.approx((300.0, row), abs=0.5 + off_px)
+    assert path.points[-20:, 1] == pytest.approx(row, abs=off_px)
 
 
 def test_in_a_stream_a_head_that_reaches_the_border_stays_the_head() -> None:
