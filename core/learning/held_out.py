@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from core.learning.dataset import WORKING_SIZE_PX, Sample
+from core.perception.segmentation import padded
 from core.perception.unet import DualUNet
 from core.types import Image, Mask
 
@@ -58,10 +59,8 @@ def dice(pairs: Sequence[tuple[Mask, Mask]]) -> float:
 def _see(network: DualUNet, sample: Sample) -> HeldOutFrame:
     image, vessel, robot = sample.load(WORKING_SIZE_PX)
     height, width = image.shape[:2]
-    stride = network.shape.stride
-    # Repeated to whole strides, as perception does it, and cut back.
-    padded = np.pad(image, ((0, -height % stride), (0, -width % stride), (0, 0)), mode="edge")
+    whole = padded(image, network.shape.stride)  # as perception does it, and cut back
     device = next(network.parameters()).device
-    batch = torch.from_numpy(np.ascontiguousarray(padded.transpose(2, 0, 1)))[None].to(device).float() / 255
+    batch = torch.from_numpy(np.ascontiguousarray(whole.transpose(2, 0, 1)))[None].to(device).float() / 255
     found = (network(batch)[0] > 0).cpu().numpy()[:, :height, :width]
     return HeldOutFrame(sample.stem, image, vessel, robot, found[0], found[1])

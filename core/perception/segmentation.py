@@ -121,7 +121,7 @@ def to_working(image: Image, working_size_px: int) -> tuple[Image, tuple[float, 
     return np.asarray(resized, np.uint8), (size[0] / width, size[1] / height)
 
 
-def _padded(image: Image, stride: int) -> Image:
+def padded(image: Image, stride: int) -> Image:
     """Right and bottom filled up to multiples of `stride`; mirrored, because an edge of constant colour would look like a wall."""
     height, width = image.shape[:2]
     down, right = -height % stride, -width % stride
@@ -218,9 +218,9 @@ class OpenVinoSegmenter:
         taken: list[_Taken] = []
         for first in range(0, len(images), _AT_ONCE):
             some = images[first : first + _AT_ONCE]
-            padded = np.stack([_padded(image, self.info.stride) for image in some])
+            batch = np.stack([padded(image, self.info.stride) for image in some])
             with self._asking:
-                results = self._request(padded.shape[:3]).infer({0: padded}, share_inputs=True, share_outputs=True)
+                results = self._request(batch.shape[:3]).infer({0: batch}, share_inputs=True, share_outputs=True)
                 deepest = results[1] if self._recognises else [None] * len(some)
                 taken += map(take, some, results[0], deepest)
         return taken
@@ -281,7 +281,7 @@ class TorchSegmenter:
     def _infer(self, image: Image) -> tuple[Any, Any]:
         """Probabilities (2, H, W) with padding, and the deepest level, on the device."""
         torch = self._torch
-        batch = torch.from_numpy(np.ascontiguousarray(_padded(image, self.info.stride)))[None].to(self._device)
+        batch = torch.from_numpy(np.ascontiguousarray(padded(image, self.info.stride)))[None].to(self._device)
         with torch.inference_mode(), torch.autocast("cuda", torch.float16, enabled=self._device.type == "cuda"):
             probabilities, deepest = self._network.with_deepest(batch)
         return probabilities[0], deepest[0]

@@ -11,6 +11,7 @@ import torch
 
 from core.learning.dataset import find_samples
 from core.learning.held_out import dice, measure_held_out
+from core.perception.segmentation import padded
 from core.perception.unet import DualUNet, UNetShape
 from core.study.annotation_images import FoundImage, find_images
 from core.study.annotation_records import StoredAnnotation
@@ -78,3 +79,26 @@ def test_a_network_that_finds_all_or_nothing_is_measured_and_left_in_its_mode(tm
     assert seen.robot_dice == 0.0
     assert {frame.stem for frame in seen.frames} == {sample.stem for sample in find_samples([frames.held_out])}
     assert seen.frames[0].vessel.shape == seen.frames[0].image.shape[:2]
+
+
+def test_a_held_out_frame_is_filled_up_to_whole_strides_as_perception_does_it() -> None:
+    """Mirrored: a network is measured on what it will be shown."""
+
+    class Drawn:
+        stem = "drawn"
+
+        def load(self, size_px: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            image = np.random.default_rng(0).integers(0, 255, (90, 120, 3), np.uint8)
+            return image, np.zeros((90, 120), bool), np.zeros((90, 120), bool)
+
+    shown: list[np.ndarray] = []
+    network = DualUNet(UNetShape.of_base(4))
+    network.register_forward_pre_hook(lambda _, given: shown.append(np.rint(255 * given[0][0].numpy()).astype(np.uint8)))
+    (seen,) = measure_held_out(network, [Drawn()]).frames  # type: ignore[list-item]
+    assert seen.vessel.shape == (90, 120)
+    (batch,) = shown
+    height = batch.shape[1]
+    assert height > 90
+    assert height % network.shape.stride == 0
+    np.testing.assert_array_equal(batch[:, 90:height], batch[:, 88 : 178 - height : -1])
+    np.testing.assert_array_equal(batch.transpose(1, 2, 0), padded(seen.image, network.shape.stride))
