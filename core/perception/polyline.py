@@ -66,7 +66,7 @@ def cut(points: Points, start_px: float, end_px: float, along: NDArray[np.float6
 def continued(points: Points, length_px: float, over_px: float) -> Points:
     """How a polyline would go on from its last point, bending as it did before: a point every px, the last point first.
 
-    Its direction and its bend are taken over the last `over_px`, and ``BEND_SHARE`` of the bend is continued.
+    Its direction and its bend are taken over the last `over_px`, or all of a shorter line, and ``BEND_SHARE`` of the bend goes on.
     """
     along = arc_length(points)
     total = float(along[-1])
@@ -75,9 +75,9 @@ def continued(points: Points, length_px: float, over_px: float) -> Points:
     before = math.atan2(middle[1] - first[1], middle[0] - first[0])
     after = math.atan2(last[1] - middle[1], last[0] - middle[0])
     turn = (after - before + math.pi) % (2.0 * math.pi) - math.pi
-    per_px = BEND_SHARE * turn / max(0.5 * over_px, 1.0)
+    per_px = BEND_SHARE * turn / max(0.5 * back_px, 1.0)
     # From the middle of the last half, where its chord has the line's direction, to each further step.
-    headings = after + per_px * (0.25 * over_px + 0.5 + np.arange(int(length_px)))
+    headings = after + per_px * (0.25 * back_px + 0.5 + np.arange(int(length_px)))
     onward = np.empty((len(headings) + 1, 2))
     onward[0] = last
     np.cos(headings, out=onward[1:, 0])

@@ -83,3 +83,14 @@ def test_a_known_arc_length_need_not_be_given_again_and_changes_nothing() -> Non
     along = polyline.arc_length(CORNER)
     assert polyline.cut(CORNER, 20.0, 35.0, along).tolist() == polyline.cut(CORNER, 20.0, 35.0).tolist()
     assert polyline.nearest(CORNER, (33.0, 44.0), along) == polyline.nearest(CORNER, (33.0, 44.0))
+
+
+@pytest.mark.parametrize("over_px", [20.0, 30.0, 60.0])
+def test_a_short_line_goes_on_with_half_the_bend_that_it_has(over_px: float) -> None:
+    """A circle of 40 px radius, of which 20 px are known."""
+    angle = np.linspace(0.0, 0.5, 41)
+    line = 40.0 * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
+    onward = polyline.continued(line, 20.0, over_px)
+    heading = np.unwrap(np.arctan2(*np.diff(onward, axis=0).T[::-1]))
+    assert heading[0] == pytest.approx(0.44, abs=0.01)  # its last half has 0.375
+    assert np.diff(heading) == pytest.approx(0.5 / 40.0, rel=0.05)
