@@ -12,21 +12,38 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from app.window_command import window_config
-from hardware.preflight import Check, run_checks
+from hardware.checks import program
+from hardware.checks.check import RENEW, Check, one_line
 
 _NAME_COLUMNS = 18
 
 
 def run_doctor(rig: str | None, config_path: Path | None, *, as_json: bool) -> int:
     """Check everything and tell; returns 0 when all is well, 1 when something is not. Raises UserError for bad input."""
-    config, _ = window_config(rig, config_path, None)
-    checks = list(_with_progress(run_checks(config)))
+    checks = list(_with_progress(_checks(rig, config_path)))
     if as_json:
         sys.stdout.write(json.dumps({"checks": [check.to_json() for check in checks]}) + "\n")
     else:
         _print(checks)
     return 0 if all(check.ok for check in checks) else 1
+
+
+def _checks(rig: str | None, config_path: Path | None) -> Iterator[Check]:
+    """All of them; where what they stand on is missing or damaged, those that say so."""
+    # One that is cut short would end this process, too.
+    problem = program.load_problem(program.OPENCV)
+    if not problem:
+        try:
+            from app.window_command import window_config
+            from hardware.preflight import run_checks
+        except ImportError as error:
+            problem = one_line(error)
+    if problem:
+        yield from (check() for check in program.OF_THE_PROGRAM)
+        yield Check("all others", False, f"not made, since the program does not load: {problem}", RENEW)
+        return
+    config, _ = window_config(rig, config_path, None)
+    yield from run_checks(config)
 
 
 def _with_progress(checks: Iterator[Check]) -> Iterator[Check]:

@@ -25,10 +25,7 @@ def run_checks(config: Config, environ: Mapping[str, str] | None = None) -> Iter
     """
     environ = os.environ if environ is None else environ
     checks: tuple[Callable[[], Check], ...] = (
-        program.check_python,
-        program.check_packages,
-        program.check_libraries,
-        program.check_binaries,
+        *program.OF_THE_PROGRAM,
         lambda: program.check_display(environ),
         lambda: model.check_model(config.perception.segmentation.model),
         lambda: model.check_self_test(config.perception),

@@ -12,7 +12,7 @@ from core.config import Config
 from core.devices import Camera, DeviceError
 from core.types import Frame
 from hardware.checks.check import Check, one_line
-from hardware.checks.program import realsense_problem
+from hardware.checks.program import REALSENSE, load_problem
 from hardware.rig import RigKind, kind_of, real_camera
 from hardware.usb import DEV, SYS, USB3_MBIT_S, realsense_on_usb, video_devices
 
@@ -38,7 +38,7 @@ def _realsense() -> Sequence[RealSenseInfo]:
 
 def _check_realsense_library() -> None:
     """Raises ImportError. A library cut short ends whoever loads it with a memory fault, and all checks with it."""
-    if problem := realsense_problem():
+    if problem := load_problem(REALSENSE):
         raise ImportError(f"the library of RealSense cameras cannot be used: {problem}")
 
 

@@ -46,11 +46,11 @@ LIBRARIES = {
 }
 """Shared library -> the Debian package that has it; the same list as in ``scripts/set_up.sh``."""
 
-_REALSENSE = "RealSense"
+OPENCV, REALSENSE = "OpenCV", "RealSense"
 _BINARIES = (
     ("Qt's window plugin (xcb)", "PySide6_Essentials", "**/plugins/platforms/libqxcb.so"),
-    ("OpenCV", "opencv-python-headless", "cv2/cv2*.so"),
-    (_REALSENSE, "pyrealsense2", "pyrealsense2/pyrealsense2*.so"),
+    (OPENCV, "opencv-python-headless", "cv2/cv2*.so"),
+    (REALSENSE, "pyrealsense2", "pyrealsense2/pyrealsense2*.so"),
 )
 _LOAD = "import ctypes, sys\ntry: ctypes.CDLL(sys.argv[1])\nexcept OSError as error: sys.exit(str(error))\n"
 _LOAD_WITHIN_S = 60.0
@@ -121,9 +121,9 @@ def load_elsewhere(path: Path) -> str:
     return "" if done.returncode == 0 else one_line(done.stderr or f"loading it ends with code {done.returncode}")
 
 
-def realsense_problem() -> str:
-    """Why the RealSense library cannot be loaded, "" when it can. Asked for in a process of its own, in a tenth of a second."""
-    path = dict(_binaries())[_REALSENSE]
+def load_problem(title: str) -> str:
+    """Why OPENCV or REALSENSE cannot be loaded, "" when it can. Asked in a process of its own, in a tenth of a second."""
+    path = dict(_binaries())[title]
     return load_elsewhere(path) if path is not None else "is not installed"
 
 
@@ -174,6 +174,10 @@ def check_binaries(
     fixes = [" && ".join(commands)] if commands else []
     fixes += [f"find and install the package of {unknown}: apt-file search {unknown}"] if unknown else []
     return Check(name, False, "; ".join(problems), "; ".join(fixes))
+
+
+OF_THE_PROGRAM: tuple[Callable[[], Check], ...] = (check_python, check_packages, check_libraries, check_binaries)
+"""Those that need nothing of what they look at: they can be made where nothing else can."""
 
 
 def x_server_answers(display: str) -> bool:

@@ -14,7 +14,8 @@ from app.doctor_command import run_doctor
 from app.window_command import window_config
 from core.config import Config
 from core.rig_file import RigFileError
-from hardware.preflight import Check
+from hardware.checks import program
+from hardware.checks.check import Check
 from hardware.rig import RigKind
 
 MAIN = Path(__file__).resolve().parents[2] / "main.py"
@@ -59,7 +60,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments: tuple[str, ...]) -> No
 def test_people_get_a_table_and_what_to_do(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     long = "echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer   # and so on, far beyond the width of a terminal"
     checks = [Check("clock", True, "monotonic"), Check("adapter latency", False, "16 ms", long)]
-    monkeypatch.setattr("app.doctor_command.run_checks", lambda _config: iter(checks))
+    monkeypatch.setattr("hardware.preflight.run_checks", lambda _config: iter(checks))
     assert run_doctor(None, None, as_json=False) == 1
     lines = capsys.readouterr().out.splitlines()
     assert any(line.split() == ["NOT", "OK", "adapter", "latency", "16", "ms"] for line in lines)
@@ -68,6 +69,30 @@ def test_people_get_a_table_and_what_to_do(monkeypatch: pytest.MonkeyPatch, caps
     checks.pop()
     assert run_doctor(None, None, as_json=False) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "All is well."
+
+
+def test_an_opencv_that_ends_its_process_is_told_without_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    binaries = program._binaries()
+    (tmp_path / "cv2.so").write_bytes(b"\x7fELF but no more")
+    monkeypatch.setattr(program, "_binaries", lambda: [*binaries, (program.OPENCV, tmp_path / "cv2.so")])
+    monkeypatch.setattr("hardware.preflight.run_checks", None)
+    assert run_doctor(None, None, as_json=True) == 1
+    checks = json.loads(capsys.readouterr().out)["checks"]
+    assert [check["name"] for check in checks[:4]] == ["python", "packages", "system libraries", "vendor libraries"]
+    assert "OpenCV: " in checks[3]["detail"]
+    assert checks[4]["name"] == "all others"
+    assert checks[4]["fix"] == "make clean && make setup"
+
+
+def test_a_package_that_does_not_load_is_told_without_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "hardware.preflight", None)
+    assert run_doctor(None, None, as_json=False) == 1
+    told = " ".join(capsys.readouterr().out.split())
+    assert "NOT OK all others not made, since the program does not load: import of hardware.preflight halted" in told
 
 
 # --- which rig a command means ---------------------------------------------------------------------------------------------------
