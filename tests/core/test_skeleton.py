@@ -85,6 +85,17 @@ def test_a_thin_vessel_is_thinned_at_full_size() -> None:
     assert thin_half_size(mask).sum() > 150
 
 
+@pytest.mark.parametrize("shift_px", [0.0, 0.5])
+def test_a_narrow_branch_of_a_wide_vessel_is_not_lost_at_half_size(shift_px: float) -> None:
+    trunk = depth(np.array([[-20.0, 240.0], [660.0, 240.0]]), 22.0)
+    branch = depth(curve((300, 240), (400, 180 + shift_px), (520, 120), (690, 60)), 1.5)
+    mask = probability(trunk, branch) >= 0.5
+    skeleton = thin_half_size(mask)
+    assert topology(skeleton) == (1, 0)
+    assert skeleton[:200, 400:].sum() > 200  # some 240 px of it
+    assert picture(thin_half_size(trunk > 0.0)) != picture(thin(trunk > 0.0)), "where nothing is lost half the size is enough"
+
+
 def test_ends_are_where_the_papers_convolution_gives_eleven() -> None:
     skeleton = art("""
 .........
