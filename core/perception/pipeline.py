@@ -287,7 +287,7 @@ class Pipeline:
                 return replace(scene, refusal=refusal or Refusal(Reason.TOO_SHORT, "it has no direction"))
             centerline = find_centerline(graph, skeletons.vessel, path.head, robot_vector.direction, config.vectors, scene.route)
             vessel_vector = fit_vessel_vector(centerline, config.vectors.line_fit) if centerline is not None else None
-            refusal = quality.check_centerline(centerline, config.quality)
+            refusal = quality.check_centerline(centerline, path.head, config.quality)
             if refusal is None and vessel_vector is None:
                 refusal = Refusal(Reason.NO_VESSEL, "the centerline beside the head has no direction")
             return replace(scene, centerline=centerline, vessel_vector=vessel_vector, refusal=refusal)

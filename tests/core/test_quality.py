@@ -186,15 +186,22 @@ def test_paths_that_are_refused_say_the_value_and_its_limit(found: RobotPath, wh
 
 
 def test_no_centerline_and_two_that_fit_alike() -> None:
-    assert quality.check_centerline(PIECE, LIMITS) is None
-    missing = quality.check_centerline(None, LIMITS)
-    tied = quality.check_centerline(Centerline(PIECE.piece, PIECE.nearest, 20.0, ambiguity=0.99), LIMITS)
+    assert quality.check_centerline(PIECE, PIECE.nearest, LIMITS) is None
+    missing = quality.check_centerline(None, PIECE.nearest, LIMITS)
+    tied = quality.check_centerline(Centerline(PIECE.piece, PIECE.nearest, 20.0, ambiguity=0.99), PIECE.nearest, LIMITS)
     assert isinstance(missing, Refusal)
     assert missing.reason is Reason.NO_VESSEL
     assert isinstance(tied, Refusal)
     assert tied.reason is Reason.AMBIGUOUS_BRANCH
     assert "99 %" in tied.detail
     assert "95 %" in tied.detail
+
+
+def test_a_head_farther_from_the_centerline_than_any_lumen_reaches_is_in_a_vessel_that_was_not_found() -> None:
+    assert quality.check_centerline(PIECE, (120.0, 115.0), LIMITS) is None  # 53 px of 2.5 * 20 + 4
+    far = quality.check_centerline(PIECE, (120.0, 163.0), LIMITS)
+    assert str(far) == "robot outside vessel: its head is 101 px from the nearest centerline (at most 54 px)"
+    assert quality.check_centerline(PIECE, (120.0, 163.0), QualityConfig(enabled=False)) is None
 
 
 def test_confidence_is_one_when_nothing_speaks_against() -> None:
