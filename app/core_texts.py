@@ -197,6 +197,7 @@ FIXED = (
 
 # A value called by one letter is a number; any other is a text that may be known itself.
 TEMPLATES = (
+    "the library of RealSense cameras cannot be used: {problem}",
     "{path}: end of the video",
     "{path}: cut short: {a} of {b} pictures",
     "{path}: cut short: {a} of {b} s",

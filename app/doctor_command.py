@@ -32,7 +32,9 @@ def _checks(rig: str | None, config_path: Path | None) -> Iterator[Check]:
     """All of them; where what they stand on is missing or damaged, those that say so."""
     # One that is cut short would end this process, too.
     problem = program.load_problem(program.OPENCV)
-    if not problem:
+    if problem:
+        problem = f"{program.OPENCV}: {problem}"
+    else:
         try:
             from app.window_command import window_config
             from hardware.preflight import run_checks

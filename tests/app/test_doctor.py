@@ -83,6 +83,7 @@ def test_an_opencv_that_ends_its_process_is_told_without_it(
     assert [check["name"] for check in checks[:4]] == ["python", "packages", "system libraries", "vendor libraries"]
     assert "OpenCV: " in checks[3]["detail"]
     assert checks[4]["name"] == "all others"
+    assert "does not load: OpenCV: " in checks[4]["detail"]
     assert checks[4]["fix"] == "make clean && make setup"
 
 
