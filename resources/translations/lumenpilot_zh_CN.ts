@@ -1213,7 +1213,7 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     <message>
         <location filename="../../app/core_texts.py"/>
         <source>see the vendor libraries in main.py doctor</source>
-        <translation type="unfinished"></translation>
+        <translation>请查看 main.py doctor 中的厂商库检查</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -1414,6 +1414,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>take the algorithm's lines</source>
         <translation>采用算法的线</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the library of RealSense cameras cannot be used: {problem}</source>
+        <translation>无法使用 RealSense 相机的库：{problem}</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
