@@ -61,6 +61,8 @@ FIXED = (
     # refusals
     "it has no pixels",
     "no centerline beside the robot's head",
+    "it reaches the image border at its head, which may be out of view",
+    "both of its ends lie at the image border, so its head may be out of view",
     "it has no direction",
     "the centerline beside the head has no direction",
     # the way to the destination
@@ -220,6 +222,7 @@ TEMPLATES = (
     "what looks like one has walls beside the head that are blurred over {a} px (at most {b} px)",
     "{a} % of the robot is bridged (at most {b} %)",
     "{a} % of its last {b} px lie in the vessel (at least {c} %)",
+    "its head is {a} px from the nearest centerline (at most {b} px)",
     "a second branch fits {a} % as well (at most {b} %)",
     "{a} % (at least {b} %)",
     "distance {a} from the pictures that it knows (at most {b})",

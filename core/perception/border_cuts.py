@@ -37,18 +37,26 @@ def by_wall_in_view(
     shift : by how much each point lies beside the middle of the map (N,), along the normals.
     shape : of the picture, (h, w).
     """
-    ahead, behind = _to_border(lines.points, normal, shape), _to_border(lines.points, -normal, shape)
-    across = np.minimum(ahead, behind)
-    is_cut = across < (1.0 + MAP_SHARE) * reach + MAP_PX
-    is_cut &= _to_nearest_border(lines.points, shape) >= ALONG * across
-    if not is_cut.any():
+    nearest, limit = _to_nearest_border(lines.points, shape), (1.0 + MAP_SHARE) * reach + MAP_PX
+    near = np.flatnonzero(nearest < limit)  # mostly the ends of some vessels, or nothing at all
+    if not len(near):
         return shift
+    ahead, behind = (_to_border(lines.points[near], sign * normal[near], shape) for sign in (1.0, -1.0))
+    across = np.minimum(ahead, behind)
+    found = (across < limit[near]) & (nearest[near] >= ALONG * across)
+    if not found.any():
+        return shift
+    cut = near[found]
+    is_cut = np.zeros(len(lines.points), np.bool_)
+    is_cut[cut] = True
     is_plain = ~is_cut & (step_px * _to_ends(lines) > END_RADII * reach)
     half = lines.split(np.where(is_plain, reach + np.abs(shift), np.nan))
     known, away = np.concatenate([_from_the_nearest(values) for values in half], axis=1)
-    belief = np.exp(-step_px * away / (WIDTH_RADII * reach))
-    towards = np.clip(belief * (known - reach), -reach, np.minimum(ahead, behind))
-    return np.where(is_cut, np.where(ahead < behind, towards, -towards), shift)
+    belief = np.exp(-step_px * away[cut] / (WIDTH_RADII * reach[cut]))
+    towards = np.clip(belief * (known[cut] - reach[cut]), -reach[cut], across[found])
+    moved = shift.copy()
+    moved[cut] = np.where(ahead[found] < behind[found], towards, -towards)
+    return moved
 
 
 def _to_border(points: Points, direction: Points, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -802,6 +802,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>it reaches the image border at its head, which may be out of view</source>
+        <translation>机器人头端处到达图像边缘，头端可能已在画面之外</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>both of its ends lie at the image border, so its head may be out of view</source>
+        <translation>机器人两端都在图像边缘，头端可能已在画面之外</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>it has no direction</source>
         <translation>没有方向</translation>
     </message>
@@ -1524,6 +1534,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>{a} % of its last {b} px lie in the vessel (at least {c} %)</source>
         <translation>其末段 {b} px 中有 {a} % 在血管内（至少 {c} %）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>its head is {a} px from the nearest centerline (at most {b} px)</source>
+        <translation>机器人头端距最近的中心线 {a} px（最多 {b} px）</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
