@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from app.annotate_sources import default_store, image_files
+from app.annotate_sources import default_store, image_files, tell_problems
 from app.language import tr
 from app.learning_commands import progress_bar
 from core.config import Config, choose_model, load_config
@@ -25,7 +25,6 @@ from core.study.study_plan import Order, StudySettings, Task, queue_order, repea
 from core.types import Frame
 
 EXPORTS = ("dataset", "csv", "coco")
-_NAMED_PROBLEMS = 20
 _DISAGREEMENT_DEG = 30.0
 
 
@@ -115,7 +114,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         from app.layout_keeper import LayoutKeeper, Parts, Switch, toggling
 
         desk = AnnotationDesk(store, items, config.perception, blind=bool(options.study.name))
-        _tell(store.problems)
+        tell_problems(store.problems)
         who = (
             tr("study {name}, rater {rater}, blind", name=options.study.name, rater=rater)
             if options.study.name
@@ -132,18 +131,10 @@ def _listed(files: Sequence[Path], store: AnnotationStore) -> list[FoundImage]:
     with progress_bar() as bar:
         task = bar.add_task("looking at the images", total=len(files))
         images, problems = find_images(files, store, lambda: bar.advance(task))
-    _tell(problems)
+    tell_problems(problems)
     if not images:
         raise AnnotationError(f"{files[0].parent}: no image that can be read")
     return images
-
-
-def _tell(problems: Sequence[str]) -> None:
-    """One line each on standard error; many are counted."""
-    for line in problems[:_NAMED_PROBLEMS]:
-        sys.stderr.write(f"warning: {line}\n")
-    if len(problems) > _NAMED_PROBLEMS:
-        sys.stderr.write(f"warning: and {len(problems) - _NAMED_PROBLEMS} more\n")
 
 
 def _user() -> str:
@@ -162,10 +153,12 @@ def _queue(store: AnnotationStore, images: Sequence[FoundImage], rater: str, opt
         settings = _study(store, images, options, config)
         missing = [sha256 for sha256 in settings.images if sha256 not in here]
         others = len(set(here) - set(settings.images))
-        _tell([f"{others} images are here that do not belong to study {options.name!r}; left out"] if others else [])
+        tell_problems([f"{others} images are here that do not belong to study {options.name!r}; left out"] if others else [])
         if missing:
             names = store.images()
-            _tell([f"{names[m].name if m in names else m[:12]}: belongs to the study, but is not here; left out" for m in missing])
+            tell_problems(
+                [f"{names[m].name if m in names else m[:12]}: belongs to the study, but is not here; left out" for m in missing]
+            )
         queue = [task for task in tasks(settings, rater) if task.sha256 in here]
         if not queue:
             raise AnnotationError(f"study {options.name!r}: none of its {len(settings.images)} images is here")
@@ -251,7 +244,7 @@ def _report(store_path: Path, options: AnnotateOptions) -> int:
         annotations = choose_study(store.annotations(), options.study.name or None, str(store_path))
         annotations = _of_rater(annotations, options.study.rater)
         names = {sha256: image.name for sha256, image in store.images().items()}
-        _tell(store.problems)
+        tell_problems(store.problems)
     study = annotations[0].key.study
     report = {"study": study} | agreement_report(annotations, names, options.study.seed or 0)
     if options.out is not None:
@@ -289,7 +282,7 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     annotations = _of_rater(annotations, options.study.rater)
     if options.export == "dataset":
         count, problems = export_training_set(annotations, images, options.out)
-        _tell(problems)
+        tell_problems(problems)
         sys.stderr.write(f"{count} frames with both masks in {options.out}: train --data {options.out}\n")
     elif options.export == "coco":
         count = export_coco(annotations, images, options.out)
@@ -330,10 +323,10 @@ def read_annotated(store_path: Path, paths: Sequence[Path], frames: int = 48) ->
     with AnnotationStore(store_path, read_only=True) as store:
         annotations = store.annotations()
         images, problems = known_images(files, store)
-        _tell([*store.problems, *problems])
+        tell_problems([*store.problems, *problems])
     annotated, here = {one.key.sha256 for one in annotations}, {image.sha256 for image in images}
     if here and not annotated <= here:
-        _tell([f"{len(annotated - here)} of {len(annotated)} annotated images are not in {paths[0]}: left out"])
+        tell_problems([f"{len(annotated - here)} of {len(annotated)} annotated images are not in {paths[0]}: left out"])
     return annotations, images
 
 
@@ -382,7 +375,7 @@ def _import(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
             store.save(key, View.AS_IS, entry, content, measure_lines(content, one.image.record.size, config.perception), 0.0)
             existing[key] = content
             counts[one.image.sha256] += 1
-    _tell(problems)
+    tell_problems(problems)
     if not counts:
         raise AnnotationError("nothing was imported")
     sys.stderr.write(f"{len(counts)} images got annotations, for rater {rater}, in {store_path}\n")
@@ -394,6 +387,6 @@ def _salvage(store_path: Path, out: Path | None) -> int:
 
     target = out or store_path.with_name(f"salvaged_{store_path.name}")
     kept, problems = salvage(store_path, target)
-    _tell(problems)
+    tell_problems(problems)
     sys.stderr.write(f"{kept} annotations saved into {target}; the damaged file is as it was\n")
     return 0

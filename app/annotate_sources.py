@@ -11,6 +11,8 @@ from app.taken_frames import take_frames, taken_of
 from core.study.annotation_store import DEFAULT_NAME
 from core.study.annotations import AnnotationError
 
+_NAMED_PROBLEMS = 20
+
 
 def default_store(paths: Sequence[Path]) -> Path:
     """Beside the images: in the folder that is given, or in that of the first file."""
@@ -34,7 +36,7 @@ def image_files(paths: Sequence[Path], frames: int, *, taken: bool = False) -> l
             found = _whole(path / "images")
         for file in found:
             if is_video(file):
-                files += (taken_of(file) if taken else []) or take_frames(file, frames, _tell)
+                files += (taken_of(file) if taken else []) or take_frames(file, frames, tell_problems)
             else:
                 files.append(file)
     if not files:
@@ -47,5 +49,9 @@ def _whole(path: Path) -> list[Path]:
     return [file for file in expand([path]) if file.exists()]
 
 
-def _tell(line: str) -> None:
-    sys.stderr.write(f"warning: {line}\n")
+def tell_problems(problems: Sequence[str]) -> None:
+    """One line each on standard error; many are counted."""
+    for line in problems[:_NAMED_PROBLEMS]:
+        sys.stderr.write(f"warning: {line}\n")
+    if len(problems) > _NAMED_PROBLEMS:
+        sys.stderr.write(f"warning: and {len(problems) - _NAMED_PROBLEMS} more\n")

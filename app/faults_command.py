@@ -13,6 +13,7 @@ from pathlib import Path
 from app.faults.registry import COUNT, CampaignError, FaultCase, Result, all_cases, run_case, tidy
 from app.faults.report import line_of, page_of, summary_of, to_json
 from app.learning_commands import Interrupt, progress_bar
+from core.whole_file import write_whole
 
 
 def run_faults(only: list[int], out: Path | None, *, quick: bool, as_json: bool) -> int:
@@ -34,7 +35,7 @@ def run_faults(only: list[int], out: Path | None, *, quick: bool, as_json: bool)
     if not as_json:
         sys.stdout.write(f"{summary_of(results)}\n")
     if out is not None and results:
-        out.write_text(page_of(results, live=not quick), encoding="utf-8")
+        write_whole(out, page_of(results, live=not quick).encode())
     if len(results) < len(cases):
         raise KeyboardInterrupt
     return 0 if all(result.seen.ok for result in results) else 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
@@ -17,9 +17,9 @@ from app.learning_commands import progress_bar
 from app.sources import is_video
 from core.images import ImageError, read_image
 from core.learning.dataset import write_png
-from core.session.manifest import FRAMES, SessionError
+from core.session.manifest import FRAMES
 from core.session.pictures import packet_times, video_number
-from core.session.reader import SessionReader, check_is_session
+from core.session.reader import SessionReader
 from core.session.video_in import open_video
 from core.study.annotations import AnnotationError
 from core.types import Image
@@ -42,7 +42,7 @@ def taken_of(video: Path) -> list[Path]:
     return found
 
 
-def take_frames(video: Path, count: int, tell: Callable[[str], object]) -> list[Path]:
+def take_frames(video: Path, count: int, tell: Callable[[Sequence[str]], object]) -> list[Path]:
     """Take `count` pictures of a video evenly over time; those that were taken before stay as they are.
 
     A frame that is lost or damaged is left out, and `tell` hears how many: decoders conceal damage, and what they show must not be
@@ -75,7 +75,7 @@ def take_frames(video: Path, count: int, tell: Callable[[str], object]) -> list[
             f"{error.filename or folder}: cannot be written ({error.strerror}); copy the video elsewhere"
         ) from None
     if len(written) < len(chosen):
-        tell(f"{video}: {len(chosen) - len(written)} of {len(chosen)} chosen frames are lost or damaged: left out")
+        tell([f"{video}: {len(chosen) - len(written)} of {len(chosen)} chosen frames are lost or damaged: left out"])
     return written
 
 
@@ -138,13 +138,8 @@ def _is_alike(path: Path, image: Image | None) -> bool:
 
 def _is_of_session(video: Path) -> bool:
     """Whether it is the video of a recorded session: its rows know how each of its pictures was."""
-    if video_number(video) is None or not video.name.startswith("video_"):
-        return False
-    try:
-        check_is_session(video.absolute().parent)
-    except SessionError:
-        return False
-    return (video.absolute().parent / FRAMES).is_file()
+    is_named_so = video.name.startswith("video_") and video_number(video) is not None
+    return is_named_so and (video.absolute().parent / FRAMES).is_file()
 
 
 @contextmanager

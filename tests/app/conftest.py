@@ -50,16 +50,26 @@ MakeWindow = Callable[..., OperatorWindow]
 
 
 @pytest.fixture
-def make_window(qtbot: QtBot, bench: FakeBench) -> Iterator[MakeWindow]:
+def engines() -> list[FakeEngine]:
+    """Those that the windows of a test have opened, where it does not say how."""
+    return []
+
+
+@pytest.fixture
+def make_window(qtbot: QtBot, bench: FakeBench, engines: list[FakeEngine]) -> Iterator[MakeWindow]:
     """Makes operator windows over fake engines; at the end each is closed, and its thread must have ended."""
     windows: list[OperatorWindow] = []
+
+    def open_another(_config: Config) -> FakeEngine:
+        engines.append(FakeEngine(bench))
+        return engines[-1]
 
     def make(
         open_engine: Callable[[Config], FakeEngine] | None = None,
         config: Config | None = None,
         kind: RigKind = RigKind.SIM,
     ) -> OperatorWindow:
-        opener = open_engine or (lambda _config: FakeEngine(bench))
+        opener = open_engine or open_another
         window = OperatorWindow(
             config or Config.model_validate({"record": {"ring_s": 0}}), opener, kind, PHANTOMS if kind is RigKind.SIM else ()
         )

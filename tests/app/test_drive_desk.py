@@ -79,15 +79,9 @@ def test_alerts_are_shown_logged_and_heard(
 
 
 def test_the_speed_by_hand_reaches_the_pilot_and_that_of_the_next_rig(
-    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot
+    make_window: MakeWindow, engines: list[FakeEngine], qtbot: QtBot
 ) -> None:
-    engines: list[FakeEngine] = []
-
-    def open_engine(_config: Config) -> FakeEngine:
-        engines.append(FakeEngine(bench))
-        return engines[-1]
-
-    window = make_window(open_engine)
+    window = make_window()
     window.start()
     until(qtbot, lambda: len(engines) == 1 and engines[0].pilot.speed == 1.0)
     window.panels.jog.speed_changed.emit(0.2)

@@ -137,17 +137,11 @@ def choose_phantom(window: OperatorWindow) -> None:
 def test_no_picture_of_the_old_rig_is_kept_as_one_of_the_new(
     again: Callable[[OperatorWindow], None],
     make_window: MakeWindow,
-    bench: FakeBench,
+    engines: list[FakeEngine],
     qtbot: QtBot,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    engines: list[FakeEngine] = []
-
-    def open_engine(_config: Config) -> FakeEngine:
-        engines.append(FakeEngine(bench))
-        return engines[-1]
-
-    window = make_window(open_engine)
+    window = make_window()
     window.start()
     until(qtbot, lambda: window.shown_tick is not None)
     kept: list[Tick] = []
