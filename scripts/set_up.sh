@@ -6,6 +6,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 venv=.venv
 stamp=$venv/.ready # holds what .venv was made from; written last, so an interrupted set-up leaves none
+compiled=$venv/.compiled # holds what machine code was made from
 half=$venv/.half # there from the beginning of a .venv until its packages are in: only such a one is thrown away
 unset PYTHONPATH PYTHONHOME # of a ROS set-up, say: its packages would hide those of .venv
 export PIP_USER=0 # a pip.conf that says user=true would end every installation into .venv
@@ -146,7 +147,19 @@ install_python_packages() {
     fi
 }
 
-main() {
+# The geometry's inner loops (core/perception/compiled), which the first start would else wait for.
+compile_loops() {
+    local loops=core/perception/compiled wanted
+    wanted=$(cat requirements.lock $loops/*.py <(stat -c %Y $loops/*.py) | sha256sum)
+    if [[ -f $compiled && $(<"$compiled") == "$wanted" ]] && compgen -G "$loops/__pycache__/compiled-*" >/dev/null; then
+        return
+    fi
+    say "set-up: compiling (some 15 seconds)"
+    "$venv/bin/python" -c 'import core.perception.pipeline'
+    echo "$wanted" >"$compiled"
+}
+
+install_all() {
     local wanted
     wanted=$(cat requirements.lock scripts/set_up.sh | sha256sum)
     if [[ -f $stamp && $(<"$stamp") == "$wanted" ]] && is_python_311 "$venv/bin/python"; then
@@ -166,4 +179,5 @@ main() {
     say "set-up: done"
 }
 
-main
+install_all
+compile_loops

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+LOOPS = "core/perception/compiled"
 PYTHON = """#!/usr/bin/env bash
 here=$(cd "$(dirname "$0")" && pwd)
 [[ -z ${PYTHONPATH:-}${PYTHONHOME:-} ]] || { echo "PYTHONPATH or PYTHONHOME is set" >&2; exit 1; }
@@ -18,6 +19,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 case "$*" in
 "-m venv"*) [[ $* != *--clear* ]] || rm -rf "${@: -1}"; mkdir -p "${@: -1}/bin" && cp "$0" "${@: -1}/bin/python" ;;
 "-m pip install"*) [[ ! -e offline && $PIP_USER == 0 ]] && : >"$here/../packages" ;;
+"-c import core.perception.pipeline") mkdir -p "$LOOPS/__pycache__/compiled-0" && echo >>"$here/../../compilations" ;;
 "-m pip uninstall"*) [[ ! -e record ]] || printf '%s\n' "$*" >>record ;;
 -) [[ -e record ]] && exec "$REAL_PYTHON" - ; cat >/dev/null ;;
 esac
@@ -32,6 +34,8 @@ def checkout(tmp_path: Path) -> Path:
     for name in ("Makefile", "scripts/set_up.sh"):
         shutil.copy(ROOT / name, folder / name)
     (folder / "requirements.lock").write_text("# nothing\n")
+    (folder / LOOPS).mkdir(parents=True)
+    (folder / LOOPS / "lines.py").write_text("# as it was\n")
     python = folder / "my python" / "python3.11"
     python.parent.mkdir()
     python.write_text(PYTHON)
@@ -42,7 +46,7 @@ def checkout(tmp_path: Path) -> Path:
 def set_up(checkout: Path, **more: str) -> subprocess.CompletedProcess[str]:
     """With `PYTHON=""` an interpreter is looked for."""
     chosen = str(checkout / "my python" / "python3.11")
-    env = {"PATH": os.environ["PATH"], "PYTHON": chosen, "REAL_PYTHON": sys.executable, **more}
+    env = {"PATH": os.environ["PATH"], "PYTHON": chosen, "REAL_PYTHON": sys.executable, "LOOPS": LOOPS, **more}
     script = ["bash", str(checkout / "scripts" / "set_up.sh")]
     return subprocess.run(script, env=env, capture_output=True, text=True, check=False, timeout=60)
 
@@ -58,12 +62,28 @@ def renew(checkout: Path, *, offline: bool) -> int:
 def test_a_venv_that_works_outlives_a_renewal_without_network(checkout: Path) -> None:
     assert set_up(checkout).returncode == 0
     venv = checkout / ".venv"
-    assert {path.name for path in venv.iterdir()} == {"bin", "packages", ".ready"}
+    assert {path.name for path in venv.iterdir()} == {"bin", "packages", ".ready", ".compiled"}
     (venv / "kept").touch()
     assert [renew(checkout, offline=True) for _ in range(3)] == [1, 1, 1]
     assert (venv / "packages").exists()
     assert renew(checkout, offline=False) == 0
-    assert {path.name for path in venv.iterdir()} == {"bin", "packages", ".ready", "kept"}
+    assert {path.name for path in venv.iterdir()} == {"bin", "packages", ".ready", ".compiled", "kept"}
+
+
+def test_loops_are_compiled_once_and_again_when_they_are_others_or_the_machine_code_is_gone(checkout: Path) -> None:
+    def compilations() -> int:
+        assert set_up(checkout).returncode == 0
+        return len((checkout / "compilations").read_text().splitlines())
+
+    assert [compilations(), compilations()] == [1, 1]
+    (checkout / LOOPS / "lines.py").write_text("# as it is\n")
+    assert [compilations(), compilations()] == [2, 2]
+    os.utime(checkout / LOOPS / "lines.py", (1e9, 1e9))  # what is compiled goes by its time, too
+    assert [compilations(), compilations()] == [3, 3]
+    shutil.rmtree(checkout / LOOPS / "__pycache__")
+    assert [compilations(), compilations()] == [4, 4]
+    assert renew(checkout, offline=False) == 0
+    assert compilations() == 5
 
 
 def test_one_that_was_begun_and_never_worked_is_made_anew(checkout: Path) -> None:
@@ -80,7 +100,7 @@ def test_one_whose_python_is_gone_is_made_anew(checkout: Path) -> None:
     (checkout / ".venv" / "of_another_python").touch()
     done = set_up(checkout)
     assert done.returncode == 0, done.stderr
-    assert {path.name for path in (checkout / ".venv").iterdir()} == {"bin", "packages", ".ready"}
+    assert {path.name for path in (checkout / ".venv").iterdir()} == {"bin", "packages", ".ready", ".compiled"}
 
 
 def test_a_chosen_python_is_the_only_candidate(checkout: Path) -> None:

@@ -19,7 +19,7 @@ from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX, look_again, places_to_look
 from core.perception.segmentation import Probability, Segmenter
 from core.perception.skeleton import end_pixels
-from core.perception.thinning import thin_parts
+from core.perception.thinning import thin
 from core.perception.windows import window_around
 from core.types import Mask, Point
 
@@ -242,5 +242,5 @@ def _true_ends(robot: Mask) -> list[tuple[int, int]]:
     half_width = float(cv2.distanceTransform(np.pad(box, 1).view(np.uint8), cv2.DIST_L2, 3).max())
     margin = max(_BORDER_PX, half_width + 3.0)
     height, width = robot.shape
-    ends = ((x + left, y + top) for x, y in end_pixels(thin_parts(box)))
+    ends = ((x + left, y + top) for x, y in end_pixels(thin(box)))
     return [(x, y) for x, y in ends if min(x, y, width - 1 - x, height - 1 - y) >= margin]

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import VectorConfig
-from core.perception import bundle, polyline
-from core.perception.bundle import Bundle
+from core.perception import polyline
 from core.perception.route import incidence_of, plan_route
 from core.perception.vessel_graph import build_graph
 from core.types import Centerline, Mask, Point, Points, Route, VesselGraph
@@ -135,11 +134,8 @@ def _feet(graph: VesselGraph, head: Point, half_length: float) -> list[tuple[int
     usable = [index for index, edge in enumerate(graph.edges) if len(edge.points) >= 2]
     if not usable:
         return []
-    away = bundle.distances(Bundle.of([graph.edges[index].points for index in usable]), head).tolist()
-    widest = max(float(graph.edges[index].radius.max()) for index in usable)
-    beyond_reach = min(away) + REACH_RADII * max(widest, 0.25 * half_length)
     found = []
-    for index in (index for index, distance in zip(usable, away, strict=True) if distance <= beyond_reach):
+    for index in usable:
         edge = graph.edges[index]
         along = polyline.arc_length(edge.points)
         distance, position, _ = polyline.nearest(edge.points, head, along)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from core.perception import polyline
 from core.perception.opening_lines import Trunk, between_walls, side_branch, trunk_between
 from core.perception.openings import STEP_PX, Arm, Gate, equal_trunks, gate_of, likely_trunks, meeting_point, turn_deg
-from core.types import Point, Points
+from core.types import Mask, Point, Points
 
 TOGETHER = 1.5
 """A branch from junction to junction that has no gate even with the openings so many times as wide lies within both of them."""
@@ -48,7 +48,7 @@ def are_together(arm: Arm, back: Arm) -> bool:
     return any(gate_of(a, polyline.arc_length(a.points), 0.0, wider=TOGETHER) is None for a in (arm, back))
 
 
-def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> Rebuilt | None:
+def rebuild(arms: list[Arm], vessel: Mask, *, is_alone: bool) -> Rebuilt | None:
     """A junction, or some that are together, anew.
 
     None where too few arms are long enough to tell, where an arm of junctions that are together does not lead to the trunk (it
@@ -57,21 +57,21 @@ def rebuild(arms: list[Arm], level: NDArray[np.float32], *, is_alone: bool) -> R
     Parameters
     ----------
     arms : all branches that lead out of the opening, outwards.
-    level : the vessel's mask or probability (h, w).
+    vessel : the vessel's mask (h, w).
     is_alone : whether that is one junction.
     """
-    anew = _anew(arms, level, is_alone)
-    return anew if anew is not None and _is_inside(anew, level) else None
+    anew = _anew(arms, vessel, is_alone)
+    return anew if anew is not None and _is_inside(anew, vessel) else None
 
 
-def _is_inside(anew: Rebuilt, level: NDArray[np.float32]) -> bool:
+def _is_inside(anew: Rebuilt, vessel: Mask) -> bool:
     """Whether all places are in the vessel and all lines in the picture, which smoothing may leave by a pixel."""
     lines = np.concatenate([*anew.pieces, *(arm.points for _, arm in anew.arms)])
-    limit = np.array([level.shape[1], level.shape[0]])
-    return bool((lines >= -1.0).all() and (lines <= limit).all() and (polyline.sample(level, anew.places) >= 0.5).all())
+    limit = np.array([vessel.shape[1], vessel.shape[0]])
+    return bool((lines >= -1.0).all() and (lines <= limit).all() and (polyline.sample(vessel, anew.places) >= 0.5).all())
 
 
-def _anew(arms: list[Arm], level: NDArray[np.float32], is_alone: bool) -> Rebuilt | None:
+def _anew(arms: list[Arm], vessel: Mask, is_alone: bool) -> Rebuilt | None:
     along = [polyline.arc_length(arm.points) for arm in arms]
     gates: list[Gate | None] = [gate_of(arm, way, 0.0) for arm, way in zip(arms, along, strict=True)]
     known = {index: gate for index, gate in enumerate(gates) if gate is not None}
@@ -82,7 +82,7 @@ def _anew(arms: list[Arm], level: NDArray[np.float32], is_alone: bool) -> Rebuil
     if equal is not None:
         (_, first), (_, second) = equal
         from_branch_to_branch = turn_deg(known[first], known[second])
-        return _star(arms, along, known) if from_branch_to_branch < ROUND_DEG else _fork(arms, along, known, equal, level)
+        return _star(arms, along, known) if from_branch_to_branch < ROUND_DEG else _fork(arms, along, known, equal, vessel)
     trunk = trunk_between(known, likely[0][1])
     bridges = {index: side_branch(gate, trunk) for index, gate in known.items() if index not in trunk.ends}
     # The skeleton's junction may lie well inside one arm: seen from the new place, that arm's opening reaches further out.
@@ -94,13 +94,13 @@ def _anew(arms: list[Arm], level: NDArray[np.float32], is_alone: bool) -> Rebuil
             moved = True
     if moved:
         trunk = trunk_between(known, likely_trunks(known)[0][1])
-    trunk = between_walls(trunk, level)
+    trunk = between_walls(trunk, vessel)
     # Who comes from elsewhere mostly shows it without its walls, too. It is asked first, with its walls, and they decide: where it
     # does come from elsewhere the others need not be asked.
     straight = {index: _missed_px(line) for index, (_, line) in bridges.items()}
     bridges = {}
     for index in sorted(known.keys() - set(trunk.ends), key=lambda index: -straight.get(index, 0.0)):
-        mark, line = side_branch(known[index], trunk, level)
+        mark, line = side_branch(known[index], trunk, vessel)
         if _missed_px(line) > MISSED_PX:
             if not is_alone:
                 return None
@@ -173,10 +173,10 @@ def _fork(
     along: list[NDArray[np.float64]],
     gates: dict[int, Gate],
     trunks: tuple[tuple[int, int], tuple[int, int]],
-    level: NDArray[np.float32],
+    vessel: Mask,
 ) -> Rebuilt:
     """A junction whose stem goes on smoothly into both branches, and ends where they part."""
-    curves = [between_walls(trunk_between(gates, ends), level).points for ends in trunks]
+    curves = [between_walls(trunk_between(gates, ends), vessel).points for ends in trunks]
     common = np.stack([curve[: min(len(curves[0]), len(curves[1]))] for curve in curves])
     is_apart = np.hypot(*(common[0] - common[1]).T) > FORKED_PX
     last = common.shape[1] - 2

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
+from core.perception.compiled import maps
 from core.types import Mask, Points
 
 EROSION_PX = 0.9
@@ -36,10 +35,10 @@ class RadiusMap:
         return 2.0 * polyline.sample(self._map, points / 2.0) + EROSION_PX
 
 
-def wall_distances(
+def walls(
     level: NDArray[np.float32], points: Points, normals: Points, expected: NDArray[np.float64], search_px: int = SEARCH_PX
-) -> NDArray[np.float64]:
-    """How far the walls to both sides of a line are: to a fraction of a pixel.
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How far the walls to both sides of a line are, to a fraction of a pixel, and how steeply the level falls there.
 
     Parameters
     ----------
@@ -50,52 +49,8 @@ def wall_distances(
 
     Returns
     -------
-    (2, N) in px, along the normals and against them; NaN where a wall is not there: in a branch's opening, or beyond the image's
-    border.
+    Distances (2, N) in px, along the normals and against them; NaN where a wall is not there: in a branch's opening, or beyond the
+    image's border. And the level's slopes (2, N), per px, at least ``SOFTEST``: a network that is not sure draws a soft wall.
     """
-    return _crossings(level, points, normals, expected, search_px)[0].reshape(2, -1)
-
-
-def sharp_walls(
-    level: NDArray[np.float32], points: Points, normals: Points, expected: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """``wall_distances``, and how steeply the level falls there, per px (2, N): a network that is not sure draws a soft wall."""
-    reach, inside, first = _crossings(level, points, normals, expected, SEARCH_PX)
-    rows = np.arange(len(first))
-    before, after = np.maximum(first - 2, 0), np.minimum(first + 1, 2 * SEARCH_PX)
-    slope = np.maximum((inside[rows, before] - inside[rows, after]) / np.maximum(after - before, 1), SOFTEST)
-    return reach.reshape(2, -1), slope.reshape(2, -1)
-
-
-def _crossings(
-    level: NDArray[np.float32], points: Points, normals: Points, expected: NDArray[np.float64], search_px: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
-    """Along all normals and then against all: distances (2N,), the level pixel by pixel (2N, 2 `search_px` + 1), and the first
-    pixel outside (2N,)."""
-    distances = expected[:, None] + np.arange(-search_px, search_px + 1.0)
-    np.maximum(distances, 0.0, out=distances)
-    count, looked = distances.shape
-    x, y = np.empty((2, count, looked)), np.empty((2, count, looked))
-    for places, axis in ((x, 0), (y, 1)):
-        offset, place = distances * normals[:, axis, None], points[:, axis, None]
-        np.add(place, offset, out=places[0])
-        np.subtract(place, offset, out=places[1])
-    inside = polyline.sample_at(level, x, y).reshape(2 * count, looked)
-    first = (inside < 0.5).argmax(axis=1)
-    rows = np.arange(2 * count)
-    before = first - 1
-    here, there = inside[rows, before], inside[rows, first]
-    reach = distances[rows % count, before] + (here - 0.5) / np.maximum(here - there, 1e-6)
-    # Nowhere outside, or from the start: both have 0 for the first place that is outside.
-    return np.where(first > 0, reach, math.nan), inside, first
-
-
-def two_shapes(
-    shapes: NDArray[np.float64], wanted: NDArray[np.float64], weight: NDArray[np.float64], stiffness: float
-) -> tuple[float, float]:
-    """How much of each of two shapes (2, N) comes nearest to what is `wanted` (N,), by weights; `stiffness` keeps both small."""
-    first, second = shapes * weight
-    a, b, c = float(first @ shapes[0]) + stiffness, float(first @ shapes[1]), float(second @ shapes[1]) + stiffness
-    one, other = float(first @ wanted), float(second @ wanted)
-    determinant = a * c - b * b
-    return (c * one - b * other) / determinant, (a * other - b * one) / determinant
+    reach, slope = maps.walls(level, points, normals, expected, search_px)
+    return reach, np.maximum(slope, SOFTEST, out=slope)

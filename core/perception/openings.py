@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception import polyline
+from core.perception.compiled import openings
 from core.types import Point, Points
 
 STEP_PX = 2.0
@@ -71,31 +71,24 @@ def gate_of(arm: Arm, along: NDArray[np.float64], at_least_px: float, *, wider: 
 
     `along` is its arc length (N,); the gate lies at least `at_least_px` along it, and the opening counts as `wider` as it is.
     """
-    radius_px = wider * arm.opening_px
-    low = max(OPENING_MIN_RADII * radius_px, at_least_px)
-    usable = float(along[-1]) * (0.5 if arm.far_is_junction else 1.0) - 8.0
-    high = min(max(OPENING_MAX_RADII * radius_px, low + radius_px), usable)
-    if low >= high:
-        return None
-    first, last, near, far = along.searchsorted((low, high, radius_px, 4.0 * radius_px)).tolist()
-    if first >= last:
-        return None
-    opening = arm.radius[first:last]
-    plain = sorted(arm.radius[near:far].tolist())
-    own = plain[int(0.4 * len(plain))] if plain else float(opening.min())
-    settled = opening <= SETTLED * own + 0.3
-    index = int(settled.argmax())
-    index = first + index if settled[index] else last - 1
-    index = min(index + round(BEYOND_RADII * own / STEP_PX), len(along) - 1 - round(8.0 / STEP_PX))
-    x, y = arm.points[index].tolist()
-    far_x, far_y = arm.points[min(index + round(max(12.0, HEADING_RADII * own) / STEP_PX), len(along) - 1)].tolist()
-    length = max(math.hypot(far_x - x, far_y - y), 1e-9)
-    # The distance to the nearest wall is less than half the width wherever the line is not quite in the middle.
-    wide = arm.half_width[index : index + WIDTH_POINTS]
-    wide = wide[np.abs(wide - own) < WIDTH_RADII * own + 1.0]
-    return Gate(
-        (x, y), ((far_x - x) / length, (far_y - y) / length), float(along[index]), polyline.median(wide) if len(wide) else own
+    found, x, y, across, down, position_px, radius_px = openings.gate(
+        arm.points,
+        arm.radius,
+        arm.half_width,
+        along,
+        wider * arm.opening_px,
+        at_least_px,
+        arm.far_is_junction,
+        STEP_PX,
+        OPENING_MIN_RADII,
+        OPENING_MAX_RADII,
+        SETTLED,
+        BEYOND_RADII,
+        WIDTH_POINTS,
+        WIDTH_RADII,
+        HEADING_RADII,
     )
+    return Gate((x, y), (across, down), position_px, radius_px) if found else None
 
 
 def _unlikeliness(gates: dict[int, Gate], pair: tuple[int, int]) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
+from core.perception.compiled import maps
 from core.types import Mask, Masks, Points
 
 STEP_PX = 2.0
@@ -44,22 +45,10 @@ def _centred(line: Points, probability: NDArray[np.float32], radius_px: float) -
     """Each point moved across the path to the middle of the robot's probability there, and the median of the half widths."""
     if len(line) < 3:
         return line, radius_px
-    side = int(np.ceil(1.5 * radius_px + 2.0))
-    offsets = np.arange(-side, side + 1, dtype=np.float64)
     across = polyline.normals(line)
-    x, y = (line[:, axis] + offsets[:, None] * across[:, axis] for axis in (0, 1))
-    # What lies beyond the image's border is not seen. Sampled as what is beside it, a robot there would be drawn outwards.
-    height, width = probability.shape
-    inside = (x > -0.5) & (x < width - 0.5) & (y > -0.5) & (y < height - 0.5)
-    weight = np.where(inside, polyline.sample_at(probability, x, y), 0.0)
-    # Looking outwards the weight may only fall: another stretch of robot close by does not pull.
-    weight[side:] = np.minimum.accumulate(weight[side:])
-    weight[side::-1] = np.minimum.accumulate(weight[side::-1])
-    total = weight.sum(axis=0)
-    seen = total > 1.0
-    shift = np.where(seen, (offsets @ weight) / np.maximum(total, 1e-6), 0.0)
-    shift = np.minimum(np.maximum(shift, -radius_px), radius_px)
-    thickness = polyline.median(total[seen]) if seen.any() else 2.0 * radius_px
+    shift, total = maps.middles(probability, line, across, int(np.ceil(1.5 * radius_px + 2.0)), radius_px)
+    seen = total[total > 1.0]
+    thickness = polyline.median(seen) if len(seen) else 2.0 * radius_px
     return line + shift[:, None] * across, 0.5 * thickness
 
 

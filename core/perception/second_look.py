@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from core.perception.masks import clean_mask
 from core.perception.segmentation import Probability, Recognised, Segmenter, recognise, see
 from core.perception.skeleton import MAX_KNOTS, end_pixels
-from core.perception.thinning import thin_parts
+from core.perception.thinning import thin
 from core.perception.windows import MARGIN_PX, window_around
 from core.types import Image, Point
 
@@ -63,7 +63,7 @@ def places_to_look(robot: Probability) -> list[Point]:
         return [(float(column), float(row))] if likely[row, column] >= _FAINT else []
     box = np.ascontiguousarray(mask[top : top + down, left : left + across])
     _, labels, stats, _ = cv2.connectedComponentsWithStats(box.view(np.uint8), connectivity=8)
-    ends = end_pixels(thin_parts(box))
+    ends = end_pixels(thin(box))
     if len(ends) > MAX_KNOTS:
         return []
     ends.sort(key=lambda end: (-int(stats[labels[end[1], end[0]], cv2.CC_STAT_AREA]), end))

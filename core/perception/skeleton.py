@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from core.config import CleaningConfig, PerceptionConfig
 from core.perception.pixel_graph import Chain, trace
 from core.perception.polyline import arc_length
-from core.perception.thinning import thin, thin_half_size, thin_parts
+from core.perception.thinning import thin, thin_half_size
 from core.types import Mask, Masks, Point, Points, Skeletons
 
 MAX_KNOTS = 200
@@ -40,7 +40,7 @@ def thin_robot(mask: Mask, config: PerceptionConfig) -> Mask:
 
 def _robot_skeleton(mask: Mask, config: CleaningConfig) -> Mask:
     """The robot's skeleton in a mask that is cut to its bounding box."""
-    skeleton = thin_parts(mask)
+    skeleton = thin(mask)
     links = _count_links(skeleton)[1]
     if np.count_nonzero(links != 2) > MAX_KNOTS:
         return skeleton

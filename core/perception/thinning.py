@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import combinations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from skimage.morphology import skeletonize
 
+from core.perception.compiled import pixels
 from core.types import Mask
 
 MIN_HALF_SIZE_SHARE = 0.35
@@ -17,17 +14,35 @@ MIN_HALF_SIZE_SHARE = 0.35
 MOST_LOST_PX = 40
 """Where the half-size step leaves nothing near more pixels than these, a vessel is lost: some 20 px of one that is 3 px wide. Tips,
 corners and ragged walls of wide ones are less (in all but 1 % of the masks that the network found on 480 frames)."""
-LARGE_BOX_PX = 20_000
-"""In a bounding box of so many pixels it pays to look for separate parts."""
 _THREE, _FIVE = (np.ones((side, side), np.uint8) for side in (3, 5))
-MAX_PARTS = 8
-"""More parts than these are specks all over the box: thinned together."""
+_CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+
+
+def _turns(bits: int) -> int:
+    """In which turns (1, 2, 3: in both) a pixel with these neighbours goes: bit 0 is the upper left one, then clockwise."""
+    north, east, south, west = (bool(bits >> n & 1) for n in (1, 3, 5, 7))
+    around = [bits >> n & 1 for n in range(8)]
+    edges = sum(not here and there for here, there in zip(around, around[1:] + around[:1], strict=True))
+    if not 2 <= sum(around) <= 6 or edges != 1:
+        return 0
+    return int(not (east and south and (north or west))) + 2 * int(not (north and west and (east or south)))
+
+
+_OTHERWISE = (
+    {3: 1, 6: 1, 12: 1, 24: 2, 48: 0, 96: 2, 129: 0, 192: 2}  # where a diagonal two pixels wide ends, not both at once
+    | {14: 1, 56: 2, 131: 1, 224: 2}
+    | {10: 3, 40: 3, 130: 3, 160: 3}  # corners of a staircase go
+    | {11: 1, 26: 2, 104: 2, 108: 2, 134: 1, 161: 1, 176: 2, 194: 1, 198: 1}
+)
+"""Neighbourhoods of which the paper says something else: as it stands it wears diagonals away, and leaves staircases."""
+_TURNS = np.array([_OTHERWISE.get(bits, _turns(bits)) for bits in range(256)], np.uint8)
 
 
 def thin(mask: Mask) -> Mask:
     """The mask thinned to one pixel, with its topology: as many components and loops as before.
 
-    Zhang and Suen's algorithm [1]_, on the mask's bounding box only.
+    Zhang and Suen's algorithm [1]_ with scikit-image's corrections, pixel for pixel what its ``skeletonize`` gives in three times
+    the time: that looks at all pixels in every turn, this one only where something has changed.
 
     References
     ----------
@@ -37,31 +52,12 @@ def thin(mask: Mask) -> Mask:
     x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
     if width:
         window = np.s_[y : y + height, x : x + width]
-        skeleton[window] = skeletonize(np.ascontiguousarray(mask[window]))
+        framed = np.zeros((height + 2, width + 2), np.uint8)
+        framed[1:-1, 1:-1] = mask[window]
+        outer = np.flatnonzero(framed > cv2.erode(framed, _CROSS))
+        pixels.thin(framed.reshape(-1), width + 2, outer, _TURNS)
+        skeleton[window] = framed[1:-1, 1:-1]
     return skeleton
-
-
-def thin_parts(mask: Mask) -> Mask:
-    """``thin``, parts whose bounding boxes lie apart one by one: a robot and a speck in the other corner have much nothing between
-    them, and thinning looks at all of it some twenty times.
-    """
-    if mask.size < LARGE_BOX_PX:
-        return np.asarray(skeletonize(mask))
-    outlines, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    boxes = [cv2.boundingRect(outline) for outline in outlines]
-    size = sum(width * height for _, _, width, height in boxes)
-    if len(boxes) > MAX_PARTS or 2 * size > mask.size or any(_touch(a, b) for a, b in combinations(boxes, 2)):
-        return np.asarray(skeletonize(mask))
-    skeleton = np.zeros(mask.shape, np.bool_)
-    for x, y, width, height in boxes:
-        window = np.s_[y : y + height, x : x + width]
-        skeleton[window] = skeletonize(np.ascontiguousarray(mask[window]))
-    return skeleton
-
-
-def _touch(a: Sequence[int], b: Sequence[int]) -> bool:
-    """Whether two boxes (x, y, width, height) share a pixel."""
-    return a[0] < b[0] + b[2] and b[0] < a[0] + a[2] and a[1] < b[1] + b[3] and b[1] < a[1] + a[3]
 
 
 def thin_half_size(mask: Mask) -> Mask:

@@ -13,7 +13,7 @@ from core.perception import bundle, pixel_graph, polyline
 from core.perception.border_cuts import by_wall_in_view
 from core.perception.bundle import Bundle
 from core.perception.junctions import are_together, rebuild
-from core.perception.lumen import RadiusMap, sharp_walls
+from core.perception.lumen import RadiusMap, walls
 from core.perception.openings import Arm
 from core.perception.vessel_ends import led_on
 from core.types import GraphEdge, Mask, Points, VesselGraph
@@ -67,33 +67,30 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability:
             if len(kept) == len(lines):
                 break
             lines = _merged(kept)
-    level = mask.astype(np.float32)
-    _centre(lines, radius, level if probability is None else probability)
+    _centre(lines, radius, mask.astype(np.float32) if probability is None else probability)
     nodes = traced.nodes.copy()
     if config.rebuild_junctions:
-        nodes = _rebuild_junctions(lines, nodes, radius, level)
+        nodes = _rebuild_junctions(lines, nodes, radius, mask)
     if config.extend_ends:
-        _lead_on_ends(lines, nodes, level)
+        _lead_on_ends(lines, nodes, mask)
     return _packed(lines, nodes, radius)
 
 
-def _lead_on_ends(lines: list[_Line], nodes: Points, level: NDArray[np.float32]) -> None:
+def _lead_on_ends(lines: list[_Line], nodes: Points, mask: Mask) -> None:
     """Ends of vessels without the hook that thinning leaves there; at the image border they go on to the border."""
     degrees = _degrees(lines, len(nodes)).tolist()
-    at_once = [(line, -1, line.start) for line in lines if degrees[line.start] == 1]
-    later: list[tuple[_Line, int, int]] = []
-    for line in lines:
-        if degrees[line.end] == 1:  # of a short line with two ends the first one has taken most
-            (later if degrees[line.start] == 1 else at_once).append((line, 1, line.end))
-    for sides in (at_once, later):
-        long = [side for side in sides if len(side[0].points) >= 4]
-        # In the corner where the skeleton ends the radius would be nearly nothing.
-        told = [(line.points[::side], polyline.median(line.radius[::side][-RADIUS_POINTS:])) for line, side, _ in long]
-        for (line, side, node), points in zip(long, led_on(told, level), strict=True):
+    # Of a short line with two ends the first one takes most.
+    starts = [(line, -1, line.start) for line in lines if degrees[line.start] == 1]
+    ends = [(line, 1, line.end) for line in lines if degrees[line.end] == 1]
+    for line, side, node in (*starts, *ends):
+        if len(line.points) >= 4:
+            # In the corner where the skeleton ends the radius would be nearly nothing.
+            radius_px = polyline.median(line.radius[::side][-RADIUS_POINTS:])
+            points = led_on(line.points[::side], radius_px, mask)
             line.points, nodes[node] = points[::side], points[-1]
 
 
-def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, level: NDArray[np.float32]) -> Points:
+def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, mask: Mask) -> Points:
     """The lines led to junctions that are put anew; returns the nodes, some of which may be new, too."""
     degrees, sizes = _degrees(lines, len(nodes)).tolist(), radius.at(nodes).tolist()
     places: list[Points] = list(nodes)
@@ -106,7 +103,7 @@ def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, lev
             for outward in (True, False)
             if line not in inner and (line.start if outward else line.end) in group
         ]
-        anew = rebuild([_arm(line, outward, degrees, sizes) for line, outward in sides], level, is_alone=len(group) == 1)
+        anew = rebuild([_arm(line, outward, degrees, sizes) for line, outward in sides], mask, is_alone=len(group) == 1)
         if anew is None:
             if len(group) > 1:
                 pending += [({node}, []) for node in sorted(group)]
@@ -263,7 +260,7 @@ def _between_walls(
     A vessel's width changes slowly. So where one wall is soft, the middle is rather as far from the other one as half the width
     that it has around there.
     """
-    (right, left), (on_right, on_left) = sharp_walls(level, lines.points, normal, expected)
+    (right, left), (on_right, on_left) = walls(level, lines.points, normal, expected)
     half = 0.5 * (right + left)
     seen = np.isfinite(half)
     weight = np.where(seen, np.minimum(on_right, on_left) ** 2, 0.0)

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from core.perception.polyline import distance_to_segments
 from core.study.annotations import Annotation, Line, MaskPolygon
-from core.types import Point
+from core.types import Point, Points
 
 ROBOT, VESSEL = -2, -1
 
@@ -78,9 +78,17 @@ def touched(annotation: Annotation, lines: Iterable[int], point: Point, point_re
             best_point = float(distance[place]), Touch(line, place)
         closed = points if line < 0 else np.concatenate([points, points[:1]])
         if len(closed) > 1:
-            gap, _ = distance_to_segments(closed[:-1], closed[1:], point)
+            gap = _distances_to_edges(closed, point)
             edge = int(np.argmin(gap))
             if gap[edge] <= edge_reach and (best_edge is None or gap[edge] < best_edge[0]):
                 best_edge = float(gap[edge]), Touch(line, edge + 1, is_edge=True)
     chosen = best_point or best_edge
     return chosen[1] if chosen is not None else None
+
+
+def _distances_to_edges(points: Points, point: Point) -> NDArray[np.float64]:
+    """How far `point` is from each straight piece of a line (N, 2), shape (N - 1,)."""
+    start, step = points[:-1], points[1:] - points[:-1]
+    offset = np.array(point) - start
+    share = np.clip((offset * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-12), 0.0, 1.0)
+    return np.asarray(np.hypot(*(offset - share[:, None] * step).T))

@@ -23,12 +23,6 @@ def test_lines_come_back_as_they_went_in() -> None:
         assert again.tolist() == line.tolist()
 
 
-def test_lengths_and_distances_by_hand() -> None:
-    corner = Bundle.of([LINES[1], LINES[2], LINES[4]])
-    assert bundle.lengths(corner).tolist() == [5.0, 0.0, 70.0]
-    assert bundle.distances(corner, (33.0, 44.0)) == pytest.approx([np.hypot(25, 35), np.hypot(26, 37), 5.0])
-
-
 @pytest.mark.parametrize("step_px", [1.0, 2.0, 7.5])
 def test_resampling_is_that_of_each_line(step_px: float) -> None:
     found = bundle.resample(ALL, step_px)
@@ -55,4 +49,3 @@ def test_no_line_and_lines_of_no_length(lines: list[Points]) -> None:
     few = Bundle.of(lines)
     even = bundle.smooth(bundle.resample(few, 2.0), 4.0)
     assert [line.tolist() for line in even.split(even.points)] == [[[3.0, 4.0]]] * len(lines)
-    assert bundle.distances(few, (0.0, 0.0)).tolist() == [5.0] * len(lines)

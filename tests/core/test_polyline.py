@@ -67,13 +67,6 @@ def test_a_map_is_sampled_between_pixels_and_beyond_its_border() -> None:
     assert polyline.sample(ramp, np.array([[2.5, 3.0], [-4.0, 1.0], [20.0, 1.0]])).tolist() == [2.5, 0.0, 7.0]
 
 
-def test_more_places_than_opencv_takes_at_once_are_sampled_too() -> None:
-    ramp = np.tile(np.arange(8, dtype=np.float32), (6, 1))
-    places = np.zeros((700, 100, 2))
-    places[..., 0] = np.linspace(0.0, 7.0, 70_000).reshape(700, 100)
-    np.testing.assert_allclose(polyline.sample(ramp, places), places[..., 0], atol=0.02)
-
-
 @pytest.mark.parametrize("values", [[3.0], [4.0, 1.0], [5.0, 2.0, 9.0], [1.0, 8.0, 2.0, 4.0]])
 def test_the_median_of_a_few_numbers(values: list[float]) -> None:
     assert polyline.median(np.array(values)) == np.median(values)

@@ -3,10 +3,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter, label
+from skimage.morphology import skeletonize
 
 from core.config import CleaningConfig, PerceptionConfig
 from core.perception.skeleton import end_direction, end_pixels, extend_ends, thin_masks, walk_back, without_spurs
-from core.perception.thinning import thin, thin_half_size, thin_parts
+from core.perception.thinning import thin, thin_half_size
 from core.types import Mask
 from tests.core.drawing import art, curve, depth, everywhere, masks_of, picture, probability
 
@@ -54,12 +55,12 @@ def test_half_size_thinning_keeps_loops_and_narrow_walls(shape: tuple[int, int])
     assert not (skeleton & ~mask).any()
 
 
-@settings(max_examples=40, deadline=None)
-@given(seed=st.integers(0, 10**6), sigma=st.floats(3.0, 9.0), share=st.floats(0.6, 0.99))
-def test_thinning_part_by_part_is_thinning_all_at_once(seed: int, sigma: float, share: float) -> None:
-    noise = gaussian_filter(np.random.default_rng(seed).random((160, 240)), sigma)
-    mask = noise > np.quantile(noise, share)
-    assert np.array_equal(thin_parts(mask), thin(mask))
+@settings(max_examples=150, deadline=None)
+@given(seed=st.integers(0, 10**6), sigma=st.floats(0.0, 5.0), share=st.floats(0.05, 0.95), height=st.integers(1, 60))
+def test_thinning_is_scikit_images_pixel_for_pixel(seed: int, sigma: float, share: float, height: int) -> None:
+    noise = gaussian_filter(np.random.default_rng(seed).random((height, 47)), sigma)
+    mask = noise >= np.quantile(noise, share)
+    assert np.array_equal(thin(mask), skeletonize(mask))
 
 
 def test_a_tangle_of_noise_is_thinned_and_no_more() -> None:

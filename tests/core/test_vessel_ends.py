@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from core.perception import polyline
 from core.perception.vessel_ends import led_on
-from core.types import Points
+from core.types import Mask, Points
 from tests.core.drawing import SIZE, depth
 
 LIMIT = np.array(SIZE) - 1.0
 
 
-def level(line: Points, radius: float) -> np.ndarray:
-    return (depth(line, radius) >= 0.0).astype(np.float32)
+def vessel(line: Points, radius: float) -> Mask:
+    return np.asarray(depth(line, radius) >= 0.0)
 
 
 def bend(last_deg: float, radius: float) -> Points:
@@ -33,7 +32,7 @@ def hooked(line: Points, count: int, by_px: float) -> Points:
 @pytest.mark.parametrize("radius", [9.0, 14.0])
 def test_a_vessel_that_ends_in_a_bend_bends_to_its_end(radius: float, around_px: float) -> None:
     line = bend(20.0, around_px)
-    found = led_on([(hooked(line, round(0.6 * radius), 0.7 * radius), radius)], level(line, radius))[0]
+    found = led_on(hooked(line, round(0.6 * radius), 0.7 * radius), radius, vessel(line, radius))
     aside = np.abs(np.hypot(*(found - [320.0, 240.0]).T) - around_px)
     assert aside.max() < 1.2
     assert np.hypot(*(found[-1] - line[-1])) < 0.6 * radius, "it ends where it ended"
@@ -42,29 +41,19 @@ def test_a_vessel_that_ends_in_a_bend_bends_to_its_end(radius: float, around_px:
 
 def test_it_goes_on_to_the_border_that_cuts_it_off() -> None:
     line = np.column_stack([np.arange(200.0, 700.0, 2.0), np.linspace(200.0, 260.0, 250)])
-    found = led_on([(line[line[:, 0] < 625.0], 12.0)], level(line, 12.0))[0]
+    found = led_on(line[line[:, 0] < 625.0], 12.0, vessel(line, 12.0))
     assert found[-1, 0] == pytest.approx(LIMIT[0], abs=0.5)
     assert np.abs(found[:, 1] - np.interp(found[:, 0], line[:, 0], line[:, 1])).max() < 0.8
 
 
 def test_a_short_stump_keeps_a_third_and_its_length() -> None:
     line = np.column_stack([np.arange(300.0, 320.0, 2.0), np.full(10, 240.0)])
-    found = led_on([(line, 20.0)], level(np.array([[280.0, 240.0], [340.0, 240.0]]), 20.0))[0]
+    found = led_on(line, 20.0, vessel(np.array([[280.0, 240.0], [340.0, 240.0]]), 20.0))
     assert found[-1] == pytest.approx(line[-1], abs=1.0)
     assert found[0] == pytest.approx(line[0])
 
 
 def test_where_no_wall_is_seen_it_goes_on_as_it_was() -> None:
     line = bend(0.0, 100.0)
-    found = led_on([(line, 14.0)], np.ones((SIZE[1], SIZE[0]), np.float32))[0]
+    found = led_on(line, 14.0, np.ones((SIZE[1], SIZE[0]), np.bool_))
     assert np.abs(np.hypot(*(found - [320.0, 240.0]).T) - 100.0).max() < 2.0
-
-
-def test_many_ends_at_once_are_each_as_it_is_alone() -> None:
-    ways = [np.array([[60.0, 70.0 + 90 * k], [200.0 + 60 * k, 70.0 + 90 * k]]) for k in range(4)]
-    radii = [8.0, 15.0, 11.0, 20.0]
-    both = np.maximum.reduce([level(way, radius) for way, radius in zip(ways, radii, strict=True)])
-    ends = [(hooked(polyline.resample(way, 2.0), round(0.6 * r), 0.7 * r), r) for way, r in zip(ways, radii, strict=True)]
-    for found, end in zip(led_on(ends, both), ends, strict=True):
-        np.testing.assert_array_equal(found, led_on([end], both)[0])
-    assert led_on([], both) == []

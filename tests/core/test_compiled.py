@@ -1,0 +1,173 @@
+"""The compiled loops against what NumPy and OpenCV say, on all kinds of arrays; and where their machine code is kept."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from core.perception import polyline
+from core.perception.compiled import jit, lines, maps, openings, pixels
+from core.types import Points
+
+ROOT = Path(__file__).parents[2]
+
+
+def walk(seed: int, count: int) -> Points:
+    """A line that may stand still from one point to the next."""
+    steps = np.random.default_rng(seed).normal(0.0, 3.0, (count, 2))
+    steps[np.random.default_rng(seed + 1).random(count) < 0.2] = 0.0
+    return np.cumsum(steps, axis=0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6), count=st.integers(1, 60), step=st.floats(0.3, 20.0))
+def test_arc_length_and_places_along_it(seed: int, count: int, step: float) -> None:
+    points = walk(seed, count)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    np.testing.assert_allclose(polyline.arc_length(points), along, atol=1e-9)
+    wanted = np.linspace(-5.0, along[-1] + 5.0, 37)
+    places = np.column_stack([np.interp(wanted, along, points[:, axis]) for axis in (0, 1)])
+    np.testing.assert_allclose(polyline.point_at(points, along, wanted), places, atol=1e-7)
+    if along[-1] > 0.0:
+        marks = np.linspace(0.0, along[-1], max(2, round(along[-1] / step) + 1))
+        even = np.column_stack([np.interp(marks, along, points[:, axis]) for axis in (0, 1)])
+        np.testing.assert_allclose(polyline.resample(points, step), even, atol=1e-7)
+    start, end = sorted(np.random.default_rng(seed).uniform(-2.0, along[-1] + 2.0, 2))
+    part = polyline.cut(points, start, end)
+    inner = points[(along > max(start, 0.0)) & (along < min(end, along[-1]))]
+    np.testing.assert_allclose(part[1:-1], inner)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6), count=st.integers(1, 40), x=st.floats(-30.0, 30.0), y=st.floats(-30.0, 30.0))
+def test_the_nearest_place_is_none_farther_than_any_other(seed: int, count: int, x: float, y: float) -> None:
+    points = walk(seed, count)
+    distance, position, place = polyline.nearest(points, (x, y))
+    fine = polyline.point_at(points, polyline.arc_length(points), np.linspace(0.0, polyline.arc_length(points)[-1], 4000))
+    assert distance <= np.hypot(*(fine - (x, y)).T).min() + 1e-9
+    assert distance == pytest.approx(np.hypot(place[0] - x, place[1] - y), abs=1e-9)
+    assert polyline.point_at(points, polyline.arc_length(points), np.array([position]))[0] == pytest.approx(place, abs=1e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6), count=st.integers(2, 70), sigma=st.floats(0.5, 6.0), keeps=st.booleans())
+def test_smoothing_is_a_weighted_mean_of_the_line_mirrored_through_its_ends(
+    seed: int, count: int, sigma: float, keeps: bool
+) -> None:
+    points = walk(seed, count)
+    pad = min(count - 1, int(np.ceil(3.0 * sigma)))
+    square = (np.arange(-pad, pad + 1) / sigma) ** 2
+    weights = np.exp(-0.5 * square)
+    if keeps and pad >= 2:
+        weights *= (weights * square**2).sum() - (weights * square).sum() * square
+    weights /= weights.sum()
+    mirrored = np.concatenate([2.0 * points[0] - points[pad:0:-1], points, 2.0 * points[-1] - points[-2 : -pad - 2 : -1]])
+    expected = np.column_stack([np.correlate(mirrored[:, axis], weights) for axis in (0, 1)])
+    np.testing.assert_allclose(polyline.smooth(points, sigma, keeps_bends=keeps), expected, atol=1e-7)
+
+
+@pytest.mark.parametrize("shape", [(480, 640), (37, 20), (1, 9), (9, 1), (1, 1)])
+def test_a_map_is_read_as_opencv_reads_it_and_beyond_its_border_as_there(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(7)
+    values = rng.random(shape, np.float32)
+    places = rng.uniform(-3.0, 3.0, (300, 2)) + rng.random((300, 2)) * (shape[1], shape[0])
+    across, down = places.astype(np.float32).T
+    there = cv2.remap(values, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    np.testing.assert_allclose(polyline.sample(values, places), there.ravel(), atol=0.04)  # OpenCV rounds places to 1/32 px
+    mask = values > 0.5
+    np.testing.assert_allclose(polyline.sample(mask, places), polyline.sample(mask.astype(np.float32), places), atol=1e-12)
+
+
+def test_places_that_are_no_number_are_read_at_the_border_and_end_nothing() -> None:
+    values = np.arange(12.0, dtype=np.float32).reshape(3, 4)
+    found = maps.sample(values, np.array([np.nan, np.inf, -np.inf]), np.array([np.nan, 1.0, np.inf]))
+    assert found.tolist() == [0.0, 7.0, 8.0]
+
+
+def test_arrays_of_any_strides_and_such_as_are_not_to_be_written() -> None:
+    points = walk(3, 30)
+    fixed = points.copy()
+    fixed.setflags(write=False)
+    for same in (fixed, np.asfortranarray(points), np.repeat(points, 2, axis=0)[::2], points[::-1][::-1]):
+        np.testing.assert_array_equal(lines.arc_length(same), lines.arc_length(points))
+
+
+@pytest.mark.parametrize("points", [np.zeros((3, 2), np.float32), np.zeros((3, 2), np.int64), np.zeros(3)])
+def test_an_array_of_another_kind_is_a_type_error_and_compiles_nothing(points: np.ndarray) -> None:
+    with pytest.raises(TypeError):
+        lines.arc_length(points)
+
+
+def test_an_index_beyond_an_array_is_an_index_error() -> None:
+    with pytest.raises(IndexError):
+        pixels.thin(np.ones(30, np.uint8), 6, np.array([29]), np.zeros(256, np.uint8))
+    with pytest.raises(IndexError):
+        lines.point_at(np.zeros((0, 2)), np.zeros(1), np.zeros(1))
+
+
+def test_every_compiled_function_is_compiled_before_it_is_called() -> None:
+    for module in (lines, maps, openings, pixels):
+        kernels = [value for value in vars(module).values() if hasattr(value, "nopython_signatures")]
+        assert kernels
+        assert all(kernel.nopython_signatures and not kernel._can_compile for kernel in kernels)
+
+
+def test_machine_code_is_kept_by_version_and_an_older_one_taken_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit.config, "CACHE_DIR", "")
+    older, other = tmp_path / "compiled-0123456789abcdef", tmp_path / "other"
+    older.mkdir()
+    other.mkdir()
+    assert jit._keep_in(tmp_path)
+    kept = Path(jit.config.CACHE_DIR)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([kept.name, "other"])
+    assert kept.parent == tmp_path
+
+
+def test_a_folder_that_cannot_be_made_is_none_to_keep_it_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit.config, "CACHE_DIR", "before")
+    (tmp_path / "file").write_text("")
+    assert not jit._keep_in(tmp_path / "file")
+    assert jit.config.CACHE_DIR == "before"
+
+
+@pytest.mark.parametrize("damage", ["cut", "garbage"])
+def test_damaged_machine_code_is_compiled_anew(tmp_path: Path, damage: str) -> None:
+    """What a full disk or a power cut leaves of it must not keep the program from starting."""
+    code = (
+        "import numpy as np, sys\n"
+        "from pathlib import Path\n"
+        "from core.perception.compiled import jit\n"
+        "assert jit._keep_in(Path(sys.argv[1]))\n"
+        "from numba import float64\n"
+        "source = Path(sys.argv[1]) / 'one.py'\n"
+        "sys.path.insert(0, sys.argv[1])\n"
+        "import one\n"
+        "print(one.twice(2.0))\n"
+    )
+    (tmp_path / "one.py").write_text(
+        "from numba import float64\n"
+        "from core.perception.compiled.jit import compiled\n"
+        "@compiled((float64,))\n"
+        "def twice(value):\n"
+        "    return 2.0 * value\n"
+    )
+
+    def run() -> str:
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        found = subprocess.run(
+            [sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+        )
+        return found.stdout.strip() or found.stderr[-600:]
+
+    assert run() == "4.0"
+    kept = [path for path in tmp_path.glob("compiled-*/**/*") if path.suffix in {".nbi", ".nbc"}]
+    assert kept
+    for path in kept:
+        path.write_bytes(path.read_bytes()[:20] if damage == "cut" else b"\x80garbage" * 50)
+    assert run() == "4.0"
