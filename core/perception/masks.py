@@ -47,11 +47,13 @@ def clean_mask(mask: Mask, min_area_px: int, max_hole_area_px: int) -> Mask:
     """
     if _is_noise(mask):
         return np.zeros(mask.shape, np.bool_)
+    whole = np.array(mask, np.uint8, order="C")
+    x, y, width, height = cv2.boundingRect(whole)
+    cleaned = whole[y : y + height, x : x + width]
     # Areas come from the contours, which cost 0.1 ms at 640x480 where labelling foreground and background costs 1.4 ms.
-    cleaned = np.array(mask, np.uint8, order="C")
     contours, hierarchy = cv2.findContours(cleaned, cv2.RETR_TREE, cv2.CHAIN_APPROX_NONE)
     if not contours:
-        return cleaned.view(np.bool_)
+        return whole.view(np.bool_)
     if len(contours) > MAX_OUTLINES:
         return np.zeros(mask.shape, np.bool_)
     parents: list[int] = hierarchy[0, :, 3].tolist()
@@ -70,7 +72,7 @@ def clean_mask(mask: Mask, min_area_px: int, max_hole_area_px: int) -> Mask:
         if areas[index] - sum(areas[hole] for hole in holes) < min_area_px:
             # Drawn together with its holes, a component goes and what lies in its holes stays.
             cv2.drawContours(cleaned, [contours[part] for part in (index, *holes)], -1, 0, cv2.FILLED)
-    return cleaned.view(np.bool_)
+    return whole.view(np.bool_)
 
 
 def _is_noise(mask: Mask) -> bool:

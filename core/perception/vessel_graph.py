@@ -12,8 +12,9 @@ from core.config import CleaningConfig
 from core.perception import bundle, pixel_graph, polyline
 from core.perception.border_cuts import by_wall_in_view
 from core.perception.bundle import Bundle
+from core.perception.compiled import maps
 from core.perception.junctions import are_together, rebuild
-from core.perception.lumen import RadiusMap, walls
+from core.perception.lumen import RadiusMap
 from core.perception.openings import Arm
 from core.perception.vessel_ends import led_on
 from core.types import GraphEdge, Mask, Points, VesselGraph
@@ -28,6 +29,10 @@ WIDTH_SHARE = 0.2
 """The same of a vessel's width, and by how much that may differ from what is seen at one place."""
 SPUR_RADII = 1.5
 """A spur of thinning runs from the middle to a bump or corner of the wall: at most about one and a half lumen radii."""
+SEARCH_PX = 4
+"""A wall is looked for so far to both sides of where a distance map of every second pixel has it."""
+SOFTEST = 0.02
+"""Per px: a wall where the network's probability falls less steeply than this says as little as this."""
 MOST_SHIFT_PX = 2.0
 """The map of distances is not farther off than this: what is, is the wall of something else."""
 RADIUS_POINTS = 30
@@ -260,17 +265,10 @@ def _between_walls(
     A vessel's width changes slowly. So where one wall is soft, the middle is rather as far from the other one as half the width
     that it has around there.
     """
-    (right, left), (on_right, on_left) = walls(level, lines.points, normal, expected)
-    half = 0.5 * (right + left)
-    seen = np.isfinite(half)
-    weight = np.where(seen, np.minimum(on_right, on_left) ** 2, 0.0)
-    sums = bundle.smooth(Bundle(np.column_stack([np.where(seen, half, 0.0) * weight, weight]), lines.starts), WIDTH_PX / STEP_PX)
-    # Smoothing mirrors a line through its ends, where a weight that is nothing becomes less.
-    around = np.where(sums.points[:, 1] > 1e-6, sums.points[:, 0] / np.maximum(sums.points[:, 1], 1e-6), half)
-    around = np.clip(around, (1.0 - WIDTH_SHARE) * half, (1.0 + WIDTH_SHARE) * half)
-    by_walls = on_right**2 * (right - around) + on_left**2 * (around - left)
-    shift = np.where(seen, by_walls / (on_right**2 + on_left**2), 0.0)
-    return np.clip(shift, -MOST_SHIFT_PX, MOST_SHIFT_PX), half
+    sigma = WIDTH_PX / STEP_PX
+    return maps.between_walls(
+        level, lines.points, lines.starts, normal, expected, SEARCH_PX, SOFTEST, sigma, WIDTH_SHARE, MOST_SHIFT_PX
+    )
 
 
 def _moved(lines: Bundle, normal: Points, shift: NDArray[np.float64]) -> Bundle:

@@ -1,4 +1,4 @@
-"""What maps show at sub-pixel places: for ``polyline``, ``lumen`` and ``path_shape``."""
+"""What maps show at sub-pixel places: for ``polyline``, ``lumen``, ``vessel_graph`` and ``path_shape``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 from numba import float64, int64
 from numpy.typing import NDArray
 
-from core.perception.compiled.jit import MAP, MASK, POINTS, VALUES, compiled
+from core.perception.compiled.jit import MAP, MASK, POINTS, STARTS, VALUES, compiled
+from core.perception.compiled.lines import smooth
 
 
 @compiled((MAP, float64, float64), (MASK, float64, float64))
@@ -73,7 +74,11 @@ def walls(
     expected: NDArray[np.float64],
     search_px: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Of places with unit vectors across: how far the walls to both sides are, and how steep, both (2, N)."""
+    """Where the level falls through 0.5 to both sides of places with unit vectors across them: distances (2, N), NaN where it does
+    not (in a branch's opening, beyond the image's border), and slopes (2, N), per px.
+
+    It is looked for so far to both sides of where it is expected (N,).
+    """
     count = len(points)
     reach, slope = np.empty((2, count)), np.empty((2, count))
     for side in range(2):
@@ -83,6 +88,43 @@ def walls(
                 level, points[i, 0], points[i, 1], sign * across[i, 0], sign * across[i, 1], expected[i], search_px
             )
     return reach, slope
+
+
+@compiled((MAP, POINTS, STARTS, POINTS, VALUES, int64, float64, float64, float64, float64))
+def between_walls(
+    level: NDArray[np.float32],
+    points: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    across: NDArray[np.float64],
+    expected: NDArray[np.float64],
+    search_px: int,
+    softest: float,
+    sigma: float,
+    width_share: float,
+    most_px: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of lines one after the other: how far each point lies beside the middle between its walls, and half its width; (N,), (N,)."""
+    reach, slope = walls(level, points, across, expected, search_px)
+    count = len(points)
+    half, sums = np.empty(count), np.zeros((count, 2))
+    for i in range(count):
+        half[i] = 0.5 * (reach[0, i] + reach[1, i])
+        slope[0, i], slope[1, i] = max(slope[0, i], softest), max(slope[1, i], softest)
+        if not math.isnan(half[i]):
+            sums[i, 1] = min(slope[0, i], slope[1, i]) ** 2
+            sums[i, 0] = half[i] * sums[i, 1]
+    sums = smooth(sums, starts, sigma, False)
+    shift = np.zeros(count)
+    for i in range(count):
+        if math.isnan(half[i]):
+            continue
+        # Smoothing mirrors a line through its ends, where a weight that is nothing becomes less.
+        around = sums[i, 0] / sums[i, 1] if sums[i, 1] > 1e-6 else half[i]
+        around = min(max(around, (1.0 - width_share) * half[i]), (1.0 + width_share) * half[i])
+        right, left = slope[0, i] ** 2, slope[1, i] ** 2
+        wanted = (right * (reach[0, i] - around) + left * (around - reach[1, i])) / (right + left)
+        shift[i] = min(max(wanted, -most_px), most_px)
+    return shift, half
 
 
 @compiled((MAP, POINTS, POINTS, int64, float64))
