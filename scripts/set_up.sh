@@ -6,9 +6,10 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 venv=.venv
 stamp=$venv/.ready # holds what .venv was made from; written last, so an interrupted set-up leaves none
-compiled=$venv/.compiled # holds what machine code was made from
+compiled=$venv/.compiled # holds where machine code lies, and what it was made from
 half=$venv/.half # there from the beginning of a .venv until its packages are in: only such a one is thrown away
 unset PYTHONPATH PYTHONHOME # of a ROS set-up, say: its packages would hide those of .venv
+unset PYTHONSAFEPATH # would hide the program itself
 export PIP_USER=0 # a pip.conf that says user=true would end every installation into .venv
 
 # Shared library that is missing on a bare Debian 12 -> the package that has it.
@@ -147,16 +148,17 @@ install_python_packages() {
     fi
 }
 
-# The geometry's inner loops (core/perception/compiled), which the first start would else wait for.
+# The geometry's inner loops (core/perception/compiled), which the first start would else wait for. What goes wrong here does not
+# matter: the program compiles by itself.
 compile_loops() {
-    local loops=core/perception/compiled wanted
-    wanted=$(cat requirements.lock $loops/*.py <(stat -c %Y $loops/*.py) | sha256sum)
-    if [[ -f $compiled && $(<"$compiled") == "$wanted" ]] && compgen -G "$loops/__pycache__/compiled-*" >/dev/null; then
+    local loops=core/perception/compiled wanted folder
+    wanted=$(cat requirements.lock $loops/*.py <(stat -c %Y $loops/*.py; pwd -P) | sha256sum)
+    if [[ -f $compiled ]] && { read -r folder && read -r; } <"$compiled" && [[ $REPLY == "$wanted" && ($folder == None || -d $folder) ]]; then
         return
     fi
     say "set-up: compiling (some 15 seconds)"
-    "$venv/bin/python" -c 'import core.perception.pipeline'
-    echo "$wanted" >"$compiled"
+    folder=$("$venv/bin/python" -c 'from core.perception.compiled.jit import folder; print(folder())') || return 0
+    { printf '%s\n' "$folder" "$wanted" >"$compiled"; } 2>/dev/null || true
 }
 
 install_all() {

@@ -19,7 +19,9 @@ here=$(cd "$(dirname "$0")" && pwd)
 case "$*" in
 "-m venv"*) [[ $* != *--clear* ]] || rm -rf "${@: -1}"; mkdir -p "${@: -1}/bin" && cp "$0" "${@: -1}/bin/python" ;;
 "-m pip install"*) [[ ! -e offline && $PIP_USER == 0 ]] && : >"$here/../packages" ;;
-"-c import core.perception.pipeline") mkdir -p "$LOOPS/__pycache__/compiled-0" && echo >>"$here/../../compilations" ;;
+"-c from core.perception.compiled"*)
+    [[ -z ${PYTHONSAFEPATH:-} && ! -e broken ]] || exit 1
+    mkdir -p "$LOOPS/__pycache__/compiled-0" && echo >>"$here/../../compilations" && echo "$LOOPS/__pycache__/compiled-0" ;;
 "-m pip uninstall"*) [[ ! -e record ]] || printf '%s\n' "$*" >>record ;;
 -) [[ -e record ]] && exec "$REAL_PYTHON" - ; cat >/dev/null ;;
 esac
@@ -72,7 +74,7 @@ def test_a_venv_that_works_outlives_a_renewal_without_network(checkout: Path) ->
 
 def test_loops_are_compiled_once_and_again_when_they_are_others_or_the_machine_code_is_gone(checkout: Path) -> None:
     def compilations() -> int:
-        assert set_up(checkout).returncode == 0
+        assert set_up(checkout, PYTHONSAFEPATH="1").returncode == 0
         return len((checkout / "compilations").read_text().splitlines())
 
     assert [compilations(), compilations()] == [1, 1]
@@ -84,6 +86,17 @@ def test_loops_are_compiled_once_and_again_when_they_are_others_or_the_machine_c
     assert [compilations(), compilations()] == [4, 4]
     assert renew(checkout, offline=False) == 0
     assert compilations() == 5
+    checkout = checkout.rename(checkout.with_name("moved"))  # Numba goes by the place
+    assert [compilations(), compilations()] == [6, 6]
+
+
+def test_loops_that_cannot_be_compiled_now_stop_nothing(checkout: Path) -> None:
+    (checkout / "broken").touch()
+    assert set_up(checkout).returncode == 0
+    assert not (checkout / ".venv" / ".compiled").exists()
+    (checkout / "broken").unlink()
+    assert set_up(checkout).returncode == 0
+    assert (checkout / ".venv" / ".compiled").exists()
 
 
 def test_one_that_was_begun_and_never_worked_is_made_anew(checkout: Path) -> None:

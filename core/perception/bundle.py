@@ -1,8 +1,4 @@
-"""Many polylines handled at once: one array of all their points.
-
-A vessel tree has some ten lines of some fifty points. NumPy takes as long for fifty points as for five hundred, so what is done
-to each line alone is done to all of them together.
-"""
+"""Many polylines handled at once, one after the other in one array: what is done to each of them takes one call."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ MANIFEST, FRAMES, EVENTS = "manifest.json", "frames.jsonl", "events.jsonl"
 PREFIX, RECOVERED = "session_", "_recovered"
 FORMAT = 1
 _MAX_BYTES = 8_000_000
-_PACKAGES = ("av", "mujoco-core", "numpy", "opencv-python-headless", "openvino", "scikit-image", "scipy", "torch")
+_PACKAGES = ("av", "mujoco-core", "numba", "numpy", "opencv-python-headless", "openvino", "scikit-image", "scipy", "torch")
 
 Kind = Literal["SIM", "LIVE", "PLAYBACK", "UNKNOWN"]
 """What the banner said; UNKNOWN only where a damaged manifest can no longer tell."""

@@ -1,32 +1,25 @@
-"""How the geometry's inner loops become machine code, and where that is kept.
+"""How the geometry's inner loops become machine code.
 
 NumPy would do them in hundreds of small calls a frame. What stands in this package is plain arithmetic on arrays, and belongs to
 the module that calls it: there stand its meaning, its units and its reasons.
 
-Types are declared, so that nothing is compiled in the middle of a stream: an array of another kind is a TypeError. Indices are
-checked. The interpreter's lock is let go, so that the window stays quick meanwhile.
+Types are declared, so that nothing is compiled in the middle of a stream: an array of another kind is a TypeError (of another byte
+order it is misread). Indices are checked. The interpreter's lock is let go, so that the window stays quick meanwhile.
 """
 
 from __future__ import annotations
 
-import hashlib
-import os
-import shutil
 from collections.abc import Callable
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any, TypeVar, cast
 
 import numba
 from numba import boolean, float32, float64, int64, types
-from platformdirs import user_cache_path
+
+from core.perception.compiled.store import open_store
 
 njit: Any = numba.njit  # its types do not know of lists of types
-config: Any = numba.config
-_DAMAGE = (AttributeError, EOFError, ImportError, LookupError, OSError, RuntimeError, TypeError, UnpicklingError, ValueError)
-"""What reading machine code ends in that a full disk or a power cut has damaged."""
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-_HERE = Path(__file__).parent
 
 
 def _array(kind: Any, dimensions: int) -> Any:
@@ -38,42 +31,50 @@ POINTS, VALUES, STARTS = _array(float64, 2), _array(float64, 1), _array(int64, 1
 MAP, MASK = _array(float32, 2), _array(boolean, 2)
 
 
+class _Compiler:
+    """Takes machine code from the store, or fills it."""
+
+    def __init__(self, sources: Path) -> None:
+        self._store = open_store(sources)
+        if self._store is not None:
+            numba.config.CACHE_DIR = str(self._store.folder)  # type: ignore[attr-defined]
+
+    def compile(self, function: Any, kinds: list[tuple[Any, ...]]) -> Any:
+        options = {"nogil": True, "error_model": "numpy", "boundscheck": True}
+        if self._store is not None:
+            try:
+                return njit(kinds, cache=True, **options)(function)
+            except OSError:  # the disk is full
+                self._store.discard()
+                self._store = None
+        return njit(kinds, **options)(function)
+
+    def finish(self) -> None:
+        if self._store is not None:
+            self._store.seal()
+
+    @property
+    def folder(self) -> Path | None:
+        return None if self._store is None else self._store.name or self._store.folder
+
+
+_compiler = _Compiler(Path(__file__).resolve().parent)
+
+
 def compiled(*kinds: tuple[Any, ...]) -> Callable[[_Function], _Function]:
     """Compile a function for each of these kinds of arguments, or take what was compiled before."""
 
     def compile_now(function: _Function) -> _Function:
-        options = {"nogil": True, "error_model": "numpy", "boundscheck": True}
-        try:
-            kernel = njit(list(kinds), cache=_IS_KEPT, **options)(function)
-        except _DAMAGE:
-            shutil.rmtree(config.CACHE_DIR, ignore_errors=True)
-            kernel = njit(list(kinds), **options)(function)
-        return cast(_Function, kernel)
+        return cast(_Function, _compiler.compile(function, list(kinds)))
 
     return compile_now
 
 
-def _keep_in(folder: Path) -> bool:
-    """Have Numba keep what it compiles in a folder of this version's own; False where that cannot be written.
-
-    By itself Numba takes what it has kept for as long as the one file of a function is the same: one that calls functions of
-    another file would not notice when these change.
-    """
-    told = hashlib.sha256(numba.__version__.encode())
-    for file in sorted(_HERE.glob("*.py")):
-        told.update(file.read_bytes())
-    own = folder / f"compiled-{told.hexdigest()[:16]}"
-    try:
-        own.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    if not os.access(own, os.W_OK):
-        return False
-    for older in folder.glob("compiled-*"):
-        if older != own:
-            shutil.rmtree(older, ignore_errors=True)
-    config.CACHE_DIR = str(own)
-    return True
+def finish() -> None:
+    """All functions are compiled: keep that for the next start."""
+    _compiler.finish()
 
 
-_IS_KEPT = _keep_in(_HERE / "__pycache__") or _keep_in(user_cache_path("lumenpilot"))
+def folder() -> Path | None:
+    """Where the machine code is kept; None where it cannot be."""
+    return _compiler.folder

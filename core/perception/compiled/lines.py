@@ -58,6 +58,8 @@ def resample(points: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     total = along[-1]
     if total == 0.0:
         return points[:1].copy()
+    if not math.isfinite(total / step):
+        raise ValueError("a line of points that are no numbers, or steps of nothing")
     count = max(2, int(np.rint(total / step)) + 1)
     found = np.empty((count, 2))
     for i in range(count - 1):
