@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled import lines
+from core.perception.compiled.loops import lines
 from core.types import Points
 
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled import openings
+from core.perception.compiled.loops import openings
 from core.perception.openings import STEP_PX, Gate
 from core.types import Mask, Points
 

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled import openings
+from core.perception.compiled.loops import openings
 from core.types import Point, Points
 
 STEP_PX = 2.0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
-from core.perception.compiled import maps
+from core.perception.compiled.loops import maps
 from core.types import Mask, Masks, Points
 
 STEP_PX = 2.0

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled import pixels
+from core.perception.compiled.loops import pixels
 from core.types import Mask, Points
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled import lines, maps
+from core.perception.compiled.loops import lines, maps
 from core.types import Mask, Point, Points
 
 BEND_SHARE = 0.5

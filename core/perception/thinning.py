@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled import pixels
+from core.perception.compiled.loops import pixels
 from core.types import Mask
 
 MIN_HALF_SIZE_SHARE = 0.35

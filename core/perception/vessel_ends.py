@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
-from core.perception.compiled import openings
+from core.perception.compiled.loops import openings
 from core.types import Mask, Points
 
 STEP_PX = 2.0

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from core.perception import polyline
-from core.perception.compiled import lines, maps, openings, pixels
+from core.perception.compiled.loops import lines, maps, openings, pixels
 from core.types import Points
 
 
