@@ -236,6 +236,7 @@ TEMPLATES = (
     "backing off: {why}",
     "missed the branch {a} times: take over, or choose another destination",
     "came no farther in {a} tries: take over, or choose another destination",
+    "the robot cannot go back any farther: take over, or choose another destination",
     # faults, and what is being done
     "{joint} off by {a} mm (at most {b} mm)",
     "silent for {a} ms",
@@ -257,7 +258,7 @@ TEMPLATES = (
     "{joint} at {a} mm, sent to {b} mm",
     "restarting servo {a}",
     "not armed: {why}",
-    "outside its envelope: {where}: move it back by hand, or zero it again",
+    "outside its envelope: {where}: switch the torque off and move it back by hand, or zero it again",
     # checks before driving
     "QT_QPA_PLATFORM={name}: nothing is shown on a screen",
     "{engine}, first frame in {a} ms: state {state} (true {truth}), theta off by {b} deg, head by {c} px",

@@ -65,7 +65,7 @@ class DriveDesk(QObject):
         """Whether a rig runs, or has run to its end: else nobody knows whether there is something to drive."""
         self._timer = QTimer(self)
         self._timer.setInterval(_LOOK_EVERY_MS)
-        self._timer.timeout.connect(self._look)
+        self._timer.timeout.connect(self.look)
         self.jog.changed.connect(self._on_jog)
         self.jog.stop_pressed.connect(self.stop)
         self.deadman.reported.connect(self._on_deadman)
@@ -212,7 +212,8 @@ class DriveDesk(QObject):
             pilot.deadman("window", held)
 
     @Slot()
-    def _look(self) -> None:
+    def look(self) -> None:
+        """Take in what the pilot has said since the last look."""
         pilot = self._thread.pilot
         if pilot is None:
             # A pilot that has just gone belonged to a rig that is over, even where nobody has told so yet.
@@ -224,7 +225,9 @@ class DriveDesk(QObject):
         if not self.deadman.is_held:
             pilot.deadman("window", False)
         news = pilot.news()
-        for view in news.changes:
+        # The recorder may have heard of the next rig already; what this one said until then was told before (``look``).
+        is_kept = not self._thread.is_ending
+        for view in news.changes if is_kept else ():
             self._recorder.drive(view)
         before, self._shown = self._shown, news.view
         if before is None or before.mode is not news.view.mode:
@@ -232,7 +235,8 @@ class DriveDesk(QObject):
         for alert in news.alerts:
             detail = f": {tr_text(alert.detail)}" if alert.detail else ""
             self._panels.log(EventKind.ALERT, f"{tr(alert.spec.text)}{detail}")
-            self._recorder.alert(alert, news.view.time_s)
+            if is_kept:
+                self._recorder.alert(alert, news.view.time_s)
             if alert.sound is not None:
                 self.sounds.play(alert.sound)
         self._panels.show_drive(news.view, self._thread.bus_status())

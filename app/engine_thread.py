@@ -122,6 +122,11 @@ class EngineThread(QThread):
         engine = self._engine
         return engine.problem if engine is not None else None
 
+    @property
+    def is_ending(self) -> bool:
+        """The running engine is not wanted any more; what it still says belongs to nobody."""
+        return self._changed.is_set()
+
     def stop_opening(self) -> bool:
         """STOP while an engine is announced or being opened: it starts stopped. False when there is none. From any thread."""
         with self._lock:

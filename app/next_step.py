@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from app.language import mark, tr, tr_text
 from core.control.alerts import ALERTS, AlertKey
 from core.control.drive_view import DriveView
-from core.control.faults import AREA, REACTION, Area, Fault, Reaction
+from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
 from core.control.gate_checks import Source
 from core.control.modes import Mode
 
@@ -105,7 +105,10 @@ def next_step(view: DriveView) -> NextStep:
         faults = tuple(fault.cause for fault in view.active if AREA[fault.cause] is Area.SERVOS and _holds(fault))
         rest = tr("press {key}: they are checked with the torque off, then tighten the wires", key=Step.SERVOS_ON.value.key)
         if faults:
-            return _refused(Step.SERVOS_ON, faults)
+            step = _refused(Step.SERVOS_ON, faults)
+            # What it is that is not as configured the servos' process has said, and what to do depends on it.
+            said = next((fault.detail for fault in view.active if fault.cause is Cause.SERVOS_WRONG), "")
+            return replace(step, rest=said) if said and faults[0] is Cause.SERVOS_WRONG else step
         return NextStep(Step.SERVOS_ON, True, tr("The servos follow nobody, but may still pull"), rest)
     if view.mode is Mode.ARMED:
         return _hand_over(view)

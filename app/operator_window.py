@@ -272,6 +272,7 @@ class OperatorWindow(WindowFrame):
 
     def _start_rig(self) -> None:
         self._thread.announce_engine()
+        self._desk.look()  # the last changes of the old rig belong to its session
         self._thread.end_engine()  # before the recorder hears of the new rig: no picture of the old one is kept as one of it
         self._prepare_rig()
         self._open_rig()

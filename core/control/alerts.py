@@ -123,7 +123,7 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Hindrance.ALREADY_AUTONOMOUS: ("Already handed over", "touch the controls to take back"),
     Hindrance.NO_DESTINATION: ("No destination chosen", "click the destination in the picture"),
     Hindrance.DESTINATION_BEHIND: ("The destination is behind the robot", "choose one ahead, or retract by hand first"),
-    Hindrance.DEADMAN_NOT_HELD: ("The deadman is not held", "press and hold the deadman, then hand over"),
+    Hindrance.DEADMAN_NOT_HELD: ("The deadman is not held", "press and hold it (let it go first if it is down), then hand over"),
     Hindrance.DEADMAN_HELD_BEFORE: ("The deadman was down before arming", "let it go and press it again"),
     Hindrance.OPERATOR_DRIVING: ("The controls are in use", "let go of the controls, then hand over"),
     RejectReason.NON_FINITE: ("Command is not a number", "nothing to do; report it if it comes again"),

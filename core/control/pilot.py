@@ -84,7 +84,6 @@ class Pilot:
         self._told_cycle = -1
         self._asked_s: float | None = None
         self._arrived_since_s: float | None = None
-        self._is_handed_over = False
         self._queue = AlertQueue()
         self._lock = threading.Lock()  # of what follows: other threads read or write it
         self._forget = False
@@ -248,7 +247,11 @@ class Pilot:
             self._robot.stop()
         if self._halted:
             decision = replace(decision, permitted=None)
-        self._is_handed_over = self._is_handed_over and decision.mode in DRIVING_MODES
+        was_refused = any(refused.act is Act.HAND_OVER for refused in decision.refused)
+        if Act.HAND_OVER in inputs.events and decision.mode is Mode.AUTONOMOUS and not was_refused:
+            # Not after a hold that ends by itself: how often a branch was missed, and that it was going back, is true as before.
+            with self._lock:
+                self._forget = True
         commanded = self._send(decision, inputs.jog, seen, sent, now_s)
         self._tell(before, decision, inputs.jog, sent if is_news else None, kept_back, now_s)
         view = self._look(decision, inputs, seen, commanded, sent, now_s)
@@ -354,11 +357,6 @@ class Pilot:
         # a press that itself ended a hold is a new one
         self._must_rest = self._permitted is None and permitted is Source.OPERATOR and not self._was_at_rest
         self._permitted = permitted
-        if permitted is Source.PROGRAM and not self._is_handed_over:
-            # Not after a hold: how often it missed a branch, and that it was on its way back, is true as before.
-            self._is_handed_over = True
-            with self._lock:
-                self._forget = True
 
     def _tell(
         self,
@@ -377,8 +375,11 @@ class Pilot:
         if sent is not None and decision.permitted is not None:
             if sent.rejection is not None and sent.rejection not in _NOT_WORTH_A_WORD:
                 raised.append((sent.rejection, ""))
-            if sent.at_end and not jog.is_rest:
-                raised.append((Note.AT_END, ", ".join(sent.at_end)))
+            # The program bends to the end of a tendon's travel as a matter of course; a feed that has none left goes nowhere.
+            by_program = decision.permitted is Source.PROGRAM and jog.is_rest
+            at_end = [name for name in sent.at_end if not by_program or name == "advance"]
+            if at_end and (by_program or not jog.is_rest):
+                raised.append((Note.AT_END, ", ".join(at_end)))
         is_tried = not jog.is_rest or decision.mode in DRIVING_MODES
         if kept_back is not None and decision.permitted is not None and is_tried and kept_back.reason not in _NOT_WORTH_A_WORD:
             raised.append((kept_back.reason, kept_back.detail))

@@ -16,6 +16,8 @@ from core.types import Advice, RobotStatus, Scene, Speed
 
 _UNFOLLOWED_S = 1.0
 """Who does not take the robot back for so long meant something else; if the reason is gone, the advice is, too."""
+_STRANDED_S = 3.0
+"""Who is advised to go back for so long and does not move at all cannot: the feed is at the end of its travel, say."""
 _LONGEST_S = 0.15
 """A frame counts for no longer than this, so that after a pause no single one decides."""
 _PAUSE_S = 0.5
@@ -44,6 +46,7 @@ class Pursuit:
         self._back: BackOff | None = None
         self._behind_s = 0.0
         self._unfollowed_s = 0.0
+        self._is_stranded = False
 
     def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
         """Advice for a scene; `status` adds the contact force and how fast the robot is really fed. None when there is no pose."""
@@ -69,12 +72,15 @@ class Pursuit:
         gave_up = self._back is None and (self._misses.count >= config.most_misses or self._tries.count >= config.most_tries)
         otherwise = fed_mm_s >= 0.0 if self._back is not None else gave_up and fed_mm_s != 0.0
         self._unfollowed_s = self._unfollowed_s + elapsed_s if otherwise else 0.0
+        self._is_stranded = self._is_stranded and way.behind and fed_mm_s == 0.0
         rises = self._lean.rises(contact_n, fed_mm)
         return self._backing(way, contact_n, rises, stuck, fed_mm) or self._given_up(way) or self._forward(way, rises)
 
     def _backing(self, way: Way, contact_n: float | None, rises: bool, stuck: bool, fed_mm: float) -> Advice | None:
         """Backwards while there is a reason to, which one picture alone never is; None to go on. `fed_mm` since the last frame."""
         config = self._config
+        if self._is_stranded:
+            return self._advise(0.0, 0.0, "the robot cannot go back any farther: take over, or choose another destination")
         if self._back is None:
             if way.behind and self._behind_s < config.behind_s:
                 return self._advise(0.0, 0.0, "the way seems to lie behind the head: looking again")
@@ -82,14 +88,17 @@ class Pursuit:
                 self._misses.add(way)
                 self._back = BackOff("the way to the target branches off behind the head", config.retry_mm)
             elif self._contact.exceeded(contact_n, rises, way.left_px):
-                self._tries.add()
+                self._tries.add(way)
                 self._back = BackOff(f"the robot presses against the wall with {contact_n or 0.0:.2f} N", config.back_off_mm / 2)
             elif stuck:
-                self._tries.add()
+                self._tries.add(way)
                 # All that was fed in vain lies bent behind the head.
                 self._back = BackOff("the robot is fed but its head does not move", max(config.back_off_mm, self._stall.lost_mm))
             else:
                 return None
+        if way.behind and self._unfollowed_s > _STRANDED_S:
+            self._back, self._unfollowed_s, self._is_stranded = None, 0.0, True
+            return self._backing(way, contact_n, rises, stuck, fed_mm)
         is_unfollowed = self._unfollowed_s > _UNFOLLOWED_S and not way.behind
         if is_unfollowed or self._back.done(way.behind, -fed_mm):
             self._back, self._unfollowed_s = None, 0.0

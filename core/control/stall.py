@@ -17,6 +17,8 @@ _STILL_MM_S = 0.3
 """Servos at rest measure a little motion, too."""
 _STATUS_GAP_S = 0.5
 """What happened between two statuses farther apart is not known."""
+_SHORTEST_S = 0.02
+"""Frames and statuses come no faster than this: two that do are one moment, and a way divided by it would be a wild speed."""
 _REST_S = 0.3
 """Who is not fed for so long rests; a shorter pause is one of the measurement."""
 _FARTHER_PX = 6.0
@@ -88,7 +90,7 @@ class Feed:
         before, self._known = self._known, (status.time_s, status.insertion_mm)
         since_s, fed_mm = (0.0, 0.0) if before is None else (status.time_s - before[0], status.insertion_mm - before[1])
         if since_s == 0.0 and fed_mm:
-            since_s = elapsed_s  # of several servos one was late, and its time is that of all
+            since_s = max(elapsed_s, _SHORTEST_S)  # of several servos one was late, and its time is that of all
         self._silent_s = self._silent_s + elapsed_s if since_s == 0.0 else 0.0
         if not 0.0 <= since_s <= _STATUS_GAP_S or self._silent_s > _STATUS_GAP_S:
             self._speed_mm_s = 0.0
@@ -111,22 +113,27 @@ class Stall:
         self._fed_mm = 0.0
         self._watched_s = 0.0
         self._rested_s = 0.0
+        self._blind_s = 0.0
         self.lost_mm = 0.0
         """What was fed in vain when it was last told."""
 
     def update(self, left_px: float | None, head: Point, speed_mm_s: float, elapsed_s: float) -> bool:
-        """Take in one frame; True when there was no progress for the configured time. Without a target it cannot tell."""
+        """Take in one frame; True when there was no progress for the configured time.
+
+        Without a target, or a way to it, it cannot tell; a frame or two in which the way was not found change nothing.
+        """
         self._rested_s = 0.0 if speed_mm_s else self._rested_s + elapsed_s
-        if left_px is None or speed_mm_s < 0.0 or self._rested_s >= _REST_S:
+        self._blind_s = 0.0 if left_px is not None else self._blind_s + elapsed_s
+        if speed_mm_s < 0.0 or max(self._rested_s, self._blind_s) >= _REST_S:
             self.forget()
             return False
         if self._start is None:
-            if speed_mm_s:
+            if speed_mm_s and left_px is not None:
                 self._start = left_px, head
             return False
         self._fed_mm += speed_mm_s * elapsed_s
         self._watched_s += elapsed_s
-        if self._watched_s < self._config.stuck_s:
+        if self._watched_s < self._config.stuck_s or left_px is None:
             return False
         before_px, before = self._start
         self.lost_mm = self._fed_mm
@@ -142,7 +149,11 @@ class Stall:
 
 
 class Tries:
-    """How often the robot was taken back without its head having come farther since; feeding on would only press and buckle it."""
+    """How often the robot was taken back without its head having come farther since; feeding on would only press and buckle it.
+
+    Where the head is counts only where it was taken back: there it stood still, and no single frame beside a branch, from where the
+    way left seems shorter, hides what it comes farther later. A frame in which no way was found tells nothing.
+    """
 
     def __init__(self) -> None:
         self.count = 0
@@ -154,16 +165,21 @@ class Tries:
         self.count, self._nearest_px = 0, None
 
     def see(self, way: Way) -> None:
-        """Take in where the head is. Without a target nobody knows whether it comes farther, and nothing is counted."""
-        if way.left_px is None or way.target != self._target:
+        """Take in where the robot is to go: for another target it may be tried again."""
+        if way.left_px is None:
+            return
+        if way.target != self._target:
             self.forget()
         self._target = way.target
-        if way.left_px is not None and (self._nearest_px is None or way.left_px < self._nearest_px - _FARTHER_PX):
-            self.count, self._nearest_px = 0, way.left_px
 
-    def add(self) -> None:
-        """Taken back once more."""
-        self.count += 1
+    def add(self, way: Way) -> None:
+        """Taken back once more. Without a way to a target nobody knows whether the head came farther, and nothing is counted."""
+        if way.left_px is None:
+            return
+        if self._nearest_px is None or way.left_px < self._nearest_px - _FARTHER_PX:
+            self.count, self._nearest_px = 1, way.left_px
+        else:
+            self.count += 1
 
 
 class Misses:
@@ -190,7 +206,9 @@ class Misses:
         return self.count
 
     def _check(self, way: Way) -> None:
-        if way.left_px is None or way.target != self._target or abs(way.left_px - self._left_px) > _SAME_BRANCH_PX:
+        if way.left_px is None:
+            return  # a frame in which no way was found tells nothing
+        if way.target != self._target or abs(way.left_px - self._left_px) > _SAME_BRANCH_PX:
             self.count = 0
 
 

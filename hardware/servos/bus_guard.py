@@ -137,7 +137,8 @@ class BusGuard:
         if at is None or self._cycle_s - at.measured_s > self._safety.measurement_max_age_s:
             return []
         outside = outside_envelope(at.positions_mm, self._servos)
-        return [f"outside its envelope: {joint}: move it back by hand, or zero it again" for joint in outside]
+        advice = "switch the torque off and move it back by hand, or zero it again"
+        return [f"outside its envelope: {joint}: {advice}" for joint in outside]
 
     def set_armed(self, now_s: float) -> None:
         """The driver has armed the servos. Orders from before do not count."""

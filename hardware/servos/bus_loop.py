@@ -17,13 +17,14 @@ from hardware.servos.bus_messages import BusPhase, BusStatus
 from hardware.servos.dynamixel import ServoBus
 from hardware.servos.errors import NotReady, PortLost, ServoError
 from hardware.servos.guard_end import GuardEnd, Request
-from hardware.servos.status_block import ServoReading, ServoState
+from hardware.servos.status_block import MissingServo, ServoReading, ServoState
 from hardware.servos.stopwatch import Stopwatch
 
 _LINGER_S = 0.2
 """So long after disarming for silence the servos are still polled, to see that they hold."""
 _REOPEN_S = 1.0
 _SAME_STOP_S = 0.5
+_LOOKS_BEFORE_ARMING = 3
 _SETTLE_CYCLES = 5
 _SETTLED_MM = 0.2
 _WINDOW_S = 10.0
@@ -210,7 +211,12 @@ class BusLoop:
         if not self._bus.is_open:
             raise NotReady("not armed: the servo port is not open")
         if not self._guard.armed:
-            self._look()  # a quiet bus was not read for long, and after a zero the last positions mean nothing
+            # A quiet bus was not read for long, and after a zero the last positions mean nothing. One servo's late answer is no
+            # reason to go by them all the same: the guard takes in whole sets only.
+            for _ in range(_LOOKS_BEFORE_ARMING):
+                self._look()
+                if not any(isinstance(reading, MissingServo) for reading in self._readings):
+                    break
         self._guard.check_arming()
         self._bus.arm()
         self._settle = 0

@@ -1602,6 +1602,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the robot cannot go back any farther: take over, or choose another destination</source>
+        <translation>机器人无法再后退：请接管，或另选目的地</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>{joint} off by {a} mm (at most {b} mm)</source>
         <translation>{joint}偏差 {a} mm（最多 {b} mm）</translation>
     </message>
@@ -1702,8 +1707,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>outside its envelope: {where}: move it back by hand, or zero it again</source>
-        <translation>超出行程范围：{where}：请用手移回，或重新归零</translation>
+        <source>outside its envelope: {where}: switch the torque off and move it back by hand, or zero it again</source>
+        <translation>超出行程范围：{where}：请关闭力矩后用手移回，或重新归零</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8904,8 +8909,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>press and hold the deadman, then hand over</source>
-        <translation>按住使能键，然后移交</translation>
+        <source>press and hold it (let it go first if it is down), then hand over</source>
+        <translation>按住它（若已按下请先松开），然后移交</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

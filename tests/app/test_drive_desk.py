@@ -90,6 +90,36 @@ def test_the_speed_by_hand_reaches_the_pilot_and_that_of_the_next_rig(
     until(qtbot, lambda: len(engines) == 2 and engines[1].pilot.speed == 0.2)
 
 
+def test_what_a_rig_that_is_closed_still_says_is_nothing_of_the_next_ones(
+    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_close = threading.Event()
+
+    class Slow(FakeEngine):
+        def close(self) -> None:
+            may_close.wait(20.0)
+            super().close()
+
+    engine = Slow(bench)
+    rigs = iter([engine])
+    window = make_window(lambda _config: next(rigs, None) or FakeEngine(bench))
+    window.start()
+    until(qtbot, lambda: window.desk.view is not None)
+    heard: list[str] = []
+    recorder = window.recorder
+    monkeypatch.setattr(recorder, "alert", lambda alert, _time_s: heard.append(alert.detail))
+    opened = recorder.open_rig
+    monkeypatch.setattr(recorder, "open_rig", lambda *about: (heard.append("the next rig"), opened(*about)))
+    engine.pilot.alerts = [Alert(Cause.TRACKING, ALERTS[Cause.TRACKING], "the last word")]
+    try:
+        window.restart()
+        engine.pilot.alerts = [Alert(Cause.TRACKING, ALERTS[Cause.TRACKING], "while it is closed")]
+        until(qtbot, lambda: not engine.pilot.alerts)
+        assert heard == ["the last word", "the next rig"]
+    finally:
+        may_close.set()
+
+
 def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
     engine = FakeEngine(bench)
     engine.pilot = None  # type: ignore[assignment]

@@ -195,6 +195,13 @@ def test_acknowledging_looks_subdued_while_servos_in_use_still_have_the_fault() 
     assert next_step(DriveView(0.0, servos_on=True, latched=hot)).granted
 
 
+def test_what_is_not_as_configured_is_said_where_it_is_known() -> None:
+    detail = "not armed: outside its envelope: right at 4.00 mm (-2.4 to 2.8 mm)"
+    wrong = next_step(DriveView(0.0, active=(Fault(Cause.SERVOS_WRONG, detail),)))
+    assert wrong.rest == detail
+    assert next_step(DriveView(0.0, active=(Fault(Cause.SERVOS_WRONG),))).rest == ALERTS[Cause.SERVOS_WRONG].what_to_do
+
+
 def test_servos_in_trouble_can_be_checked_again() -> None:
     following = next_step(DriveView(0.0, active=(Fault(Cause.PORT_LOST),)))
     assert (following.step, following.granted, following.headline) == (Step.SERVOS_ON, True, ALERTS[Cause.PORT_LOST].text)

@@ -208,6 +208,22 @@ def test_a_policy_remembers_through_a_hold_and_forgets_at_the_next_hand_over(ben
     assert bench.policy.resets == 2
 
 
+def test_a_policy_forgets_when_it_is_handed_over_to_out_of_a_hold_that_has_expired(bench: Bench) -> None:
+    """Whoever asks for it again wants it to try again: one that has given up would else give up at once."""
+    bench.handed_over().turn(3)
+    bench.held = False
+    bench.seconds(2.0)
+    assert bench.mode is Mode.HOLD
+    bench.held = True
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn(3)
+    assert bench.mode is Mode.AUTONOMOUS
+    assert bench.policy.resets == 2
+    bench.pilot.ask(Act.HAND_OVER)  # refused: it drives already
+    bench.turn(3)
+    assert bench.policy.resets == 2
+
+
 def test_a_deadman_that_falls_silent_is_let_go_within_a_tenth_of_a_second(bench: Bench) -> None:
     bench.handed_over()
     last_s = bench.now_s
@@ -323,6 +339,14 @@ def test_a_joint_at_its_end_is_told_to_him_who_drives_it(bench: Bench) -> None:
     bench.robot.edit = lambda sent: replace(sent, at_end=("advance",))
     bench.turn(4)
     assert [alert.detail for alert in bench.pilot.news().alerts if alert.key is Note.AT_END] == ["advance"]
+
+
+def test_a_feed_at_its_end_is_told_when_the_program_drives_and_a_tendon_is_not(bench: Bench) -> None:
+    bench.handed_over()
+    for at_end, told in ((("right",), []), (("right", "advance"), ["advance"])):
+        bench.robot.edit = lambda sent, at_end=at_end: replace(sent, at_end=at_end)
+        bench.turn(4)
+        assert [alert.detail for alert in bench.pilot.news().alerts if alert.key is Note.AT_END] == told
 
 
 def test_zeroing_restarting_and_letting_go_need_switching_on_afterwards(bench: Bench) -> None:

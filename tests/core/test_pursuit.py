@@ -228,6 +228,34 @@ def test_a_head_that_is_blocked_is_not_fed_on_for_ever(fps: float) -> None:
     assert abs(fed_mm[-1]) < 0.5 * WORDS.fast_mm_s * CONFIG.stuck_s, "what was fed in vain is taken back"
 
 
+@pytest.mark.parametrize("every_s", [1.4, 5.0])
+def test_a_route_that_is_missing_in_single_frames_hides_no_blocked_head(every_s: float) -> None:
+    pursuit, fps, insertion_mm, said = Pursuit(CONFIG, WORDS), 30.0, 50.0, []
+    for k in range(round(60.0 * fps)):
+        scene = scene_at(STRAIGHT, (100, 100), (380, 100), time_s=10.0 + k / fps)
+        if k % round(every_s * fps) == 7:
+            scene = replace(scene, route=None)
+        advice = pursuit(scene, replace(status(None, insertion_mm), time_s=10.0 + k / fps))
+        assert advice is not None
+        insertion_mm += advice.advance_mm_s / fps
+        said.append(advice.why)
+    assert said[-1] == f"came no farther in {CONFIG.most_tries} tries: take over, or choose another destination"
+
+
+def test_a_robot_that_cannot_go_back_is_said_to_be_until_it_moves() -> None:
+    """Its feed is at the end of its travel: the branch lies behind, and it would be advised to go there for ever."""
+    pursuit, said = Pursuit(CONFIG, WORDS), []
+    for k in range(200):
+        told = replace(status(None, 50.0 if k < 150 else 50.0 - 0.4 * (k - 149)), time_s=0.1 * k)
+        advice = pursuit(scene_at(STRAIGHT, (200, 100), (20, 100), time_s=0.1 * k), told)
+        assert advice is not None
+        said.append((advice.advance_mm_s, advice.why))
+    stranded = (0.0, "the robot cannot go back any farther: take over, or choose another destination")
+    assert stranded not in said[:25]
+    assert said[60:150] == [stranded] * 90
+    assert said[-1][0] < 0.0
+
+
 def test_a_head_that_presses_and_comes_no_farther_is_given_up_too() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
     said, _ = _blocked(pursuit, 60.0, CONFIG.contact_limit_n + 0.1)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
-from core.control.stall import BackOff, ContactLimit, Feed, Stall
+from core.control.stall import BackOff, ContactLimit, Feed, Misses, Stall, Tries
+from core.control.way import Way
 from core.policy_config import PursuitConfig
 from core.types import RobotStatus
 
@@ -61,6 +63,50 @@ def test_a_robot_that_tells_nothing_any_more_is_not_taken_to_be_fed() -> None:
     late = RobotStatus(9.0, 70.0, 0.0, (0.0,) * 4, (0.0,) * 4)
     assert feed.update(late, 0.0, 0.1) == (0.0, 0.0)
     assert feed.update(None, 4.0, 0.1) == (4.0, 0.4)
+
+
+def test_two_frames_of_one_moment_make_no_wild_speed() -> None:
+    feed = Feed()
+    feed.update(RobotStatus(1.0, 50.0, 0.0, (0.0,) * 4, (0.0,) * 4), 4.0, 0.03)
+    speed, _ = feed.update(RobotStatus(1.0, 50.2, 0.0, (0.0,) * 4, (0.0,) * 4), 4.0, 0.001)
+    assert speed == pytest.approx(10.0)
+
+
+def way(left_px: float | None, target: tuple[float, float] | None = (380.0, 100.0)) -> Way:
+    """As it is where only the target and the way left to it matter."""
+    return Way((0.0, 0.0), np.zeros((2, 2)), left_px, target if left_px is not None else None, 0.0, False, 0.0, None, 0.0)
+
+
+@pytest.mark.parametrize("blind_s", [0.1, 0.2])
+def test_frames_without_a_way_hide_no_stall(blind_s: float) -> None:
+    stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
+    told = []
+    for k in range(60):
+        told.append(stall.update(None if 0 < k % 9 <= round(blind_s / 0.1) else 100.0, (0, 0), 5.0, 0.1))
+    assert sum(told) >= 4
+    assert not any(stall.update(None, (0, 0), 5.0, 0.1) for _ in range(30)), "without a target it cannot tell"
+
+
+def test_tries_count_where_the_head_stood_and_no_farther_place_that_one_frame_saw() -> None:
+    tries = Tries()
+    counts = []
+    for left_px in (200.0, 198.0, None, 197.0, 150.0, 149.0, 148.0):
+        tries.see(way(left_px))
+        tries.see(way(60.0))  # one frame beside a branch
+        tries.add(way(left_px))
+        counts.append(tries.count)
+    assert counts == [1, 2, 2, 3, 1, 2, 3]
+    tries.see(way(None))
+    assert tries.count == 3
+    tries.see(way(100.0, (5.0, 5.0)))
+    assert tries.count == 0, "another target"
+
+
+def test_misses_outlive_a_frame_without_a_way() -> None:
+    misses = Misses()
+    misses.add(way(150.0))
+    assert [misses.at(way(None)), misses.at(way(140.0))] == [1, 1]
+    assert misses.at(way(140.0, (5.0, 5.0))) == 0
 
 
 def test_a_head_that_slides_sideways_is_not_stuck() -> None:

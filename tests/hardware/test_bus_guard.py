@@ -236,9 +236,10 @@ def test_a_joint_from_where_no_goal_leads_hinders_arming_and_is_named() -> None:
     bench.positions[0], bench.positions[4] = 4.0, -7.0
     with pytest.raises(NotReady) as told:
         bench.arm()
+    what_to_do = "switch the torque off and move it back by hand, or zero it again"
     assert str(told.value) == (
-        "not armed: outside its envelope: right at 4.00 mm (-2.4 to 2.8 mm): move it back by hand, or zero it again; "
-        "outside its envelope: advance at -7.00 mm (-5 to 400 mm): move it back by hand, or zero it again"
+        f"not armed: outside its envelope: right at 4.00 mm (-2.4 to 2.8 mm): {what_to_do}; "
+        f"outside its envelope: advance at -7.00 mm (-5 to 400 mm): {what_to_do}"
     )
     assert not bench.guard.armed
     bench.positions[0], bench.positions[4] = 2.8, -6.0  # one bounded step brings it back

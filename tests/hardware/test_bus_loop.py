@@ -215,6 +215,28 @@ def test_arming_looks_where_the_joints_are_now(paper: Paper) -> None:
     assert armed is None
 
 
+@pytest.mark.parametrize(("late", "told"), [(1, []), (2, []), (9, ["arm"])])
+def test_arming_looks_again_where_an_answer_is_late(paper: Paper, late: int, told: list[str]) -> None:
+    """The guard takes in whole sets only: else one late answer would let a joint outside its envelope be armed."""
+    reads = 0
+
+    def read() -> tuple[MissingServo | ServoState, ...]:
+        nonlocal reads
+        reads += 1
+        states = [
+            ServoState(joint.name, joint.id, paper.now_s, 0, 0, -7.0, 0.0, 0.0, 8.0, 12.0, 30.0, HardwareError(0), False, False)
+            for joint in ServosConfig().joints
+        ]
+        silent = MissingServo(states[6].name, states[6].id, paper.now_s, 1, "no answer")
+        return tuple(states[:6]) + ((silent,) if reads <= late else (states[6],))
+
+    paper.end.heartbeat = lambda: None  # type: ignore[attr-defined]
+    paper.bus.read = read  # type: ignore[method-assign,assignment]
+    paper.hear(request="arm")
+    assert paper.bus.told == told, "the driver itself asks all servos once more"
+    assert reads == min(late + 1, 3)
+
+
 def test_a_robot_that_is_closed_while_it_connects_keeps_no_bus_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """F5 while "Servos on" starts a lost bus process again: that one would keep the port from the next rig."""
     opening, go_on = threading.Event(), threading.Event()
