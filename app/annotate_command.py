@@ -41,6 +41,10 @@ class StudyOptions:
     order: str | None = None
 
 
+FRAMES = 48
+"""Pictures taken of a video, unless told otherwise."""
+
+
 @dataclass(frozen=True, slots=True)
 class AnnotateOptions:
     """The command line of ``annotate``."""
@@ -48,7 +52,8 @@ class AnnotateOptions:
     paths: tuple[Path, ...]
     store: Path | None = None
     study: StudyOptions = StudyOptions()
-    frames: int = 48
+    frames: int | None = None
+    """Of each video; None: those that were taken before, or ``FRAMES`` new ones."""
     report: bool = False
     export: str | None = None
     imports: tuple[Path, ...] = ()
@@ -102,7 +107,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     from app.application import check_display, make_application, run_until_closed
 
     check_display()
-    files = image_files(paths, options.frames)
+    files = _files(paths, options.frames)
     with AnnotationStore(store_path) as store:
         images = _listed(files, store)
         rater = options.study.rater or _user()
@@ -125,6 +130,10 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         switches = {name: Switch(partial(bar.is_on, key), toggling(partial(bar.toggle, key))) for name, key in _KEPT}
         LayoutKeeper(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
         return run_until_closed(application, window, window.say)
+
+
+def _files(paths: Sequence[Path], frames: int | None) -> list[Path]:
+    return image_files(paths, frames or FRAMES, taken=frames is None)
 
 
 def _listed(files: Sequence[Path], store: AnnotationStore) -> list[FoundImage]:
@@ -276,7 +285,7 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     from core.study.evaluation import write_measurements
 
     assert options.out is not None
-    annotations, images = read_annotated(store_path, paths, options.frames)
+    annotations, images = read_annotated(store_path, paths, options.frames or FRAMES)
     if options.study.name:
         annotations = [one for one in annotations if one.key.study == options.study.name]
     annotations = _of_rater(annotations, options.study.rater)
@@ -314,7 +323,9 @@ def _of_rater(annotations: list[StoredAnnotation], rater: str | None) -> list[St
     return own
 
 
-def read_annotated(store_path: Path, paths: Sequence[Path], frames: int = 48) -> tuple[list[StoredAnnotation], list[FoundImage]]:
+def read_annotated(
+    store_path: Path, paths: Sequence[Path], frames: int = FRAMES
+) -> tuple[list[StoredAnnotation], list[FoundImage]]:
     """All annotations of a file and those of its images that are here; how many are not is told. Raises AnnotationError.
 
     Of a video those pictures count that were taken from it before; where there are none, `frames` are taken.
@@ -356,7 +367,7 @@ def _import(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         raise AnnotationError(f"{options.imports[0]}: no .json file in it")
     if not any(source.is_file() for source in sources):  # before an annotation file is made for them
         raise AnnotationError(f"{sources[0]}: no such file; nothing was imported")
-    files = image_files(paths, options.frames)
+    files = _files(paths, options.frames)
     rater = options.study.rater or _user()
     counts: Counter[str] = Counter()
     with AnnotationStore(store_path) as store:

@@ -223,11 +223,12 @@ class AnnotationDesk(QObject):
             return  # asked for once more before the first answer was heard: what has been begun since stays
         self._loaded[place] = loaded
         if place not in self._histories:  # one that was edited meanwhile knows more than the disk
-            history, kept = loaded.history, self._contents.get(self.items[place].key, Annotation())
-            if history.current != kept:  # the journal is damaged: what counts is the annotation
-                self._histories[place] = history
-                self._write(place, history.edit("restored", kept), kept)
+            history, kept = loaded.history, self._contents.get(self.items[place].key)
             self._histories[place] = history
+            if kept is None:  # never begun, or its record is damaged: then the journal has what it said
+                self._write(place, history.renewed("restored"), history.current)
+            elif history.current != kept:  # the journal is damaged: what counts is the annotation
+                self._write(place, history.edit("restored", kept), kept)
         while len(self._loaded) > _KEPT_IMAGES:
             del self._loaded[max(self._loaded, key=lambda other: abs(other - self.index))]
         if place == self.index:

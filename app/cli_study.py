@@ -47,7 +47,10 @@ def annotate(
     turn: Annotated[bool, typer.Option("--turn", help="repeats of a study are shown turned by 180 degrees")] = False,
     order: Annotated[str | None, typer.Option(help="listed, random, worst (least sure first) or even (evenly over time)")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="of the shuffled order")] = None,
-    frames: Annotated[int, typer.Option(min=1, max=100_000, help="pictures taken of each video, evenly over time")] = 48,
+    frames: Annotated[
+        int | None,
+        typer.Option(min=1, max=100_000, help="pictures taken of each video, evenly; default: those taken before, or 48"),
+    ] = None,
     report: Annotated[bool, typer.Option("--report", help="agreement within and between raters, instead of the window")] = False,
     export: Annotated[str | None, typer.Option(help="dataset (for train), csv (for evaluate) or coco, to --out")] = None,
     import_: Annotated[list[Path] | None, typer.Option("--import", help="labelme or COCO file or folder; may be repeated")] = None,

@@ -168,6 +168,7 @@ FIXED = (
     "too little of the robot is seen: feed it farther into the vessel",
     "the robot's end has no direction: feed it farther into the vessel",
     "the head does not follow the wire: is it hung in, does the head lie free? Or zero it by eye",
+    "a step was stopped half way and the wires are where it left them: find the zeros anew",
     "the head does not follow the wire's pull: pull it by hand, or zero it by eye",
     "the wire was taut before it was pulled: loosen it, then try again, or zero it by eye",
     "board",

@@ -142,7 +142,9 @@ def calibrate(draft: RigDraft, steps: tuple[str, ...], pictures: int) -> Iterato
         draft.identify()
         yield "servos"
     if "zero" in steps:
-        draft.find_zeros()
+        zeros = draft.find_zeros()
+        if zeros.problems:  # to pull on from there would be to measure from nowhere
+            raise UserError(f"no zero for all tendons: {'; '.join(zeros.problems)}")
         if "steering" not in steps:
             yield "zero"
     if "steering" in steps:

@@ -118,7 +118,7 @@ def _text(summary: dict[str, Any]) -> str:
         f"{'OK' if summary['ok'] else 'NOT OK'} {when} {summary['seconds']:.0f} s (seed {summary['seed']})",
         f"wire: {summary['packets']} packets, {summary['goals']} goals, {summary['unsafe']} unsafe",
         f"records: {records['rows']} rows in {records['sessions']} sessions, {records['lost']} lost",
-        f"use: {steady}, from {flat['before']} to {flat['after']}",
+        f"use: {steady}" + (f", from {flat['before']} to {flat['after']}" if flat["flat"] is not None else ""),
         f"modes: {shares}; {summary['rigs_opened']} rigs opened, {summary['breakdowns']} broke down",
         f"faults: {sum(summary['faults'].values())}; requests: {sum(summary['operator'].values())}",
     ]

@@ -16,6 +16,28 @@ from app.thread_priority import let_the_window_first
 _log = logging.getLogger(__name__)
 
 
+class _Lifeline:
+    """Whether the object that reports is still there: Qt may destroy it, as a child of a window, while its thread reports.
+
+    Then the signal would be that of freed memory. So it cannot be destroyed meanwhile, and nothing is reported afterwards.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._is_cut = False
+
+    def cut(self) -> None:
+        """The object is being destroyed; waits for a report that is under way."""
+        with self._lock:
+            self._is_cut = True
+
+    def report(self, report: Callable[[], None]) -> None:
+        with self._lock:
+            if not self._is_cut:
+                with contextlib.suppress(RuntimeError):  # it has just begun to be destroyed, and has no signals any more
+                    report()
+
+
 class WorkThread(QObject):
     """Jobs in the order in which they come, urgent ones first. ``stop`` lets those be finished that must not be lost.
 
@@ -41,6 +63,8 @@ class WorkThread(QObject):
         self._stopping = False
         self._busy: Hashable | None = None
         self._thread: threading.Thread | None = None
+        self._lifeline = _Lifeline()
+        self.destroyed.connect(self._lifeline.cut)
 
     @property
     def pending(self) -> int:
@@ -94,8 +118,7 @@ class WorkThread(QObject):
         if self._behind:
             let_the_window_first()
         self._work()
-        with contextlib.suppress(RuntimeError):  # whoever asked has gone, and this object with it
-            self.ended.emit()
+        self._lifeline.report(self._tell_ended)
 
     def _work(self) -> None:
         while True:
@@ -114,13 +137,23 @@ class WorkThread(QObject):
                 if type(error).__module__.partition(".")[0] not in {"core", "hardware"}:
                     _log.error("a job of %s failed", self.objectName(), exc_info=error)
                     line = f"unexpected {type(error).__name__}: {line}"
-                self._finished(partial(self.failed.emit, key, line))
+                self._finished(partial(self._tell_failed, key, line))
             else:
-                self._finished(partial(self.done.emit, key, result))
+                self._finished(partial(self._tell_done, key, result))
 
     def _finished(self, report: Callable[[], None]) -> None:
         """Report after the job no longer counts as pending, so that "all saved" is true when it is heard."""
         with self._changed:
             self._busy = None
-        with contextlib.suppress(RuntimeError):  # as above
-            report()
+        self._lifeline.report(report)
+
+    # Signals are looked up only while the object is there.
+
+    def _tell_done(self, key: Hashable, result: object) -> None:
+        self.done.emit(key, result)
+
+    def _tell_failed(self, key: Hashable, line: str) -> None:
+        self.failed.emit(key, line)
+
+    def _tell_ended(self) -> None:
+        self.ended.emit()

@@ -116,7 +116,7 @@ def list_rigs(folder: Path | None = None) -> tuple[ListedRig, ...]:
         except RigFileError as error:
             found.append(ListedRig(path.stem, path, None, str(error)))
         else:
-            found.append(ListedRig(rig.name, path, rig))
+            found.append(ListedRig(path.stem, path, rig))  # the name inside is that of another one where the file is a copy
     return tuple(found)
 
 
@@ -130,7 +130,8 @@ def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
     for rank in range(4):
         for rig in listed:
             stem = rig.path.stem
-            if (stem == wanted, rig.name == wanted, stem.casefold() == folded, rig.name.casefold() == folded)[rank]:
+            inside = rig.rig.name if rig.rig is not None else stem
+            if (stem == wanted, inside == wanted, stem.casefold() == folded, inside.casefold() == folded)[rank]:
                 if rig.rig is None:
                     raise RigFileError(rig.problem)
                 return rig.path, rig.rig
@@ -143,7 +144,7 @@ def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
 def has_rig(name: str, folder: Path | None = None) -> bool:
     """Whether there is a file of this name, in order or not, whatever its case."""
     wanted = name.strip().casefold()
-    return any(wanted in {rig.name.casefold(), rig.path.stem.casefold()} for rig in list_rigs(folder))
+    return any(wanted in {rig.name.casefold(), (rig.rig.name if rig.rig else "").casefold()} for rig in list_rigs(folder))
 
 
 def read_rig(path: Path) -> RigFile:
@@ -237,8 +238,8 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
 
 
 def with_rig(base: Config, rig: RigFile, path: Path) -> Config:
-    """The configuration with the rig's camera, servos and twin in the place of its own."""
-    chosen = RigConfig(name=rig.name, camera=rig.kind, robot=rig.robot, file=str(path))
+    """The configuration with the rig's camera, servos and twin in the place of its own. Its name is the file's."""
+    chosen = RigConfig(name=path.stem, camera=rig.kind, robot=rig.robot, file=str(path))
     update: dict[str, Any] = {"rig": chosen, "camera": rig.camera, "servos": rig.servos}
     if rig.twin is not None:
         update["twin"] = rig.twin

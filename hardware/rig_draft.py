@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -11,6 +12,7 @@ import numpy as np
 from core.calibration.board import BoardSpec, find_board
 from core.calibration.identify import Assignment, Finding, NotIdentified, assign
 from core.calibration.lens import BoardView, LensError, distort, fit_lens, straighten
+from core.calibration.look import HeadNotSeen
 from core.calibration.scale import scale_of_board, scale_of_clicks
 from core.calibration_config import CalibrationConfig, LensConfig, ScaleConfig, SteeringConfig, ZeroConfig
 from core.config import Config
@@ -20,6 +22,7 @@ from core.servo_config import JOINT_NAMES, JointName, ServosConfig
 from core.types import Image, Point
 from hardware import servo_wizard
 from hardware.calibration_bench import CalibrationBench
+from hardware.servos.errors import ServoError
 from hardware.servos.search import BAUDS, FoundServos, find_servos
 
 _NOTICEABLE_PX = 1.0
@@ -59,6 +62,8 @@ class RigDraft:
         self._assumed_earlier = known.assumed if known is not None else None
         self.zeros: servo_wizard.Zeros | None = None
         self.notes: list[str] = []
+        self._is_displaced = False
+        self._is_nudged = False
         self._head_px: Point | None = None
         self._begun_with = self._findings()
         bench.set_lens(self.lens)
@@ -154,11 +159,13 @@ class RigDraft:
 
     def wiggle(self, servo_id: int) -> None:
         """Turn one servo both ways, for somebody who watches."""
-        servo_wizard.wiggle(self.bench.bench, self.servos, self._ids(), servo_id)
+        with self._moving():
+            servo_wizard.wiggle(self.bench.bench, self.servos, self._ids(), servo_id)
 
     def identify_one(self, servo_id: int) -> Finding | None:
         """What one servo does, as the camera sees it; None when nothing is clear."""
-        finding = servo_wizard.identify_servo(self.bench.bench, self.servos, self._ids(), servo_id, self.say)
+        with self._moving():
+            finding = servo_wizard.identify_servo(self.bench.bench, self.servos, self._ids(), servo_id, self.say)
         self.findings.pop(servo_id, None)
         if finding is not None:
             self.findings[servo_id] = finding
@@ -215,14 +222,36 @@ class RigDraft:
 
     def find_zeros(self) -> servo_wizard.Zeros:
         """Leave every tendon where it just becomes taut."""
-        self.zeros = servo_wizard.find_zeros(self.bench.bench, self.servos, self.say)
-        self.zero = None
-        self.notes += self.zeros.problems
-        return self.zeros
+        with self._moving():
+            zeros = servo_wizard.find_zeros(self.bench.bench, self.servos, self.say)
+        self.zeros, self.zero = zeros, None
+        self._is_displaced = self._is_nudged = False
+        self.notes += zeros.problems
+        return zeros
+
+    @property
+    def are_zeros_known(self) -> bool:
+        """Whether all tendons are where they become taut: found so, or put there by hand."""
+        return self.zeros is not None and (not self.zeros.problems or self._is_nudged)
+
+    @contextmanager
+    def _moving(self) -> Iterator[None]:
+        """A step that turns servos, and turns them back. After one that was stopped half way nobody knows where the wires are."""
+        try:
+            yield
+        except BaseException as error:
+            if isinstance(error, (HeadNotSeen, DeviceError)) and not isinstance(error, ServoError):
+                raise  # the wires went back
+            self.zero = self.zeros = None
+            self._is_displaced = True
+            raise
 
     def learn_steering(self) -> SteeringConfig:
         """Zero the joints where they stand, and learn in which direction each tendon moves the head."""
-        learnt = servo_wizard.learn_steering(self.bench.bench, self.servos, self.say)
+        if self._is_displaced:
+            raise DeviceError("a step was stopped half way and the wires are where it left them: find the zeros anew")
+        with self._moving():
+            learnt = servo_wizard.learn_steering(self.bench.bench, self.servos, self.say)
         steering, ticks = learnt.steering, learnt.zero_ticks
         self.steering, self._head_px = steering, learnt.head_px
         slack = self.zeros.slack_mm if self.zeros is not None else (0.0, 0.0, 0.0, 0.0)
@@ -234,6 +263,7 @@ class RigDraft:
         """Tighten one tendon by so much, or let it go (negative), for somebody who watches."""
         servo_wizard.nudge(self.bench.bench, self.servos, name, way_mm)
         self.zero = None
+        self._is_nudged = True
 
     @property
     def head_px(self) -> Point | None:

@@ -250,10 +250,11 @@ class AnnotationCanvas(PictureCanvas):
         """The first of its clicks has set the last point."""
         if not self.levels:
             return
-        if event.button() == Qt.MouseButton.LeftButton and not self.brush_on and not self.is_pannable:
-            self.end_line()
-        else:
+        ends = event.button() == Qt.MouseButton.LeftButton and not self.brush_on and not self.is_pannable
+        # Where nothing is being drawn it is a second quick grab; Enter alone takes a state, or goes on.
+        if not (ends and self._tell_ending(self._hand.end())):
             self.mousePressEvent(event)
+        self.update()
 
     def leaveEvent(self, event: QEvent) -> None:
         if not self._cross_by_key:

@@ -66,7 +66,7 @@ class ZeroPage(WizardPage):
 
     @property
     def is_done(self) -> bool:
-        return self.desk.draft is not None and self.desk.draft.zeros is not None
+        return self.desk.draft is not None and self.desk.draft.are_zeros_known
 
     def refresh(self) -> None:
         draft = self.desk.draft

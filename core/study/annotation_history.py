@@ -69,6 +69,12 @@ class History:
             return None
         return self._taken(JournalEntry(self._last + 1, "edit", self._now, action, content))
 
+    def renewed(self, action: str) -> JournalEntry | None:
+        """What is in force once more, because its record was lost; None where nothing was ever said."""
+        if self.current == Annotation():
+            return None
+        return self._taken(JournalEntry(self._last + 1, "edit", self._now, action, self.current))
+
     def undo(self) -> JournalEntry | None:
         """Back to before the last edit; None when there is none."""
         if not self.can_undo:

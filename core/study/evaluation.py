@@ -46,17 +46,19 @@ class Measurement:
 
     @property
     def manual_angle_deg(self) -> float | None:
-        """The mean of the manual measures there are."""
-        measured = [angle for angle in (self.angle_1, self.angle_2) if angle is not None]
-        return sum(measured) / len(measured) if measured else None
+        """The mean of all single measures that there are."""
+        measured = [(a, n) for a, n in zip((self.angle_1, self.angle_2), self.counts, strict=True) if a is not None]
+        return sum(a * n for a, n in measured) / sum(n for _, n in measured) if measured else None
 
 
 GROUP = "group"
+COUNTS = ("count_1", "count_2")
 COLUMNS = tuple(column.name for column in fields(Measurement) if column.name not in (GROUP, "counts"))
+_MAY_BE = (GROUP, *COUNTS)
 
 
 def read_measurements(path: Path) -> list[Measurement]:
-    """Rows of a CSV file with the columns ``COLUMNS`` in any order, and ``group`` if there is one.
+    """Rows of a CSV file with the columns ``COLUMNS`` in any order, and ``group``, ``count_1`` and ``count_2`` if there are such.
 
     Others are ignored, blank cells mean "not measured".
 
@@ -92,14 +94,14 @@ def read_measurements(path: Path) -> list[Measurement]:
 
 def _places(path: Path, header: list[str]) -> dict[str, int]:
     """Where each column stands."""
-    for name in (*COLUMNS, GROUP):
+    for name in (*COLUMNS, *_MAY_BE):
         if header.count(name) > 1:
             raise EvaluationError(f"{path}: column {name!r} occurs {header.count(name)} times")
-        if name not in header and name != GROUP:
+        if name not in header and name not in _MAY_BE:
             alike = difflib.get_close_matches(name, [h for h in header if h not in COLUMNS], 1, cutoff=0.75)
             found = f"; is {alike[0]!r} meant?" if alike else f"; needs {', '.join(COLUMNS)} (blank where not measured)"
             raise EvaluationError(f"{path}: column {name!r} is missing{found}")
-    return {name: header.index(name) for name in (*COLUMNS, GROUP) if name in header} | {"": len(header)}
+    return {name: header.index(name) for name in (*COLUMNS, *_MAY_BE) if name in header} | {"": len(header)}
 
 
 def _measurement(where: str, cells: list[str], place: dict[str, int], separator: str) -> Measurement:
@@ -125,6 +127,12 @@ def _measurement(where: str, cells: list[str], place: dict[str, int], separator:
             raise EvaluationError(f"{where}: {name} is {text[name]!r}; must be one of {known}, or blank where not measured")
         return label or None
 
+    def count(name: str) -> int:
+        said = text.get(name) or "1"
+        if not said.isdecimal() or int(said) < 1:
+            raise EvaluationError(f"{where}: {name} is {said!r}; must be of how many measures the angle is the mean, 1 or more")
+        return int(said)
+
     return Measurement(
         text["image"],
         angle("angle_1"),
@@ -133,17 +141,21 @@ def _measurement(where: str, cells: list[str], place: dict[str, int], separator:
         angle("algorithm_angle"),
         state("algorithm_state"),
         text.get(GROUP) or None,
+        (count("count_1"), count("count_2")),
     )
 
 
 def write_measurements(path: Path, rows: Iterable[Measurement]) -> None:
-    """The rows as a CSV file that ``read_measurements`` reads, with their groups where there are such; raises OSError."""
+    """The rows as a CSV file that ``read_measurements`` reads, with groups and counts where they say something; raises OSError."""
     rows = list(rows)
     columns = (*COLUMNS, GROUP) if any(row.group is not None for row in rows) else COLUMNS
+    counts = COUNTS if any(row.counts != (1, 1) for row in rows) else ()
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(columns)
-        table.writerows([["" if value is None else value for value in (getattr(row, name) for name in columns)] for row in rows])
+        table.writerow((*columns, *counts))
+        for row in rows:
+            values = (*(getattr(row, name) for name in columns), *(row.counts if counts else ()))
+            table.writerow(["" if value is None else value for value in values])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +167,7 @@ class AnglePairs:
 
 
 def angle_pairs(rows: Sequence[Measurement]) -> AnglePairs:
-    """The rows that have both; the two manual measures are averaged."""
+    """The rows that have both; of the manual measures the mean."""
     pairs = [(row.manual_angle_deg, row.algorithm_angle) for row in rows]
     both = np.array([(m, a) for m, a in pairs if m is not None and a is not None], np.float64).reshape(-1, 2)
     return AnglePairs(both[:, 0], both[:, 1])

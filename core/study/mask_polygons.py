@@ -16,6 +16,7 @@ from core.types import Mask, Points
 TOLERANCE_PX = 0.7
 """Outlines may miss the border pixels' centres by this much; it saves most of their points."""
 _MIN_AREA_PX = 12.0
+_CRUMB_PX = 5.0
 _SHIFT = 6
 _BRUSH_SIDE_PX = 2048
 """The brush paints in no finer raster than this on the longer side: at 8k a stroke would take half a second."""
@@ -76,7 +77,10 @@ def paint(
     polygons: tuple[MaskPolygon, ...], target: MaskTarget, stroke: Points, radius_px: float, size: tuple[int, int], *, erase: bool
 ) -> tuple[MaskPolygon, ...]:
     """The polygons after a stroke of the brush: `stroke` (N, 2) is where its middle went, in image pixels of `size`."""
-    others = tuple(polygon for polygon in polygons if polygon.target is not target)
+    touched = _touching([polygon for polygon in polygons if polygon.target is target], _reach(stroke, radius_px + 2.0))
+    # What the brush did not come near stays as it was drawn; the rest keeps every pixel, however often it is painted on.
+    others = tuple(polygon for polygon in polygons if polygon not in touched)
+    polygons = tuple(touched)
     scale = min(1.0, _BRUSH_SIDE_PX / max(size))
     if scale < 1.0:
         polygons, stroke, radius_px = _scaled(polygons, scale), (stroke + 0.5) * scale - 0.5, radius_px * scale
@@ -88,8 +92,44 @@ def paint(
         cv2.circle(mask, point.tolist(), round(radius_px * (1 << _SHIFT)), ink, -1, cv2.LINE_8, _SHIFT)
     if len(points) > 1:
         cv2.polylines(mask, [points.reshape(-1, 1, 2)], False, ink, max(1, round(2 * radius_px)), cv2.LINE_8, _SHIFT)
-    painted = polygons_of(mask > 0, target)
+    painted = polygons_of(mask > 0, target, 0.0)
+    if erase:
+        painted = tuple(polygon for polygon in painted if not _is_crumb(polygon, _reach(stroke, radius_px + _CRUMB_PX)))
     return others + (_scaled(painted, 1.0 / scale) if scale < 1.0 else painted)
+
+
+_Box = tuple[float, float, float, float]
+
+
+def _touching(polygons: list[MaskPolygon], box: _Box) -> list[MaskPolygon]:
+    """Those polygons whose boxes overlap `box` (left, top, right, bottom), or that of another of these: holes go with their
+    outlines."""
+    boxes = [_box(polygon) for polygon in polygons]
+    reached, found = [box], set[int]()
+    while reached:
+        left, top, right, bottom = reached.pop()
+        for place, other in enumerate(boxes):
+            if place not in found and other[0] <= right and other[2] >= left and other[1] <= bottom and other[3] >= top:
+                found.add(place)
+                reached.append(other)
+    return [polygons[place] for place in sorted(found)]
+
+
+def _box(polygon: MaskPolygon) -> _Box:
+    across, down = zip(*polygon.points, strict=True)
+    return min(across) - 1.0, min(down) - 1.0, max(across) + 1.0, max(down) + 1.0
+
+
+def _reach(stroke: Points, around_px: float) -> _Box:
+    (left, top), (right, bottom) = stroke.min(axis=0).tolist(), stroke.max(axis=0).tolist()
+    return left - around_px, top - around_px, right + around_px, bottom + around_px
+
+
+def _is_crumb(polygon: MaskPolygon, reach: _Box) -> bool:
+    """Whether it is a small piece that the eraser left beside its way."""
+    left, top, right, bottom = _box(polygon)
+    beside = left >= reach[0] and top >= reach[1] and right <= reach[2] and bottom <= reach[3]
+    return beside and not polygon.is_hole and cv2.contourArea(np.array(polygon.points, np.float32)) < _MIN_AREA_PX
 
 
 def _scaled(polygons: tuple[MaskPolygon, ...], scale: float) -> tuple[MaskPolygon, ...]:

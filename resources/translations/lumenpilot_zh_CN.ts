@@ -1307,6 +1307,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>a step was stopped half way and the wires are where it left them: find the zeros anew</source>
+        <translation>有一步中途停止，驱动丝停在当时的位置：请重新寻找零位</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>the head does not follow the wire's pull: pull it by hand, or zero it by eye</source>
         <translation>头端不跟随驱动丝的牵拉：用手拉，或者目测归零</translation>
     </message>

@@ -303,6 +303,21 @@ def test_a_double_click_ends_the_line(rater: Rater) -> None:
     assert len(drawn(rater).robot) == 2
 
 
+def test_a_second_quick_grab_of_a_point_takes_no_state_and_leaves_no_image(rater: Rater) -> None:
+    rater.click((200.0, 180.0), (320.0, 180.0))
+    rater.press(Qt.Key.Key_Return)
+    rater.click((200.0, 200.0), (320.0, 200.0))
+    rater.press(Qt.Key.Key_Return)
+    assert drawn(rater).state is None
+    for _ in range(2):
+        QTest.mouseDClick(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((320.0, 180.0)))
+        QTest.mouseRelease(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((320.0, 180.0)))
+    assert drawn(rater).state is None
+    assert rater.desk.index == 0
+    rater.press(Qt.Key.Key_Return)
+    assert drawn(rater).state is not None, "Enter does"
+
+
 def test_progress_and_status(rater: Rater) -> None:
     queue = rater.window.panels.queue
     assert queue.progress_text == "0 of 3 done, 3 left"

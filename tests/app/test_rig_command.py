@@ -22,6 +22,7 @@ from core.devices import DeviceError
 from core.errors import UserError
 from core.rig_file import find_rig, make_rig, rig_path, write_rig
 from hardware.rig_draft import RigDraft
+from hardware.servo_wizard import Zeros
 
 runner = CliRunner()
 
@@ -184,13 +185,24 @@ def test_an_interruption_keeps_what_was_done_and_tendons_are_kept_with_the_steer
         raise KeyboardInterrupt
 
     monkeypatch.setattr(RigDraft, "search_servos", lambda _: None)
-    monkeypatch.setattr(RigDraft, "find_zeros", lambda _: None)
+    monkeypatch.setattr(RigDraft, "find_zeros", lambda _: Zeros((0.0,) * 4))
     monkeypatch.setattr(RigDraft, "learn_steering", learn_steering)
     with pytest.raises(KeyboardInterrupt):
         run_calibrate(CalibrateOptions("bench 1", None, None, ("board", "zero", "steering")))
     assert "board saved in " in (told := capsys.readouterr().err)
     assert told.endswith("--steps zero,steering\n")
     assert find_rig("bench 1")[1].calibration is not None
+
+
+@pytest.mark.usefixtures("board_alone", "bench")
+def test_a_tendon_without_a_zero_ends_it_before_the_steering(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RigDraft, "search_servos", lambda _: None)
+    monkeypatch.setattr(RigDraft, "find_zeros", lambda _: Zeros((0.0,) * 4, ("up: the head does not follow the wire",)))
+    monkeypatch.setattr(RigDraft, "learn_steering", lambda _: pytest.fail("measured from nowhere"))
+    with pytest.raises(
+        UserError, match=r"no zero for all tendons: up: the head does not follow the wire; board saved in .*zero,steering"
+    ):
+        run_calibrate(CalibrateOptions("bench 1", None, None, ("board", "zero", "steering")))
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 from pytestqt.qtbot import QtBot
 
 from app.work_thread import WorkThread
 from core.errors import UserError
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_in_order_urgent_first_once_per_key(qtbot: QtBot) -> None:
@@ -75,3 +79,32 @@ def test_one_that_computes_for_long_waits_behind_the_window(qtbot: QtBot) -> Non
         assert thread.wait(2000)
     qtbot.waitUntil(lambda: len(found) == 2)
     assert found == {"behind": min(19, niceness() + 4), "beside": niceness()}
+
+
+DESTROYED = """
+import os, random, time
+from PySide6.QtCore import QCoreApplication, QEvent, QObject
+from app.work_thread import WorkThread
+
+app = QCoreApplication([])
+for _ in range(400):
+    window = QObject()
+    threads = [WorkThread("test", window) for _ in range(4)]
+    for thread in threads:
+        thread.done.connect(lambda *_: None)
+        for k in range(30):
+            thread.submit(k, lambda: bytes(100))
+    time.sleep(random.uniform(0, 0.004))
+    window.deleteLater()
+    del window
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    app.processEvents()
+print("fine", flush=True)
+os._exit(0)
+"""
+
+
+def test_one_that_is_destroyed_with_its_window_while_it_reports_ends_nothing() -> None:
+    """Its signal would be that of freed memory, which now and then ended the program when a window was closed."""
+    done = subprocess.run([sys.executable, "-c", DESTROYED], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "fine\n", "")

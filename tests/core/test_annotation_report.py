@@ -12,7 +12,7 @@ from core.config import PerceptionConfig
 from core.study.annotation_records import ItemKey, StoredAnnotation
 from core.study.annotation_report import agreement_report, choose_study, manual_measurements, write_measures
 from core.study.annotations import Annotation, AnnotationError, View, measure_lines
-from core.study.evaluation import evaluate
+from core.study.evaluation import EvaluationError, evaluate, read_measurements, write_measurements
 from core.types import PoseState
 
 TRUE_DEG = np.linspace(0.0, 60.0, 200)
@@ -93,6 +93,22 @@ def test_the_common_answer() -> None:
     assert common(*twice) == (5.0, 9.0, "C")
     assert common(answer("i", "ann", 1, None, None), answer("i", "bob", 1, 3.0, c)) == (3.0, None, "C")
     assert common(answer("i", "ann", 1, None, None)) == (None, None, None)
+
+
+def test_the_common_angle_is_the_mean_of_all_measures_whatever_the_raters_are_called(tmp_path) -> None:
+    for names in (("anna", "ben", "cleo"), ("zoe", "ben", "cleo")):
+        answers = [answer("i", who, 1, theta, PoseState.B) for who, theta in zip(names, (10.0, 20.0, 30.0), strict=True)]
+        (row,) = manual_measurements(answers, {})
+        assert row.manual_angle_deg == pytest.approx(20.0)
+    answers = [answer("i", who, 1, 10.0, PoseState.B) for who in names] + [answer("i", names[0], 2, 40.0, PoseState.B)]
+    (row,) = manual_measurements(answers, {})
+    assert row.manual_angle_deg == pytest.approx(17.5)
+    write_measurements(tmp_path / "m.csv", [row])
+    assert read_measurements(tmp_path / "m.csv") == [row], "also when it is read again"
+    text = (tmp_path / "m.csv").read_text().replace(",3,1", ",0,1")
+    (tmp_path / "m.csv").write_text(text)
+    with pytest.raises(EvaluationError, match=r"line 2: count_1 is '0'; must be of how many measures"):
+        read_measurements(tmp_path / "m.csv")
 
 
 def test_a_row_tells_of_how_many_measures_its_angles_are_the_means() -> None:

@@ -70,6 +70,27 @@ def test_the_brush_adds_and_takes_away_a_disc(place: tuple[float, float]) -> Non
         assert np.sum(found != (before & ~disc if erase else before | disc)) <= 16
 
 
+def test_the_brush_changes_nothing_that_it_does_not_come_near() -> None:
+    polygons = (*polygons_of(ring(), MaskTarget.VESSEL), MaskPolygon(MaskTarget.VESSEL, ((1.0, 44.0), (3.0, 46.0), (2.0, 45.0))))
+    bar = next(p for p in polygons if min(x for x, _ in p.points) > 40)
+    after = paint(polygons, MaskTarget.VESSEL, np.array([(52.0, 15.0)]), 2.0, SIZE, erase=True)
+    others = tuple(polygon for polygon in polygons if polygon is not bar)
+    assert after[: len(others)] == others
+    assert len(after) > len(others)
+
+
+def test_painting_again_and_again_wears_nothing_away() -> None:
+    """A tube of one pixel's width is training truth, too."""
+    line = np.zeros((48, 64), bool)
+    line[24, 4:60] = True
+    line[30:33, 4:60] = True
+    polygons = polygons_of(line, MaskTarget.VESSEL, 0.0)
+    for k in range(20):
+        polygons = paint(polygons, MaskTarget.VESSEL, np.array([(10.0 + 2 * k, 27.0)]), 1.0, SIZE, erase=k % 2 == 1)
+    found = fill(polygons, MaskTarget.VESSEL, SIZE)
+    assert (found & line).sum() == line.sum()
+
+
 def test_a_stroke_is_as_wide_as_the_brush() -> None:
     stroke = np.array([[10.0, 24.0], [50.0, 24.0]])
     found = fill(paint((), MaskTarget.VESSEL, stroke, 4.0, SIZE, erase=False), MaskTarget.VESSEL, SIZE)

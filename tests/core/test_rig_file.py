@@ -76,6 +76,16 @@ def test_a_copy_of_a_rig_file_does_not_take_its_place() -> None:
     assert not has_rig("bench 2")
 
 
+def test_a_copy_is_the_rig_that_its_file_says() -> None:
+    """The way to a second bench: copied, and another port put in."""
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    copied = path.with_name("bench 2.toml")
+    copied.write_text(path.read_text())
+    assert [(one.name, one.path) for one in list_rigs()] == [("bench 1", path), ("bench 2", copied)]
+    assert with_rig(load_config(), read_rig(copied), copied).rig.name == "bench 2"
+    assert find_rig("bench 2")[0] == copied
+
+
 def test_the_configuration_takes_the_rig_over() -> None:
     path = write_rig(make_rig(REAL, "bench 1", KNOWN))
     config = with_rig(load_config(overrides={"advice": {"slow_mm_s": 2.0}}), read_rig(path), path)
