@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import math
+import sqlite3
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -316,6 +318,20 @@ def test_a_second_quick_grab_of_a_point_takes_no_state_and_leaves_no_image(rater
     assert rater.desk.index == 0
     rater.press(Qt.Key.Key_Return)
     assert drawn(rater).state is not None, "Enter does"
+
+
+def test_a_record_that_is_damaged_comes_back_from_its_journal(make: MakeRater) -> None:
+    """Opening its image must not put an empty one in its place."""
+    rater = make()
+    rater.click((200.0, 180.0), (320.0, 180.0))
+    rater.press(Qt.Key.Key_Return)
+    (before,) = rater.kept()
+    with closing(sqlite3.connect(rater.store_path)) as database, database:
+        database.execute("UPDATE annotations SET check_sum = 'spoilt'")
+    again = make()
+    rater.qtbot.waitUntil(lambda: drawn(again).robot == before.content.robot)
+    (after,) = again.kept()
+    assert after.content == before.content
 
 
 def test_progress_and_status(rater: Rater) -> None:
