@@ -91,7 +91,8 @@ def _calibrated(
         scores = list(bar.track(found, total=len(samples), description=title))
         if not scores:
             break
-        pairs = [(score.evidence, is_right(score)) for score in scores if score.answered and score.evidence is not None]
+        answered = [score for score in scores if score.answered and score.is_measured]
+        pairs = [(score.evidence, is_right(score)) for score in answered if score.evidence is not None]
         calibration = fit([evidence for evidence, _ in pairs], [right for _, right in pairs], described)
         right, auroc = sum(right for _, right in pairs), describe_confidence(scores)["confidence_auroc"]
         told.append((f"mirrored {mirrored}: {len(pairs)} answers of {folder.name}", (calibration, right, auroc)))

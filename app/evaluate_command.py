@@ -227,7 +227,7 @@ class _Truth:
 
 def _read_set(folder: Path) -> list[_Truth]:
     """The images of a labelled set with their truth, by name; raises EvaluationError, DatasetError."""
-    from core.learning.dataset import find_labelled
+    from core.learning.dataset import UNMEASURED, find_labelled
 
     if not (folder / "truth.jsonl").is_file() or not (folder / "images").is_dir():
         what = (
@@ -240,10 +240,14 @@ def _read_set(folder: Path) -> list[_Truth]:
     found = []
     for sample in samples:
         row = truth[sample.stem]
+        if row.get("reason") == UNMEASURED:  # drawn to train on: nobody has said that it has no pose
+            continue
         theta, state = row.get("theta_deg"), row.get("state")
         angle, state = (float(theta), str(state)) if theta is not None and state is not None else (None, None)
         group = f"phantom {row['seed']}" if row.get("seed") is not None else None
         found.append(_Truth(sample.stem, sample.image, angle, state, group))
+    if not found:
+        raise EvaluationError(f"{folder}: no frame of it was measured, only drawn: draw both lines and set the state (annotate)")
     return found
 
 

@@ -258,6 +258,10 @@ class IdentifyPage(WizardPage):
         if draft is None:
             return
         before = {one.name: one for one in draft.assignments}
+        if not before:  # as the rig's file has it: what was assumed there nobody has confirmed by touching another row
+            earlier = draft.assumed
+            kept = (Assignment(one.name, one.id, one.sign, mark("set by hand"), one.name in earlier) for one in draft.servos.joints)
+            before = {one.name: one for one in kept}
         made = []
         for row, name in enumerate(JOINT_NAMES):
             servo_id, sign = int(self._ids[row].currentData()), self._signs[row].currentData()

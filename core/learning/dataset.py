@@ -23,6 +23,8 @@ from core.whole_file import write_whole
 
 WORKING_SIZE_PX = 640
 """Longer side at which networks are trained: the default of ``perception.working_size_px``."""
+UNMEASURED = "not measured by hand"
+"""The `reason` of a frame with masks whose pose nobody has told: it may well have one."""
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 

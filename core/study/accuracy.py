@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.learning.dataset import DatasetError, Sample
+from core.learning.dataset import UNMEASURED, DatasetError, Sample
 from core.perception.pipeline import Pipeline
 from core.study.classification import kappa
 from core.types import Frame, Image, Mask, Point, Reason, Scene
@@ -34,6 +34,8 @@ class FrameScore:
     true_state: str | None
     confidence: float
     evidence: tuple[float, ...] | None = None
+    is_measured: bool = True
+    """False: nobody has told whether there is a pose, or which, so that no answer is right or wrong."""
 
 
 class TrueMasks:
@@ -93,6 +95,7 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
         true_state=state,
         confidence=pose.confidence if pose is not None else 0.0,
         evidence=scene.evidence,
+        is_measured=truth.get("reason") != UNMEASURED,
     )
 
 
@@ -139,13 +142,16 @@ def _statistics(values: Sequence[float]) -> dict[str, float] | None:
 
 
 def summarise(scores: Sequence[FrameScore]) -> dict[str, Any]:
-    """Sums over frames: "expected" are those whose truth has a pose, "empty" those without any robot, "poseless" the rest."""
+    """Sums over frames: "expected" are those whose truth has a pose, "empty" those without any robot, "poseless" the rest.
+
+    Of frames that nobody has measured only the masks count.
+    """
     expected = [s for s in scores if s.expected]
     pairs = [(s.true_state, s.state) for s in expected if s.true_state is not None and s.state is not None]
     thetas = [(s.true_theta_deg, s.theta_deg) for s in expected if s.theta_deg is not None and s.true_theta_deg is not None]
     robots = [s.robot_dice for s in scores if s.robot_dice is not None]
-    empty = [s for s in scores if s.robot_dice is None]
-    poseless = [s for s in scores if s.robot_dice is not None and not s.expected]
+    empty = [s for s in scores if s.robot_dice is None and s.is_measured]
+    poseless = [s for s in scores if s.robot_dice is not None and not s.expected and s.is_measured]
     refused: dict[str, int] = {}
     for s in expected:
         if s.reason is not None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from core.config import PerceptionConfig
 from core.images import ImageError, read_image
-from core.learning.dataset import IMAGE_ENDINGS, write_mask, write_png
+from core.learning.dataset import IMAGE_ENDINGS, UNMEASURED, write_mask, write_png
 from core.study.annotation_images import FoundImage
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotation_report import manual_measurements
@@ -127,7 +127,7 @@ def _truth_rows(
         row: dict[str, Any] = {"stem": stems[sha256], "source": "annotated by hand", "reason": None}
         if lines is None or theta is None or manual.state is None:
             nothing = ("head_xy", "theta_deg", "theta_signed_deg", "d_head_px", "d_tail_px", "crossed", "state")
-            rows.append(row | dict.fromkeys(nothing) | {"reason": "not measured by hand"})
+            rows.append(row | dict.fromkeys(nothing) | {"reason": UNMEASURED})
             continue
         readout = measure_lines(lines.content, here[sha256].record.size, PerceptionConfig())
         row |= {"head_xy": list(lines.content.robot[-1]), "robot_path_xy": [list(point) for point in lines.content.robot]}

@@ -98,7 +98,7 @@ _EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 1.0)
 
 def describe_confidence(scores: Sequence[FrameScore]) -> dict[str, Any]:
     """How far the confidence of the answered frames can be believed: AUROC, calibration error, reliability table."""
-    answered = [score for score in scores if score.answered]
+    answered = [score for score in scores if score.answered and score.is_measured]
     confidence = np.array([score.confidence for score in answered])
     right = np.array([is_right(score) for score in answered], np.bool_)
     bins = reliability(confidence, right, _EDGES)

@@ -269,6 +269,20 @@ def test_servos_are_told_apart_by_hand(opened: RigWizard, qtbot: QtBot) -> None:
     assert draft.assignments[0].id == 1
 
 
+def test_touching_one_servo_confirms_no_other_one(opened: RigWizard) -> None:
+    """A rig that is calibrated once more: nobody has looked which of two is up meanwhile."""
+    _to(opened, opened.identify_page)
+    _with_servos(opened)
+    page, draft = opened.identify_page, opened.desk.draft
+    assert draft is not None
+    draft._assumed_earlier = ("up", "down")
+    page._signs[4].activated.emit(page._signs[4].currentIndex())
+    assert draft.assumed == ("up", "down")
+    page._signs[2].setCurrentIndex(1 - page._signs[2].currentIndex())
+    page._signs[2].activated.emit(0)
+    assert draft.assumed == ("down",)
+
+
 @pytest.mark.parametrize("change", ["another servo", "the other way"])
 def test_zero_and_steering_are_of_the_servos_they_were_found_with(opened: RigWizard, qtbot: QtBot, change: str) -> None:
     _to(opened, opened.identify_page)

@@ -7,6 +7,7 @@ import pytest
 
 from core.learning.dataset import DatasetError
 from core.study.accuracy import FrameScore, dice, kappa, score_frame, summarise, summarise_looks
+from core.study.calibration import describe_confidence
 from core.types import Masks, Pose, PoseState, Reason, Refusal, RobotPath, Scene
 from tests.core.drawing import art
 
@@ -114,6 +115,14 @@ def score(**more: object) -> FrameScore:
 
 
 REFUSED: dict[str, object] = {"answered": False, "head_error_px": None, "theta_error_deg": None, "theta_deg": None, "state": None}
+
+
+def test_of_what_nobody_has_measured_only_the_masks_count() -> None:
+    drawn = score(expected=False, true_state=None, true_theta_deg=None, theta_error_deg=None, head_error_px=None, is_measured=False)
+    sums = summarise([score(), drawn, drawn])
+    assert (sums["frames"], sums["expected"], sums["poseless_frames"], sums["empty_frames"]) == (3, 1, 0, 0)
+    assert sums["robot_dice"] == pytest.approx(drawn.robot_dice)
+    assert describe_confidence([score(), drawn])["reliability"]["0.90-0.95"]["n"] == 1
 
 
 def test_sums_by_hand() -> None:
