@@ -56,6 +56,10 @@ class ScaleConfig(_Section):
         """Working pixels per millimetre in the middle of the picture, whose longer side is `working_size_px` then."""
         return working_size_px / (self.mm_per_px * max(self.size_px))
 
+    def fits(self, size_px: tuple[int, int]) -> bool:
+        """Whether it holds for pictures of this size: those of another aspect show another part of the bench, of unknown size."""
+        return abs(self.size_px[0] * size_px[1] / (self.size_px[1] * size_px[0]) - 1.0) <= 0.01
+
 
 class TendonConfig(_Section):
     """Where the head goes when a tendon is pulled. Angles in the image: 0 to the right, 90 down."""

@@ -269,8 +269,10 @@ def calibration_of(config: Config) -> CalibrationConfig | None:
 
 
 def scaled(config: Config, known: CalibrationConfig | None) -> Config:
-    """The configuration with the measured scale in the place of ``policy.pursuit.pixels_per_mm``; unchanged without one."""
-    if known is None or known.scale is None:
+    """The configuration with the measured scale in the place of ``policy.pursuit.pixels_per_mm``; unchanged without one for such
+    pictures."""
+    camera = config.camera
+    if known is None or known.scale is None or not known.scale.fits((camera.width_px, camera.height_px)):
         return config
     zoom = known.scale.working_px_per_mm(config.perception.working_size_px)
     pursuit = config.policy.pursuit.model_copy(update={"pixels_per_mm": zoom})

@@ -77,18 +77,11 @@ def mm_per_px_at(scale: ScaleConfig, point: Point | None, size: tuple[int, int])
 
 
 def mm_per_working_px(scale: ScaleConfig | None, scene: Scene) -> float | None:
-    """Millimetres per working pixel at the robot's head, where there is one; None without a scale for such pictures.
-
-    A camera shows another part of the bench in pictures of another aspect, and how large is not known.
-    """
-    if scale is None or not _same_aspect(scale.size_px, scene.source_size):
+    """Millimetres per working pixel at the robot's head, where there is one; None without a scale for such pictures."""
+    if scale is None or not scale.fits(scene.source_size):
         return None
     head = scene.to_source(scene.path.head) if scene.path is not None else None
     return mm_per_px_at(scale, head, scene.source_size) / scene.scale
-
-
-def _same_aspect(first: tuple[int, int], second: tuple[int, int]) -> bool:
-    return abs(first[0] * second[1] / (first[1] * second[0]) - 1.0) <= 0.01
 
 
 def _local(plane: np.ndarray, at: Point) -> float:

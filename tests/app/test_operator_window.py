@@ -119,7 +119,7 @@ def test_a_window_that_is_closed_before_its_rig_was_opened_opens_none(make_windo
 
 
 def test_millimetres_are_those_of_the_calibrated_rig(make_window: MakeWindow, bench: FakeBench, tmp_path: Path) -> None:
-    scale = ScaleConfig(mm_per_px=0.2, size_px=(1280, 720), method="board", uncertainty_share=0.001)
+    scale = ScaleConfig(mm_per_px=0.2, size_px=(1280, 960), method="board", uncertainty_share=0.001)
     known = CalibrationConfig(made_utc=datetime(2025, 3, 4, tzinfo=UTC), scale=scale)
     config = Config.model_validate({"record": {"ring_s": 0}})
     path = write_rig(make_rig(config, "bench 1", known), tmp_path / "bench 1.toml")

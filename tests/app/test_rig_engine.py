@@ -90,7 +90,7 @@ def test_starting_again_clears_no_stop(open_engine: Open, robots: list[Robot]) -
 
 def test_the_policy_and_the_watch_over_stalls_use_the_rigs_own_scale(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """0.2 mm a pixel at 1280 px are 2.5 working pixels a millimetre."""
-    scale = ScaleConfig(mm_per_px=0.2, size_px=(1280, 720), method="board", uncertainty_share=0.001)
+    scale = ScaleConfig(mm_per_px=0.2, size_px=(1280, 960), method="board", uncertainty_share=0.001)
     known = CalibrationConfig(made_utc=datetime(2025, 3, 4, tzinfo=UTC), scale=scale)
     path = write_rig(make_rig(Config(), "bench 1", known), tmp_path / "bench 1.toml")
     told: list[float] = []

@@ -111,11 +111,15 @@ def test_the_configuration_takes_the_rig_over() -> None:
 def test_the_measured_scale_goes_before_the_configured_one(
     mm_per_px: float, size_px: tuple[int, int], working_px: int, px_per_mm: float
 ) -> None:
-    config = load_config(overrides={"perception": {"working_size_px": working_px}, "policy": {"pursuit": {"pixels_per_mm": 7.0}}})
+    camera = {"width_px": size_px[0], "height_px": size_px[1]}
+    said = {"perception": {"working_size_px": working_px}, "policy": {"pursuit": {"pixels_per_mm": 7.0}}, "camera": camera}
+    config = load_config(overrides=said)
     scale = SCALE.model_copy(update={"mm_per_px": mm_per_px, "size_px": size_px})
     found = scaled(config, KNOWN.model_copy(update={"scale": scale}))
     assert found.policy.pursuit.pixels_per_mm == pytest.approx(px_per_mm)
     assert found.policy.pursuit.look_ahead_px == config.policy.pursuit.look_ahead_px
+    cropped = load_config(overrides=said | {"camera": {"width_px": 960, "height_px": 960}})
+    assert scaled(cropped, KNOWN.model_copy(update={"scale": scale})) == cropped, "another part of the bench"
     assert scaled(config, None) is config
     assert scaled(config, CalibrationConfig(made_utc=MADE, lens=LENS)).policy.pursuit.pixels_per_mm == 7.0
 
