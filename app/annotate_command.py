@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from app.annotate_sources import default_store, image_files, tell_problems
+from app.annotate_sources import FRAMES, asked_files, default_store, image_files, tell_problems
 from app.language import tr
 from app.learning_commands import progress_bar
 from core.config import Config, choose_model, load_config
@@ -39,10 +39,6 @@ class StudyOptions:
     turn: bool = False
     seed: int | None = None
     order: str | None = None
-
-
-FRAMES = 48
-"""Pictures taken of a video, unless told otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +103,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     from app.application import check_display, make_application, run_until_closed
 
     check_display()
-    files = _files(paths, options.frames)
+    files = asked_files(paths, options.frames)
     with AnnotationStore(store_path) as store:
         images = _listed(files, store)
         rater = options.study.rater or _user()
@@ -130,10 +126,6 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         switches = {name: Switch(partial(bar.is_on, key), toggling(partial(bar.toggle, key))) for name, key in _KEPT}
         LayoutKeeper(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
         return run_until_closed(application, window, window.say)
-
-
-def _files(paths: Sequence[Path], frames: int | None) -> list[Path]:
-    return image_files(paths, frames or FRAMES, taken=frames is None)
 
 
 def _listed(files: Sequence[Path], store: AnnotationStore) -> list[FoundImage]:
@@ -367,7 +359,7 @@ def _import(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         raise AnnotationError(f"{options.imports[0]}: no .json file in it")
     if not any(source.is_file() for source in sources):  # before an annotation file is made for them
         raise AnnotationError(f"{sources[0]}: no such file; nothing was imported")
-    files = _files(paths, options.frames)
+    files = asked_files(paths, options.frames)
     rater = options.study.rater or _user()
     counts: Counter[str] = Counter()
     with AnnotationStore(store_path) as store:

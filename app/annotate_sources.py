@@ -20,6 +20,10 @@ def default_store(paths: Sequence[Path]) -> Path:
     return (first if first.is_dir() else first.parent) / DEFAULT_NAME
 
 
+FRAMES = 48
+"""Pictures taken of a video, unless told otherwise."""
+
+
 def image_files(paths: Sequence[Path], frames: int, *, taken: bool = False) -> list[Path]:
     """All pictures among `paths`, in name order; of each video `frames` pictures, which lie in a folder beside it afterwards.
 
@@ -42,6 +46,11 @@ def image_files(paths: Sequence[Path], frames: int, *, taken: bool = False) -> l
     if not files:
         raise AnnotationError(f"{paths[0]}: no picture or video in it")
     return files
+
+
+def asked_files(paths: Sequence[Path], frames: int | None) -> list[Path]:
+    """``image_files`` as a person asks for them: without a number, the pictures that were taken before, or ``FRAMES`` new ones."""
+    return image_files(paths, frames or FRAMES, taken=frames is None)
 
 
 def _whole(path: Path) -> list[Path]:

@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 import pytest
 
-from app.annotate_command import AnnotateOptions, StudyOptions, _config, _files, _queue, run_annotate
+from app.annotate_command import AnnotateOptions, StudyOptions, _config, _queue, run_annotate
 from app.annotate_evaluation import _names_of
-from app.annotate_sources import default_store, image_files
+from app.annotate_sources import asked_files, default_store, image_files
 from app.evaluate_command import run_evaluate
 from core.config import Config, TwinConfig
 from core.errors import UserError
@@ -241,10 +241,10 @@ def test_videos_whose_names_differ_in_their_endings_have_pictures_of_their_own(t
 def test_a_video_that_pictures_were_taken_of_is_gone_on_with_those(tmp_path: Path) -> None:
     """The second rater's call does not say how many: a study of 500 must not become one of 48."""
     video = film(tmp_path / "run.mp4", [4 * k for k in range(60)])
-    assert len(_files([video], 55)) == 55
-    assert len(_files([video], None)) == 55
+    assert len(asked_files([video], 55)) == 55
+    assert len(asked_files([video], None)) == 55
     other = film(tmp_path / "other.mp4", [4 * k for k in range(60)])
-    assert len(_files([other], None)) == 48
+    assert len(asked_files([other], None)) == 48
 
 
 def test_pictures_of_an_older_video_of_its_name_are_not_taken_for_its_own(tmp_path: Path) -> None:

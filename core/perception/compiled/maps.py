@@ -1,4 +1,4 @@
-"""What maps show at sub-pixel places: for ``polyline``, ``lumen``, ``vessel_graph`` and ``path_shape``."""
+"""What maps show at sub-pixel places: for ``polyline``, ``vessel_graph`` and ``path_shape``."""
 
 from __future__ import annotations
 
