@@ -70,6 +70,8 @@ class OperatorWindow(WindowFrame):
         """Asked before a step of the operator goes to the pilot; whoever says no tells why."""
         self.amend_config: Callable[[Config], Config] = lambda config: config
         """Asked before a rig is opened: settings that waited for it."""
+        self.read_rig_again: Callable[[Config], Config] = lambda config: config
+        """Asked, too, and before it is calibrated: what somebody has edited in its file meanwhile."""
         self.stop_lent: Callable[[], bool] = lambda: False
         """STOP for whoever the rig is lent to; False: nothing of it moves. From any thread."""
         self._last_tick: Tick | None = None
@@ -278,7 +280,11 @@ class OperatorWindow(WindowFrame):
         self._open_rig()
 
     def _prepare_rig(self) -> None:
-        self._config = self.amend_config(self._config)
+        config, before = self.read_rig_again(self.amend_config(self._config)), self._config
+        self._config = config
+        if config.rig != before.rig:
+            self._kind = kind_of(config.rig)
+            self._show_kind()
         self._panels.set_config(self._config)
         self._desk.reset()
         self.clear_target()

@@ -27,6 +27,7 @@ from core.rig_file import (
     with_rig,
     write_rig,
 )
+from hardware.rig import RigKind
 
 if TYPE_CHECKING:
     from hardware.calibration_bench import See
@@ -137,6 +138,8 @@ def calibrate(draft: RigDraft, steps: tuple[str, ...], pictures: int) -> Iterato
         draft.solve_boards()
         yield "board"
     if set(steps) & {"servos", "zero", "steering"}:
+        if "board" in steps and draft.bench.kind is not RigKind.SIM:  # the twin's lies in its pictures of it only
+            draft.wait_for_no_board()
         draft.search_servos()
     if "servos" in steps:
         draft.identify()

@@ -234,7 +234,7 @@ class RigDesk(QObject):
     @Slot()
     def calibrate(self) -> None:
         """Calibrate the present rig once more, or make one of it."""
-        config = self._window.config
+        config = self._window.read_rig_again(self._window.config)  # or the wizard would save the file's old servos once more
         try:
             known = calibration_of(config)
         except RigFileError as error:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QPointF, QSize, Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QCloseEvent, QColor, QIcon, QKeyEvent, QPainter, QPen, QPixmap, QPolygonF
 from PySide6.QtWidgets import (
@@ -70,6 +72,7 @@ class RigWizard(QDialog):
         self.picture = WizardPicture()
         self.picture.show_text(tr("No camera yet"))
         self.camera_page = CameraPage(desk, self.picture, rig_name)
+        self.camera_page.ask = self._ask
         self.scale_page = ScalePage(desk, self.picture)
         self.port_page = PortPage(desk, self.picture)
         self.identify_page = IdentifyPage(desk, self.picture)
@@ -138,8 +141,7 @@ class RigWizard(QDialog):
         if not self._has_news():
             self.reject()
         elif not self.question.text:
-            self._show_question(True)
-            self.question.ask(tr("Leave without saving what was found?"), tr("Leave"), self.reject)
+            self._ask(tr("Leave without saving what was found?"), tr("Leave"), self.reject)
 
     def done(self, result: int) -> None:
         """The dialog closes, whichever way: nothing moves any more, camera and port are free."""
@@ -182,6 +184,10 @@ class RigWizard(QDialog):
     def _on_answered(self) -> None:
         self._show_question(False)
         self.setFocus()
+
+    def _ask(self, question: str, answer: str, action: Callable[[], None]) -> None:
+        self._show_question(True)
+        self.question.ask(question, answer, action)
 
     def _show_question(self, on: bool) -> None:
         """In place of the line and of Cancel: the question has one of its own, which goes on with the wizard."""

@@ -5,6 +5,7 @@ Nothing changes while the robot is armed or a session is being recorded, and the
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from functools import partial
 
@@ -26,6 +27,7 @@ from core.config_schema import Effect, with_value
 from core.config_write import write_settings
 from core.control.modes import ARMED_MODES
 from core.profiles import Profiles
+from core.rig_file import RigFileError, read_again
 from core.settings_file import SettingsFile
 from core.types import Frame, Point, Scene
 
@@ -68,6 +70,7 @@ class SettingsDesk(QObject):
         self._languages = LanguageMenu(window, file.config.window.language)
         self._languages.chosen.connect(self.choose_language)
         window.amend_config = self._amend
+        window.read_rig_again = self._read_rig_again
         window.may_take = partial(self._may_take, window.may_take)
         window.phase_changed.connect(self._on_phase)
 
@@ -222,6 +225,12 @@ class SettingsDesk(QObject):
         amended = with_changes(config, self._at_rig_start, self._saved, _AT_START)
         self._at_rig_start = self._saved
         return amended
+
+    def _read_rig_again(self, config: Config) -> Config:
+        """What stands in its rig file now; whoever opens the rig tells what is wrong with that file."""
+        with contextlib.suppress(RigFileError):
+            return read_again(config, self._saved)
+        return config
 
     @Slot(int)
     def _on_finished(self, _result: int) -> None:

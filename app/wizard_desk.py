@@ -104,7 +104,7 @@ class WizardDesk(QObject):
         Lens, scale and port are a camera's, with its size of picture; what was learnt of the servos is not another kind of bench's.
         """
         before = self._began_with
-        if self._known is None or _camera_of(config) == _camera_of(before):
+        if self._known is None or _is_same_camera(before, config):
             return self._known
         lost: dict[str, None] = dict.fromkeys(("lens", "scale", "port"))
         if config.rig.camera != before.rig.camera:
@@ -153,9 +153,16 @@ class WizardDesk(QObject):
         self.changed.emit()
 
 
-def _camera_of(config: Config) -> tuple[object, ...]:
-    """Which camera a configuration has, and the size of its pictures."""
-    rig, camera, twin = config.rig, config.camera, config.twin
-    if rig.camera == "twin":
-        return rig.camera, twin.image_width_px, twin.image_height_px
-    return rig.camera, rig.source, camera.serial, camera.device, camera.width_px, camera.height_px
+def _is_same_camera(before: Config, now: Config) -> bool:
+    """Whether both have the same camera, and pictures of the same size.
+
+    One that was not named is whichever was there: found by its own sign now, it is taken for the same.
+    """
+    if before.rig.camera != now.rig.camera or before.rig.source != now.rig.source:
+        return False
+    if now.rig.camera == "twin":
+        sizes = [(config.twin.image_width_px, config.twin.image_height_px) for config in (before, now)]
+        return sizes[0] == sizes[1]
+    was, is_now = before.camera, now.camera
+    signs = (was.serial, is_now.serial) if now.rig.camera == "realsense" else (was.device, is_now.device)
+    return signs[0] in {None, signs[1]} and (was.width_px, was.height_px) == (is_now.width_px, is_now.height_px)

@@ -256,6 +256,24 @@ def sections_of_rig(running: Config, settings: Config) -> frozenset[str]:
     return frozenset({"camera", "servos", "twin"} if running.rig.camera == "twin" else {"camera", "servos"})
 
 
+def read_again(running: Config, settings: Config) -> Config:
+    """The running configuration with camera, servos and twin as its rig file has them now: somebody may have edited it.
+
+    A phantom that was picked stays. Settings that name the file themselves keep their own sections.
+
+    Raises
+    ------
+    RigFileError
+    """
+    if running.rig.file is None or not sections_of_rig(running, settings):
+        return running
+    path = Path(running.rig.file)
+    rig = read_rig(path)
+    if rig.twin is not None and running.rig.camera == "twin":
+        rig = rig.model_copy(update={"twin": rig.twin.model_copy(update={"phantom": running.twin.phantom})})
+    return with_rig(running, rig, path)
+
+
 def calibration_of(config: Config) -> CalibrationConfig | None:
     """The calibration of the configured rig; None without a rig file, and for recordings, whose pictures are straight already.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -9,7 +10,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from core.calibration.board import BoardSpec, find_board
+from core.calibration.board import BoardError, BoardSpec, find_board
 from core.calibration.identify import Assignment, Finding, NotIdentified, assign
 from core.calibration.lens import BoardView, LensError, distort, fit_lens, straighten
 from core.calibration.look import HeadNotSeen
@@ -27,6 +28,10 @@ from hardware.servos.search import BAUDS, FoundServos, find_servos
 
 _NOTICEABLE_PX = 1.0
 """A lens that moves nothing farther than this in a picture 640 px wide is left alone: straightening costs a millisecond a frame."""
+
+_BOARD_MISSES = 2
+"""So many pictures in a row without the board: a hand over it is not enough."""
+_BOARD_LOOK_S, _BOARD_GONE_WITHIN_S = 0.5, 180.0
 
 Say = Callable[[str], object]
 
@@ -96,6 +101,22 @@ class RigDraft:
         """Begin anew."""
         self.views.clear()
 
+    def wait_for_no_board(self, within_s: float = _BOARD_GONE_WITHIN_S) -> None:
+        """Until the board is out of sight: no robot is seen under it. Raises BoardError when nobody takes it away."""
+        ends_s, misses, is_told = time.monotonic() + within_s, 0, False
+        while misses < _BOARD_MISSES:
+            try:
+                find_board(self.bench.board_picture(self.spec), self.spec)
+            except BoardError:
+                misses += 1
+                continue
+            if time.monotonic() > ends_s:
+                raise BoardError("the board is still in the picture: take it away, then go on")
+            if not is_told:
+                self.say("take the board away: the servos move when it is out of sight")
+            misses, is_told = 0, True
+            self.bench.stop.sleep(_BOARD_LOOK_S)
+
     def solve_boards(self) -> tuple[LensConfig | None, ScaleConfig]:
         """Lens and scale from the pictures taken; no lens where it hardly bends anything. Raises LensError, ScaleError."""
         if not self.views:
@@ -145,6 +166,11 @@ class RigDraft:
         chosen = bauds if bauds is not None else (servos.baud, *(baud for baud in BAUDS if baud != servos.baud))
         found = find_servos(servos.port, chosen, self.say, self.bench.stop.check)
         listed = ", ".join(f"{servo.id} (model {servo.model})" for servo in found.servos)
+        if found.elsewhere and len(found.servos) < len(JOINT_NAMES):
+            others = "; ".join(f"{', '.join(map(str, ids))} at {baud} baud" for baud, ids in found.elsewhere)
+            raise DeviceError(
+                f"servos at several speeds: {', '.join(map(str, found.ids))} at {found.baud} baud; {others}; set all seven to one"
+            )
         if len(found.servos) != len(JOINT_NAMES):
             raise DeviceError(
                 f"{len(found.servos)} servos answer, seven are needed: {listed}; check cables, and that no id is used twice"
@@ -154,6 +180,9 @@ class RigDraft:
             raise DeviceError(f"servos of several models: {listed}; all seven must be of one")
         self.say(f"seven servos at {found.baud} baud: {', '.join(map(str, found.ids))}")
         self.found = found
+        self.findings = {servo_id: finding for servo_id, finding in self.findings.items() if servo_id in found.ids}
+        if any(one.id not in found.ids for one in self.assignments):  # a servo was changed for another one
+            self.assignments = ()
         self._set_servos(servos.model_copy(update={"baud": found.baud, "model": models.pop()}))
         return found
 
@@ -226,8 +255,18 @@ class RigDraft:
             zeros = servo_wizard.find_zeros(self.bench.bench, self.servos, self.say)
         self.zeros, self.zero = zeros, None
         self._is_displaced = self._is_nudged = False
+        self._keep_zero()
         self.notes += zeros.problems
         return zeros
+
+    def _keep_zero(self) -> None:
+        """Remember where the servos stand, if all tendons are known to be at their zeros: the steering need not be learnt anew."""
+        if self.are_zeros_known:
+            self._set_zero(servo_wizard.standing_ticks(self.bench.bench, self.servos))
+
+    def _set_zero(self, ticks: tuple[int, ...]) -> None:
+        slack = self.zeros.slack_mm if self.zeros is not None else (0.0, 0.0, 0.0, 0.0)
+        self.zero = ZeroConfig(ticks=ticks, slack_mm=slack, pretension_mm=self.config.servos.pretension_mm)
 
     @property
     def are_zeros_known(self) -> bool:
@@ -252,10 +291,9 @@ class RigDraft:
             raise DeviceError("a step was stopped half way and the wires are where it left them: find the zeros anew")
         with self._moving():
             learnt = servo_wizard.learn_steering(self.bench.bench, self.servos, self.say)
-        steering, ticks = learnt.steering, learnt.zero_ticks
+        steering = learnt.steering
         self.steering, self._head_px = steering, learnt.head_px
-        slack = self.zeros.slack_mm if self.zeros is not None else (0.0, 0.0, 0.0, 0.0)
-        self.zero = ZeroConfig(ticks=ticks, slack_mm=slack, pretension_mm=self.config.servos.pretension_mm)
+        self._set_zero(learnt.zero_ticks)
         self.say(f"steering: roll {steering.roll_deg:+.0f}°, way and heading {steering.disagreement_deg:.1f}° from a right angle")
         return steering
 
@@ -264,6 +302,7 @@ class RigDraft:
         servo_wizard.nudge(self.bench.bench, self.servos, name, way_mm)
         self.zero = None
         self._is_nudged = True
+        self._keep_zero()
 
     @property
     def head_px(self) -> Point | None:
@@ -272,7 +311,9 @@ class RigDraft:
 
     def set_pretension(self, pretension_mm: float) -> None:
         """Pull of every tendon at zero bend."""
-        self._set_servos(ServosConfig.model_validate({**self.servos.model_dump(), "pretension_mm": pretension_mm}))
+        self._set_servos(ServosConfig.model_validate({**self.config.servos.model_dump(), "pretension_mm": pretension_mm}))
+        if self.zero is not None:
+            self.zero = self.zero.model_copy(update={"pretension_mm": pretension_mm})
 
     def _ids(self) -> tuple[int, ...]:
         if self.found is None:

@@ -244,6 +244,12 @@ def nudge(bench: Bench, servos: ServosConfig, name: str, way_mm: float) -> None:
     _move(bench, servos, name, way_mm)
 
 
+def standing_ticks(bench: Bench, servos: ServosConfig) -> tuple[int, ...]:
+    """Position registers of the seven joints, armed for a moment where they stand; nothing turns. Raises ServoError."""
+    with bench.hands.steered(servos.model_copy(update={"pretension_mm": 0.0})) as robot:
+        return robot.ticks()
+
+
 @dataclass(frozen=True, slots=True)
 class Learnt:
     """The steering, where the head was, and the position registers of the seven joints at zero."""

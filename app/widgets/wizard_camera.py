@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QLineEdit, QListWidget, QListWidgetItem, QSpinBox
 
@@ -65,6 +67,8 @@ class CameraPage(WizardPage):
         self.column.addWidget(self.problem)
         self.column.addStretch(1)
         self.found = Found((), ())
+        self.ask: Callable[[str, str, Callable[[], None]], None] = lambda _question, _answer, action: action()
+        """Asks before something is lost: a question, the answer that does it, and what is done then."""
 
     @property
     def rig_name(self) -> str:
@@ -122,6 +126,13 @@ class CameraPage(WizardPage):
     def _open(self) -> None:
         if self.cameras.currentRow() < 0:
             return
+        draft = self.desk.draft
+        if draft is not None and draft.has_news:
+            self.ask(tr("Open the camera anew and lose what was found?"), tr("Open"), self._open_now)
+        else:
+            self._open_now()
+
+    def _open_now(self) -> None:
         camera = self.cameras.currentItem().data(Qt.ItemDataRole.UserRole)
         config = self.desk.config
         if not _is_of(camera, config):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHBoxLayout, QLabel
 
 from app.cells import NONE
@@ -12,7 +13,7 @@ from app.language import mark, tr, tr_text
 from app.widgets.wizard_page import WizardPage, button, fit, note, put, table, tell
 from app.widgets.wizard_picture import Arrow, Shape, WizardPicture
 from app.wizard_desk import WizardDesk
-from core.servo_config import TENDONS
+from core.servo_config import TENDONS, ServosConfig
 
 _NUDGE_MM = 0.1
 _ARROW_PX = 70.0
@@ -40,9 +41,7 @@ class ZeroPage(WizardPage):
         self.tighten = button(tr("&Tighten {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(_NUDGE_MM))
         self.loosen = button(tr("&Loosen {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(-_NUDGE_MM))
         self.pretension = QDoubleSpinBox()
-        self.pretension.setRange(0.0, 2.0)
         self.pretension.setSingleStep(0.05)
-        self.pretension.setValue(desk.config.servos.pretension_mm)
         self.pretension.setSuffix(" mm")
         self.pretension.setAccessibleName(tr("Pretension"))
         self.pretension.setToolTip(tr("Pull of every wire while the robot is straight, so that none hangs"))
@@ -73,6 +72,8 @@ class ZeroPage(WizardPage):
         ready = draft is not None and draft.found is not None and not self.desk.is_busy
         for control in (self.find_button, self.tendon, self.tighten, self.loosen, self.pretension):
             control.setEnabled(ready)
+        if draft is not None:
+            self._show_pretension(draft.config.servos)
         zeros = draft.zeros if draft is not None else None
         for row in range(len(TENDONS)):
             put(self.rows, row, 1, NONE if zeros is None else f"{zeros.slack_mm[row]:+.2f} mm")
@@ -92,6 +93,13 @@ class ZeroPage(WizardPage):
         if draft is not None:
             name = TENDONS[self.tendon.currentIndex()]
             self.desk.run(tr("moving tendon {name}", name=tr_text(name)), lambda: draft.nudge(name, way_mm))
+
+    def _show_pretension(self, servos: ServosConfig) -> None:
+        """As it is, within what every wire's envelope allows."""
+        with QSignalBlocker(self.pretension):
+            tendons = servos.joints[: len(TENDONS)]
+            self.pretension.setRange(max(0.0, *(one.low_mm for one in tendons)), min(5.0, *(one.high_mm for one in tendons)))
+            self.pretension.setValue(servos.pretension_mm)
 
     def _set_pretension(self, pretension_mm: float) -> None:
         if self.desk.draft is not None and not self.desk.is_busy:

@@ -41,6 +41,8 @@ class FoundServos:
     port: str
     baud: int
     servos: tuple[FoundServo, ...]
+    elsewhere: tuple[tuple[int, tuple[int, ...]], ...] = ()
+    """Other speeds at which others answered, with their ids: one bus has one speed."""
 
     @property
     def ids(self) -> tuple[int, ...]:
@@ -65,7 +67,7 @@ def find_servos(
     said: Callable[[str], object] = lambda _: None,
     stopped: Callable[[], None] = _nothing,
 ) -> FoundServos:
-    """Ask everybody who he is, at one speed after the other, until somebody answers.
+    """Ask everybody who he is, at one speed after the other, until seven answer; where they never do, those of the fullest speed.
 
     Parameters
     ----------
@@ -79,6 +81,7 @@ def find_servos(
     NoAnswer
         Nobody answers at any speed.
     """
+    answered: dict[int, tuple[FoundServo, ...]] = {}
     for baud in bauds:
         stopped()
         said(f"asking at {baud} baud")
@@ -89,7 +92,13 @@ def find_servos(
         finally:
             line.close()
         if found:
-            return FoundServos(port, baud, tuple(found))
+            answered[baud] = tuple(found)
+        if len(found) >= len(JOINT_NAMES):
+            break
+    if answered:
+        fullest = max(answered, key=lambda baud: len(answered[baud]))
+        others = tuple((baud, tuple(one.id for one in found)) for baud, found in answered.items() if baud != fullest)
+        return FoundServos(port, fullest, answered[fullest], others)
     speeds = ", ".join(map(str, bauds))
     raise NoAnswer(f"no servo answers on {port} (asked at {speeds} baud): switch their 12 V on, check the cable to the adapter")
 

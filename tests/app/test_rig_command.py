@@ -21,6 +21,7 @@ from core.config import load_config
 from core.devices import DeviceError
 from core.errors import UserError
 from core.rig_file import find_rig, make_rig, rig_path, write_rig
+from hardware.rig import RigKind
 from hardware.rig_draft import RigDraft
 from hardware.servo_wizard import Zeros
 
@@ -117,7 +118,7 @@ class _Bench:
     """Opened where none must be, or moves nothing."""
 
     def __init__(self) -> None:
-        self.closed = False
+        self.closed, self.kind = False, RigKind.SIM
 
     def set_lens(self, lens: object) -> None: ...
     def warm_up(self) -> None: ...
@@ -203,6 +204,18 @@ def test_a_tendon_without_a_zero_ends_it_before_the_steering(monkeypatch: pytest
         UserError, match=r"no zero for all tendons: up: the head does not follow the wire; board saved in .*zero,steering"
     ):
         run_calibrate(CalibrateOptions("bench 1", None, None, ("board", "zero", "steering")))
+
+
+@pytest.mark.parametrize(("kind", "waits"), [(RigKind.LIVE, 1), (RigKind.SIM, 0)])
+@pytest.mark.usefixtures("board_alone")
+def test_nothing_moves_under_a_real_board(bench: _Bench, monkeypatch: pytest.MonkeyPatch, kind: RigKind, waits: int) -> None:
+    done: list[str] = []
+    bench.kind = kind
+    monkeypatch.setattr(RigDraft, "wait_for_no_board", lambda _: done.append("waited"))
+    monkeypatch.setattr(RigDraft, "search_servos", lambda _: done.append("searched"))
+    monkeypatch.setattr(RigDraft, "find_zeros", lambda _: Zeros((0.0,) * 4))
+    run_calibrate(CalibrateOptions("bench 1", None, None, ("board", "zero")))
+    assert done == ["waited"] * waits + ["searched"]
 
 
 @pytest.mark.parametrize(

@@ -421,6 +421,46 @@ def test_another_camera_does_not_inherit_the_calibration(make_wizard: MakeWizard
     assert wizard.scale_page.is_done
 
 
+@pytest.mark.parametrize(("kind", "sign"), [("realsense", "serial"), ("webcam", "device")])
+def test_a_camera_that_was_not_named_keeps_its_calibration_when_it_is_found(
+    make_wizard: MakeWizard, qtbot: QtBot, kind: str, sign: str
+) -> None:
+    known = CalibrationConfig.model_validate({"made_utc": "2025-01-01T00:00:00Z", "port": {"x_share": 0.1, "y_share": 0.5}})
+    before = load_config(overrides={"rig": {"camera": kind, "robot": "none"}})
+    wizard = make_wizard("bench 1", before, known)
+    wizard.desk.open_camera(before.model_copy(update={"camera": before.camera.model_copy(update={sign: "f0123456"})}))
+    _idle(wizard, qtbot)
+    assert wizard.desk.draft is not None
+    assert wizard.desk.draft.port == known.port
+
+
+def test_opening_the_camera_anew_asks_before_it_loses_what_was_found(opened: RigWizard, qtbot: QtBot) -> None:
+    draft, page = opened.desk.draft, opened.camera_page
+    assert draft is not None
+    draft.scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="board", uncertainty_share=0.01)
+    page.open_button.click()
+    assert opened.question.text == "Open the camera anew and lose what was found?"
+    opened.question.cancel()
+    assert opened.desk.draft is draft
+    page.open_button.click()
+    opened.question._yes.click()
+    _idle(opened, qtbot)
+    assert opened.desk.draft is not draft
+
+
+def test_the_pretension_is_what_the_wires_envelopes_allow(opened: RigWizard) -> None:
+    draft, page = opened.desk.draft, opened.zero_page
+    assert draft is not None
+    joints = tuple(joint.model_copy(update={"high_mm": 1.5}) for joint in draft.config.servos.joints)
+    draft.config = draft.config.model_copy(
+        update={"servos": draft.config.servos.model_copy(update={"joints": joints, "pretension_mm": 0.8})}
+    )
+    page.refresh()
+    assert page.pretension.value() == pytest.approx(0.8)
+    page.pretension.setValue(9.0)
+    assert draft.config.servos.pretension_mm == page.pretension.value() == 1.5
+
+
 def test_the_ports_are_those_of_the_bench_that_is_open(
     make_wizard: MakeWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

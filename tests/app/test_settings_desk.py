@@ -391,6 +391,24 @@ def test_what_was_saved_before_a_rig_file_was_chosen_does_not_reach_it(at: Bench
     assert (at.configs[1].servos, at.configs[1].advice.fast_mm_s) == (rig.servos, 9.0)
 
 
+def test_what_somebody_edits_in_the_rig_file_acts_when_the_rig_is_started_again(at: Bench, tmp_path: Path, qtbot: QtBot) -> None:
+    path = write_rig(make_rig(load_config(), "bench 1", None), tmp_path / "bench 1.toml")
+    at.window.use_config(with_rig(at.window.config, read_rig(path), path))
+    until(qtbot, lambda: len(at.configs) == 2)
+    at.window._choose_phantom("y_junction")
+    until(qtbot, lambda: len(at.configs) == 3)
+    file = path.read_text(encoding="utf-8")
+    path.write_text(file.replace("max_pull_mm = 2.0", "max_pull_mm = 4.5"), encoding="utf-8")
+    at.window.restart()
+    until(qtbot, lambda: len(at.configs) == 4)
+    assert (at.configs[3].servos.max_pull_mm, at.configs[3].twin.phantom) == (4.5, "y_junction")
+    assert at.window.read_rig_again(at.configs[2]).servos.max_pull_mm == 4.5, "Calibrate begins with it, too"
+    path.write_text("[servos", encoding="utf-8")
+    at.window.restart()
+    until(qtbot, lambda: len(at.configs) == 5)
+    assert at.configs[4] == at.configs[3], "whoever opens it tells what is wrong"
+
+
 def test_closing_the_window_closes_the_dialog(at: Bench) -> None:
     at.edit(D_ALLOW, "9")
     at.desk.close()

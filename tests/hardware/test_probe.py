@@ -146,6 +146,14 @@ def test_servos_at_another_speed_are_found() -> None:
     assert said == ["asking at 1000000 baud", "asking at 57600 baud"]
 
 
+def test_servos_at_several_speeds_are_all_named(servos: SoftServoBus) -> None:
+    for servo_id in (3, 6):
+        servos._servos[servo_id].table["baud_rate"] = 1  # 57600, as from the factory
+    found = find_servos(servos.port, (57_600, 1_000_000, 115_200))
+    assert (found.baud, found.ids) == (1_000_000, (1, 2, 4, 5, 7))
+    assert found.elsewhere == ((57_600, (3, 6)),)
+
+
 def test_nobody_answers(servos: SoftServoBus) -> None:
     for joint in CONFIG.joints:
         servos.faults.mute(joint.id)

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import cast
 
+import numpy as np
 import pytest
 
+from core.calibration.board import BoardError, BoardSpec
+from core.calibration.identify import Assignment, Finding
 from core.calibration.look import HeadNotSeen
+from core.calibration_config import ZeroConfig
 from core.config import Config
 from core.devices import DeviceError
+from core.types import Image
 from hardware import servo_wizard
 from hardware.rig_draft import RigDraft
 from hardware.servo_wizard import Zeros
-from hardware.servos.probe import Stopped
+from hardware.servos.probe import Stopped, StopSwitch
+from hardware.servos.search import FoundServo, FoundServos
+
+TICKS = (2048, 2049, 2050, 2051, 0, 1, 2)
 
 
 class Bench:
@@ -20,15 +29,23 @@ class Bench:
 
     bench = None
 
+    def __init__(self) -> None:
+        self.stop = StopSwitch()
+        self.pictures: Iterator[Image] = iter(())
+
     def set_lens(self, _lens: object) -> None: ...
 
     def servos_config(self, servos: object) -> object:
         return servos
 
+    def board_picture(self, _spec: BoardSpec) -> Image:
+        return next(self.pictures)
+
 
 @pytest.fixture
 def draft(monkeypatch: pytest.MonkeyPatch) -> RigDraft:
     monkeypatch.setattr(servo_wizard, "find_zeros", lambda *_: Zeros((0.1,) * 4))
+    monkeypatch.setattr(servo_wizard, "standing_ticks", lambda *_: TICKS)
     made = RigDraft(Bench(), Config())  # type: ignore[arg-type]
     made.find_zeros()
     return made
@@ -73,5 +90,59 @@ def test_a_tendon_that_could_not_be_told_is_known_once_it_was_put_there_by_hand(
     assert not draft.are_zeros_known
     draft.nudge("up", 0.2)
     assert draft.are_zeros_known
+    assert draft.zero is not None
     draft.find_zeros()
     assert not draft.are_zeros_known
+    assert draft.zero is None
+
+
+def test_zeros_are_kept_without_the_steering(draft: RigDraft) -> None:
+    draft.set_pretension(0.4)
+    assert draft.calibration().zero == ZeroConfig(ticks=TICKS, slack_mm=(0.1,) * 4, pretension_mm=0.4)
+
+
+@pytest.mark.parametrize(
+    ("elsewhere", "problem"),
+    [
+        (((57_600, (6, 7)),), r"^servos at several speeds: 1, 2, 3, 4, 5 at 1000000 baud; 6, 7 at 57600 baud; set all"),
+        ((), r"^5 servos answer, seven are needed: .*check cables"),
+    ],
+)
+def test_what_keeps_servos_from_being_seven_is_told(
+    draft: RigDraft, monkeypatch: pytest.MonkeyPatch, elsewhere: tuple[tuple[int, tuple[int, ...]], ...], problem: str
+) -> None:
+    draft.config = draft.config.model_copy(update={"servos": draft.config.servos.model_copy(update={"port": "/dev/ttyUSB0"})})
+    found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in range(1, 6)), elsewhere)
+    monkeypatch.setattr("hardware.rig_draft.find_servos", lambda *_: found)
+    with pytest.raises(DeviceError, match=problem):
+        draft.search_servos()
+
+
+def test_what_was_seen_of_a_servo_that_is_gone_is_forgotten(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    draft.config = draft.config.model_copy(update={"servos": draft.config.servos.model_copy(update={"port": "/dev/ttyUSB0"})})
+    draft.set_assignments([Assignment(joint.name, joint.id, joint.sign, "seen") for joint in draft.servos.joints])
+    draft.findings = dict.fromkeys(range(1, 8), Finding("advance", 1, "seen"))  # type: ignore[arg-type]
+    found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in (1, 2, 3, 4, 5, 6, 9)))
+    monkeypatch.setattr("hardware.rig_draft.find_servos", lambda *_: found)
+    draft.search_servos()
+    assert sorted(draft.findings) == [1, 2, 3, 4, 5, 6]
+    assert draft.assignments == ()
+
+
+def test_the_servos_wait_until_the_board_is_away(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    board, empty, said = np.ones((2, 2), np.uint8), np.zeros((2, 2), np.uint8), []
+
+    def find_board(image: Image, _spec: BoardSpec) -> None:
+        if not image.any():
+            raise BoardError("no board is seen")
+
+    monkeypatch.setattr("hardware.rig_draft.find_board", find_board)
+    draft.say = said.append
+    bench = cast("Bench", draft.bench)
+    bench.pictures = iter([board, board, empty, board, empty, empty])
+    draft.wait_for_no_board()
+    assert said == ["take the board away: the servos move when it is out of sight"]
+    assert next(bench.pictures, None) is None, "a hand over it is not enough"
+    bench.pictures = iter([board] * 9)
+    with pytest.raises(BoardError, match="still in the picture: take it away"):
+        draft.wait_for_no_board(0.0)
