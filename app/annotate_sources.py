@@ -6,8 +6,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.sources import expand, is_video
-from app.taken_frames import take_frames, taken_of
+from app.sources import expand, is_of_session, is_video
+from app.taken_frames import evenly, evenly_over, take_frames, taken_of
 from core.study.annotation_store import DEFAULT_NAME
 from core.study.annotations import AnnotationError
 
@@ -38,11 +38,18 @@ def image_files(paths: Sequence[Path], frames: int, *, taken: bool = False) -> l
         found = _whole(path)
         if path.is_dir() and not found and (path / "images").is_dir():  # a labelled set
             found = _whole(path / "images")
+        parts = [file for file in found if is_video(file) and is_of_session(file)]  # one recording, in files of an hour
+        there = {file: taken_of(file) for file in found if is_video(file)} if taken else {}
+        shares = {} if any(there.get(part) for part in parts) else evenly_over(parts, frames)
         for file in found:
-            if is_video(file):
-                files += (taken_of(file) if taken else []) or take_frames(file, frames, tell_problems)
-            else:
+            if not is_video(file):
                 files.append(file)
+            elif there.get(file):
+                files += there[file]
+            elif file in parts and not shares:
+                continue  # of the session's other files pictures were taken before
+            else:
+                files += take_frames(file, shares.get(file, evenly(frames)), tell_problems)
     if not files:
         raise AnnotationError(f"{paths[0]}: no picture or video in it")
     return files

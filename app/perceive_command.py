@@ -80,7 +80,7 @@ def run_perceive(
                 scene = _perceive_one(pipeline, picture, picture.image, tally.done, targets)
                 record = scene_to_json(picture.name, scene)
                 if scene.route_problem:
-                    tally.notes.append(f"{picture.name}: no route to the target: {scene.route_problem}")
+                    tally.no_route(picture.real_stems[-1], picture.name, scene.route_problem)
                 tally.done += 1
             lines.write(json.dumps(record, allow_nan=False))
             if picture.image is not None:
@@ -100,15 +100,21 @@ class _Tally:
     done: int = 0
     unwritten: int = 0
     problems: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    routes: dict[tuple[str, str], tuple[str, int]] = field(default_factory=dict)
+    """Video or picture, and why there is no way to its target: the first picture, and how many."""
+
+    def no_route(self, source: str, name: str, why: str) -> None:
+        first, count = self.routes.get((source, why), (name, 0))
+        self.routes[source, why] = first, count + 1
 
     def problem(self, line: str) -> None:
         self.problems.append(line)
 
     def close(self, unused_targets: list[str]) -> None:
         """Say what went wrong, once; raises UserError where nothing could be done or something was not written."""
-        for note in self.notes:
-            sys.stderr.write(f"note: {note}\n")
+        for (_, why), (first, count) in self.routes.items():
+            more = f" (and in {count - 1} more of its frames)" if count > 1 else ""
+            sys.stderr.write(f"note: {first}: no route to the target: {why}{more}\n")
         if unused_targets:
             sys.stderr.write(f"note: targets of no picture: {', '.join(unused_targets)}\n")
         if self.unwritten:

@@ -136,7 +136,9 @@ class Recorder(QObject):
         if (pilot := self._thread.pilot) is not None:
             for fault in faults_between(before, now):
                 pilot.report(fault)
-        if now.problem and now.problem != before.problem:
+        if now.problem and now.problems != before.problems:
             self.said.emit(tr("Recording stopped: {problem}", problem=tr_text(now.problem)), True)
+        if now.notices != before.notices:
+            self.said.emit(tr_text(now.notice), True)
         if now.saved is not None and now.saved != before.saved:
             self.said.emit(tr("Session saved: {saved}", saved=now.saved), False)

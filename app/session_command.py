@@ -28,7 +28,7 @@ def run_info(folder: Path, *, as_json: bool) -> None:
     """Say what a session is. Raises SessionError."""
     with SessionReader(folder) as reader:
         reader.wait()
-        result = describe(reader)
+        result, is_cut = describe(reader), _is_cut(reader)
     if as_json:
         sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
         return
@@ -36,8 +36,13 @@ def run_info(folder: Path, *, as_json: bool) -> None:
     for key, value in result.items():
         table.add_row(key, _words(value))
     Console(markup=False, emoji=False).print(table)
-    if result["ended"] == "cut":
+    if is_cut:
         sys.stderr.write(f"note: it did not end properly; repair it with: session recover {folder}\n")
+
+
+def _is_cut(reader: SessionReader) -> bool:
+    """Whether it did not end properly, and nobody has repaired it."""
+    return not (reader.manifest is not None and reader.manifest.closed) and not is_being_written(reader.folder)
 
 
 def _words(value: Any) -> str:
@@ -53,7 +58,9 @@ def describe(reader: SessionReader) -> dict[str, Any]:
     manifest, line, events = reader.manifest, reader.timeline(), reader.events
     counts = manifest.counts if manifest else None
     loss = manifest.recovered if manifest else None
-    ended = "being recorded" if is_being_written(reader.folder) else "cut"
+    ended = "cut" if _is_cut(reader) else "being recorded"
+    if loss is not None:
+        ended = "recovered"
     kinds: dict[str, int] = {}
     for event in events:
         kinds[event.kind.value] = kinds.get(event.kind.value, 0) + 1
@@ -62,12 +69,12 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "kind": manifest.kind if manifest else None,
         "rig": manifest.rig if manifest else None,
         "started_utc": manifest.started_utc.isoformat() if manifest else None,
-        "ended": (manifest.ended or "closed") if manifest and manifest.closed else ended,
+        "ended": (manifest.ended or "closed") if manifest and manifest.closed and loss is None else ended,
         "recovered": f"{loss.seconds} s, {loss.rows} rows and {loss.pictures} pictures lost" if loss else None,
         "seconds": round(reader.duration_s, 3),
         "rows": len(reader),
         "missing_rows": reader.missing_rows + rows_cut_off(reader),
-        "dropped": counts.dropped if counts else None,
+        "dropped": counts.dropped if counts and manifest and manifest.closed else None,
         "states": {state.value: int((line.state == place).sum()) for place, state in enumerate(PoseState)},
         "without_pose": int((line.state < 0).sum()),
         "theta_median_deg": round(float(np.nanmedian(np.abs(line.theta_deg))), 3) if np.isfinite(line.theta_deg).any() else None,
@@ -118,6 +125,10 @@ def run_export(folder: Path, outs: list[Path], *, plain: bool, as_json: bool) ->
                 written[str(out)] = _export(reader, out, plain, lambda task=task: bar.advance(task))
         lost = losses(reader, reader.events)  # what is wrong with the events is found here
         problems = [*reader.problems, *lost]
+        if _is_cut(reader):
+            problems.append(f"it did not end properly; what can be saved of it, saves: session recover {folder}")
+        elif is_being_written(folder):
+            problems.append("it is still being recorded: what came later is not in what was written")
     if as_json:
         sys.stdout.write(json.dumps({"written": written, "problems": problems}) + "\n")
         return

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.devices import DamagedStream, DeviceError, EndOfStream
+from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream
 from core.errors import UserError
 from core.images import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS
@@ -99,24 +99,70 @@ def frame_of(stem: str, videos: Collection[str]) -> bool:
 
 
 def _video(path: Path, stem: str) -> Iterator[SourcePicture]:
+    """The pictures of a video, damaged ones as problems."""
     from hardware.cameras.video_file import VideoFile
 
+    if is_of_session(path):
+        yield from _session_video(path, stem)
+        return
     video = VideoFile(path, paced=False)
-    index = 0
+    index, is_first = 0, True
     try:
         video.open()
         while True:
-            frame = video.read(0.0)
-            if frame is not None:
-                yield SourcePicture(*_named(path, stem, index), frame.image, None, frame.captured_s, index == 0)
+            try:
+                frame = video.read(0.0)
+            except DamagedPicture as damage:
+                yield SourcePicture(*_named(path, stem, index), None, str(damage))
                 index += 1
+                continue
+            if frame is not None:
+                yield SourcePicture(*_named(path, stem, index), frame.image, None, frame.captured_s, is_first)
+                index, is_first = index + 1, False
     except EndOfStream as end:
-        if index == 0 or isinstance(end, DamagedStream):
+        if is_first or isinstance(end, DamagedStream):
             yield SourcePicture(*_named(path, stem, index), None, str(end))
     except DeviceError as error:
         yield SourcePicture(str(path), stem, (path.stem,), None, str(error))
     finally:
         video.close()
+
+
+def _session_video(path: Path, stem: str) -> Iterator[SourcePicture]:
+    """Of a recorded session: its rows know how each picture was written, so that no damage passes."""
+    from core.session.manifest import SessionError
+    from core.session.pictures import packet_times, video_number
+    from core.session.reader import SessionReader
+    from core.session.video_in import upright
+
+    number = video_number(path)
+    assert number is not None
+    try:
+        with SessionReader(path.absolute().parent) as reader:
+            reader.wait()
+            times_ms = sorted({pts_ms for pts_ms, _ in packet_times(path)})
+            is_first = True
+            for index, at_ms in enumerate(times_ms):
+                frame = reader.decoded(number, at_ms)
+                if frame is None:
+                    yield SourcePicture(*_named(path, stem, index), None, f"{path}: picture {index} is lost or damaged")
+                    continue
+                yield SourcePicture(*_named(path, stem, index), upright(frame), None, (at_ms - times_ms[0]) / 1000.0, is_first)
+                is_first = False
+    except SessionError as error:
+        yield SourcePicture(str(path), stem, (path.stem,), None, str(error))
+        return
+    if not times_ms:
+        yield SourcePicture(str(path), stem, (path.stem,), None, f"{path}: no picture in it can be read")
+
+
+def is_of_session(video: Path) -> bool:
+    """Whether it is the video of a recorded session."""
+    from core.session.manifest import FRAMES
+    from core.session.pictures import video_number
+
+    is_named_so = video.name.startswith("video_") and video_number(video) is not None
+    return is_named_so and (video.absolute().parent / FRAMES).is_file()
 
 
 def _named(path: Path, stem: str, index: int) -> tuple[str, str, tuple[str, ...]]:

@@ -14,13 +14,12 @@ import av.error
 import numpy as np
 
 from app.learning_commands import progress_bar
-from app.sources import is_video
+from app.sources import is_of_session, is_video
 from core.images import ImageError, read_image
 from core.learning.dataset import write_png
-from core.session.manifest import FRAMES
 from core.session.pictures import packet_times, video_number
 from core.session.reader import SessionReader
-from core.session.video_in import open_video
+from core.session.video_in import open_video, upright
 from core.study.annotations import AnnotationError
 from core.types import Image
 
@@ -42,8 +41,29 @@ def taken_of(video: Path) -> list[Path]:
     return found
 
 
-def take_frames(video: Path, count: int, tell: Callable[[Sequence[str]], object]) -> list[Path]:
-    """Take `count` pictures of a video evenly over time; those that were taken before stay as they are.
+Choose = Callable[[int], Sequence[int]]
+"""Which of so many pictures of a video."""
+
+
+def evenly(count: int) -> Choose:
+    """`count` pictures evenly over time, or all where there are fewer."""
+    return lambda total: sorted({round(place) for place in np.linspace(0, total - 1, min(count, total))})
+
+
+def evenly_over(videos: Sequence[Path], count: int) -> dict[Path, Choose]:
+    """`count` pictures evenly over several videos that follow each other, as the files of one session do."""
+    lengths = [len({pts_ms for pts_ms, _ in packet_times(video)}) for video in videos]
+    chosen, begin = evenly(count)(sum(lengths)) if sum(lengths) else [], 0
+    shares: dict[Path, Choose] = {}
+    for video, length in zip(videos, lengths, strict=True):
+        places = [place - begin for place in chosen if begin <= place < begin + length]
+        shares[video] = lambda _total, places=places: places  # type: ignore[misc]
+        begin += length
+    return shares
+
+
+def take_frames(video: Path, choose: Choose, tell: Callable[[Sequence[str]], object]) -> list[Path]:
+    """Take the chosen pictures of a video; those that were taken before stay as they are.
 
     A frame that is lost or damaged is left out, and `tell` hears how many: decoders conceal damage, and what they show must not be
     measured.
@@ -57,7 +77,7 @@ def take_frames(video: Path, count: int, tell: Callable[[Sequence[str]], object]
     written: list[Path] = []
     try:
         with _opened(video) as (total, take), progress_bar() as bar:
-            chosen = sorted({round(place) for place in np.linspace(0, total - 1, min(count, total))})
+            chosen = choose(total)
             folder.mkdir(exist_ok=True)
             _own(folder, video, take)
             for index in bar.track(chosen, description=f"frames of {video.stem}"):
@@ -92,7 +112,7 @@ def _pictures_in(folder: Path, video: Path) -> list[Path]:
 def _own(folder: Path, video: Path, take: _Take) -> None:
     """Write into the folder whose pictures it holds; those that lie in it without a word are compared with the video's."""
     _check_owner(folder, video)
-    if (folder / _WHOSE).exists() or _is_of_session(video):
+    if (folder / _WHOSE).exists() or is_of_session(video):
         return
     for path in _pictures_in(folder, video)[:1]:
         number = path.stem.removeprefix(f"{video.stem}_")
@@ -136,16 +156,10 @@ def _is_alike(path: Path, image: Image | None) -> bool:
     return float(np.abs(written.astype(np.int16) - image).mean()) <= _SAME_LEVELS
 
 
-def _is_of_session(video: Path) -> bool:
-    """Whether it is the video of a recorded session: its rows know how each of its pictures was."""
-    is_named_so = video.name.startswith("video_") and video_number(video) is not None
-    return is_named_so and (video.absolute().parent / FRAMES).is_file()
-
-
 @contextmanager
 def _opened(video: Path) -> Iterator[tuple[int, _Take]]:
     """How many pictures a video has, and how to take one. Raises AnnotationError, av.error.FFmpegError, OSError."""
-    with _session_opened(video) if _is_of_session(video) else _video_opened(video) as (total, take):
+    with _session_opened(video) if is_of_session(video) else _video_opened(video) as (total, take):
         if not total:
             raise AnnotationError(f"{video}: no frame in it can be read")
         yield total, take
@@ -161,7 +175,7 @@ def _session_opened(video: Path) -> Iterator[tuple[int, _Take]]:
 
         def take(index: int) -> Image | None:
             frame = reader.decoded(number, times_ms[index]) if index < len(times_ms) else None
-            return _rgb(frame) if frame is not None else None
+            return upright(frame) if frame is not None else None
 
         yield len(times_ms), take
 
@@ -189,11 +203,6 @@ def _decoded(container: av.container.InputContainer, stream: av.VideoStream, pts
             continue
         for frame in frames:
             if frame.pts == pts and not frame.is_corrupt:
-                return _rgb(frame)
+                return upright(frame, stream)
             if frame.pts is not None and frame.pts > pts:
                 return None
-
-
-def _rgb(frame: av.VideoFrame) -> Image:
-    """As pictures of videos have always been taken here: another conversion would make other files of them."""
-    return np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)

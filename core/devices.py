@@ -32,6 +32,10 @@ class CameraLost(DeviceError):
     """A camera gives no more frames, and looks for itself: ``read`` raises this until it is back, and then gives frames again."""
 
 
+class DamagedPicture(DeviceError):
+    """One picture of a recorded source cannot be read; the next one may be."""
+
+
 class EndOfStream(DeviceError):
     """A recorded source has no more frames."""
 

@@ -90,7 +90,7 @@ def _lines_of(status: RecordStatus) -> tuple[str, str]:
         size = f"{status.bytes / 1e6:.0f} MB" if status.bytes < 1e9 else f"{status.bytes / 1e9:.1f} GB"
         return f"{minutes}:{seconds:02d}", tr("{count} dropped", count=status.dropped) if status.dropped else size
     if status.problem:
-        return tr("Record"), tr("stopped: disk?")
+        return tr("Record"), tr("stopped: disk full") if status.is_disk_full else tr("stopped")
     if status.armed:
         return tr("Record"), tr("no picture yet")
     return tr("Record"), tr("saving") if status.saving else "F9"

@@ -105,6 +105,7 @@ _FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
     Cause.VOLTAGE_SAGS: ("The servos' supply voltage sags", "check the power supply"),
     Cause.DISK_LOW: ("The disk is nearly full", "make room or end the recording"),
     Cause.DISK_FULL: ("Disk full: recording stopped", "make room and record again; driving goes on"),
+    Cause.RECORDING_STOPPED: ("The recording stopped", "do what it says and record again; driving goes on"),
     Cause.RECORDER_BEHIND: ("The recorder drops frames", "close other programs or record at a lower rate"),
 }
 

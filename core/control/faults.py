@@ -84,6 +84,7 @@ class Cause(StrEnum):
     VOLTAGE_SAGS = "supply voltage sags"
     DISK_LOW = "disk nearly full"
     DISK_FULL = "disk full"
+    RECORDING_STOPPED = "recording stopped"
     RECORDER_BEHIND = "recorder drops frames"
 
 
@@ -112,7 +113,7 @@ _TABLE: dict[tuple[Area, Reaction], tuple[Cause, ...]] = {
     (Area.SERVOS, Reaction.HOLD): (Cause.BUS_SILENT,),
     (Area.SERVOS, Reaction.WARN): (Cause.WARM, Cause.VOLTAGE_SAGS),
     (Area.HOST, Reaction.DISARM): (Cause.CLOCK, Cause.WINDOW_HUNG, Cause.WORKER_DEAD),
-    (Area.HOST, Reaction.WARN): (Cause.DISK_LOW, Cause.DISK_FULL, Cause.RECORDER_BEHIND),
+    (Area.HOST, Reaction.WARN): (Cause.DISK_LOW, Cause.DISK_FULL, Cause.RECORDING_STOPPED, Cause.RECORDER_BEHIND),
     (Area.CAMERA, Reaction.DISARM): (
         Cause.CAMERA_LOST,
         Cause.CAMERA_FROZEN,

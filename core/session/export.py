@@ -41,7 +41,10 @@ def new_file(path: Path) -> Iterator[Path]:
 
 
 def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None) -> int:
-    """One line per frame, blank where something is missing; points in source pixels. Returns the lines; SessionError."""
+    """One line per frame, blank where something is missing; points in source pixels, distances in working pixels.
+
+    Returns the lines. Raises SessionError.
+    """
     reader.wait()
     written = 0
     first_s: float | None = None
@@ -100,6 +103,9 @@ _COLUMNS: dict[str, Callable[[RecordedRow, float], Any]] = {
     "dropped_frames": _of("dropped_frames"),
     "camera_lost": _of("camera_lost"),
     "dropped_rows": _of("dropped_rows"),
+    "width_px": lambda row, _: row.size[0],
+    "height_px": lambda row, _: row.size[1],
+    "source_px_per_working_px": lambda row, _: round(row.source_px_per_working_px, 6),
     "state": _pose("state"),
     "theta_deg": _pose("theta_deg"),
     "theta_signed_deg": _pose("theta_signed_deg"),

@@ -163,6 +163,8 @@ class SessionFiles:
         self.folder = parent / f"{PREFIX}{started:%Y%m%dT%H%M%SZ}_{session_id}"
         self._manifest = new_manifest(about, session_id, started, first_s, config.codec).model_copy(update={"origin": origin})
         self.counts = Counts()
+        self.dropped_before = 0
+        """Frames that the recorder had dropped before the session began."""
         try:
             parent.mkdir(parents=True, exist_ok=True)
             self.folder.mkdir()
@@ -188,7 +190,8 @@ class SessionFiles:
         pts_ms = self._track.write(frame.packet)
         place = f'{{"row":{self.counts.frames},"video":{self.counts.videos - 1},"pts_ms":{pts_ms},'
         place += f'"picture_crc":"{frame.packet.crc:08x}",'
-        self.counts.bytes += self._rows.write(sealed(place + frame.row[1:])) + len(frame.packet.data)
+        dropped = f',"dropped_rows":{max(0, frame.dropped - self.dropped_before)}}}'
+        self.counts.bytes += self._rows.write(sealed(place + frame.row[1:-1] + dropped)) + len(frame.packet.data)
         self.counts.frames += 1
 
     def write_event(self, event: Event) -> None:

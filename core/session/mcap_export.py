@@ -133,6 +133,7 @@ def _pose(row: RecordedRow) -> dict[str, Any]:
         "theta_signed_deg": pose.theta_signed_deg if pose else None,
         "c_head_px": pose.c_head_px if pose else None,
         "c_tail_px": pose.c_tail_px if pose else None,
+        "source_px_per_working_px": row.source_px_per_working_px,
         "confidence": pose.confidence if pose else None,
         "novelty": row.scene.novelty,
         "state": pose.state.value if pose else None,

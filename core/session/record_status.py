@@ -27,6 +27,9 @@ class RecordStatus:
     disk_free : bytes; None before the first look.
     warning : disk nearly full, in plain words.
     problem : why the recording stopped, or could not start; empty when all is well. The next start clears it.
+    is_disk_full : the disk is why.
+    problems : how often there was one: the same twice is told twice.
+    notice : the last thing to say of "save the last seconds" that went wrong; `notices` counts them.
     ring_s : how much "save the last seconds" would give now.
     saving : the last seconds are being written.
     saved : the newest session that was completed, by stop or from the ring.
@@ -42,6 +45,10 @@ class RecordStatus:
     disk_free: int | None = None
     warning: str = ""
     problem: str = ""
+    is_disk_full: bool = False
+    problems: int = 0
+    notice: str = ""
+    notices: int = 0
     ring_s: float = 0.0
     saving: bool = False
     saved: Path | None = None
@@ -50,8 +57,8 @@ class RecordStatus:
 def faults_between(before: RecordStatus, now: RecordStatus) -> list[Fault]:
     """What the pilot must tell the operator of the recorder, from one look to the next."""
     faults = []
-    if now.problem and now.problem != before.problem:
-        faults.append(Fault(Cause.DISK_FULL, now.problem))
+    if now.problem and now.problems != before.problems:
+        faults.append(Fault(Cause.DISK_FULL if now.is_disk_full else Cause.RECORDING_STOPPED, now.problem))
     elif now.warning:
         faults.append(Fault(Cause.DISK_LOW, now.warning))
     if now.dropped > before.dropped:
@@ -69,6 +76,17 @@ class StatusBoard:
     def show(self, **changes: Any) -> None:
         with self._lock:
             self._status = replace(self._status, **changes)
+
+    def fail(self, problem: str, *, is_disk_full: bool = False) -> None:
+        """The recording stopped, or could not start."""
+        with self._lock:
+            count = self._status.problems + 1
+            self._status = replace(self._status, problem=problem, is_disk_full=is_disk_full, problems=count)
+
+    def notice(self, text: str) -> None:
+        """Something to say that stops no recording."""
+        with self._lock:
+            self._status = replace(self._status, notice=text, notices=self._status.notices + 1)
 
     @property
     def status(self) -> RecordStatus:

@@ -78,6 +78,11 @@ class RecordedRow:
     bus: dict[str, Any] | None
     camera_lost: int = 0
 
+    @property
+    def source_px_per_working_px(self) -> float:
+        """Places are told in source pixels, distances to the centerline (``c_head_px``, ``c_tail_px``) in working pixels."""
+        return 1.0 / self.scene.scale
+
     def tick(self, image: Image) -> Tick:
         """The tick as it was, with its picture from the video."""
         frame = Frame(self.index, self.captured_s, image, self.camera_lost)

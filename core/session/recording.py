@@ -94,8 +94,8 @@ class Recording:
             picture = replace(picture, tick=replace(picture.tick, frame=frame))
         if self._is_armed:
             self._open(picture)
-        if picture.drive is not None:
-            self.take_drive(picture.drive)
+        if self._drive is None and picture.drive is not None:
+            self.take_drive(picture.drive)  # where it began; what changes then comes by itself, all of it and in order
         self._tell_lost(picture.tick.frame)
         encoded = self._encoded(picture)
         if self._ring is not None:
@@ -114,9 +114,9 @@ class Recording:
             self._encoder = FrameEncoder(size, self._config)
         force_key = self._files is not None and self._files.wants_key(frame.captured_s)
         packet = self._encoder.encode(frame.image, frame.captured_s, force_key=force_key)
-        dropped = max(0, picture.dropped - self.dropped_before) if self._files is not None else 0
-        row = row_of(picture.tick, picture.drive, bus=picture.bus, dropped_rows=dropped, with_masks=self._config.masks)
-        return EncodedFrame(frame.captured_s, packet, self._encoder, json.dumps(row, allow_nan=False, separators=(",", ":")))
+        row = row_of(picture.tick, picture.drive, bus=picture.bus, with_masks=self._config.masks)
+        written = json.dumps(row, allow_nan=False, separators=(",", ":"))
+        return EncodedFrame(frame.captured_s, packet, self._encoder, written, picture.dropped)
 
     def take_drive(self, view: DriveView) -> None:
         """Write what changed since the last view; one that is overtaken by a newer one tells nothing new. Raises OSError."""
@@ -159,14 +159,17 @@ class Recording:
         """A session begins with the next frame; nothing happens when one is being recorded."""
         if self._files is None:
             self._is_armed = True
-            self._board.show(armed=True, problem="")
+            self._board.show(armed=True, problem="", is_disk_full=False)
 
     def _open(self, picture: Picture) -> None:
         self._is_armed = False
         first_s = picture.tick.frame.captured_s
         self._files = SessionFiles(self._parent, self._about, self._config, first_s=first_s, now_s=self._clock())
-        self.dropped_before, self._dropped_told, self._dropped_told_s = picture.dropped, 0, -math.inf
+        self.dropped_before = self._files.dropped_before = picture.dropped
+        self._dropped_told, self._dropped_told_s = 0, -math.inf
         self.began_s = self._clock()
+        if self._ring is None:
+            self._lost = None  # nobody has counted between two sessions
         self._board.show(armed=False, recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
         drive = picture.drive or self._drive
         if drive is not None:
@@ -190,15 +193,18 @@ class Recording:
             return
         count, elapsed_s = dropped - self.dropped_before, max(0.0, self._clock() - self.began_s)
         problem = files.close(ended, count)
-        changes: dict[str, Any] = {"problem": problem} if problem else {"saved": files.folder}
-        self._board.show(recording=False, elapsed_s=elapsed_s, dropped=count, bytes=files.counts.bytes, **changes)
+        self._board.show(recording=False, elapsed_s=elapsed_s, dropped=count, bytes=files.counts.bytes)
+        if problem:
+            self._board.fail(problem)
+        else:
+            self._board.show(saved=files.folder)
 
-    def fail(self, problem: str, dropped: int) -> None:
+    def fail(self, problem: str, dropped: int, *, is_disk_full: bool = False) -> None:
         """End the session, keeping what was written. The ring goes on, with a new encoder."""
         was_on = self.is_on
         self.end(problem, dropped)
         self.drop_encoder()
-        self._board.show(problem=f"recording stopped: {problem}" if was_on else problem)
+        self._board.fail(f"recording stopped: {problem}" if was_on else problem, is_disk_full=is_disk_full)
 
     def change_rig(self, about: About, dropped: int) -> None:
         """A session never mixes two rigs, and neither does the ring."""
@@ -206,6 +212,7 @@ class Recording:
         self._about, self._drive, self._lost = about, None, None
         if self._ring is not None:
             self._ring.clear()
+            self._board.show(ring_s=0.0)
             if self._target is not None:  # under other thresholds the rig and its destination are the same
                 self._ring.add_event(self._target)
 

@@ -6,13 +6,14 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from core.names import name_as_text
 from core.session.checked import Damaged
-from core.session.events import event_from_json, was_added_later
+from core.session.events import EventKind, event_from_json, was_added_later
 from core.session.files import alone_in, is_being_written
 from core.session.lines import Line, lines_of, parse_line
 from core.session.manifest import (
@@ -103,7 +104,9 @@ class _Salvage:
     rows: list[int] = field(default_factory=list)
     places: list[tuple[int, int, float]] = field(default_factory=list)
     expected: dict[int, list[Expected]] = field(default_factory=dict)
+    last_row: Line | None = None
     events: int = 0
+    dropped: int = 0
     last_event_s: float | None = None
     kept: set[tuple[int, int]] = field(default_factory=set)
     videos: int = 0
@@ -199,7 +202,10 @@ def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Reco
         # The rows' clock began anywhere; its moment that the folder's name tells of is the first row's.
         manifest = manifest.model_copy(update={"started_monotonic_s": found.places[0][2]})
     loss = _loss(session, manifest, found)
-    counts = Counts(frames=len(found.rows), events=found.events, videos=found.videos, dropped=manifest.counts.dropped)
+    if found.last_row is not None:  # a session that was cut has no count in its manifest
+        found.dropped = max(found.dropped, row_from_json(parse_line(found.last_row)).dropped_rows)
+    counts = Counts(frames=len(found.rows), events=found.events, videos=found.videos)
+    counts.dropped = max(found.dropped, manifest.counts.dropped)
     counts.bytes = sum(path.stat().st_size for path in work.iterdir())
     ended = {"closed": True, "ended": manifest.ended or "cut", "counts": counts, "recovered": loss}
     write_manifest(work, manifest.model_copy(update=ended))
@@ -238,6 +244,7 @@ def _take_row(line: Line, found: _Salvage) -> None:
         columns = columns_of(record)
         row_from_json(record)
     row, captured_s, video, pts_ms, *_, crc = columns
+    found.last_row = line
     if found.rows and row <= found.rows[-1]:
         raise Damaged(f"row {row} after row {found.rows[-1]}")
     found.rows.append(row)
@@ -251,6 +258,8 @@ def _take_event(line: Line, found: _Salvage) -> None:
         return  # kept, but neither counted nor a sign of how long was recorded
     found.events += 1
     found.last_event_s = event.time_s
+    if event.kind is EventKind.DROPPED and isinstance(total := event.data.get("total"), int):
+        found.dropped = max(found.dropped, total)
 
 
 def _copy_video(path: Path, target: Path, found: _Salvage) -> None:
@@ -264,6 +273,16 @@ def _copy_video(path: Path, target: Path, found: _Salvage) -> None:
     found.videos += bool(done.kept_ms)
 
 
+def _period_s(row_steps_s: np.ndarray, found: _Salvage) -> float:
+    """Time from picture to picture, by the rows, where these are gone by the videos' own clock, or as cameras usually have it."""
+    kept = sorted(found.kept)
+    steps_s = [(after - before) / 1000.0 for (video, before), (same, after) in pairwise(kept) if video == same]
+    for steps in (row_steps_s, np.array(steps_s)):
+        if (steps > 0).any():
+            return float(np.median(steps[steps > 0]))
+    return 1.0 / 30.0
+
+
 def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:
     """Rows that should be there and are not, pictures that rows tell of and that are not there, and how long all that lasted."""
     told = {(video, pts_ms) for video, pts_ms, _ in found.places}
@@ -271,8 +290,7 @@ def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:
     whole = max(found.rows[-1] + 1 if found.rows else 0, manifest.counts.frames)
     rows = max(whole - len(found.rows), len(found.kept - told))
     times = np.array([captured_s for *_, captured_s in found.places])
-    steps = np.diff(times)
-    period_s = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0 / 30.0
+    period_s = _period_s(np.diff(times), found)
     seconds = (pictures + rows) * period_s
     if found.last_event_s is not None and len(times) and not manifest.closed:
         # an event after the last row: at least until then it was recording

@@ -11,12 +11,16 @@ from core.session.video import FrameEncoder, Packet
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EncodedFrame:
-    """A frame ready to be written: its packet, the encoder that made it, and its row's JSON without its place in a session."""
+    """A frame ready to be written: its packet, the encoder that made it, and its row's JSON without its place in a session.
+
+    ``dropped`` counts the frames that the recorder dropped before it, ever.
+    """
 
     captured_s: float
     packet: Packet
     encoder: FrameEncoder
     row: str
+    dropped: int = 0
 
     @property
     def nbytes(self) -> int:

@@ -26,11 +26,11 @@ class RingSaver:
     def save(self, about: About, frames: list[EncodedFrame], events: list[Event], now_s: float) -> None:
         """Start to write; `now_s` is the frames' clock now."""
         if not frames:
-            self._board.show(problem="nothing to save: no frames in memory yet")
+            self._board.notice("nothing to save: no frames in memory yet")
         elif self._thread is not None and self._thread.is_alive():
-            self._board.show(problem="the last seconds are still being saved")
+            self._board.notice("the last seconds are still being saved")
         else:
-            self._board.show(saving=True, problem="")
+            self._board.show(saving=True)
             arguments = (about, frames, events, now_s)
             self._thread = threading.Thread(target=self._write, args=arguments, name="ring saver", daemon=True)
             self._thread.start()
@@ -47,6 +47,7 @@ class RingSaver:
         try:
             first_s = frames[0].captured_s
             files = SessionFiles(self._parent, about, self._config, first_s=first_s, now_s=now_s, origin="last seconds")
+            files.dropped_before = frames[0].dropped
             for event in events:
                 files.write_event(event)
             for frame in frames:
@@ -58,12 +59,12 @@ class RingSaver:
             problem = f"{error.filename or self._parent}: {error.strerror or error}"
         if files is not None:
             # The folder itself says that it is not whole: a message in a window is soon forgotten.
-            at_end = files.close(problem or "saved from memory", len(frames) - written)
+            at_end = files.close(problem or "saved from memory", frames[-1].dropped - frames[0].dropped + len(frames) - written)
             problem = problem or at_end
+        self._board.show(saving=False)
         if not problem:
-            self._board.show(saving=False, saved=files.folder if files is not None else None)
+            self._board.show(saved=files.folder if files is not None else None)
         elif not written:
-            self._board.show(saving=False, problem=f"the last seconds were not saved: {problem}")
+            self._board.notice(f"the last seconds were not saved: {problem}")
         else:
-            part = f"{written} of {len(frames)} frames"
-            self._board.show(saving=False, problem=f"of the last seconds only {part} were saved: {problem}")
+            self._board.notice(f"of the last seconds only {written} of {len(frames)} frames were saved: {problem}")

@@ -54,14 +54,13 @@ def light_tick(tick: Tick) -> Tick:
     return replace(tick, scene=replace(scene, masks=masks, skeletons=skeletons))
 
 
-def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, dropped_rows: int = 0, with_masks: bool = True) -> Row:
-    """One row, without its place in the session (``row``, ``video``, ``pts_ms``), which the writer adds.
+def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, with_masks: bool = True) -> Row:
+    """One row, without its place in the session (``row``, ``video``, ``pts_ms``, ``dropped_rows``), which the writer adds.
 
     Parameters
     ----------
     drive : None when there is no robot to drive.
     bus : the newest status of the servo bus, any dataclass of plain values; None where there is no bus.
-    dropped_rows : frames that the recorder could not take since the session's start.
     with_masks : also outlines of the masks, and the vessel graph.
     """
     scene, pose = tick.scene, tick.scene.pose
@@ -82,7 +81,6 @@ def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, dropped_rows
         "size": [width, height],
         "dropped_frames": tick.dropped_frames,
         "camera_lost": tick.frame.lost,
-        "dropped_rows": dropped_rows,
         "fps": finite(tick.frames_per_second, 3),
         "mode": drive.mode.value if drive else None,
         "state": pose.state.value if pose else None,

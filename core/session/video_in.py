@@ -1,11 +1,19 @@
-"""Opens videos to read."""
+"""Opens videos to read, and gives their pictures as a person sees them: none that a decoder invented, upright, in square pixels."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from heapq import heappop, heappush
 from pathlib import Path
 
 import av
+import av.error
+import numpy as np
 from av.container import InputContainer
+
+from core.types import Image
+
+_SQUARE = 0.005
 
 
 def open_video(path: Path) -> InputContainer:
@@ -14,3 +22,47 @@ def open_video(path: Path) -> InputContainer:
     Titles and tags are decoded when it is opened; a flipped bit in one of them must not cost the pictures.
     """
     return av.open(str(path), metadata_errors="replace")
+
+
+def decoded(container: InputContainer, stream: av.VideoStream) -> Iterator[av.VideoFrame | None]:
+    """Each picture in order; None for one that is damaged, or that builds on such a one.
+
+    Decoders conceal damage: they show something, until the next picture that stands for itself, and that must not be measured.
+    Damage that the decoder does not notice (another content of the right form) passes. Raises av.error.FFmpegError where the file
+    itself cannot be read on.
+    """
+    is_whole, waiting = True, list[int]()
+    # Of other codecs packets may rightly give no picture.
+    gives_all = stream.codec_context.name == "h264"
+    for packet in container.demux(stream):
+        if gives_all and packet.pts is not None and packet.size and not packet.is_discard:
+            heappush(waiting, packet.pts)
+        try:
+            frames = packet.decode()
+        except EOFError:
+            return
+        except av.error.FFmpegError:
+            is_whole = False
+            if not gives_all:
+                yield None
+            continue
+        for frame in frames:
+            while waiting and frame.pts is not None and waiting[0] < frame.pts:
+                heappop(waiting)
+                is_whole = False
+                yield None
+            if waiting and waiting[0] == frame.pts:
+                heappop(waiting)
+            is_whole = (is_whole or frame.key_frame) and not frame.is_corrupt
+            yield frame if is_whole else None
+    yield from (None for _ in waiting)
+
+
+def upright(frame: av.VideoFrame, stream: av.VideoStream | None = None) -> Image:
+    """RGB uint8 (H, W, 3) of a frame as players show it: turned as the file says, its pixels made square as its stream says."""
+    aspect = float((stream.sample_aspect_ratio if stream is not None else None) or 1.0)
+    if abs(aspect - 1.0) > _SQUARE:
+        frame = frame.reformat(width=max(1, round(frame.width * aspect)), height=frame.height, format="rgb24")
+    image = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
+    turns = round(frame.rotation / 90) % 4  # to the left
+    return np.ascontiguousarray(np.rot90(image, turns)) if turns else image

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import math
 import threading
@@ -84,7 +85,8 @@ class SessionWriter:
     def put(self, tick: Tick, drive: DriveView | None = None, bus: Any = None) -> bool:
         """Hand a tick over, with who drives and the newest status of the servo bus (a dataclass) where there are such.
 
-        Never waits for the disk. False when it was dropped, because the recorder is behind or has ended.
+        Where driving began is taken from the first one; what changes then is told by `drive`. Never waits for the disk. False when
+        it was dropped, because the recorder is behind or has ended.
         """
         if not self._wants_pictures:
             return self._thread.is_alive()
@@ -191,15 +193,16 @@ class SessionWriter:
         except (VideoError, SessionError) as error:
             self._fail(str(error))
         except OSError as error:
-            self._fail(f"{error.filename or self._parent}: {error.strerror or error}")
+            is_full = error.errno in {errno.ENOSPC, errno.EDQUOT}
+            self._fail(f"{error.filename or self._parent}: {error.strerror or error}", is_disk_full=is_full)
 
     def _begin(self) -> None:
         with self._changed:
             self._starts_waiting -= 1
         self._recording.begin()
 
-    def _fail(self, problem: str) -> None:
-        self._recording.fail(problem, self._dropped)
+    def _fail(self, problem: str, *, is_disk_full: bool = False) -> None:
+        self._recording.fail(problem, self._dropped, is_disk_full=is_disk_full)
 
     def _watch_disk(self) -> None:
         now_s = time.monotonic()
@@ -210,4 +213,4 @@ class SessionWriter:
         if disk is not None:
             self._board.show(disk_free=disk.free, warning=disk.warning)
             if disk.full and self._recording.is_on:
-                self._fail(disk.full)
+                self._fail(disk.full, is_disk_full=True)

@@ -9,8 +9,8 @@ import av
 import av.error
 import numpy as np
 
-from core.devices import DamagedStream, DeviceError, EndOfStream
-from core.session.video_in import open_video
+from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream
+from core.session.video_in import decoded, open_video, upright
 from core.types import Frame, Image
 from hardware.cameras.pacing import Pacer
 
@@ -18,25 +18,23 @@ _MAY_LACK_S = 1.0
 """A video that does not say how many pictures it has may end so much before its time: the last one may stay for a while."""
 
 
-def _rgb(frame: av.VideoFrame) -> Image:
-    return np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
-
-
 class VideoFile:
     """A ``Camera`` over a video file.
 
-    With `paced` the frames come at the speed of the recording and late ones are skipped, as from a camera; without, every frame is
-    given. A video that decodes slower than it was recorded is played slower. ``captured_s`` is the presentation time from the first
-    frame on, in the clock of the first read when paced.
+    With `paced` the frames come at the speed of the recording and late ones are skipped, as from a camera, and damaged ones are
+    lost; without, every frame is given, and for a damaged one DamagedPicture raised, after which the next may be read. A video that
+    decodes slower than it was recorded is played slower. ``captured_s`` is the presentation time from the first frame on, in the
+    clock of the first read when paced.
     """
 
     def __init__(self, path: Path, *, paced: bool = True) -> None:
         self._path = path
         self._paced = paced
-        self._frames: Iterator[av.VideoFrame] | None = None
+        self._frames: Iterator[av.VideoFrame | None] | None = None
         self._container: av.container.InputContainer | None = None
         self._index = -1
         self._count = 0
+        self._lost = 0
         self._first_s: float | None = None
         self._end_s = 0.0
         self._pacer: Pacer[av.VideoFrame] = Pacer()
@@ -50,7 +48,7 @@ class VideoFile:
         return False
 
     def open(self) -> None:
-        self._count, self._first_s, self._end_s, self._pacer = 0, None, 0.0, Pacer()
+        self._count, self._lost, self._first_s, self._end_s, self._pacer = 0, 0, None, 0.0, Pacer()
         try:
             container = open_video(self._path)
         except (av.error.FFmpegError, OSError) as error:
@@ -59,15 +57,26 @@ class VideoFile:
             container.close()
             raise DeviceError(f"{self._path}: has no video in it")
         stream = container.streams.video[0]
-        stream.thread_type = "AUTO"
-        self._container, self._frames = container, container.decode(stream)
+        stream.thread_type = "SLICE"  # with a thread for each frame nobody could say which one is damaged
+        self._container, self._frames = container, decoded(container, stream)
 
     def read(self, timeout_s: float) -> Frame | None:
         if not self._paced:
             frame, at_s = self._decode()
-            return Frame(self._index, at_s, _rgb(frame))
-        due = self._pacer.next(self._decode, timeout_s)
-        return None if due is None else Frame(self._index, due[1], _rgb(due[0]))
+            return Frame(self._index, at_s, self._rgb(frame))
+        due = self._pacer.next(self._decode_whole, timeout_s)
+        return None if due is None else Frame(self._index, due[1], self._rgb(due[0]), self._lost)
+
+    def _rgb(self, frame: av.VideoFrame) -> Image:
+        assert self._container is not None
+        return upright(frame, self._container.streams.video[0])
+
+    def _decode_whole(self) -> tuple[av.VideoFrame, float]:
+        while True:
+            try:
+                return self._decode()
+            except DamagedPicture:
+                self._lost += 1
 
     def _decode(self) -> tuple[av.VideoFrame, float]:
         if self._frames is None:
@@ -82,7 +91,9 @@ class VideoFile:
             raise EndOfStream(f"{self._path}: end of the video") from None
         except av.error.FFmpegError as error:
             where = f"after frame {self._index}" if self._count else "before its first frame"
-            raise DamagedStream(f"{self._path}: damaged {where} ({error.strerror or error})") from None
+            raise DamagedStream(f"{self._path}: damaged {where} ({error.strerror or error}), and not read on") from None
+        if frame is None:
+            raise DamagedPicture(f"{self._path}: picture {self._index} is damaged")
         at = frame.time if frame.time is not None and np.isfinite(frame.time) else self._index / 30.0
         if self._first_s is None:
             self._first_s = at

@@ -30,7 +30,7 @@ from core.study.annotations import Annotation, MaskPolygon, MaskTarget, View, me
 from core.study.evaluation import read_measurements
 from core.types import PoseState
 from hardware.twin.world import TwinWorld
-from tests.core.session_data import number_in, record, tick_of
+from tests.core.session_data import QUICK, number_in, record, tick_of
 
 MAIN = Path(__file__).resolve().parents[2] / "main.py"
 BOXES = (
@@ -245,6 +245,16 @@ def test_a_video_that_pictures_were_taken_of_is_gone_on_with_those(tmp_path: Pat
     assert len(asked_files([video], None)) == 55
     other = film(tmp_path / "other.mp4", [4 * k for k in range(60)])
     assert len(asked_files([other], None)) == 48
+
+
+def test_a_session_in_several_files_is_one_recording(tmp_path: Path) -> None:
+    """The last minute of an hour must not count as much as the hour."""
+    config = QUICK.model_copy(update={"split_s": 1.4})
+    session = record(tmp_path, [tick_of(index, 1000.0 + index / 30.0) for index in range(60)], config)
+    assert len(list(session.glob("video_*.mkv"))) == 2
+    files = image_files([session], 7)
+    assert [path.parent.name for path in files] == ["video_0000_frames"] * 5 + ["video_0001_frames"] * 2
+    assert asked_files([session], None) == files
 
 
 def test_pictures_of_an_older_video_of_its_name_are_not_taken_for_its_own(tmp_path: Path) -> None:

@@ -121,7 +121,7 @@ def test_a_folder_that_cannot_be_written_stops_the_recording_visibly(
     until(qtbot, lambda: running._recorder.status.problem != "")
     until(qtbot, lambda: "stopped" in running.panels.record_bar.text)
     assert "Recording stopped" in running.panels.toast.text()
-    assert engine.pilot.faults[-1].cause is Cause.DISK_FULL
+    assert engine.pilot.faults[-1].cause is Cause.RECORDING_STOPPED
     assert running.shown_tick is not None, "the rig goes on"
 
 

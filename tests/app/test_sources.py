@@ -13,6 +13,7 @@ from app.sources import own_stems, pictures
 from core.devices import DamagedStream
 from core.types import Frame
 from hardware.cameras.video_file import VideoFile
+from tests.core.session_data import record, tick_of
 
 
 def video(path: Path, frames: int = 4) -> Path:
@@ -62,6 +63,23 @@ def test_a_picture_is_called_by_its_real_stem(tmp_path: Path) -> None:
         ("b#1", ("b#1",)),
         ("v_000000", ("v_000000", "v")),
     ]
+
+
+def test_the_damaged_picture_of_a_session_is_a_problem_though_its_decoder_shows_something(tmp_path: Path) -> None:
+    session = record(tmp_path, [tick_of(index, 1000.0 + index / 30.0) for index in range(40)])
+    path = session / "video_0000.mkv"
+    data = bytearray(path.read_bytes())
+    with av.open(str(path)) as container:
+        packets = [packet for packet in container.demux() if packet.size]
+    at = bytes(data).index(bytes(packets[33]))
+    data[at + packets[33].size // 2] ^= 1
+    path.write_bytes(data)
+    found = list(pictures([path]))
+    assert len(found) == 40
+    assert next(place for place, one in enumerate(found) if one.image is None) == 33
+    assert found[33].problem == f"{path}: picture 33 is lost or damaged"
+    assert found[0].time_s == 0.0
+    assert found[1].stem == "video_0000_000001"
 
 
 def test_a_video_that_breaks_off_says_so_after_its_last_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

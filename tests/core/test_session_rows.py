@@ -19,7 +19,7 @@ from core.session.rows import light_tick, row_of
 from core.types import Command, Masks, Pose, PoseState, Reason, Refusal, Tick, Vector
 from tests.core.session_data import drive_of, full_scene, tick_of
 
-PLACE = {"row": 3, "video": 0, "pts_ms": 99}
+PLACE = {"row": 3, "video": 0, "pts_ms": 99, "dropped_rows": 0}
 
 
 def through_json(tick: Tick, drive: DriveView | None = None) -> RecordedRow:

@@ -28,6 +28,7 @@ from core.session.events import EventKind, event_of_target
 from core.session.files import SessionFiles, is_being_written
 from core.session.manifest import About, read_manifest, write_manifest
 from core.session.reader import SessionReader
+from core.session.record_status import faults_between
 from core.session.ring import EncodedFrame, Ring
 from core.session.video import FrameEncoder, Packet
 from core.session.writer import SessionWriter
@@ -191,6 +192,7 @@ def test_events_of_driving_and_the_mode_at_the_start_are_written(tmp_path: Path)
         writer.start()
         writer.put(tick_of(0, 1000.0), DriveView(1000.0, Mode.ADVISORY))
         writer.put(tick_of(1, 1000.1), drive_of(1000.1, Mode.ARMED))
+        writer.drive(drive_of(1000.1, Mode.ARMED))
         writer.event(EventKind.TARGET, "10, 20", {"xy": [10.0, 20.0]}, 1000.2)
         writer.stop("enough")
         wait_for(lambda: writer.status().saved is not None)
@@ -224,6 +226,95 @@ def test_driving_is_recorded_though_the_camera_gives_no_picture(tmp_path: Path) 
         (1000.5, EventKind.DISARM, "camera lost"),
         (1000.5, EventKind.FAULT, "camera lost"),
     ]
+
+
+def test_a_hold_shorter_than_a_picture_is_kept_though_its_news_come_late(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0), DriveView(1000.0, Mode.AUTONOMOUS))
+        writer.put(tick_of(1, 1000.066), DriveView(1000.06, Mode.AUTONOMOUS))
+        for view in (DriveView(1000.04, Mode.HOLD), DriveView(1000.06, Mode.AUTONOMOUS)):
+            writer.drive(view)
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        told = [(event.time_s, event.text) for event in reader.events if event.kind is EventKind.MODE]
+    assert told == [(1000.0, "AUTONOMOUS"), (1000.04, "HOLD"), (1000.06, "AUTONOMOUS")]
+
+
+def test_what_the_recorder_dropped_is_told_in_what_the_ring_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with writer_in(tmp_path, replace_config(ring_s=5.0)) as writer:
+        for tick in ticks(3):
+            writer.put(tick)
+        wait_for(lambda: writer.pictures_waiting == 0)
+        writer._dropped += 7
+        for tick in ticks(3, start=10):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().saved is not None)
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        assert [row.dropped_rows for place in range(len(reader)) if (row := reader.row(place))] == [0, 0, 0, 7, 7, 7]
+    assert read_manifest(session).counts.dropped == 7
+
+
+def test_saving_the_last_seconds_twice_or_of_nothing_stops_no_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    go = threading.Event()
+    close = SessionFiles.close
+
+    def slow(self: SessionFiles, ended: str, dropped: int) -> str:
+        go.wait(10.0)
+        return close(self, ended, dropped)
+
+    monkeypatch.setattr(SessionFiles, "close", slow)
+    with writer_in(tmp_path, replace_config(ring_s=5.0)) as writer:
+        writer.put(tick_of(0, 1000.0))
+        writer.put(tick_of(1, 1000.5))
+        wait_for(lambda: writer.status().ring_s > 0.0)
+        before = writer.status()
+        writer.save_last()
+        writer.save_last()
+        wait_for(lambda: writer.status().notices == 1)
+        assert writer.status().notice == "the last seconds are still being saved"
+        go.set()
+        wait_for(lambda: writer.status().saved is not None)
+        writer.set_about(About("LIVE", "bench"))
+        wait_for(lambda: writer.status().ring_s == 0.0)
+        writer.save_last()
+        wait_for(lambda: writer.status().notices == 2)
+        assert (writer.status().problem, faults_between(before, writer.status())) == ("", [])
+
+
+def test_a_recording_that_cannot_start_says_so_each_time(tmp_path: Path) -> None:
+    (tmp_path / "sessions").write_text("a file where the folder should be")
+    with writer_in(tmp_path / "sessions") as writer:
+        for count in (1, 2):
+            before = writer.status()
+            writer.start()
+            writer.put(tick_of(count, 1000.0 + count))
+            wait_for(lambda: writer.status().problems == count)  # noqa: B023
+            assert [fault.cause for fault in faults_between(before, writer.status())] == [Cause.RECORDING_STOPPED]
+
+
+def test_losses_between_two_sessions_are_not_the_second_ones(tmp_path: Path) -> None:
+    def with_lost(index: int, lost: int) -> Tick:
+        tick = tick_of(index, 1000.0 + index)
+        return replace(tick, frame=replace(tick.frame, lost=lost))
+
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(with_lost(0, 0))
+        writer.stop()
+        wait_for(lambda: writer.status().saved is not None)
+        writer.put(with_lost(1, 500))
+        writer.start()
+        writer.put(with_lost(2, 500))
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        assert EventKind.LOST not in {event.kind for event in reader.events}
 
 
 def test_nothing_is_written_before_start_and_after_stop(tmp_path: Path) -> None:
@@ -358,8 +449,8 @@ def test_last_seconds_that_were_saved_in_part_say_so(tmp_path: Path, monkeypatch
         for tick in ticks(50):
             writer.put(tick)
         writer.save_last()
-        wait_for(lambda: writer.status().problem)
-        assert writer.status().problem.startswith("of the last seconds only 20 of 50 frames were saved: ")
+        wait_for(lambda: writer.status().notice)
+        assert writer.status().notice.startswith("of the last seconds only 20 of 50 frames were saved: ")
         assert writer.status().saved is None
     (session,) = (path for path in tmp_path.iterdir() if path.is_dir())
     manifest = read_manifest(session)
@@ -392,7 +483,7 @@ def test_a_recording_and_the_last_seconds_share_one_encoder(tmp_path: Path) -> N
 def test_with_nothing_in_memory_saving_says_so(tmp_path: Path) -> None:
     with writer_in(tmp_path) as writer:
         writer.save_last()
-        wait_for(lambda: "nothing to save" in writer.status().problem)
+        wait_for(lambda: "nothing to save" in writer.status().notice)
 
 
 def test_the_ring_is_bounded_by_bytes_and_begins_at_a_key_picture() -> None:

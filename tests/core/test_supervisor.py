@@ -212,6 +212,7 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.VOLTAGE_SAGS: _bus(voltages_v=_joint(11.0, 0, 12.0)),
     Cause.DISK_LOW: _events(Fault(Cause.DISK_LOW)),
     Cause.DISK_FULL: _events(Fault(Cause.DISK_FULL)),
+    Cause.RECORDING_STOPPED: _events(Fault(Cause.RECORDING_STOPPED)),
     Cause.RECORDER_BEHIND: _events(Fault(Cause.RECORDER_BEHIND)),
 }
 
@@ -228,7 +229,7 @@ def test_every_refusal_of_perception_means_something() -> None:
 REACTIONS = {
     Reaction.WARN: {
         Cause.FRAMES_DROPPED, Cause.OUT_OF_ORDER, Cause.WARM, Cause.VOLTAGE_SAGS, Cause.DISK_LOW, Cause.DISK_FULL,
-        Cause.RECORDER_BEHIND,
+        Cause.RECORDING_STOPPED, Cause.RECORDER_BEHIND,
     },
     Reaction.STOP: {Cause.STOP_PRESSED, Cause.PORT_LOST, Cause.SERVO_ALERT, Cause.TRACKING},
     Reaction.HOLD: {

@@ -1,5 +1,6 @@
 """One contract for every camera that needs no device, and what is special to each."""
 
+import contextlib
 import itertools
 import os
 from collections.abc import Callable, Iterator
@@ -13,7 +14,8 @@ import numpy as np
 import pytest
 
 from core.config import TwinConfig
-from core.devices import Camera, DamagedStream, DeviceError, EndOfStream
+from core.devices import Camera, DamagedPicture, DamagedStream, DeviceError, EndOfStream
+from core.session.video_in import upright
 from core.types import Frame
 from hardware.cameras import pacing
 from hardware.cameras.image_folder import ImageFolder
@@ -144,12 +146,14 @@ def test_a_cut_video_gives_what_is_there(tmp_path: Path) -> None:
 
 
 def _ends(path: Path) -> tuple[int, EndOfStream]:
-    """How many frames come, and how they end."""
+    """How many frames come, damaged ones too, and how they end."""
     video = VideoFile(path, paced=False)
     video.open()
     count = 0
     with pytest.raises(EndOfStream) as end:
-        while video.read(0.0) is not None:
+        while True:
+            with contextlib.suppress(DamagedPicture):
+                assert video.read(0.0) is not None
             count += 1
     video.close()
     return count, end.value
@@ -188,6 +192,83 @@ def test_a_cut_video_that_knows_its_time_alone_says_so_when_much_is_lacking(tmp_
     assert not isinstance(_ends(path)[1], DamagedStream)
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     assert str(_ends(path)[1]).endswith(" of 3.0 s")
+
+
+def _h264(path: Path, frames: int = 40, broken: int | None = None, aspect: Fraction | None = None) -> Path:
+    """With a key picture every ten; one packet has other bytes than were written."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=30, options={"g": "10", "bf": "0", "sc_threshold": "0"})
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        if aspect is not None:
+            stream.sample_aspect_ratio = aspect
+        packets = []
+        for index in range(frames):
+            image = np.random.default_rng(index).integers(0, 255, (48, 64, 3), np.uint8)
+            packets += stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24"))
+        for index, packet in enumerate(packets + stream.encode()):
+            if index == broken:
+                data = bytes(packet)
+                other = av.Packet(data[:5] + bytes(value ^ 0x5A for value in data[5:]))
+                other.pts, other.dts, other.time_base, other.stream = packet.pts, packet.dts, packet.time_base, stream
+                container.mux(other)
+            else:
+                container.mux(packet)
+    return path
+
+
+def test_a_damaged_picture_and_what_builds_on_it_are_named_and_the_rest_goes_on(tmp_path: Path) -> None:
+    video = VideoFile(_h264(tmp_path / "v.mp4", broken=13), paced=False)
+    video.open()
+    whole: list[int] = []
+    damaged: list[str] = []
+    with pytest.raises(EndOfStream, match="end of the video"):
+        while True:
+            try:
+                frame = video.read(0.0)
+            except DamagedPicture as error:
+                damaged.append(str(error))
+            else:
+                assert frame is not None
+                whole.append(frame.index)
+    video.close()
+    assert whole == [*range(13), *range(20, 40)]
+    assert damaged == [f"{tmp_path / 'v.mp4'}: picture {index} is damaged" for index in range(13, 20)]
+
+
+def test_damaged_pictures_are_lost_to_a_window(tmp_path: Path) -> None:
+    video = VideoFile(_h264(tmp_path / "v.mp4", broken=13))
+    video.open()
+    lost: list[int] = []
+    with pytest.raises(EndOfStream):
+        while True:
+            if (frame := video.read(1.0)) is not None:
+                lost.append(frame.lost)
+    video.close()
+    assert (lost[0], lost[-1]) == (0, 7)
+
+
+def test_pixels_that_are_not_square_are_made_so(tmp_path: Path) -> None:
+    video = VideoFile(_h264(tmp_path / "v.mkv", 1, aspect=Fraction(3, 2)), paced=False)
+    video.open()
+    frame = video.read(0.0)
+    video.close()
+    assert frame is not None
+    assert frame.image.shape == (48, 96, 3)
+
+
+@pytest.mark.parametrize(("rotation", "turns"), [(0, 0), (-90, -1), (90, 1), (180, 2)])
+def test_a_video_that_was_taken_on_its_side_stands_upright(rotation: int, turns: int) -> None:
+    image = np.random.default_rng(0).integers(0, 255, (48, 64, 3), np.uint8)
+
+    class Frame:
+        def __init__(self) -> None:
+            self.rotation = rotation
+
+        def to_ndarray(self, format: str) -> np.ndarray:
+            assert format == "rgb24"
+            return image
+
+    assert np.array_equal(upright(Frame()), np.rot90(image, turns))  # type: ignore[arg-type]
 
 
 def test_a_trimmed_video_is_whole(tmp_path: Path) -> None:
