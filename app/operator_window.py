@@ -197,6 +197,8 @@ class OperatorWindow(WindowFrame):
         """Open the rig anew with another configuration; it may be a rig of another kind."""
         if kind_of(config.rig) is not kind_of(self._config.rig):
             self._kind = kind_of(config.rig)
+        self._thread.announce_engine()
+        self._desk.look()  # the last changes of the old rig belong to its session
         self._thread.end_engine()  # before the banner changes: nothing of the old rig is shown or recorded under it
         self._config = config
         self._show_kind()

@@ -289,8 +289,10 @@ def calibration_of(config: Config) -> CalibrationConfig | None:
 def scaled(config: Config, known: CalibrationConfig | None) -> Config:
     """The configuration with the measured scale in the place of ``policy.pursuit.pixels_per_mm``; unchanged without one for such
     pictures."""
-    camera = config.camera
-    if known is None or known.scale is None or not known.scale.fits((camera.width_px, camera.height_px)):
+    camera, twin = config.camera, config.twin
+    is_twin = config.rig.camera == "twin"
+    size = (twin.image_width_px, twin.image_height_px) if is_twin else (camera.width_px, camera.height_px)
+    if known is None or known.scale is None or not known.scale.fits(size):
         return config
     zoom = known.scale.working_px_per_mm(config.perception.working_size_px)
     pursuit = config.policy.pursuit.model_copy(update={"pixels_per_mm": zoom})

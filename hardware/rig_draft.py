@@ -15,6 +15,7 @@ from core.calibration.identify import Assignment, Finding, NotIdentified, assign
 from core.calibration.lens import BoardView, LensError, distort, fit_lens, straighten
 from core.calibration.look import HeadNotSeen
 from core.calibration.scale import scale_of_board, scale_of_clicks
+from core.calibration.steering import SteeringNotSeen
 from core.calibration_config import CalibrationConfig, LensConfig, ScaleConfig, SteeringConfig, ZeroConfig
 from core.config import Config
 from core.devices import DeviceError
@@ -68,7 +69,7 @@ class RigDraft:
         self.zeros: servo_wizard.Zeros | None = None
         self.notes: list[str] = []
         self._is_displaced = False
-        self._is_nudged = False
+        self._nudged: set[str] = set()
         self._head_px: Point | None = None
         self._begun_with = self._findings()
         bench.set_lens(self.lens)
@@ -254,7 +255,8 @@ class RigDraft:
         with self._moving():
             zeros = servo_wizard.find_zeros(self.bench.bench, self.servos, self.say)
         self.zeros, self.zero = zeros, None
-        self._is_displaced = self._is_nudged = False
+        self._is_displaced = False
+        self._nudged.clear()
         self._keep_zero()
         self.notes += zeros.problems
         return zeros
@@ -271,7 +273,7 @@ class RigDraft:
     @property
     def are_zeros_known(self) -> bool:
         """Whether all tendons are where they become taut: found so, or put there by hand."""
-        return self.zeros is not None and (not self.zeros.problems or self._is_nudged)
+        return self.zeros is not None and all(problem.partition(":")[0] in self._nudged for problem in self.zeros.problems)
 
     @contextmanager
     def _moving(self) -> Iterator[None]:
@@ -279,7 +281,8 @@ class RigDraft:
         try:
             yield
         except BaseException as error:
-            if isinstance(error, (HeadNotSeen, DeviceError)) and not isinstance(error, ServoError):
+            went_back = isinstance(error, (HeadNotSeen, SteeringNotSeen, DeviceError))
+            if went_back and not isinstance(error, ServoError):
                 raise  # the wires went back
             self.zero = self.zeros = None
             self._is_displaced = True
@@ -299,10 +302,11 @@ class RigDraft:
 
     def nudge(self, name: str, way_mm: float) -> None:
         """Tighten one tendon by so much, or let it go (negative), for somebody who watches."""
-        servo_wizard.nudge(self.bench.bench, self.servos, name, way_mm)
-        self.zero = None
-        self._is_nudged = True
-        self._keep_zero()
+        with self._moving():  # a wire that strains lets all of them go
+            servo_wizard.nudge(self.bench.bench, self.servos, name, way_mm)
+            self.zero = None
+            self._nudged.add(name)
+            self._keep_zero()
 
     @property
     def head_px(self) -> Point | None:

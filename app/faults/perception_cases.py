@@ -36,7 +36,7 @@ _SEEN, _NOT = np.float32(0.99), np.float32(0.01)
 @fault(
     11,
     "NaN or infinity from network or fit",
-    injected="one pose with theta = NaN; then the network gives NaN for good",
+    injected="one pose with theta = NaN; then the network gives NaN in a part of the picture for good",
     wanted="discarded: HOLD; three in a row: DISARM",
 )
 def not_finite(kit: Kit) -> Seen:
@@ -51,11 +51,18 @@ def not_finite(kit: Kit) -> Seen:
 
         bench.hooks.scene = spoil
         bench.until(lambda view: view.mode is Mode.AUTONOMOUS and left < -2, 1.0)
-        bench.hooks.masks = lambda vessel, robot: (vessel * np.float32(np.nan), robot)
+        bench.hooks.masks = lambda vessel, robot: (_spoilt(vessel), robot)
         bench.run(0.5)
         causes = Cause.NOT_FINITE, Cause.NOT_FINITE_REPEATED
         wanted = Wanted((Mode.HOLD, Mode.AUTONOMOUS, *_TO_ADVISORY), causes, Cause.NOT_FINITE_REPEATED, blank=True)
         return judge(bench, start, wanted)
+
+
+def _spoilt(probability: Probability) -> Probability:
+    """With numbers that are none in the middle, where geometry meets them."""
+    spoilt, (height, width) = probability.copy(), probability.shape
+    spoilt[height // 3 : 2 * height // 3, width // 4 : 3 * width // 4] = np.nan
+    return spoilt
 
 
 @fault(12, "head lost", injected="the robot's mask is empty", wanted="HOLD at the third frame, DISARM after 0.5 s")

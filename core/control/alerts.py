@@ -178,9 +178,21 @@ class AlertQueue:
 
 
 def raise_alerts(
-    queue: AlertQueue, raised: Iterable[tuple[AlertKey, str]], now_s: float, *, armed: bool
+    queue: AlertQueue,
+    raised: Iterable[tuple[AlertKey, str]],
+    now_s: float,
+    *,
+    armed: bool,
+    driving: bool = True,
+    changed: bool = False,
 ) -> tuple[AlertQueue, tuple[Alert, ...]]:
-    """Which of the `raised` lines, (key, detail) each, to show now. While not `armed` only a stop sounds.
+    """Which of the `raised` lines, (key, detail) each, to show now.
+
+    Parameters
+    ----------
+    armed : else only a stop sounds.
+    driving : whether the program drives, or did: else nothing is held, and nothing sounds as if it were.
+    changed : the mode has changed with them: what has ended a motion is told each time.
 
     Returns
     -------
@@ -193,10 +205,12 @@ def raise_alerts(
     for key, detail in raised:
         spec = ALERTS[key]
         # on a clock that went back the cooldown says nothing
-        if key in shown_s and 0.0 <= now_s - shown_s[key] < spec.cooldown_s:
+        is_told_again = changed and spec.priority >= Priority.HOLD
+        if not is_told_again and key in shown_s and 0.0 <= now_s - shown_s[key] < spec.cooldown_s:
             held_back[key] = held_back.get(key, 0) + 1
             continue
-        sound = spec.sound if armed or spec.priority is Priority.STOP else None
+        is_heard = armed and (driving or spec.priority is not Priority.HOLD)
+        sound = spec.sound if is_heard or spec.priority is Priority.STOP else None
         alerts.append(Alert(key, spec, detail, held_back.pop(key, 0), sound))
         shown_s[key] = now_s
     alerts.sort(key=lambda alert: -alert.spec.priority)

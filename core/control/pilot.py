@@ -155,7 +155,7 @@ class Pilot:
         self._inbox.forget_seen()
         self._inbox.post(Act.TAKE_BACK)  # in any mode: a hand-over may have been asked for since the last turn
         if self.view.mode in DRIVING_MODES:
-            self._raise([(Note.NEW_TARGET, "")], self._clock(), armed=True)
+            self._raise([(Note.NEW_TARGET, "")], self._clock())
 
     def jog(self, source: Hashable, jog: Jog) -> None:
         """How a control is held; to be repeated while it is, since its silence counts as let go."""
@@ -214,11 +214,11 @@ class Pilot:
         """Take in what was understood of a frame; returns the advice that may be shown."""
         with self._lock:
             forget, self._forget = self._forget, False
-            turns_back, blanked = self._turns_back, self._view.blanked
+            turns_back, blanked, followed = self._turns_back, self._view.blanked, self._view.mode is Mode.AUTONOMOUS
         if forget:
             self._policy.reset()
         sound = is_sound(scene)
-        advice = self._policy(scene, status) if sound else None
+        advice = self._policy(scene, status, followed=followed) if sound else None
         report = self._reports.report(frame, scene, advice, has_target=has_target, sound=sound)
         advice = advice if is_finite(advice) else None
         if turns_back and report.route is RouteState.BEHIND:
@@ -308,7 +308,7 @@ class Pilot:
             events.append(GateReport(kept_back.reason))
         if self._has_arrived(inputs.seen, now_s):
             events.append(Act.TAKE_BACK)
-            self._raise([(Note.REACHED, "")], now_s, armed=True)
+            self._raise([(Note.REACHED, "")], now_s)
 
     def _has_arrived(self, seen: Seen | None, now_s: float) -> bool:
         """The program drove to the destination and has rested there for a moment."""
@@ -383,12 +383,16 @@ class Pilot:
         is_tried = not jog.is_rest or decision.mode in DRIVING_MODES
         if kept_back is not None and decision.permitted is not None and is_tried and kept_back.reason not in _NOT_WORTH_A_WORD:
             raised.append((kept_back.reason, kept_back.detail))
-        self._raise(raised, now_s, armed=before.mode in ARMED_MODES)
+        self._raise(raised, now_s, before.mode, changed=decision.mode is not before.mode)
 
-    def _raise(self, raised: list[tuple[AlertKey, str]], now_s: float, *, armed: bool) -> None:
+    def _raise(
+        self, raised: list[tuple[AlertKey, str]], now_s: float, mode: Mode = Mode.ADVISORY, *, changed: bool = False
+    ) -> None:
+        """`mode` is the one until now."""
         if raised:
+            armed, driving = mode in ARMED_MODES, mode in DRIVING_MODES
             with self._lock:
-                self._queue, alerts = raise_alerts(self._queue, raised, now_s, armed=armed)
+                self._queue, alerts = raise_alerts(self._queue, raised, now_s, armed=armed, driving=driving, changed=changed)
                 self._alerts = [*self._alerts, *alerts][-_MOST_ALERTS:]
 
     def _look(

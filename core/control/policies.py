@@ -16,12 +16,14 @@ POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
 
 
 class Policy(Protocol):
-    """Advice for a scene; `status` adds what the robot itself reports. None: no advice, so nothing stale is shown or driven.
+    """Advice for a scene; `status` adds what the robot itself reports, `followed` tells whether its advice drives the robot.
+
+    None: no advice, so nothing stale is shown or driven.
 
     A policy may remember the frames before; ``reset`` makes it forget them.
     """
 
-    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None: ...
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None: ...
     def reset(self) -> None: ...
 
 
@@ -31,7 +33,7 @@ class Table:
     def __init__(self, config: Config) -> None:
         self._config = config.advice
 
-    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         return table_policy(scene, self._config)
 
     def reset(self) -> None: ...
@@ -43,7 +45,7 @@ class Push:
     def __init__(self, config: Config) -> None:
         self._advice = Advice(Speed.MODERATE, config.advice.moderate_mm_s, 0.0, "straight on")
 
-    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         return self._advice
 
     def reset(self) -> None: ...
@@ -62,7 +64,7 @@ class RandomOperator:
         self._until_s: float | None = None
         self._advice: Advice | None = None
 
-    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         if self._until_s is None or scene.captured_s >= self._until_s:
             words, rng = self._config, self._rng
             speeds = (words.slowest_mm_s, words.slow_mm_s, words.moderate_mm_s, words.fast_mm_s, -words.slow_mm_s)
@@ -80,10 +82,10 @@ class StopsAtTarget:
         self._policy = policy
         self._arrive_px = arrive_px
 
-    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         if scene.pose is not None and scene.route is not None and scene.route.length_px <= self._arrive_px:
             return Advice(Speed.STOP, 0.0, 0.0, "at the target")
-        return self._policy(scene, status)
+        return self._policy(scene, status, followed=followed)
 
     def reset(self) -> None:
         self._policy.reset()

@@ -12,7 +12,7 @@ from core.config import AdviceConfig
 from core.control.stall import BackOff, ContactLimit, Feed, Lean, Misses, Stall, Tries
 from core.control.way import Way, limited, look_ahead
 from core.policy_config import PursuitConfig
-from core.types import Advice, RobotStatus, Scene, Speed
+from core.types import Advice, Point, RobotStatus, Scene, Speed
 
 _UNFOLLOWED_S = 1.0
 """Who does not take the robot back for so long meant something else; if the reason is gone, the advice is, too."""
@@ -46,10 +46,16 @@ class Pursuit:
         self._back: BackOff | None = None
         self._behind_s = 0.0
         self._unfollowed_s = 0.0
+        self._still_s = 0.0
         self._is_stranded = False
+        self._stranded_for: Point | None = None
+        self._is_miss_counted = False
 
-    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
-        """Advice for a scene; `status` adds the contact force and how fast the robot is really fed. None when there is no pose."""
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
+        """Advice for a scene; `status` adds the contact force and how fast the robot is really fed. None when there is no pose.
+
+        Of a robot that does not do what is advised, although it is `followed`, more is concluded than of one that others drive.
+        """
         config = self._config
         ahead_px = config.look_ahead_px + config.look_ahead_s * max(0.0, self._speed_mm_s) * config.pixels_per_mm
         # Who missed a branch has turned too late: each new try begins to turn earlier.
@@ -72,7 +78,10 @@ class Pursuit:
         gave_up = self._back is None and (self._misses.count >= config.most_misses or self._tries.count >= config.most_tries)
         otherwise = fed_mm_s >= 0.0 if self._back is not None else gave_up and fed_mm_s != 0.0
         self._unfollowed_s = self._unfollowed_s + elapsed_s if otherwise else 0.0
-        self._is_stranded = self._is_stranded and way.behind and fed_mm_s == 0.0
+        still = followed and self._back is not None and way.behind and fed_mm_s == 0.0
+        self._still_s = self._still_s + elapsed_s if still else 0.0
+        self._is_stranded = self._is_stranded and way.behind and fed_mm_s == 0.0 and way.target == self._stranded_for
+        self._is_miss_counted = self._is_miss_counted and self._behind_s > 0.0
         rises = self._lean.rises(contact_n, fed_mm)
         return self._backing(way, contact_n, rises, stuck, fed_mm) or self._given_up(way) or self._forward(way, rises)
 
@@ -85,7 +94,9 @@ class Pursuit:
             if way.behind and self._behind_s < config.behind_s:
                 return self._advise(0.0, 0.0, "the way seems to lie behind the head: looking again")
             if way.behind:
-                self._misses.add(way)
+                if not self._is_miss_counted:  # the same one, whoever has driven meanwhile
+                    self._misses.add(way)
+                self._is_miss_counted = True
                 self._back = BackOff("the way to the target branches off behind the head", config.retry_mm)
             elif self._contact.exceeded(contact_n, rises, way.left_px):
                 self._tries.add(way)
@@ -96,8 +107,8 @@ class Pursuit:
                 self._back = BackOff("the robot is fed but its head does not move", max(config.back_off_mm, self._stall.lost_mm))
             else:
                 return None
-        if way.behind and self._unfollowed_s > _STRANDED_S:
-            self._back, self._unfollowed_s, self._is_stranded = None, 0.0, True
+        if self._still_s > _STRANDED_S:
+            self._back, self._still_s, self._is_stranded, self._stranded_for = None, 0.0, True, way.target
             return self._backing(way, contact_n, rises, stuck, fed_mm)
         is_unfollowed = self._unfollowed_s > _UNFOLLOWED_S and not way.behind
         if is_unfollowed or self._back.done(way.behind, -fed_mm):

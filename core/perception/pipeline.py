@@ -210,6 +210,8 @@ class Pipeline:
         """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
         with watch.stage("network"):
             vessel_probability, robot_probability, signature = recognise(sight.segment, [image])[0]
+        if (broken := quality.check_finite(vessel_probability, robot_probability)) is not None:
+            return _unseen(scene, vessel_probability, robot_probability, broken)
         with watch.stage("masks"):
             found = masks.clean(vessel_probability, robot_probability, self._config)
             if past is not None:
@@ -244,6 +246,8 @@ class Pipeline:
         config, (known, window) = self._config, chosen
         with watch.stage("network"):
             robot_probability = look(sight.segment, image, window, known.robot_probability)
+        if (broken := quality.check_finite(robot_probability)) is not None:
+            return _unseen(replace(scene, window=window), known.vessel_probability, robot_probability, broken)
         with watch.stage("masks"):
             robot = masks.clean_robot(robot_probability, config)
             robot = past.lookalikes.without(robot, image, scene.captured_s, window) if past is not None else robot
@@ -340,6 +344,11 @@ class Pipeline:
         if bare.refusal is not None or bare.path is None or bare.robot_vector is None or bare.vessel_vector is None:
             return None
         return bare.path.head, measure(bare.robot_vector, bare.vessel_vector, self._config.pose).theta_signed_deg
+
+
+def _unseen(scene: Scene, vessel: NDArray[np.float32], robot: NDArray[np.float32], why: Refusal) -> Scene:
+    """A scene in which nothing was found, with what the network gave: whoever drives has to hear of it."""
+    return replace(scene, masks=Masks(np.zeros(vessel.shape, bool), np.zeros(robot.shape, bool), vessel, robot), refusal=why)
 
 
 def _believed(found: Masks, config: PerceptionConfig) -> NDArray[np.float32]:

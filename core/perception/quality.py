@@ -86,6 +86,14 @@ def _of_the_largest(values: NDArray[np.float32], rank: int) -> float:
     return float(np.partition(kept, place)[place])
 
 
+def check_finite(*probabilities: NDArray[np.float32]) -> Refusal | None:
+    """LOW_CONFIDENCE, when the network gave what is no number: no geometry can be trusted with it."""
+    # One such value spoils the sum, which takes a tenth of the time of looking at each.
+    if math.isfinite(sum(float(np.sum(probability)) for probability in probabilities)):
+        return None
+    return Refusal(Reason.LOW_CONFIDENCE, "the network's output is not finite")
+
+
 def check_masks(masks: Masks) -> Refusal | None:
     """NO_VESSEL or NO_ROBOT, when nothing is left of a mask after cleaning, or what is left cannot be a robot."""
     for mask, probability, name, reason in (

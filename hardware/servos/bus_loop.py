@@ -17,6 +17,7 @@ from hardware.servos.bus_messages import BusPhase, BusStatus
 from hardware.servos.dynamixel import ServoBus
 from hardware.servos.errors import NotReady, PortLost, ServoError
 from hardware.servos.guard_end import GuardEnd, Request
+from hardware.servos.line import LATE_S
 from hardware.servos.status_block import MissingServo, ServoReading, ServoState
 from hardware.servos.stopwatch import Stopwatch
 
@@ -211,17 +212,27 @@ class BusLoop:
         if not self._bus.is_open:
             raise NotReady("not armed: the servo port is not open")
         if not self._guard.armed:
-            # A quiet bus was not read for long, and after a zero the last positions mean nothing. One servo's late answer is no
-            # reason to go by them all the same: the guard takes in whole sets only.
-            for _ in range(_LOOKS_BEFORE_ARMING):
-                self._look()
-                if not any(isinstance(reading, MissingServo) for reading in self._readings):
-                    break
+            self._look_before_arming()
         self._guard.check_arming()
         self._bus.arm()
         self._settle = 0
         self._owes_torque_off, self._off_problem = False, ""
         self._guard.set_armed(time.monotonic())
+
+    def _look_before_arming(self) -> None:
+        """Where all joints are. A quiet bus was not read for long, and after a zero the last positions mean nothing.
+
+        The guard takes in whole sets only, so one servo's late answer is no reason to go by the old ones. Raises NotReady.
+        """
+        for left in reversed(range(_LOOKS_BEFORE_ARMING)):
+            self._look()
+            missing = [reading for reading in self._readings if isinstance(reading, MissingServo)]
+            if not missing:
+                return
+            if left:
+                time.sleep(LATE_S)  # whoever was silent is not asked before
+        silent = ", ".join(f"{one.name} (id {one.id}): {one.reason}" for one in missing)
+        raise NotReady(f"not armed: {silent}; check its supply and cable")
 
     def _disarm(self) -> None:
         self._guard.disarm()

@@ -103,3 +103,15 @@ def test_the_queue_that_was_given_is_not_changed() -> None:
 
 def test_a_stop_on_the_screen_does_not_pass_for_an_emergency_stop() -> None:
     assert "power cut" in ALERTS[Cause.STOP_PRESSED].what_to_do
+
+
+def test_what_ends_a_motion_is_told_each_time_and_nothing_sounds_held_that_was_not() -> None:
+    stop, lost = [(Cause.STOP_PRESSED, "")], [(Cause.HEAD_LOST, "")]
+    queue, first = raise_alerts(AlertQueue(), stop, 20.0, armed=True, changed=True)
+    queue, again = raise_alerts(queue, stop, 24.0, armed=False, changed=True)
+    _, held_down = raise_alerts(queue, stop, 24.1, armed=False)
+    assert [alert.sound for alert in (*first, *again)] == ["stop", "stop"]
+    assert held_down == ()
+    queue, by_hand = raise_alerts(AlertQueue(), lost, 0.0, armed=True, driving=False)
+    _, driven = raise_alerts(queue, lost, 2.5, armed=True, changed=True)
+    assert [alert.sound for alert in (*by_hand, *driven)] == [None, "hold"]

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from core.config import Config, PerceptionConfig, TrackingConfig
+from core.control.frame_reports import is_sound
 from core.learning.model_file import ModelInfo
 from core.perception import steadiness
 from core.perception.evidence import WITHOUT_SWINGS, Evidence
@@ -304,6 +305,30 @@ def test_a_target_in_source_pixels_becomes_a_route(pipeline: Pipeline, network: 
     assert scene.route.points[-1] == pytest.approx((500, 408), abs=8.0)
     assert scene.route.points[0] == pytest.approx((300, 244), abs=12.0)
     assert pipeline(frame(size=size)).route is None
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("which", ["vessel", "robot"])
+def test_numbers_that_are_none_are_refused_before_any_geometry(
+    pipeline: Pipeline, network: DrawnNetwork, which: str, value: float
+) -> None:
+    """In a part of the picture, as a broken layer gives them; the rig must not end for them."""
+    whole = getattr(network, which)
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        broken = whole.copy()
+        if seed % 2:
+            broken[random.random(broken.shape) < 0.002] = value
+        else:
+            top, left = random.integers(150, 260), random.integers(100, 400)
+            broken[top : top + 60, left : left + 60] = value
+        setattr(network, which, broken)
+        for see in (pipeline, pipeline.perceive_single):
+            scene = see(frame(seed * FRAME_S))
+            assert str(scene.refusal) == "low confidence: the network's output is not finite"
+            assert not is_sound(scene)
+    setattr(network, which, whole)
+    assert pipeline(frame(1.0)).pose is not None
 
 
 def test_a_target_beside_the_vessel_leaves_the_pose_and_says_why(pipeline: Pipeline) -> None:

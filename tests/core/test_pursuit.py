@@ -256,6 +256,29 @@ def test_a_robot_that_cannot_go_back_is_said_to_be_until_it_moves() -> None:
     assert said[-1][0] < 0.0
 
 
+@pytest.mark.parametrize("fed_mm_s", [0.0, 2.0])
+def test_an_operator_who_does_not_go_back_is_neither_stranded_nor_misses_anything(fed_mm_s: float) -> None:
+    pursuit, said = Pursuit(CONFIG, WORDS), []
+    for k in range(300):
+        told = replace(status(None, 50.0 + 0.1 * k * fed_mm_s), time_s=0.1 * k)
+        advice = pursuit(scene_at(STRAIGHT, (200, 100), (20, 100), time_s=0.1 * k), told, followed=False)
+        assert advice is not None
+        said.append(advice.why)
+    assert set(said[20:]) == {"backing off: the way to the target branches off behind the head"}
+    assert pursuit._misses.count == 1
+
+
+def test_another_destination_is_another_matter_to_a_robot_that_could_not_go_back() -> None:
+    pursuit, said = Pursuit(CONFIG, WORDS), []
+    for k in range(100):
+        target = (20, 100) if k < 80 else (60, 100)
+        advice = pursuit(scene_at(STRAIGHT, (200, 100), target, time_s=0.1 * k), replace(status(None, 50.0), time_s=0.1 * k))
+        assert advice is not None
+        said.append(advice.why)
+    assert "cannot go back" in said[79]
+    assert "cannot go back" not in said[85]
+
+
 def test_a_head_that_presses_and_comes_no_farther_is_given_up_too() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
     said, _ = _blocked(pursuit, 60.0, CONFIG.contact_limit_n + 0.1)

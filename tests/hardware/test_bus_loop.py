@@ -215,7 +215,7 @@ def test_arming_looks_where_the_joints_are_now(paper: Paper) -> None:
     assert armed is None
 
 
-@pytest.mark.parametrize(("late", "told"), [(1, []), (2, []), (9, ["arm"])])
+@pytest.mark.parametrize(("late", "told"), [(1, []), (2, []), (9, [])])
 def test_arming_looks_again_where_an_answer_is_late(paper: Paper, late: int, told: list[str]) -> None:
     """The guard takes in whole sets only: else one late answer would let a joint outside its envelope be armed."""
     reads = 0
@@ -233,7 +233,7 @@ def test_arming_looks_again_where_an_answer_is_late(paper: Paper, late: int, tol
     paper.end.heartbeat = lambda: None  # type: ignore[attr-defined]
     paper.bus.read = read  # type: ignore[method-assign,assignment]
     paper.hear(request="arm")
-    assert paper.bus.told == told, "the driver itself asks all servos once more"
+    assert paper.bus.told == told, "where a joint is that does not answer, nobody knows"
     assert reads == min(late + 1, 3)
 
 

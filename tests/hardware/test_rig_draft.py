@@ -11,6 +11,7 @@ import pytest
 from core.calibration.board import BoardError, BoardSpec
 from core.calibration.identify import Assignment, Finding
 from core.calibration.look import HeadNotSeen
+from core.calibration.steering import SteeringNotSeen
 from core.calibration_config import ZeroConfig
 from core.config import Config
 from core.devices import DeviceError
@@ -18,7 +19,7 @@ from core.types import Image
 from hardware import servo_wizard
 from hardware.rig_draft import RigDraft
 from hardware.servo_wizard import Zeros
-from hardware.servos.probe import Stopped, StopSwitch
+from hardware.servos.probe import Stopped, StopSwitch, Strained
 from hardware.servos.search import FoundServo, FoundServos
 
 TICKS = (2048, 2049, 2050, 2051, 0, 1, 2)
@@ -84,16 +85,38 @@ def test_stopped_half_way_there_are_no_zeros_until_they_are_found_anew(
 def test_a_tendon_that_could_not_be_told_is_known_once_it_was_put_there_by_hand(
     draft: RigDraft, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(servo_wizard, "find_zeros", lambda *_: Zeros((0.0,) * 4, ("up: the head does not follow",)))
+    problems = ("up: the head does not follow", "down: the head does not follow")
+    monkeypatch.setattr(servo_wizard, "find_zeros", lambda *_: Zeros((0.0,) * 4, problems))
     monkeypatch.setattr(servo_wizard, "nudge", lambda *_: None)
     draft.find_zeros()
-    assert not draft.are_zeros_known
+    for name in ("right", "down"):
+        draft.nudge(name, 0.2)
+        assert not draft.are_zeros_known
+    assert draft.zero is None
     draft.nudge("up", 0.2)
     assert draft.are_zeros_known
     assert draft.zero is not None
     draft.find_zeros()
     assert not draft.are_zeros_known
     assert draft.zero is None
+
+
+def test_a_wire_that_strains_while_it_is_tightened_lets_all_go(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends(monkeypatch, "nudge", Strained("tendon up: 312 mA: let go"))
+    with pytest.raises(Strained):
+        draft.nudge("up", 0.1)
+    assert not draft.are_zeros_known
+    with pytest.raises(DeviceError, match="find the zeros anew"):
+        draft.learn_steering()
+
+
+def test_a_head_without_room_costs_no_zero(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends(monkeypatch, "learn_steering", SteeringNotSeen("feed the robot to a place where it has room"))
+    for _ in range(2):
+        with pytest.raises(SteeringNotSeen):
+            draft.learn_steering()
+    assert draft.zero is not None
+    assert draft.are_zeros_known
 
 
 def test_zeros_are_kept_without_the_steering(draft: RigDraft) -> None:
