@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,6 +40,8 @@ class WindowWatch(QObject):
         self._window = window
         self._seconds = seconds
         self._started_s = time.monotonic()
+        self._ended_s = self._started_s + seconds
+        self.ended_early = False
         self._process = psutil.Process()
         self.readings = _Readings()
         self._operator = ScriptedOperator(window, seconds / 2.0)
@@ -78,6 +81,11 @@ class WindowWatch(QObject):
             seen.bus_p99_ms = max(seen.bus_p99_ms, bus.times.period_p99_ms)
         seen.memory_mb.append((at_s, self._process.memory_info().rss / 2**20))
 
+    def end(self) -> None:
+        """The window has gone, perhaps before its time."""
+        now = time.monotonic()
+        self.ended_early, self._ended_s = now < self._ended_s, min(now, self._ended_s)
+
     def result(self) -> dict[str, Any]:
         """Pace since the first shown frame; memory at the end of the warm-up, at the end, and its growth per minute in between.
 
@@ -86,7 +94,7 @@ class WindowWatch(QObject):
         seen = self.readings
         if seen.first_shown_s is None:
             return {"shown_fps": 0.0}
-        lasted_s = max(self._started_s + self._seconds - seen.first_shown_s, 1e-9)
+        lasted_s = max(self._ended_s - seen.first_shown_s, 1e-9)
         steady = [(at, mb) for at, mb in seen.memory_mb if at >= _WARM_UP_S] or seen.memory_mb[-1:]
         span_min = max((steady[-1][0] - steady[0][0]) / 60.0, 1e-9)
         return {
@@ -106,7 +114,7 @@ class WindowWatch(QObject):
 
 def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     """Run the window on the twin for some seconds and tell how it went."""
-    from app.application import make_application
+    from app.application import make_application, quit_on_signal
     from app.window_command import make_window, window_config
 
     config, kind = window_config("twin", config_path, None)
@@ -116,5 +124,10 @@ def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     window.show()
     window.start()
     watch = WindowWatch(window, seconds)
+    signals = quit_on_signal(application)
     application.exec()
+    signals.stop()
+    watch.end()
+    if watch.ended_early:
+        sys.stderr.write(f"note: closed before its {seconds:g} s; the figures are of the time until then\n")
     return watch.result()

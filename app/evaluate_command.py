@@ -182,8 +182,8 @@ def _perceive_annotated(
     notes = []
     recorded = _recorded(annotations.parent, config, model) if as_recorded else None
     if recorded is not None:
-        config = recorded
-        notes.append("Each picture of the session was perceived by itself, with the settings that it was recorded with.")
+        config, told = recorded
+        notes += told
     rows, reasons, engine, missed = compared_rows(answers, images, config, study, str(annotations))
     source: dict[str, Any] = {
         "kind": "annotated by hand",
@@ -198,20 +198,22 @@ def _perceive_annotated(
     return _Study(rows, source, notes, agreement, interrupted=missed > 0)
 
 
-def _recorded(folder: Path, config: Config, model: str | None) -> Config | None:
-    """The configuration that a session was recorded with, with another `model` if given; None when the folder is no session."""
-    from app.play_command import recorded_config
+def _recorded(folder: Path, config: Config, model: str | None) -> tuple[Config, list[str]] | None:
+    """The configuration that a session was recorded with, with another `model` if given, and notes on it; None: no session."""
+    from app.replay_command import ReplayOptions, model_note, model_of, replay_config
     from core.session.manifest import MANIFEST, SessionError, read_manifest
 
     if not (folder / MANIFEST).is_file():
         return None
     try:
-        perception = recorded_config(read_manifest(folder)).perception
+        manifest = read_manifest(folder)
     except SessionError:  # damaged: then as now
         return None
-    if model is not None:
-        perception = perception.model_copy(update={"segmentation": perception.segmentation.model_copy(update={"model": model})})
-    return config.model_copy(update={"perception": perception})
+    as_recorded, notes = replay_config(manifest, ReplayOptions(folder, model))
+    if not notes:
+        notes = ["Each picture of the session was perceived by itself, with the settings that it was recorded with."]
+    notes += model_note(manifest, as_recorded, model_of(as_recorded)) if model is None else []
+    return config.model_copy(update={"perception": as_recorded.perception}), notes
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from app.language import tr
-from core.learning.model_file import INFO, MODELS, ModelError, ModelInfo, own_models, read_model_info
+from core.learning.model_file import MODELS, ModelError, ModelInfo, models_in, own_models, read_model_info
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +30,12 @@ def installed_models() -> list[InstalledModel]:
     """All models, shipped ones first; a damaged one is named as such. Hashes are checked when one is opened, not here."""
     found = []
     for place, is_own in ((MODELS, False), (own_models(), True)):
-        for path in sorted(place.glob(f"*/{INFO}")):
+        for folder in models_in(place):
             try:
-                info, problem = read_model_info(path.parent, verify=()), ""
+                info, problem = read_model_info(folder, verify=()), ""
             except ModelError as error:
                 info, problem = None, str(error)
-            found.append(InstalledModel(path.parent.name, path.parent, is_own, info, problem))
+            found.append(InstalledModel(folder.name, folder, is_own, info, problem))
     return found
 
 

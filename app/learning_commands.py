@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -130,6 +131,7 @@ def run_train(
     normalisation, `data` is shown as often as the frames made now.
     """
     looks = inputs.looks_to_make()
+    _end_like_an_interrupt()
 
     import torch
 
@@ -137,6 +139,7 @@ def run_train(
     from app.teaching import Classroom, second_plan, teach_second_look
     from core.learning.dataset import DatasetError, find_samples
     from core.learning.model_file import INFO, check_can_write, check_outside, model_folder
+    from core.learning.training import LoaderLost
     from hardware.twin.synth import SynthFolderError
 
     if second_look and outputs.held_out is not None:
@@ -157,6 +160,7 @@ def run_train(
             raise DatasetError(f"{read}: lies within --out, which is replaced now and then; choose another --out")
     folders = list(inputs.data)
     samples = [sample for folder in folders for sample in _samples_of(folder, inputs.without)]
+    _tell_left_out(folders)
     if inputs.synthetic:
         folder = out.with_name(out.name + "_frames")
         first = 1_000_000 + plan.seed % 10 * 100_000  # trials have the seeds from 2000000 on
@@ -197,12 +201,33 @@ def run_train(
                 teach_second_look(room, samples, then)
         except DatasetError as error:
             kept = f"; what was learnt before is kept, go on with --init {out}" if room.has_kept else ""
-            raise DatasetError(f"{error}; mend this frame, or remove it{kept}") from None
+            advice = "" if isinstance(error, LoaderLost) else "; mend this frame, or remove it"
+            raise DatasetError(f"{error}{advice}{kept}") from None
     steps, done = room.steps_total, room.steps_before
     if teller is not None:
         teller.tell({"model": str(out), "steps_done": done, "steps": steps})
     ending = "" if done == steps else f" (interrupted after {done} of {steps} steps; go on with --init {out})"
     _console.print(f"model written to {out}{ending}", soft_wrap=True)
+
+
+def _end_like_an_interrupt() -> None:
+    """A request to end, which a window sends, is Ctrl-C from the first moment on, before ``Interrupt`` hears it."""
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, end)
+
+
+def _tell_left_out(folders: Sequence[Path]) -> None:
+    """Pictures that nobody learns from, because a mask is missing or has another name."""
+    from core.learning.dataset import without_masks
+
+    if left_out := without_masks(folders):
+        first = left_out[0]
+        masks = f"masks/{first.stem}_vessel.png and masks/{first.stem}_robot.png"
+        sys.stderr.write(f"note: {len(left_out)} images without both masks are left out; the first: {first} needs {masks}\n")
 
 
 def _check_choices(
@@ -227,6 +252,12 @@ def _check_choices(
         raise DatasetError("--widen needs the normalisation that --remember keeps as it is; leave one of them out")
     if init is None and plan.focus_share > 0:
         raise DatasetError("--focus needs --init MODEL, which tells what is hard")
+    if second_look and plan.strip_share > 0:
+        raise DatasetError("--strips is for whole pictures; with --second-look leave it out")
+    if second_look and plan.crop != type(plan)().crop:
+        raise DatasetError("--crop is for whole pictures: the second look has windows of its own size; leave it out")
+    if plan.stop_after is not None and plan.stop_after >= plan.steps:
+        raise DatasetError(f"--stop-after {plan.stop_after} is no earlier than the end, --steps {plan.steps}; leave it out")
 
 
 def _never_seen(without: Sequence[str], init: Path | None) -> list[str]:
@@ -292,6 +323,7 @@ def _described(folder: Path) -> dict[str, Any]:
 
     plan = folder / "plan.json"
     try:
-        return {"name": folder.name} | (json.loads(plan.read_text(encoding="utf-8")) if plan.is_file() else {})
-    except (OSError, ValueError):
-        return {"name": folder.name}
+        told = json.loads(plan.read_text(encoding="utf-8")) if plan.is_file() else {}
+    except (OSError, ValueError, RecursionError):
+        told = {}
+    return {"name": folder.name} | (told if isinstance(told, dict) else {})

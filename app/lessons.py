@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 _EXAMPLES = 40
 """Training frames from which an eight-bit network learns its ranges."""
+_MOST_THREADS = 64
+"""As many as perception takes (``perception.segmentation.threads``)."""
 _SECOND_LOOK_CONVOLUTIONS = ((3, 3, 3, 4, 4), 2)
 """Of each encoder level, and of every decoder level: a faint tip is decided on the fine ones."""
 _SECOND_LOOK_WIDTHS = ((32, 64, 80, 128, 192), (32, 48, 48, 64))
@@ -66,6 +68,8 @@ class FrameLesson:
         self.network = load_network(model_folder(init))[0]
         self._second_look = second_look_of(model_folder(init))
         if deepen:
+            if self.network.shape.encoder_convolutions == default_shape().encoder_convolutions:
+                raise UserError(f"{init} is as deep already; leave --deepen out")
             images = [sample.load(WORKING_SIZE_PX)[0] for sample in _some(samples)]
             self.network = deepened(self.network, default_shape().encoder_convolutions, images)
 
@@ -76,7 +80,7 @@ class FrameLesson:
     def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> FrameCrops | None:
         if self._init is None or plan.focus_share == 0:
             return FrameCrops(self._samples, plan)
-        segment = open_segmenter(SegmentationConfig(model=self._init))
+        segment = open_segmenter(_seen_by(self._init, plan))
         found = []
         for sample in bar.track(self._samples, description="finding hard frames"):
             if interrupt.asked:
@@ -116,13 +120,13 @@ class SecondLookLesson:
         return WINDOW_PX, WINDOW_PX
 
     def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> NearCrops | None:
-        plain = open_segmenter(SegmentationConfig(model=self._init))
+        plain = open_segmenter(_seen_by(self._init, plan))
         # Streams look once at the whole, single pictures eight times: the second look has to get on with both. Two stand for
         # eight here, where thousands of frames are looked at.
         ways = (plain, Turned(plain, turns=(0,)))
         # What the second look still gets wrong is worth more of its time than what only the first one did, and what it has seen it
         # may look at once more.
-        near = open_second_look(SegmentationConfig(model=self._init)) if self._has_one else None
+        near = open_second_look(_seen_by(self._init, plan)) if self._has_one else None
         looks: dict[Path, Looks] = {}  # a sample that is shown more often is looked at once
         for index, sample in enumerate(bar.track(self._samples, description="first look")):
             if interrupt.asked:
@@ -148,6 +152,11 @@ class SecondLookLesson:
                 with suppress(DatasetError):  # as in _readable
                     examples.append(np.ascontiguousarray(self._shown[index][0].numpy().transpose(1, 2, 0)))
         return examples
+
+
+def _seen_by(model: str, plan: TrainingPlan) -> SegmentationConfig:
+    """How frames are looked at before the training, on as many threads as this has."""
+    return SegmentationConfig(model=model, threads=min(plan.threads, _MOST_THREADS))
 
 
 def has_second_look(model: str) -> bool:

@@ -72,7 +72,7 @@ def run_replay(options: ReplayOptions) -> None:
             if options.out is not None:
                 check_apart(options.jsonl, [options.out / name for name in _WRITTEN], "--jsonl", "--out")
         pipeline = open_pipeline(config.perception)
-        after = _model_of(config) | {"engine": pipeline.engine}
+        after = model_of(config) | {"engine": pipeline.engine}
         notes += model_note(reader.manifest, config, after)
         reader.wait()
         lines = stack.enter_context(LineOutput(options.jsonl)) if options.jsonl is not None else None
@@ -112,7 +112,7 @@ def replay_config(manifest: Manifest | None, options: ReplayOptions) -> tuple[Co
     return config, []
 
 
-def _model_of(config: Config) -> dict[str, Any]:
+def model_of(config: Config) -> dict[str, Any]:
     name = config.perception.segmentation.model
     info = read_model_info(model_folder(name), verify=())
     return {"name": name, "sha256": info.weights_sha256, "second_look_sha256": info.second_look_sha256}

@@ -61,6 +61,8 @@ class Classroom:
             return None
         if held_out is not None:
             held_out.look(lesson.network, 0)
+        if self.interrupt.asked:
+            return None
         task = self.bar.add_task("steps", total=plan.steps)
 
         def report(now: Report) -> None:

@@ -198,6 +198,8 @@ class TrainingJob(QObject):
             learning=frames.train_count,
             held_out=frames.held_out_count,
         )
+        if frames.problems:
+            counted += tr("; {count} pictures left out: a mask or the picture itself is missing", count=len(frames.problems))
         self._show(replace(self.state, phase=Phase.RUNNING, line=counted, frames=frames))
         child.start()
 

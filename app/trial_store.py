@@ -86,10 +86,11 @@ def _described(plan: TrialPlan) -> dict[str, Any]:
     settings["twin"].pop("appearance_seed")
     weights = None
     if not plan.true_masks:
-        from core.learning.model_file import model_folder
+        from core.learning.model_file import model_folder, read_model_info
 
-        folder = model_folder(plan.config.perception.segmentation.model)
-        weights = hashlib.sha256((folder / "model.json").read_bytes()).hexdigest()
+        info = read_model_info(model_folder(plan.config.perception.segmentation.model), verify=())
+        # What was measured of it decides nothing.
+        weights = hashlib.sha256(info.model_dump_json(exclude={"figures"}).encode()).hexdigest()
     return {
         "true_masks": plan.true_masks,
         "max_seconds": plan.max_seconds,

@@ -45,7 +45,7 @@ class Sample:
         """Image (H, W, 3) and both masks (H, W), scaled to `longer_side_px` if given; raises DatasetError."""
         try:
             image = read_image(self.image)
-            masks = [read_image(path)[:, :, 0] > 127 for path in (self.vessel, self.robot)]
+            masks = [_mask_of(path) for path in (self.vessel, self.robot)]
         except ImageError as error:
             raise DatasetError(str(error)) from None
         for path, mask in zip((self.vessel, self.robot), masks, strict=True):
@@ -57,6 +57,15 @@ class Sample:
         size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
         vessel, robot = (_resized(mask.astype(np.uint8) * 255, size) > 127 for mask in masks)
         return _resized(image, size), vessel, robot
+
+
+def _mask_of(path: Path) -> Mask:
+    """A mask as it is written: grey, 255 inside. Raises ImageError, and DatasetError for one that means something else."""
+    pixels = read_image(path)
+    mask = np.asarray(pixels[:, :, 0] > 127)
+    if pixels.any() and not mask.any():
+        raise DatasetError(f"{path}: nothing in it is brighter than 127; a mask is grey, 255 inside and 0 elsewhere")
+    return mask
 
 
 def _resized(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
@@ -85,6 +94,13 @@ def find_samples(folders: Sequence[Path]) -> list[Sample]:
             )
         samples += complete
     return samples
+
+
+def without_masks(folders: Sequence[Path]) -> list[Path]:
+    """Images that ``find_samples`` leaves out, because one of their masks is missing."""
+    labelled = {sample.image for sample in find_samples(folders)}
+    images = (path for folder in folders for path in sorted((folder / "images").glob("*")))
+    return [path for path in images if path.suffix.lower() in IMAGE_ENDINGS and path not in labelled]
 
 
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

@@ -108,8 +108,13 @@ def model_folder(name: str) -> Path:
                 return folder
         except OSError as error:
             raise ModelError(f"{folder}: cannot be read ({error.strerror})") from None
-    known = ", ".join(sorted(p.parent.name for place in (MODELS, own_models()) for p in place.glob(f"*/{INFO}"))) or "none"
+    known = ", ".join(sorted(found.name for place in (MODELS, own_models()) for found in models_in(place))) or "none"
     raise ModelError(f"no model {name!r} (looked for {INFO} in {MODELS / name} and {Path(name)}); installed models: {known}")
+
+
+def models_in(place: Path) -> list[Path]:
+    """Folders of models, by name; those that are being made (``_put_in_place``) are none yet."""
+    return sorted(path.parent for path in place.glob(f"*/{INFO}") if not path.parent.name.startswith("."))
 
 
 def read_model_info(folder: Path, *, verify: tuple[str, ...] = (WEIGHTS, ONNX)) -> ModelInfo:
@@ -144,9 +149,11 @@ def check_files(info: ModelInfo, folder: Path, names: Sequence[str]) -> None:
 
 
 def trained_without(folder: Path) -> tuple[str, ...]:
-    """The families of looks that its training left out, as ``model.json`` says. Raises ModelError."""
-    told = read_model_info(folder, verify=()).training.get("without")
-    return tuple(str(look) for look in told) if isinstance(told, list) else ()
+    """The families of looks that none of its networks was trained with, as their ``model.json`` say. Raises ModelError."""
+    networks = [folder, *([near] if (near := second_look_of(folder)) is not None else [])]
+    told = [read_model_info(one, verify=()).training.get("without") for one in networks]
+    left_out = [[str(look) for look in looks] if isinstance(looks, list) else [] for looks in told]
+    return tuple(look for look in left_out[0] if all(look in others for others in left_out))
 
 
 def second_look_of(folder: Path) -> Path | None:
@@ -165,8 +172,17 @@ def second_look_of(folder: Path) -> Path | None:
 def check_model(name: str) -> None:
     """Raise ModelError when the model of this name is gone or damaged, before anything begins that needs it."""
     folder = model_folder(name)
-    read_model_info(folder)
-    second_look_of(folder)
+    check_all_files(folder)
+    if (near := second_look_of(folder)) is not None:
+        check_all_files(near)
+
+
+def check_all_files(folder: Path) -> list[str]:
+    """The files of one network, all of them whole. Raises ModelError."""
+    info = read_model_info(folder, verify=())
+    files = [WEIGHTS, ONNX, *([ONNX_INT8] if info.onnx_int8_sha256 is not None else [])]
+    check_files(info, folder, files)
+    return [INFO, *files]
 
 
 def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:

@@ -113,13 +113,21 @@ def _learning_rate(plan: TrainingPlan, step: int) -> float:
 def _batches(
     crops: Dataset[tuple[Tensor, Tensor]], plan: TrainingPlan, failed: list[DatasetError]
 ) -> Iterator[tuple[Tensor, Tensor]]:
-    """All of them, or until a frame cannot be read: that goes into `failed`."""
+    """All of them, or until a frame cannot be read, or the process that reads them has gone: that goes into `failed`."""
     try:
         yield from DataLoader(crops, plan.batch, num_workers=plan.workers, prefetch_factor=4 if plan.workers else None)
     except DatasetError as error:
         # A worker's error comes with all of its traceback; the last line is what it says.
         said = str(error).strip().splitlines()[-1].removeprefix(f"{DatasetError.__module__}.DatasetError: ")
         failed.append(DatasetError(said))
+    except RuntimeError as error:
+        if "DataLoader worker" not in str(error):
+            raise
+        failed.append(LoaderLost("the process that reads the frames was ended from outside; is there too little memory?"))
+
+
+class LoaderLost(DatasetError):
+    """No frame is at fault: the process that reads them has gone."""
 
 
 def train(

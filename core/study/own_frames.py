@@ -39,7 +39,10 @@ def split_own_frames(
     out: Path,
     go_on: Callable[[], bool] = lambda: True,
 ) -> OwnFrames:
-    """Write both sets below `out`: every fifth image, two at least, is held out, spread evenly in the order of the images' names.
+    """Write both sets below `out`: a fifth of the images, two at least, is held out.
+
+    These are neighbours in the order of the images' names: pictures of one video or session are alike, and one between two that are
+    learnt from would tell of its neighbours only.
 
     Raises
     ------
@@ -53,8 +56,9 @@ def split_own_frames(
         have = f"{len(complete)} {'image has' if len(complete) == 1 else 'images have'} both a vessel and a robot mask"
         how = "draw them with keys 3 and 4, or take over and correct the model's with G"
         raise AnnotationError(f"{have}, and training needs {FEWEST}: {missing} more ({how})")
-    step = len(complete) / max(_FEWEST_HELD_OUT, len(complete) // _ONE_IN)
-    held_out = {complete[int((k + 0.5) * step)] for k in range(round(len(complete) / step))}
+    count = max(_FEWEST_HELD_OUT, len(complete) // _ONE_IN)
+    begin = (len(complete) - count) // 2
+    held_out = set(complete[begin : begin + count])
     counts, problems = {}, []
     for name in ("train", "held_out"):
         wanted = held_out if name == "held_out" else {image.sha256 for image in images} - held_out

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cv2
@@ -12,13 +11,9 @@ from numpy.typing import NDArray
 
 from core.config import PerceptionConfig, SegmentationConfig, TwinConfig
 from core.learning.model_file import (
-    INFO,
-    ONNX,
-    ONNX_INT8,
-    WEIGHTS,
     ModelError,
     ModelInfo,
-    check_files,
+    check_all_files,
     model_folder,
     read_model_info,
     second_look_of,
@@ -48,19 +43,12 @@ def check_model(name: str) -> Check:
     """The hashes of all files of a model."""
     try:
         folder = model_folder(name)
-        info, files = _checked(folder)
+        info, files = read_model_info(folder, verify=()), check_all_files(folder)
         if (near := second_look_of(folder)) is not None:
-            files += [f"{near.name}/{file}" for file in _checked(near)[1]]
+            files += [f"{near.name}/{file}" for file in check_all_files(near)]
     except ModelError as error:
         return Check("model", False, one_line(error), _advice(name))
     return Check("model", True, f"{info.name}: all {len(files)} files are whole (SHA-256)")
-
-
-def _checked(folder: Path) -> tuple[ModelInfo, list[str]]:
-    info = read_model_info(folder, verify=())
-    files = [WEIGHTS, ONNX, *([ONNX_INT8] if info.onnx_int8_sha256 is not None else [])]
-    check_files(info, folder, files)
-    return info, [INFO, *files]
 
 
 def check_self_test(config: PerceptionConfig) -> Check:

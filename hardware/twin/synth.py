@@ -13,6 +13,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -178,6 +179,11 @@ def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int],
         _write_missing(plan, workers, on_progress)
     except OSError as error:
         raise SynthError(f"{error.filename or plan.out}: cannot be written ({error.strerror}); free some space and go on") from None
+    except BrokenProcessPool:
+        raise SynthError(
+            f"{plan.out}: a process that makes frames was ended from outside (too little memory?); the same command goes on, "
+            "with fewer --workers perhaps"
+        ) from None
     return plan.count
 
 
