@@ -18,6 +18,7 @@ from app.training_dialog import TrainingDialog
 from app.training_source import collect_from_store
 from app.window_frame import WindowFrame
 from app.wording import refusal_text
+from core.study.annotation_records import TAKES_LINES
 from core.study.annotations import Annotation, Readout, turn_annotation
 from core.types import PoseState
 
@@ -329,9 +330,7 @@ class AnnotatorWindow(WindowFrame):
                 self.say(tr("The algorithm found no {what}", what=tr_text(target.value)))
         elif shown.robot or shown.vessel:
             self.panels.canvas.close_line()
-            self._desk.edit(
-                "take the algorithm's lines", replace(annotation, robot=shown.robot, vessel=shown.vessel, cannot_tell=False)
-            )
+            self._desk.edit(TAKES_LINES, replace(annotation, robot=shown.robot, vessel=shown.vessel, cannot_tell=False))
         else:
             self.say(tr("The algorithm has no lines here"))
         self.panels.bar.set_switch("H", False)

@@ -6,6 +6,7 @@ import json
 import os
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ from app.outputs import check_no_input
 from app.progress_lines import asked_teller
 from core.config import Config, choose_model, load_config
 from core.names import name_as_text, name_of
+from core.study.annotation_images import FoundImage
+from core.study.annotation_records import StoredAnnotation
 from core.study.annotation_report import write_measures
 from core.study.evaluation import EvaluationError, Measurement, angle_pairs, evaluate, read_measurements, write_measurements
 from core.study.paper_study import PAPER, against_paper, choose_images, measure_twice, wanted_images
@@ -184,6 +187,7 @@ def _perceive_annotated(
     if recorded is not None:
         config, told = recorded
         notes += told
+    notes += _how_answered(annotations, answers, images, study)
     rows, reasons, engine, missed = compared_rows(answers, images, config, study, str(annotations))
     source: dict[str, Any] = {
         "kind": "annotated by hand",
@@ -196,6 +200,26 @@ def _perceive_annotated(
     agreement = raters_agreement(answers, images, study, str(annotations), seed)
     source |= {"preset": preset, "engine": engine, "refused": reasons, "study": study}
     return _Study(rows, source, notes, agreement, interrupted=missed > 0)
+
+
+def _how_answered(
+    annotations: Path, answers: Sequence[StoredAnnotation], images: Sequence[FoundImage], study: str | None
+) -> list[str]:
+    """What a reader must know of the manual answers: which are not among the figures, and which began with the algorithm's own."""
+    from core.study.annotation_report import choose_study
+    from core.study.annotation_store import AnnotationStore
+
+    done, here = choose_study(answers, study, str(annotations)), {image.sha256 for image in images}
+    gone = len({one.key.sha256 for one in done} - here)
+    with AnnotationStore(annotations, read_only=True) as store:
+        taken = len([one for one in done if one.key.sha256 in here and one.key in store.taken_over()])
+    notes = [f"{gone} annotated images are not where they were; they are in none of the figures."] if gone else []
+    if taken:
+        notes.append(
+            f"{taken} of the manual answers began with the algorithm's own lines (key G): they agree with it the more for that. "
+            "A blind study (annotate --study NAME) hides them."
+        )
+    return notes
 
 
 def _recorded(folder: Path, config: Config, model: str | None) -> tuple[Config, list[str]] | None:

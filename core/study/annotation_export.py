@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -138,6 +139,14 @@ def _truth_rows(
     return rows
 
 
+def _names_of(images: Sequence[FoundImage]) -> dict[Path, str]:
+    """What files call the images: their names, or, where several have one, their places below the folder that has all of them."""
+    if len({image.path.name for image in images}) == len(images):
+        return {image.path: image.path.name for image in images}
+    common = Path(os.path.commonpath([image.path.absolute().parent for image in images]))
+    return {image.path: image.path.absolute().relative_to(common).as_posix() for image in images}
+
+
 def _vector(vector: Vector | None) -> dict[str, list[float]] | None:
     return None if vector is None else {name: list(getattr(vector, name)) for name in ("start", "center", "end")}
 
@@ -149,6 +158,7 @@ def export_coco(annotations: Iterable[StoredAnnotation], images: Sequence[FoundI
     """
     categories = {target: number for number, target in enumerate(MaskTarget, 1)}
     here = {image.sha256: image for image in images}
+    names = _names_of(images)
     content: dict[str, list[dict[str, Any]]] = {
         "images": [],
         "annotations": [],
@@ -159,7 +169,7 @@ def export_coco(annotations: Iterable[StoredAnnotation], images: Sequence[FoundI
             continue
         image, number = here[sha256], len(content["images"]) + 1
         width, height = image.record.size
-        content["images"].append({"id": number, "file_name": image.path.name, "width": width, "height": height})
+        content["images"].append({"id": number, "file_name": names[image.path], "width": width, "height": height})
         for piece in _pieces(one.content.masks):
             row = _coco_piece(piece, image.record.size)
             ids = {"id": len(content["annotations"]) + 1, "image_id": number, "category_id": categories[piece[0].target]}

@@ -83,8 +83,12 @@ def _image_of(
     path: Path, name: Any, width: Any, height: Any, by_name: Mapping[str, list[FoundImage]], problems: list[str]
 ) -> FoundImage | None:
     """The image that a file means, by its file name; None, and why, when it is not there or of another size."""
-    base = str(name).replace("\\", "/").rpartition("/")[2]
+    told = str(name).replace("\\", "/")
+    base = told.rpartition("/")[2]
     candidates = by_name.get(base, [])
+    if len(candidates) > 1:  # in several folders: the name may say in which
+        ending = "/" + told.lstrip("./")
+        candidates = [one for one in candidates if one.path.absolute().as_posix().endswith(ending)] or candidates
     if not candidates:
         problems.append(f"{path}: its image {base!r} is not among the given ones; left out")
         return None

@@ -56,6 +56,10 @@ class ItemKey:
     repeat: int = 1
 
 
+TAKES_LINES = "take the algorithm's lines"
+"""The edit by which a rater begins with the algorithm's answer."""
+
+
 @dataclass(frozen=True, slots=True)
 class StoredAnnotation:
     """An annotation as it was kept, with what was measured from it at that time."""

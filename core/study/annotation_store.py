@@ -24,6 +24,7 @@ from core.study.annotation_records import (
     ENTRY_COLUMNS,
     SCHEMA,
     SCHEMA_VERSION,
+    TAKES_LINES,
     ImageRecord,
     ItemKey,
     StoredAnnotation,
@@ -227,6 +228,15 @@ class AnnotationStore:
             except (ValueError, TypeError) as error:
                 self._note(f"{self.path.name}: edit {row[0]} of image {key.sha256[:12]} is damaged ({error}); left out")
         return History(entries, last=max((row[0] for row in rows if isinstance(row[0], int)), default=0))
+
+    def taken_over(self) -> set[ItemKey]:
+        """Annotations whose lines were the algorithm's at some time: what became of them agrees with it the more for that."""
+        rows = self._rows(
+            "SELECT DISTINCT i.sha256, a.study, a.rater, a.repeat FROM journal j JOIN annotations a ON a.id = j.annotation_id"
+            " JOIN images i ON i.id = a.image_id WHERE j.action = ?",
+            (TAKES_LINES,),
+        )
+        return {ItemKey(str(sha256), str(study), str(rater), int(repeat)) for sha256, study, rater, repeat in rows}
 
     def take_rows(
         self, columns: Mapping[str, Sequence[str]], tables: Mapping[str, Sequence[Sequence[Any]]], problems: list[str]
