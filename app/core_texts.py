@@ -60,6 +60,7 @@ FIXED = (
     "steadiness",
     # refusals
     "it has no pixels",
+    "the network's output is not finite",
     "no centerline beside the robot's head",
     "it reaches the image border at its head, which may be out of view",
     "both of its ends lie at the image border, so its head may be out of view",
@@ -169,6 +170,8 @@ FIXED = (
     "the robot's end has no direction: feed it farther into the vessel",
     "the head does not follow the wire: is it hung in, does the head lie free? Or zero it by eye",
     "a step was stopped half way and the wires are where it left them: find the zeros anew",
+    "the board is still in the picture: take it away, then go on",
+    "take the board away: the servos move when it is out of sight",
     "the head does not follow the wire's pull: pull it by hand, or zero it by eye",
     "the wire was taut before it was pulled: loosen it, then try again, or zero it by eye",
     "board",
@@ -196,6 +199,8 @@ FIXED = (
     "can't tell",
     "note",
     "take the algorithm's lines",
+    "nothing to save: no frames in memory yet",
+    "the last seconds are still being saved",
 )
 
 # A value called by one letter is a number; any other is a text that may be known itself.
@@ -204,8 +209,8 @@ TEMPLATES = (
     "{path}: end of the video",
     "{path}: cut short: {a} of {b} pictures",
     "{path}: cut short: {a} of {b} s",
-    "{path}: damaged after frame {a} ({why})",
-    "{path}: damaged before its first frame ({why})",
+    "{path}: damaged after frame {a} ({why}), and not read on",
+    "{path}: damaged before its first frame ({why}), and not read on",
     # refusals
     "99 % of it is darker than {a} (black below {b} of 255)",
     "99 % of it is brighter than {a} (overexposed above {b} of 255)",
@@ -258,6 +263,7 @@ TEMPLATES = (
     "{joint} by {a} mm (at most {b} mm)",
     "{joint} at {a} mm, sent to {b} mm",
     "restarting servo {a}",
+    "not armed: {why}; check its supply and cable",
     "not armed: {why}",
     "outside its envelope: {where}: switch the torque off and move it back by hand, or zero it again",
     # checks before driving
@@ -281,6 +287,8 @@ TEMPLATES = (
     "{port}: STOP is pressed, or its wire is broken",
     "what comes from {port} is no pedal's report",
     "{a} frames in {b} s",
+    "the last seconds were not saved: {why}",
+    "of the last seconds only {a} of {b} frames were saved: {why}",
     "{folder}: {a} GB free of {b} GB",
     "{a} as pinned",
     "{a} can be loaded",
@@ -298,6 +306,7 @@ TEMPLATES = (
     "lens: straight enough ({a} px at the border)",
     "scale: {a} mm/px, ±{b} %",
     "seven servos at {a} baud: {ids}",
+    "servos at several speeds: {ids} at {a} baud; {others}; set all seven to one",
     "steering: roll {a}°, way and heading {b}° from a right angle",
     "servo {a}: {b} mm both ways",
     "servo {a}: nothing clear was seen",

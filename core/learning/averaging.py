@@ -49,6 +49,7 @@ def average_models(folders: Sequence[Path], out: Path) -> None:
         if not lacking:
             second = Path(scratch) / SECOND_LOOK
             network, of_it = _mean_of([look for look in near if look is not None])
+            of_it |= {"without": never} if never else {}
             save_model(network, second, training=of_it, figures={})
         save_model(first, out, training=told, figures={}, second_look=second)
 

@@ -797,6 +797,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the network's output is not finite</source>
+        <translation>网络输出含有非有限数值</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>no centerline beside the robot's head</source>
         <translation>机器人头端旁没有中心线</translation>
     </message>
@@ -1312,6 +1317,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the board is still in the picture: take it away, then go on</source>
+        <translation>标定板仍在画面中：请移开标定板，然后继续</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>take the board away: the servos move when it is out of sight</source>
+        <translation>请移开标定板：看不到标定板后舵机才会动作</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>the head does not follow the wire's pull: pull it by hand, or zero it by eye</source>
         <translation>头端不跟随驱动丝的牵拉：用手拉，或者目测归零</translation>
     </message>
@@ -1432,6 +1447,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>nothing to save: no frames in memory yet</source>
+        <translation>没有可保存的内容：内存中还没有帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the last seconds are still being saved</source>
+        <translation>最近几秒仍在保存中</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>the library of RealSense cameras cannot be used: {problem}</source>
         <translation>无法使用 RealSense 相机的库：{problem}</translation>
     </message>
@@ -1452,13 +1477,13 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>{path}: damaged after frame {a} ({why})</source>
-        <translation>{path}：第 {a} 帧之后损坏（{why}）</translation>
+        <source>{path}: damaged after frame {a} ({why}), and not read on</source>
+        <translation>{path}：第 {a} 帧之后损坏（{why}），未继续读取</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>{path}: damaged before its first frame ({why})</source>
-        <translation>{path}：第一帧之前已损坏（{why}）</translation>
+        <source>{path}: damaged before its first frame ({why}), and not read on</source>
+        <translation>{path}：第一帧之前已损坏（{why}），未继续读取</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -1707,6 +1732,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>not armed: {why}; check its supply and cable</source>
+        <translation>未待命：{why}；请检查其供电和电缆</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>not armed: {why}</source>
         <translation>未待命：{why}</translation>
     </message>
@@ -1817,6 +1847,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the last seconds were not saved: {why}</source>
+        <translation>最近几秒未能保存：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>of the last seconds only {a} of {b} frames were saved: {why}</source>
+        <translation>最近几秒只保存了 {b} 帧中的 {a} 帧：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>{folder}: {a} GB free of {b} GB</source>
         <translation>{folder}：{b} GB 中剩余 {a} GB</translation>
     </message>
@@ -1894,6 +1934,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>seven servos at {a} baud: {ids}</source>
         <translation>{a} 波特，七个舵机：{ids}</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>servos at several speeds: {ids} at {a} baud; {others}; set all seven to one</source>
+        <translation>舵机波特率不一致：{ids} 为 {a} baud；{others}；请将七个舵机设为同一波特率</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -5150,6 +5195,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/training_job.py"/>
+        <source>; {count} pictures left out: a mask or the picture itself is missing</source>
+        <translation>；略去 {count} 张图片：缺少掩膜或图片本身</translation>
+    </message>
+    <message>
+        <location filename="../../app/training_job.py"/>
         <source> after {done} of {steps} steps</source>
         <translation>（{steps} 步中完成 {done} 步）</translation>
     </message>
@@ -6515,11 +6565,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/record_bar.py"/>
-        <source>stopped: disk?</source>
-        <translation>已停：磁盘？</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
         <source>Recording</source>
         <translation>录制</translation>
     </message>
@@ -6527,6 +6572,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/record_bar.py"/>
         <source>{count} dropped</source>
         <translation>丢弃 {count} 帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/record_bar.py"/>
+        <source>stopped: disk full</source>
+        <translation>已停：磁盘已满</translation>
     </message>
     <message>
         <location filename="../../app/widgets/recorded_plate.py"/>
@@ -7036,6 +7086,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/wizard_camera.py"/>
         <source>There is a rig {name}: saving replaces it, and keeps the older one beside it.</source>
         <translation>已有装置 {name}：保存会替换它，旧的保留在旁边。</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_camera.py"/>
+        <source>Open the camera anew and lose what was found?</source>
+        <translation>重新打开相机并丢弃已找到的结果？</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/wizard_camera.py"/>
+        <source>Open</source>
+        <translation>打开</translation>
     </message>
     <message>
         <location filename="../../app/widgets/wizard_motion.py"/>
@@ -8149,6 +8209,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>recording stopped</source>
+        <translation>录制已停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>recorder drops frames</source>
         <translation>录制器丢帧</translation>
     </message>
@@ -8771,6 +8836,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>make room and record again; driving goes on</source>
         <translation>腾出空间后重新录制；驾驶继续</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>The recording stopped</source>
+        <translation>录制已停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>do what it says and record again; driving goes on</source>
+        <translation>按提示处理后重新录制；驱动继续</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

@@ -193,6 +193,10 @@ def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> Non
         (("--init", "default", "--widen"), "--widen is for the second look; give --second-look too"),
         (("--init", "default", "--second-look", "--widen", "--remember", "4"), "--widen needs the normalisation that --remember"),
         (("--focus", "0.5"), "--focus needs --init MODEL"),
+        (("--init", "default", "--deepen"), "default is as deep already; leave --deepen out"),
+        (("--init", "default", "--second-look", "--strips", "0.2"), "--strips is for whole pictures"),
+        (("--init", "default", "--second-look", "--crop", "384"), "--crop is for whole pictures"),
+        (("--steps", "10", "--stop-after", "10"), "--stop-after 10 is no earlier than the end, --steps 10"),
         (("--held-out", "{set}"), "is trained on, so that it cannot judge"),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,22 @@ def test_coco_goes_out_and_comes_back(image: FoundImage, tmp_path: Path) -> None
         assert np.array_equal(fill(back.content.masks, target, SIZE), fill(masks, target, SIZE))
     with pytest.raises(AnnotationError, match="is there already"):
         export_coco([stored(with_masks(*masks))], [image], out)
+
+
+def test_coco_tells_images_of_one_name_apart(image: FoundImage, tmp_path: Path) -> None:
+    images = []
+    for number, folder in enumerate(("monday", "tuesday")):
+        (tmp_path / folder).mkdir()
+        path = tmp_path / folder / "frame.png"
+        cv2.imwrite(str(path), np.full((48, 64, 3), 90 + number, np.uint8))
+        images.append(FoundImage(path, ImageRecord(f"{number}" * 64, path.name, *SIZE)))
+    answers = [replace(stored(with_masks(VESSEL_BOX)), key=ItemKey(one.sha256, "", "a", 1)) for one in images]
+    assert export_coco(answers, images, tmp_path / "coco.json") == 2
+    content = json.loads((tmp_path / "coco.json").read_text())
+    assert [one["file_name"] for one in content["images"]] == ["monday/frame.png", "tuesday/frame.png"]
+    back, problems = read_files([tmp_path / "coco.json"], images)
+    assert problems == []
+    assert [one.image for one in back] == images
 
 
 def shoelace(points: np.ndarray) -> float:

@@ -49,7 +49,8 @@ def models(tmp_path: Path) -> list[Path]:
     folders = [tmp_path / "one", tmp_path / "other"]
     for seed, (folder, without) in enumerate(zip(folders, (["subtraction", "backlit"], ["backlit"]), strict=True)):
         save_model(network(seed), folder, training={"without": without}, figures={}, examples=[PICTURE])
-        save_with_second_look(folder, network(10 + seed, replace(TINY, inputs=5)), folder, training={}, figures={})
+        near = network(10 + seed, replace(TINY, inputs=5))
+        save_with_second_look(folder, near, folder, training={"without": without}, figures={})
     return folders
 
 
@@ -89,6 +90,15 @@ def test_it_opens_in_fp32_and_says_whose_mean_it_is(models: list[Path], tmp_path
         assert np.abs(found - expected).mean() < 0.003, "what perception runs is the mean, too"
         assert np.abs(found - of_one).mean() > 0.03
     assert open_second_look(config) is not None
+
+
+def test_a_look_that_the_second_look_has_seen_is_not_left_out(models: list[Path], tmp_path: Path) -> None:
+    near = network(20, replace(TINY, inputs=5))
+    save_with_second_look(models[0], near, tmp_path / "seen", training={"without": ["subtraction"]}, figures={})
+    assert trained_without(models[0]) == ("subtraction", "backlit")
+    assert trained_without(tmp_path / "seen") == ("subtraction",)
+    save_with_second_look(models[0], near, tmp_path / "all", training={}, figures={})
+    assert trained_without(tmp_path / "all") == ()
 
 
 def test_the_mean_of_equals_is_the_same_to_the_last_bit(models: list[Path], tmp_path: Path) -> None:

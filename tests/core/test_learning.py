@@ -1,8 +1,10 @@
 """Data set layout, augmentation and the training loop on a toy task."""
 
 import errno
+import itertools
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 
 from core.images import read_image
+from core.learning import training
 from core.learning.augment import random_clutter, random_crop, random_look, with_strips
 from core.learning.crops import FrameCrops, _nearness
 from core.learning.dataset import (
@@ -20,11 +23,12 @@ from core.learning.dataset import (
     find_samples,
     leave_out_looks,
     read_truth,
+    without_masks,
     write_mask,
     write_png,
 )
 from core.learning.optimizer import make_optimizers, orthogonalised
-from core.learning.training import Progress, TrainingPlan, computes_in_bf16, loss_of, train
+from core.learning.training import LoaderLost, Progress, TrainingPlan, computes_in_bf16, loss_of, train
 from core.perception.unet import DualUNet, UNetShape
 
 
@@ -73,6 +77,25 @@ def test_a_mask_of_another_size_is_named(tmp_path: Path) -> None:
     write_mask(folder / "masks" / "000_robot.png", np.zeros((5, 5), bool))
     with pytest.raises(DatasetError, match=r"000_robot.png: 5x5, but its image is 128x96"):
         find_samples([folder])[0].load()
+
+
+@pytest.mark.parametrize("value", [1, (0, 255, 0)])
+def test_a_mask_that_means_something_else_is_named_and_not_taken_for_empty(tmp_path: Path, value: object) -> None:
+    folder = _toy_set(tmp_path / "set", 1)
+    labels = np.zeros((96, 128, 3), np.uint8)
+    labels[20:40, 30:60] = value
+    cv2.imwrite(str(folder / "masks" / "000_vessel.png"), labels)
+    with pytest.raises(DatasetError, match=r"000_vessel\.png: nothing in it is brighter than 127; a mask is grey, 255 inside"):
+        find_samples([folder])[0].load()
+    cv2.imwrite(str(folder / "masks" / "000_vessel.png"), np.zeros((96, 128), np.uint8))
+    assert not find_samples([folder])[0].load()[1].any(), "a picture without a vessel"
+
+
+def test_images_without_both_masks_are_told(tmp_path: Path) -> None:
+    folder = _toy_set(tmp_path / "set", 3)
+    (folder / "masks" / "001_robot.png").rename(folder / "masks" / "001_robot.jpg")
+    assert [path.name for path in without_masks([folder])] == ["001.png"]
+    assert len(find_samples([folder])) == 2
 
 
 def test_truth_skips_a_cut_last_line_and_names_any_other(tmp_path: Path) -> None:
@@ -288,6 +311,23 @@ def test_a_frame_that_cannot_be_read_is_one_line_and_what_was_learnt_is_kept(tmp
     assert str(raised.value).startswith(str(cut))
     assert len(last) == 1
     assert 0 < last[0] < 30
+
+
+def test_a_reader_that_is_ended_from_outside_is_one_line_and_what_was_learnt_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loader = training.DataLoader
+
+    def killed(*args: object, **options: object) -> Iterator[object]:
+        yield from itertools.islice(loader(*args, **options), 4)
+        raise RuntimeError("DataLoader worker (pid 4711) is killed by signal: Killed.")
+
+    monkeypatch.setattr(training, "DataLoader", killed)
+    last: list[int] = []
+    with pytest.raises(LoaderLost, match="was ended from outside; is there too little memory") as raised:
+        _toy_training(_toy_set(tmp_path / "set", 4), 9, on_last=lambda _n, step: last.append(step))
+    assert last == [4]
+    assert len(str(raised.value).splitlines()) == 1
 
 
 def test_the_robots_ends_are_told_where_they_count_for_more(tmp_path: Path) -> None:

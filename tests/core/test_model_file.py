@@ -22,10 +22,13 @@ from core.learning.model_file import (
     ModelError,
     changed,
     check_files,
+    check_model,
     load_network,
     model_folder,
+    models_in,
     read_model_info,
     save_model,
+    save_with_second_look,
     sha256_of,
     write_figures,
 )
@@ -87,6 +90,22 @@ def test_a_damaged_manifest_is_one_clear_error(model: Path, text: str) -> None:
     with pytest.raises(ModelError, match="damaged") as caught:
         read_model_info(model)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", [WEIGHTS, ONNX, f"{SECOND_LOOK}/{WEIGHTS}", f"{SECOND_LOOK}/{ONNX}"])
+def test_a_model_is_checked_whole_before_anything_begins_with_it(model: Path, tmp_path: Path, name: str) -> None:
+    near = DualUNet(UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 5, 2)).eval()
+    save_with_second_look(model, near, tmp_path / "both", training={}, figures={})
+    check_model(str(tmp_path / "both"))
+    file = tmp_path / "both" / name
+    file.write_bytes(file.read_bytes()[:-1])
+    with pytest.raises(ModelError, match="the file is cut or damaged"):
+        check_model(str(tmp_path / "both"))
+
+
+def test_what_is_being_made_is_no_model_yet(model: Path) -> None:
+    shutil.copytree(model, model.with_name(".tiny-ab12"))
+    assert models_in(model.parent) == [model]
 
 
 def test_weights_of_another_shape_are_refused(model: Path) -> None:

@@ -1,6 +1,8 @@
 """Labelled sets from the twin: complete, repeatable, continued after an interruption, disjoint by seed."""
 
 import os
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
@@ -55,6 +57,17 @@ def test_an_interrupted_set_goes_on_and_keeps_what_is_there(small_set: SynthPlan
     write_set(small_set)
     assert written == [0]
     assert (small_set.out / "images" / "000001.png").read_bytes() == before
+
+
+def test_a_process_that_is_ended_from_outside_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise BrokenProcessPool("A process in the process pool was terminated abruptly")
+
+    monkeypatch.setattr(synth, "as_completed", broken)
+    monkeypatch.setattr(synth, "ProcessPoolExecutor", lambda *_args, **_options: ThreadPoolExecutor(1))
+    monkeypatch.setattr(synth, "_write_episode", lambda *_: 0)
+    with pytest.raises(SynthError, match=r"was ended from outside .*; the same command goes on, with fewer --workers"):
+        write_set(SynthPlan(tmp_path / "set", 4, 5, (160, 120), None, None), workers=2)
 
 
 def test_what_a_killed_run_left_is_removed(small_set: SynthPlan) -> None:
