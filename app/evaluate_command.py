@@ -213,10 +213,10 @@ def _how_answered(
     gone = len({one.key.sha256 for one in done} - here)
     with AnnotationStore(annotations, read_only=True) as store:
         taken = len([one for one in done if one.key.sha256 in here and one.key in store.taken_over()])
-    notes = [f"{gone} annotated images are not where they were; they are in none of the figures."] if gone else []
+    notes = [f"Of the annotated images {gone} are not where they were; they are in none of the figures."] if gone else []
     if taken:
         notes.append(
-            f"{taken} of the manual answers began with the algorithm's own lines (key G): they agree with it the more for that. "
+            f"Of the manual answers {taken} began with the algorithm's own lines (key G): they agree with it the more for that. "
             "A blind study (annotate --study NAME) hides them."
         )
     return notes

@@ -436,12 +436,15 @@ def test_a_study_needs_images_annotated_by_hand(paper_csv: Path, tmp_path: Path)
 
 
 def test_a_study_goes_before_the_truth_of_its_set(tmp_path: Path) -> None:
-    images = [tmp_path / f"frame_{index}.png" for index in range(2)]
+    images = [tmp_path / f"frame_{index}.png" for index in range(3)]
     for index, image in enumerate(images):
         write_png(image, tube(index)[0])
-    measure(tmp_path / "annotations.lumenpilot.sqlite", images, [0.0, 10.0], study="main")
+    measure(tmp_path / "annotations.lumenpilot.sqlite", images, [0.0, 10.0, 5.0], study="main")
+    images[2].unlink()
     (tmp_path / "truth.jsonl").write_text("")
-    assert evaluate(tmp_path, out=tmp_path / "out", study_name="main")["source"]["kind"] == "annotated by hand"
+    result = evaluate(tmp_path, out=tmp_path / "out", study_name="main")
+    assert result["source"]["kind"] == "annotated by hand"
+    assert result["notes"] == ["Of the annotated images 1 are not where they were; they are in none of the figures."]
     with pytest.raises(UserError, match="not a labelled set"):
         evaluate(tmp_path, out=tmp_path / "out")
 

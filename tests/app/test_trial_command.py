@@ -14,10 +14,11 @@ from typing import Any
 
 import pytest
 
-from app import trial_command
+from app import trial_command, trial_store
 from app.trial_command import TrialError, parse_policies, parse_seeds, run_one, run_trials
 from app.trial_report import summary_rows
 from core.config import Config
+from core.learning.model_file import model_folder
 from core.study.trial import Measure, Row, TrialLog, summarise, trial_row
 from hardware.twin.trial import TrialPlan
 
@@ -254,3 +255,17 @@ def test_errors_are_one_line_and_exit_code_2() -> None:
         assert done.stdout == ""
         assert text in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_figures_that_are_stored_meanwhile_change_no_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`benchmark --accuracy --store` between two calls must not cut a campaign of hours off."""
+    manifest = tmp_path / "model.json"
+    manifest.write_bytes((model_folder("default") / "model.json").read_bytes())
+    monkeypatch.setattr("core.learning.model_file.model_folder", lambda _name: tmp_path)
+    plan = TrialPlan(Config())
+    before = trial_store._described(plan)
+    told = json.loads(manifest.read_text())
+    manifest.write_text(json.dumps(told | {"figures": {"frames": 1}}))
+    assert trial_store._described(plan) == before
+    manifest.write_text(json.dumps(told | {"weights_sha256": "0" * 64}))
+    assert trial_store._described(plan) != before

@@ -20,7 +20,7 @@ from core.errors import UserError
 from core.learning.dataset import write_png
 from core.study.annotation_history import History
 from core.study.annotation_images import find_images
-from core.study.annotation_records import ImageRecord, ItemKey
+from core.study.annotation_records import TAKES_LINES, ImageRecord, ItemKey
 from core.study.annotation_salvage import salvage
 from core.study.annotation_store import AnnotationStore
 from core.study.annotations import Annotation, AnnotationError, View, measure_lines
@@ -71,6 +71,18 @@ def test_raters_studies_and_repeats_are_kept_apart(tmp_path: Path) -> None:
         assert {one.key: one.content.note for one in store.annotations()} == {key: str(k) for k, key in enumerate(keys)}
         assert [one.key for one in store.annotations("pilot", "ann")] == keys[2:]
         assert store.studies() == [("", "ann"), ("", "bob"), ("pilot", "ann")]
+
+
+def test_answers_that_began_with_the_algorithms_are_known(tmp_path: Path) -> None:
+    other = ItemKey(SHA, "", "bob")
+    with known(tmp_path / "a.sqlite") as store:
+        save(store, History(), DRAWN, other)
+        history = History()
+        entry = history.edit(TAKES_LINES, DRAWN)
+        assert entry is not None
+        store.save(KEY, View.AS_IS, entry, DRAWN, measure_lines(DRAWN, (640, 480), PerceptionConfig()), 1.0)
+        save(store, history, Annotation(DRAWN.robot, DRAWN.vessel, PoseState.C))
+        assert store.taken_over() == {KEY}
 
 
 def test_a_second_window_is_told_and_the_file_is_free_after_closing(tmp_path: Path) -> None:
