@@ -209,6 +209,8 @@ def calibration_lines(rig: RigFile) -> list[str]:
         lines.append(text)
     servos = ", ".join(f"{tr_text(joint.name)} {'+' if joint.sign > 0 else '-'}{joint.id}" for joint in rig.servos.joints)
     lines.append(tr("servos (direction and id): {servos}", servos=servos))
+    ways = ", ".join(f"{tr_text(joint.name)} {joint.mm_per_turn:g}" for joint in rig.servos.joints)
+    lines.append(tr("way at one turn of the horn, as it is set and not measured: {ways} mm", ways=ways))
     if known.assumed:
         lines.append(
             tr(

@@ -3777,6 +3777,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/rig_command.py"/>
+        <source>way at one turn of the horn, as it is set and not measured: {ways} mm</source>
+        <translation>舵机输出盘每转一圈的行程（按设置，未测量）：{ways} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_command.py"/>
         <source>calibrated: {parts}</source>
         <translation>已标定：{parts}</translation>
     </message>
