@@ -22,6 +22,8 @@ from core.study.annotation_records import TAKES_LINES
 from core.study.annotations import Annotation, Readout, turn_annotation
 from core.types import PoseState
 
+_CANNOT_TELL = "can't tell"
+
 
 class AnnotatorWindow(WindowFrame):
     """Shows the desk's item in hand and hands the rater's edits to the desk.
@@ -203,14 +205,16 @@ class AnnotatorWindow(WindowFrame):
         self._desk.edit(f"state {state.value}", replace(self._desk.annotation, state=state, cannot_tell=False))
 
     def toggle_cannot_tell(self) -> None:
-        """\"Can't tell\" is an answer; once more takes it back."""
+        """\"Can't tell\" is an answer; once more takes it back, and a state that was there before is there again."""
         self.panels.canvas.complete()
         annotation = self._desk.annotation
         self.panels.canvas.close_line()
-        if annotation.cannot_tell:
+        if annotation.cannot_tell and self._desk.history.undo_action == _CANNOT_TELL:
+            self._desk.undo()
+        elif annotation.cannot_tell:
             self._desk.edit("can tell", replace(annotation, cannot_tell=False))
         else:
-            self._desk.edit("can't tell", replace(annotation, cannot_tell=True, state=None))
+            self._desk.edit(_CANNOT_TELL, replace(annotation, cannot_tell=True, state=None))
 
     def undo(self) -> None:
         """Back one edit, and say which; while an outline is drawn, its last point."""

@@ -31,7 +31,7 @@ def add_operator_menus(window: OperatorWindow) -> None:
         window,
         tr("&Robot"),
         [
-            MenuEntry(tr("S&TOP"), window.desk.stop, hint="Space"),
+            MenuEntry(tr("S&TOP"), window.desk.stop, hint="Space, Pause"),
             None,
             *(MenuEntry(tr(step.value.name), partial(window.take, step), _keys_of(step)) for step in Step),
             None,

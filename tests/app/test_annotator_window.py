@@ -178,6 +178,8 @@ def test_the_readout_is_live_and_says_what_is_missing(rater: Rater) -> None:
     assert readout.state_text == "Crossed"
     rater.press(Key.Key_X)
     assert (readout.state_text, drawn(rater).state) == ("Can't tell", None)
+    rater.press(Key.Key_X)
+    assert (readout.state_text, drawn(rater).state) == ("Crossed", PoseState.D), "as it was before"
 
 
 def test_everything_by_keyboard(rater: Rater) -> None:
