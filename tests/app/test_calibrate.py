@@ -108,8 +108,19 @@ def test_a_folder_without_pictures_is_said_before_anything_else(frames: Path, mo
 
 
 @pytest.mark.parametrize("eight_bit", [False, True])
-def test_too_few_frames_leave_the_model_as_it_is(frames: Path, model: Path, *, eight_bit: bool) -> None:
+def test_too_few_frames_leave_the_model_as_it_is(
+    frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch, *, eight_bit: bool
+) -> None:
     """Also its networks: new ones would be believed as the old ones were."""
+
+    def write_another(folder: Path, _images: object) -> None:
+        """As quickly as can be: how eight bits are learnt is another test's."""
+        shutil.copyfile(folder / ONNX, folder / ONNX_INT8)
+        info = read_model_info(folder, verify=())
+        text = info.model_copy(update={"onnx_int8_sha256": sha256_of(folder / ONNX_INT8)}).model_dump_json()
+        (folder / INFO).write_text(text)
+
+    monkeypatch.setattr("core.learning.eight_bit.write_eight_bit", write_another)
     before = _files(model)
     with pytest.raises(CalibrationError, match="give it more frames"):
         run_calibrate(frames, model=str(model), config_path=None, eight_bit=eight_bit)
