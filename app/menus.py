@@ -134,7 +134,7 @@ def _is_key(letter: str) -> bool:
 def add_help_menu(window: QMainWindow, show_keys: Callable[[], object], more: Sequence[MenuEntry | None] = ()) -> None:
     """The last menu, the same in all windows; `more` stands between the keys and what the program is."""
     about = MenuEntry(tr("&About LumenPilot"), partial(show_about, window))
-    *_, last = add_menu(window, tr("&Help"), [MenuEntry(tr("&Keys"), show_keys, ("F1",)), *more, None, about])
+    *_, last = add_menu(window, tr("&Help"), [MenuEntry(tr("&Keys"), show_keys, ("F1", "Shift+F1")), *more, None, about])
     last.setProperty(_STAYS_LAST, True)
 
 

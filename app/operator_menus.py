@@ -19,11 +19,11 @@ def add_operator_menus(window: OperatorWindow) -> None:
     panels, recorder = window.panels, window.recorder
     window.add_file_menu(
         [
-            MenuEntry(tr("&Snapshot"), window.take_snapshot, ("P", "Ctrl+S")),
+            MenuEntry(tr("&Snapshot"), window.take_snapshot, ("P", "Ctrl+S", "Shift+P")),
             MenuEntry(tr("&Open pictures folder"), window.open_pictures),
             None,
-            MenuEntry(tr("&Record, or end the recording"), recorder.toggle, ("F9",)),
-            MenuEntry(tr("Save the &last seconds"), recorder.save_last, ("F10",)),
+            MenuEntry(tr("&Record, or end the recording"), recorder.toggle, ("F9", "Shift+F9")),
+            MenuEntry(tr("Save the &last seconds"), recorder.save_last, ("F10", "Shift+F10")),
         ]
     )
     add_scene_view_menu(window, panels)

@@ -94,8 +94,8 @@ class OperatorPanels(ScenePanels):
         """What the panels know of the configuration, for a rig that is being opened with another one."""
         self.set_limits(config.perception.pose)
         known = _calibration_of(config)
-        self.live.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)
-        self.clearance.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)
+        self.live.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)  # for the ghost, which may be rough
+        self.servos.set_safety(config.safety)
         self.jog.max_pull_mm = config.servos.max_pull_mm
         self._servo_config = config.servos
         self._scale = known.scale if known is not None else None
@@ -182,9 +182,16 @@ class OperatorPanels(ScenePanels):
         """No new picture has come for so long, and why, where the camera tells it."""
         told = tr_text(problem) if problem is not None else ""
         self.blank(tr("No new picture"), told or tr("Check the camera; F5 starts the rig again"))
+        self.performance.clear()
+        self.jog.show_status(None)
         title = tr("No new picture for {seconds:.0f} s", seconds=age_s)
         detail = told or tr("The camera or the program is behind")
         self.notice.show_notice(NoticeKind.WARNING, title, detail, restartable=problem is not None)
+
+    def show_no_picture(self, problem: str) -> None:
+        """None has come since the rig was opened, and why."""
+        self.blank(tr("No picture"), tr_text(problem))
+        self.notice.show_notice(NoticeKind.WARNING, tr("No picture from the camera"), tr_text(problem), restartable=True)
 
     def _stand_still(self, title: str, why: str) -> None:
         self.blank(title, why)

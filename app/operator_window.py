@@ -75,6 +75,7 @@ class OperatorWindow(WindowFrame):
         self.stop_lent: Callable[[], bool] = lambda: False
         """STOP for whoever the rig is lent to; False: nothing of it moves. From any thread."""
         self._last_tick: Tick | None = None
+        self._waits_for: str | None = None
         self._tick: Tick | None = None
         self._is_stale = False
         self._target: Point | None = None
@@ -353,7 +354,7 @@ class OperatorWindow(WindowFrame):
     def _show_phase(self, phase: Phase, message: str = "") -> None:
         panels = self._panels
         self._phase, self._phase_message = phase, message
-        self._tick = None
+        self._tick = self._waits_for = None
         self._is_stale = False
         if phase in (Phase.ENDED, Phase.FAULT):
             self._desk.reset()
@@ -394,9 +395,21 @@ class OperatorWindow(WindowFrame):
     @Slot(float)
     def _check_age(self, age_s: float) -> None:
         """A picture that does not change is not live: after half a second nothing of it is shown as true."""
-        if self._phase is Phase.RUNNING and self._tick is not None and age_s > self._stale_after_s:
+        if self._phase is Phase.RUNNING and self._tick is None:
+            self._tell_waiting(self._thread.problem)
+        elif self._phase is Phase.RUNNING and age_s > self._stale_after_s:
             self._is_stale = True
             self._panels.show_stale(age_s, self._thread.problem)
+
+    def _tell_waiting(self, problem: str | None) -> None:
+        """No picture has come yet, and why, where the camera tells it."""
+        if problem == self._waits_for:
+            return
+        self._waits_for = problem
+        if problem is None:
+            self._tell_phase(self._phase, self._phase_message)
+        else:
+            self._panels.show_no_picture(problem)
 
     # ---- the operator
 

@@ -49,7 +49,7 @@ class ScenePanels(QWidget):
         self.badge = StateBadge(limits)
         self.gauge = ThetaGauge(limits.theta_allow_deg)
         self.bars = DistanceBars(limits.d_allow_px)
-        self.clearance = ClearanceBar(pixels_per_mm)
+        self.clearance = ClearanceBar()
         self.pages = page_tabs()
         self._allowed = (card_note(""), card_note(""))
         self._tell_allowed(limits)
@@ -83,7 +83,9 @@ class ScenePanels(QWidget):
 
     def _show_dials(self, scene: Scene, status: RobotStatus | None, *, renew_text: bool) -> None:
         self.gauge.show_pose(scene.pose, renew_text=renew_text)
-        self.bars.set_scale(mm_per_working_px(self._scale, scene))
+        mm_per_px = mm_per_working_px(self._scale, scene)
+        self.bars.set_scale(mm_per_px)
+        self.clearance.set_scale(1.0 / mm_per_px if mm_per_px else None)
         self.bars.show_pose(scene.pose, renew_text=renew_text)
         self.clearance.show_scene(scene, status)
 

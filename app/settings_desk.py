@@ -56,6 +56,8 @@ class SettingsDesk(QObject):
         self._window, self._file, self._perceive_again = window, file, perceive_again
         self._profiles = profiles or Profiles()
         self._saved = self._at_rig_start = file.config
+        self._saved_over: Config | None = None
+        """What the window had when they were saved: a phantom or model that is chosen afterwards is the newer wish."""
         self._drafted: Config | None = None
         """The dialog's settings while some of them are tried out, else None."""
         self._wants_back = False
@@ -197,6 +199,7 @@ class SettingsDesk(QObject):
         self._drafted = None
         self._stills.forget()
         self._window.take_settings(with_changes(self._window.config, before, config, _NOW))
+        self._saved_over = self._window.config
         self._window.show_still(None)  # of a rig that is over, what was tried out on its last picture must not stay: it looks alive
         _take_theme(self._window.config)
         self._window.say(tr("Settings saved in {path}", path=self._file.path) + (f". {tr_text(note)}" if note else ""))
@@ -222,8 +225,8 @@ class SettingsDesk(QObject):
 
     def _amend(self, config: Config) -> Config:
         """What waited for a rig to be opened."""
-        amended = with_changes(config, self._at_rig_start, self._saved, _AT_START)
-        self._at_rig_start = self._saved
+        amended = with_changes(config, self._at_rig_start, self._saved, _AT_START, since=self._saved_over)
+        self._at_rig_start, self._saved_over = self._saved, None
         return amended
 
     def _read_rig_again(self, config: Config) -> Config:

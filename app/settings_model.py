@@ -264,16 +264,20 @@ def _haystack(section: Section, setting: Setting) -> str:
     return " ".join(parts).casefold()
 
 
-def with_changes(running: Config, before: Config, after: Config, effects: frozenset[Effect]) -> Config:
+def with_changes(running: Config, before: Config, after: Config, effects: frozenset[Effect], since: Config | None = None) -> Config:
     """`running` with those differences of two others that act then: what it has from elsewhere (a command line, a picker) stays.
+
+    So does what has changed in it `since` it was so.
 
     What its rig file keeps stays, too: it would be gone at the next start of that rig.
     Where that does not go together it is `running` as it was; the settings then act at the next start of the program.
     """
     data, new = running.model_dump(mode="json"), after.model_dump(mode="json")
     settings, kept = settings_by_key(), sections_of_rig(running, after)
+    old = since.model_dump(mode="json") if since is not None else data
+    newer = {key for key in changed_keys(before, after) if value_at(old, key) != value_at(data, key)}
     for key in changed_keys(before, after):
-        if settings[key].effect in effects and key.partition(".")[0] not in kept:
+        if settings[key].effect in effects and key.partition(".")[0] not in kept and key not in newer:
             data = with_value(data, key, value_at(new, key))
     try:
         return Config.model_validate(data)

@@ -55,7 +55,8 @@ class WindowFrame(QMainWindow):
 
     def add_view_menu(self, entries: Sequence[MenuEntry | None]) -> list[QAction]:
         """Ends with Full screen; returns the actions without the separators."""
-        full_screen = MenuEntry(tr("&Full screen"), self.toggle_full_screen, (_FULL_SCREEN_KEY,), checked=False)
+        keys = (_FULL_SCREEN_KEY, f"Shift+{_FULL_SCREEN_KEY}")
+        full_screen = MenuEntry(tr("&Full screen"), self.toggle_full_screen, keys, checked=False)
         return add_menu(self, tr("&View"), [*entries, None, full_screen])
 
     # ---- keys

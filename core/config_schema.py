@@ -93,12 +93,13 @@ class Effect(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """An allowed range; None: open. ``low_open`` and ``high_open`` exclude the end itself."""
+    """An allowed range; None: open. ``low_open`` and ``high_open`` exclude the end itself; ``step``: only multiples of it."""
 
     low: float | None = None
     high: float | None = None
     low_open: bool = False
     high_open: bool = False
+    step: float | None = None
 
     def text(self, unit: str = "") -> str:
         """In words, with the unit at the end."""
@@ -107,7 +108,8 @@ class Bounds:
         both = f"{low} and {high}" if low and high else low or high
         if self.low is not None and self.high is not None and not (self.low_open or self.high_open):
             both = f"{_plain(self.low)} to {_plain(self.high)}"
-        return f"{both} {unit}" if both and unit else both
+        both = f"{both} {unit}" if both and unit else both
+        return f"{both}, a multiple of {_plain(self.step)}" if both and self.step is not None else both
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,11 +271,12 @@ def _bare(annotation: Any) -> tuple[Any, bool]:
 def _bounds(info: FieldInfo) -> Bounds:
     found: dict[str, float] = {}
     for item in info.metadata:
-        for name in ("ge", "gt", "le", "lt"):
+        for name in ("ge", "gt", "le", "lt", "multiple_of"):
             value = getattr(item, name, None)
             if value is not None:
                 found[name] = value
-    return Bounds(found.get("gt", found.get("ge")), found.get("lt", found.get("le")), "gt" in found, "lt" in found)
+    low, high = found.get("gt", found.get("ge")), found.get("lt", found.get("le"))
+    return Bounds(low, high, "gt" in found, "lt" in found, found.get("multiple_of"))
 
 
 def _title(name: str) -> str:

@@ -14,6 +14,7 @@ from core.types import Pose
 
 _RANGE_IN_LIMITS = 5.0
 _NAME_PX = 56
+_SMALLEST_PX = 13
 
 
 class DistanceBars(QWidget):
@@ -84,7 +85,8 @@ class DistanceBars(QWidget):
         painter.setFont(theme.semi_bold(theme.Size.BODY))
         painter.drawText(text_box, Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignLeft, name)
         painter.setPen(QColor(palette.TEXT if self._numbers is not None else palette.TEXT_FAINT))
-        painter.setFont(theme.fitted(theme.bold(24), self.texts[index], int(box.width() - _NAME_PX)))
+        largest = theme.bold(max(_SMALLEST_PX, min(24, int(text_box.height() + 4))))  # in a low window the row is low, too
+        painter.setFont(theme.fitted(largest, self.texts[index], int(box.width() - _NAME_PX)))
         right = Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignRight
         painter.drawText(text_box.adjusted(0, 0, 0, 4), right, self.texts[index])
         track = QRectF(box.left(), box.bottom() - 20, box.width(), 14)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPaintEvent, QPen, QTransform
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPaintEvent, QPen, QTransform
 from PySide6.QtWidgets import QWidget
 
 from app import theme
@@ -25,8 +25,11 @@ _CORNERS = ((1, 0), (0, 0), (1, 1), (0, 1))
 class HeadLoupe(QWidget):
     """Shows about 110 working pixels around the head with the same marks as the live view.
 
-    It stays in its corner as long as the head is elsewhere, and moves to the opposite side when the head comes near.
+    ``clicked`` carries the place that was clicked in it, in source pixels: what it hides of the picture is not meant. It stays in
+    its corner as long as the head is elsewhere, and moves to the opposite side when the head comes near.
     """
+
+    clicked = Signal(float, float)
 
     def __init__(self, parent: QWidget, marks: Marks) -> None:
         super().__init__(parent)
@@ -37,7 +40,7 @@ class HeadLoupe(QWidget):
         self._to_widget = QTransform()
         self._corner = 0
         self._drawn = MarksLabel(self)
-        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._drawn.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setAccessibleName(tr("Magnified head"))
         self.hide()
 
@@ -83,6 +86,13 @@ class HeadLoupe(QWidget):
         return QRectF(
             room.width() - size[0] - 10 if right else 10, room.height() - size[1] - 10 if bottom else 10, size[0], size[1]
         )
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() is not Qt.MouseButton.LeftButton:
+            super().mousePressEvent(event)
+            return
+        place = self._to_widget.inverted()[0].map(event.position())
+        self.clicked.emit(place.x() - 0.5, place.y() - 0.5)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         if self._image is None:

@@ -73,6 +73,7 @@ class LiveView(QWidget):
         self._drawn = MarksLabel(self)
         self._box.sigTransformChanged.connect(self._draw_marks)
         self._loupe = HeadLoupe(self, self._marks)
+        self._loupe.clicked.connect(self._on_place)
         self._loupe_pace = Pace(_LOUPE_EVERY_S)
 
     @property
@@ -208,10 +209,11 @@ class LiveView(QWidget):
         self._loupe.show_head(image, scene, QPointF(self._view.mapFromScene(at)))
 
     def _on_left_click(self, point: QPointF) -> None:
-        if self._size is None:
-            return
-        x, y = point.x() - 0.5, point.y() - 0.5
-        if -0.5 <= x < self._size[0] - 0.5 and -0.5 <= y < self._size[1] - 0.5:
+        self._on_place(point.x() - 0.5, point.y() - 0.5)
+
+    def _on_place(self, x: float, y: float) -> None:
+        """A place of the picture, source pixels, if it is one."""
+        if self._size is not None and -0.5 <= x < self._size[0] - 0.5 and -0.5 <= y < self._size[1] - 0.5:
             self.clicked.emit(x, y)
 
 

@@ -96,6 +96,8 @@ class _Chip(QAbstractButton):
             left = 35.0
         painter.setPen(QColor(palette.TEXT if on else palette.TEXT_FAINT))
         width = self.width() - left - 4
-        painter.setFont(theme.fitted(text_font, self.text(), int(width), 10))
-        painter.drawText(QRectF(left, 0, width, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
+        fitted = theme.fitted(text_font, self.text(), int(width), 10)
+        painter.setFont(fitted)
+        shown = theme.elide(fitted, self.text(), int(width))
+        painter.drawText(QRectF(left, 0, width, self.height()), Qt.AlignmentFlag.AlignVCenter, shown)
         painter.end()

@@ -116,6 +116,10 @@ class ServoTable(QWidget):
             self._kind = kind
             self._show(status, silence_s if is_silent else None)
 
+    def set_safety(self, safety: SafetyConfig) -> None:
+        """Where warnings begin, for another rig."""
+        self._safety = safety
+
     def menu_for(self, joint: JointConfig | None) -> QMenu:
         """What can be done, with one servo (None: with all)."""
         menu = QMenu(self)

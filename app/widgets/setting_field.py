@@ -120,7 +120,11 @@ class SettingField(QFrame):
             combo = editor
             combo.currentIndexChanged.connect(lambda _place: self.edited.emit(setting.key, combo.currentData()))
         else:
-            editor = QLineEdit() if setting.kind is Kind.TEXT else NumberEdit(is_whole=setting.kind is Kind.WHOLE)
+            editor = (
+                QLineEdit()
+                if setting.kind is Kind.TEXT
+                else NumberEdit(is_whole=setting.kind is Kind.WHOLE, multiple=setting.bounds.step)
+            )
             editor.setPlaceholderText(tr(_UNSET) if setting.is_optional else "")
             editor.textEdited.connect(lambda text: self.edited.emit(setting.key, text))
         editor.setAccessibleName(f"{tr(setting.title)}, {tr_text(setting.unit)}" if setting.unit else tr(setting.title))
@@ -154,7 +158,11 @@ class SettingField(QFrame):
         span = bounds.high - bounds.low
         value = bounds.low + span * (place / _SLIDER_STEPS) ** self._power()
         if self.setting.kind is Kind.WHOLE:
-            return str(round(value))
+            step = round(bounds.step or 1)
+            return str(round(value / step) * step)
+        inside = span / _SLIDER_STEPS / 10.0  # an end that is excluded is not offered
+        value = max(value, bounds.low + inside * bounds.low_open)
+        value = min(value, bounds.high - inside * bounds.high_open)
         digits = max(0, 2 - math.floor(math.log10(max(abs(value), span / 1e4, 1e-9))))
         text = f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
         return "0" if text in ("-0", "") else text
@@ -224,9 +232,9 @@ class SettingField(QFrame):
 class NumberEdit(QLineEdit):
     """A number as text; up and down change it by a step that fits its size, with Shift by ten of them."""
 
-    def __init__(self, *, is_whole: bool) -> None:
+    def __init__(self, *, is_whole: bool, multiple: float | None = None) -> None:
         super().__init__()
-        self._is_whole = is_whole
+        self._is_whole, self._multiple = is_whole, multiple
         self.setProperty(NUMBERS_ONLY, True)
         self.setAlignment(Qt.AlignmentFlag.AlignRight)
 
@@ -244,6 +252,10 @@ class NumberEdit(QLineEdit):
         except ValueError:
             return
         if not math.isfinite(value):
+            return
+        if self._multiple is not None:
+            self.setText(as_text((round(value / self._multiple) + steps) * self._multiple))
+            self.textEdited.emit(self.text())
             return
         exponent = 0 if self._is_whole else math.floor(math.log10(abs(value))) - 1 if value else -2
         value = round(value / 10.0**exponent + steps) * 10.0**exponent

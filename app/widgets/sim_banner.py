@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPainterPath, QPaintEvent, QPolygonF
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QPainter, QPainterPath, QPaintEvent, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
@@ -54,6 +54,7 @@ class SimBanner(QWidget):
     def show_kind(self, kind: RigKind, *, has_servos: bool = True) -> None:
         """Another rig is being opened."""
         self._text = BANNERS[kind] if has_servos or kind is not RigKind.LIVE else _LOOK_ONLY
+        self.setMinimumWidth(int(self._plate_width()))  # whatever else needs room: the word is always there
         self.update()
         self.setAccessibleName(f"{tr(self._text.word)}: {tr(self._text.meaning)}")
         self.setToolTip(tr(self._text.meaning))
@@ -68,11 +69,8 @@ class SimBanner(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        word_font = QFont(theme.bold(18))
-        word_font.setLetterSpacing(word_font.SpacingType.AbsoluteSpacing, 2.0)
-        painter.setFont(word_font)
-        word_width = painter.fontMetrics().horizontalAdvance(tr(self._text.word)) + 20
-        plate = QRectF(0, 0, word_width + 48, self.height())
+        painter.setFont(_word_font())
+        plate = QRectF(0, 0, self._plate_width(), self.height())
         self._paint_plate(painter, plate)
         painter.setPen(QColor(palette.INK))
         painter.drawText(plate.adjusted(24, 0, -22, 0), Qt.AlignmentFlag.AlignCenter, tr(self._text.word))
@@ -83,6 +81,9 @@ class SimBanner(QWidget):
         note = theme.elide(note_font, tr(self._text.note), int(self.width() - left))
         painter.drawText(QRectF(left, 0, self.width() - left, self.height()), Qt.AlignmentFlag.AlignVCenter, note)
         painter.end()
+
+    def _plate_width(self) -> float:
+        return QFontMetrics(_word_font()).horizontalAdvance(tr(self._text.word)) + 68.0
 
     def _paint_plate(self, painter: QPainter, plate: QRectF) -> None:
         """A plate with slanted stripes at both ends, as on a barrier: told by shape, not by colour alone."""
@@ -98,3 +99,9 @@ class SimBanner(QWidget):
             corners = [(left + 14, 0.0), (left + 22, 0.0), (left + 8, height), (left, height)]
             painter.drawPolygon(QPolygonF([QPointF(x, plate.top() + y) for x, y in corners]))
         painter.restore()
+
+
+def _word_font() -> QFont:
+    font = QFont(theme.bold(18))
+    font.setLetterSpacing(font.SpacingType.AbsoluteSpacing, 2.0)
+    return font

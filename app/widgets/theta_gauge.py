@@ -140,6 +140,8 @@ class ThetaGauge(QWidget):
         for sign in (-1.0, 1.0):
             painter.setPen(QColor(palette.TEXT if side(sign) == self.direction else palette.TEXT_FAINT))
             box = QRectF(hub.x() + sign * radius * 0.56 - 30, hub.y() - 20, 60, 20)
+            if radius < _SMALL_PX:  # on so small a dial they would lie on ticks and needle: beside the number
+                box = QRectF(hub.x() + sign * 84 - 30, hub.y() + 17, 60, 20)
             painter.drawText(box, Qt.AlignmentFlag.AlignCenter, side(sign))
 
 

@@ -24,6 +24,8 @@ PLACE_WEIGHT = 0.5
 SHORTNESS_WEIGHT = 0.5
 ROUTE_WEIGHT = 1.0
 WALL_WEIGHT = 4.0
+LEAVES_ROUTE, SAME_ROUTE = 0.5, 0.1
+"""Off the route by more than the first (0 to 1), a path leaves it; by up to the second more than another one, both keep to it."""
 REACH_RADII = 1.5
 """Vessels farther from the head than this many of their radii are not looked at."""
 TIE_COST = 0.2
@@ -35,12 +37,17 @@ TIE_ANGLE_DEG = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Candidate:
-    """One path of the graph past the head, cut to the wanted length and oriented; lower cost fits better."""
+    """One path of the graph past the head, cut to the wanted length and oriented; lower cost fits better.
+
+    ``off_route`` is 0 where its forward half is on the route, 1 where it leaves it; ``is_beside``: the head is inside its lumen.
+    """
 
     piece: Points
     nearest: Point
     radius: float
     cost: float
+    off_route: float = 0.0
+    is_beside: bool = True
 
     @property
     def direction(self) -> Points:
@@ -86,9 +93,10 @@ def centerline_at(
     """The piece of centerline beside the head, along one path of the vessel graph, in the robot's direction of travel.
 
     Near a junction the nearest edge may be a side branch that the robot merely passes. So every path that leads past the head
-    within reach is a candidate, and the one is taken that the robot's straight line fits best, in direction and in place (and that
-    keeps to the route, if there is one). The cost changes smoothly with head and direction, so that a small disturbance changes
-    the choice only where two branches fit equally well; `ambiguity` says how near that is.
+    within reach is a candidate, and the one is taken that the robot's straight line fits best, in direction and in place. Where
+    the operator's route passes, only those that keep to it are asked, whichever branch the robot points into. The cost changes
+    smoothly with head and direction, so that a small disturbance changes the choice only where two branches fit equally well;
+    `ambiguity` says how near that is.
 
     Parameters
     ----------
@@ -122,6 +130,8 @@ def centerline_at(
                     candidates.append(candidate)
     if not candidates:
         return None
+    if ahead is not None and not _is_turned(ahead, direction):
+        candidates = _on_route(candidates)
     # The same line is found from each edge it runs along: rounding alone must not decide which one's radius counts.
     least = min(candidate.cost for candidate in candidates)
     best = next(candidate for candidate in candidates if candidate.cost <= least + SAME_COST)
@@ -206,9 +216,8 @@ def _candidate(
     travel = float((piece[-1] - piece[0]) @ direction)
     if ahead is not None:
         # On the route its direction is the direction of travel, even if the head is bent to a bit beyond a right angle.
-        way = ahead[-1] - ahead[0]
-        if float(way @ direction) > -0.5 * float(np.hypot(way[0], way[1])):
-            travel = float((piece[-1] - piece[0]) @ way)
+        if not _is_turned(ahead, direction):
+            travel = float((piece[-1] - piece[0]) @ (ahead[-1] - ahead[0]))
     if travel < 0.0:
         piece, before, after = piece[::-1], after, before
     chord = piece[-1] - piece[0]
@@ -219,9 +228,23 @@ def _candidate(
     cost = turn_cost + PLACE_WEIGHT * place_cost + SHORTNESS_WEIGHT * (1.0 - length / (2.0 * half_length))
     # A path whose lumen the head is outside of is another vessel, however well it would fit.
     cost += WALL_WEIGHT * max(0.0, distance / radius - 1.0)
-    if ahead is not None:
-        cost += ROUTE_WEIGHT * _off_route(polyline.cut(piece, before, length), ahead, scale)
-    return _Candidate(piece, nearest, radius, cost)
+    off_route = _off_route(polyline.cut(piece, before, length), ahead, scale) if ahead is not None else 0.0
+    return _Candidate(piece, nearest, radius, cost + ROUTE_WEIGHT * off_route, off_route, distance <= radius)
+
+
+def _is_turned(ahead: Points, direction: NDArray[np.float64]) -> bool:
+    """Whether the robot points the other way than the route leads, and so is somewhere else."""
+    way = ahead[-1] - ahead[0]
+    return float(way @ direction) <= -0.5 * float(np.hypot(way[0], way[1]))
+
+
+def _on_route(candidates: list[_Candidate]) -> list[_Candidate]:
+    """Those that keep to the route as well as any; all where none does, or the head is in none of their lumens."""
+    beside = [candidate for candidate in candidates if candidate.is_beside]
+    least = min((candidate.off_route for candidate in beside), default=1.0)
+    if least > LEAVES_ROUTE:
+        return candidates
+    return [candidate for candidate in beside if candidate.off_route <= least + SAME_ROUTE]
 
 
 def _off_route(forward: Points, ahead: Points, radius: float) -> float:

@@ -15,29 +15,26 @@ OFF_VESSEL_PX = 15.0
 
 def route_or_reason(graph: VesselGraph, start: Point, target: Point) -> Route | str:
     """The route, or in plain words why there is none: the target is beside the vessel, or no vessel that was found leads there."""
-    there = _place(graph, target)
+    there = _lumen(graph, target)
     if there is None:
         return "no vessel was found"
-    edge = graph.edges[there[0]]
-    away_px, _, _ = polyline.nearest(edge.points, target)
-    place = int(np.argmin(np.sum((edge.points - np.array(target)) ** 2, axis=1)))
-    beside_px = away_px - float(edge.radius[place])
+    beside_px, *_ = there
     if beside_px > OFF_VESSEL_PX:
         return f"the target is {beside_px:.0f} px beside the vessel"
     return plan_route(graph, start, target) or "no vessel that was found leads there"
 
 
 def plan_route(graph: VesselGraph, start: Point, target: Point) -> Route | None:
-    """The shortest way along the graph from the place beside `start` to the place nearest to `target`.
+    """The shortest way along the graph from the place beside `start` to the one beside `target`, in the vessel that this lies in.
 
     Returns
     -------
     The route, or None when the graph is empty or has no way between the two places.
     """
-    here, there = _place(graph, start), _place(graph, target)
+    here, there = _place(graph, start), _lumen(graph, target)
     if here is None or there is None:
         return None
-    (edge, position), (last_edge, last_position) = here, there
+    (edge, position), (_, last_edge, last_position) = here, there
     lengths = [float(polyline.arc_length(e.points)[-1]) for e in graph.edges]
     reached, came_by = _distances(graph, lengths, edge, position)
     last = graph.edges[last_edge]
@@ -75,6 +72,23 @@ def _place(graph: VesselGraph, point: Point) -> tuple[int, float] | None:
         default=None,
     )
     return None if best is None else (best[2], best[1])
+
+
+def _lumen(graph: VesselGraph, point: Point) -> tuple[float, int, float] | None:
+    """The vessel that a point lies in, or nearest to: how far outside its lumen (negative: inside), its edge, the position on it.
+
+    By the walls, not by the centerlines: inside a wide vessel the centerline of a narrow one may be nearer.
+    """
+    found = []
+    for index, edge in enumerate(graph.edges):
+        if len(edge.points) > 1:
+            along = polyline.arc_length(edge.points)
+            distance, position, _ = polyline.nearest(edge.points, point, along)
+            found.append((distance - float(np.interp(position, along, edge.radius)), distance, index, position))
+    if not found:
+        return None
+    outside, _, index, position = min(found)
+    return outside, index, position
 
 
 def _distances(graph: VesselGraph, lengths: list[float], edge: int, position: float) -> tuple[list[float], list[int | None]]:

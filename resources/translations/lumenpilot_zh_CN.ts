@@ -2912,6 +2912,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/operator_panels.py"/>
+        <source>No picture</source>
+        <translation>没有画面</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_panels.py"/>
+        <source>No picture from the camera</source>
+        <translation>相机没有画面</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_panels.py"/>
         <source>Last 30 seconds</source>
         <translation>最近 30 秒</translation>
     </message>

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app import palette
+from app.widgets.head_loupe import _middle
 from app.widgets.live_view import LiveView
 from app.widgets.overlays import Layer
 from core.types import Advice, Frame, Masks, RobotPath, Route, Scene, Skeletons, Speed
@@ -64,6 +65,25 @@ def head_scene(size: tuple[int, int], scale: float, head: tuple[float, float]) -
     points = np.array([[head[0] - 60.0, head[1]], [head[0], head[1]]])
     path = RobotPath(points, 1.0, None, True, 0.0, 4.0)
     return replace(make_scene(), source_size=size, scale=scale, path=path)
+
+
+@pytest.mark.parametrize(("size", "scale"), [((640, 480), 1.0), ((1280, 960), 0.5)])
+def test_a_click_in_the_loupe_is_one_on_what_it_shows(view: LiveView, qtbot: QtBot, size: tuple[int, int], scale: float) -> None:
+    """And not on what it hides."""
+    scene = head_scene(size, scale, (400.0, 350.0))
+    _show(view, blank_frame(*size), scene)
+    view._show_loupe()
+    loupe = view._loupe
+    assert loupe.isVisible()
+    clicked: list[tuple[float, float]] = []
+    view.clicked.connect(lambda x, y: clicked.append((x, y)))
+    middle = loupe.rect().center()
+    qtbot.mouseClick(loupe, Qt.MouseButton.LeftButton, pos=middle)
+    qtbot.mouseClick(loupe, Qt.MouseButton.LeftButton, pos=QPoint(middle.x() + loupe.width() // 4, middle.y()))
+    middle_of_both = _middle(scene)
+    assert middle_of_both is not None
+    assert clicked[0] == pytest.approx(middle_of_both, abs=1.0 / scale)
+    assert clicked[1][0] - clicked[0][0] == pytest.approx(110.0 / scale / 4, rel=0.03)
 
 
 @pytest.mark.parametrize(("size", "scale"), [((640, 480), 1.0), ((1280, 960), 0.5), ((320, 240), 2.0), ((640, 360), 1.0)])

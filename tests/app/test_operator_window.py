@@ -11,10 +11,11 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
+from app import theme
 from app.engine_thread import EngineThread, Phase
 from app.operator_window import OperatorWindow
 from core.calibration_config import CalibrationConfig, ScaleConfig
-from core.config import Config
+from core.config import Config, load_config
 from core.control.drive_view import DriveView
 from core.control.hand import AT_REST
 from core.control.modes import Act, Mode
@@ -118,17 +119,22 @@ def test_a_window_that_is_closed_before_its_rig_was_opened_opens_none(make_windo
     assert opened == []
 
 
-def test_millimetres_are_those_of_the_calibrated_rig(make_window: MakeWindow, bench: FakeBench, tmp_path: Path) -> None:
+def test_millimetres_are_those_of_the_calibrated_rig(
+    make_window: MakeWindow, bench: FakeBench, tmp_path: Path, qtbot: QtBot
+) -> None:
     scale = ScaleConfig(mm_per_px=0.2, size_px=(1280, 960), method="board", uncertainty_share=0.001)
     known = CalibrationConfig(made_utc=datetime(2025, 3, 4, tzinfo=UTC), scale=scale)
     config = Config.model_validate({"record": {"ring_s": 0}})
     path = write_rig(make_rig(config, "bench 1", known), tmp_path / "bench 1.toml")
     window = make_window(lambda _config: FakeEngine(bench), with_rig(config, read_rig(path), path))
     window.start()
-    assert window.panels.clearance._pixels_per_mm == pytest.approx(2.5)
     assert window.panels.live._pixels_per_mm == pytest.approx(2.5)
+    until(qtbot, lambda: "mm" in window.panels.bars.texts[0])
+    until(qtbot, lambda: "mm" in window.panels.clearance.text)
+    assert window.panels.clearance._pixels_per_mm == pytest.approx(2.5, rel=0.01)
     window.use_config(config)
-    assert window.panels.clearance._pixels_per_mm == config.policy.pursuit.pixels_per_mm
+    until(qtbot, lambda: "px" in window.panels.clearance.text and "mm" not in window.panels.clearance.text)
+    assert "mm" not in window.panels.bars.texts[0], "nobody has measured any, beside each other neither"
 
 
 def test_everything_is_shown(running: OperatorWindow, qtbot: QtBot) -> None:
@@ -211,6 +217,46 @@ def test_silent_camera_leaves_no_stale_overlay(running: OperatorWindow, engine: 
     engine.silent = False
     until(qtbot, lambda: running.panels.live.scene is not None)
     assert not running.panels.notice.isVisible()
+
+
+def test_with_no_new_picture_no_number_of_an_older_one_stands(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    until(qtbot, lambda: "total 27.5" in running.panels.performance.text)
+    engine.silent = True
+    until(qtbot, lambda: running.panels.badge.title == "No new picture")
+    assert "27.5" not in running.panels.performance.text
+
+
+def test_a_camera_that_never_gives_a_picture_says_why(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    engine = FakeEngine(bench)
+    engine.silent = True
+    window = make_window(lambda _config: engine)
+    window.start()
+    until(qtbot, lambda: "Waiting for the first picture" in window.panels.notice.text)
+    engine.problem = "webcam 0 sends no picture: close other programs that use it"
+    until(qtbot, lambda: "webcam 0 sends no picture" in window.panels.notice.text)
+    assert window.panels.badge.title == "No picture"
+    engine.problem = None
+    until(qtbot, lambda: "Waiting for the first picture" in window.panels.notice.text)
+    engine.silent = False
+    until(qtbot, lambda: window.shown_tick is not None)
+
+
+def test_the_banners_word_needs_its_room(running: OperatorWindow) -> None:
+    running.resize(*theme.MIN_WINDOW)
+    banner = running.panels.banner
+    assert banner.width() >= banner.minimumWidth() > 90
+
+
+def test_a_hand_that_holds_the_deadman_can_record(running: OperatorWindow, qtbot: QtBot) -> None:
+    qtbot.keyClick(running, Key.Key_F9, Qt.KeyboardModifier.ShiftModifier)
+    until(qtbot, lambda: running.recorder.status.recording)
+    running.recorder.stop("enough")
+
+
+def test_warnings_of_the_servo_page_begin_where_it_is_set(make_window: MakeWindow, bench: FakeBench) -> None:
+    window = make_window(lambda _config: FakeEngine(bench), load_config(overrides={"safety": {"temperature_warn_margin_c": 20.0}}))
+    window.start()
+    assert window.panels.servos._safety.temperature_warn_margin_c == 20.0
 
 
 def test_what_was_put_off_for_an_older_picture_is_not_shown_any_more(

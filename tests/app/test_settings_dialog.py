@@ -173,6 +173,35 @@ def test_a_slider_is_there_for_what_acts_at_once_and_nowhere_else(dialog: Settin
 
 
 @pytest.mark.parametrize("key", ["perception.pose.dwell_frames", "perception.path.weight_length", D_ALLOW, THETA])
+def test_no_place_of_a_slider_gives_what_is_refused(dialog: SettingsDialog) -> None:
+    sliders = 0
+    for key in settings_by_key():
+        dialog.go_to(key)
+        shown = dialog.page.fields.get(key)
+        if shown is None or shown.slider is None:
+            continue
+        sliders += 1
+        bounds = shown.setting.bounds
+        for place in (0, 1, 2, 333, 500, 998, 999, 1000):
+            value = float(shown._value_at(place))
+            assert bounds.low is not None and bounds.high is not None
+            assert bounds.low <= value <= bounds.high
+            assert value != bounds.low or not bounds.low_open
+            assert value != bounds.high or not bounds.high_open
+            assert bounds.step is None or value % bounds.step == 0
+    assert sliders > 20
+
+
+def test_arrows_go_by_what_a_setting_is_a_multiple_of(dialog: SettingsDialog) -> None:
+    shown = field(dialog, "perception.tracking.window_px")
+    editor = shown.editor
+    assert isinstance(editor, NumberEdit)
+    before = int(editor.text())
+    editor.step(1)
+    assert int(editor.text()) == before + 32
+    assert "a multiple of 32" in shown._note()
+
+
 def test_a_slider_comes_back_to_the_value_that_it_shows(dialog: SettingsDialog, key: str) -> None:
     shown = field(dialog, key)
     default = dialog.draft.default_value(key)

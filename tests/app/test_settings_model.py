@@ -133,6 +133,15 @@ def test_changes_reach_a_running_configuration_that_has_more_from_elsewhere() ->
     assert (both.advice.fast_mm_s, both.twin.phantom) == (9.0, "random:7")
 
 
+def test_what_was_chosen_after_saving_is_the_newer_wish() -> None:
+    before, after = load_config(), load_config(overrides={"twin": {"phantom": "coil"}})
+    window_then = load_config()
+    picked = load_config(overrides={"twin": {"phantom": "random:7"}})
+    opened = with_changes(picked, before, after, frozenset(Effect), since=window_then)
+    assert opened.twin.phantom == "random:7"
+    assert with_changes(window_then, before, after, frozenset(Effect), since=window_then).twin.phantom == "coil"
+
+
 def test_changes_that_do_not_go_together_with_what_runs_are_left_out() -> None:
     after = Config.model_validate({"twin": {"phantom": "tree"}, "safety": {"pose_disarm_s": 0.2}})
     running = Config.model_validate({"safety": {"frame_hold_s": 0.1}, "twin": {"phantom": "tree"}})

@@ -120,6 +120,25 @@ def test_the_route_decides_between_branches() -> None:
         assert found.ambiguity < 0.1
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("angle", [20, 30, 45, 60])
+def test_the_route_decides_whichever_branch_the_robot_points_into(sign: int, angle: int) -> None:
+    """Before the fork: it has not turned yet, and must be told by how much."""
+    route = centerline.plan_route(FORK, (20, 100), (200, 100 + 50 * sign))
+    for x in (88, 92, 95):
+        found = centerline_at(FORK, (x, 100), direction(-sign * angle), HALF, route)
+        assert found is not None
+        assert sign * (found.piece[-1][1] - 100) > 0
+        assert found.ambiguity < 0.1
+
+
+def test_a_robot_in_another_vessel_than_the_routes_is_not_said_to_be_in_it() -> None:
+    route = centerline.plan_route(FORK, (20, 100), (200, 150))
+    beyond = centerline_at(FORK, (170, 65), direction(-26.57), HALF, route)
+    assert beyond is not None
+    assert beyond.nearest[1] < 80
+
+
 def test_a_route_that_does_not_pass_by_is_ignored() -> None:
     far = Route(np.array([[0.0, 400.0], [200.0, 400.0]]), 200.0, (200, 400))
     assert ends(FORK, (90, 100), direction(-20), far)[1][1] < 97

@@ -3,7 +3,7 @@ import pytest
 
 from core.perception.polyline import arc_length
 from core.perception.route import plan_route, route_or_reason
-from core.types import GraphEdge, Point, VesselGraph
+from core.types import GraphEdge, Point, Route, VesselGraph
 
 
 def graph_of(nodes: list[Point], edges: list[tuple[int, int]]) -> VesselGraph:
@@ -83,6 +83,22 @@ def test_no_way_and_no_vessel() -> None:
     islands = graph_of([(0, 0), (50, 0), (100, 0), (150, 0)], [(0, 1), (2, 3)])
     assert plan_route(islands, (10, 0), (120, 0)) is None
     assert plan_route(VesselGraph(np.empty((0, 2)), ()), (10, 0), (120, 0)) is None
+
+
+@pytest.mark.parametrize("y", [122, 126, 128])
+def test_a_click_inside_a_wide_vessel_is_in_it_though_a_narrow_ones_centerline_is_nearer(y: float) -> None:
+    nodes = np.array([[0.0, 100.0], [200.0, 100.0], [400.0, 100.0], [400.0, 142.0]])
+    trunk = np.column_stack([np.linspace(0, 200, 101), np.full(101, 100.0)])
+    wide = np.column_stack([np.linspace(200, 400, 101), np.full(101, 100.0)])
+    narrow = np.array([[200.0, 100.0], [210.0, 142.0], [400.0, 142.0]])
+    edges = (
+        GraphEdge(0, 1, trunk, np.full(101, 30.0)),
+        GraphEdge(1, 2, wide, np.full(101, 30.0)),
+        GraphEdge(1, 3, narrow, np.full(3, 5.0)),
+    )
+    way = route_or_reason(VesselGraph(nodes, edges), (20.0, 100.0), (350.0, y))
+    assert isinstance(way, Route)
+    assert way.points[-1][1] == pytest.approx(100.0)
 
 
 def test_start_and_target_at_the_same_place() -> None:
