@@ -392,6 +392,7 @@ COMPOSED = (
     "above {a} and at most {rest}",
     "above {a} and below {rest}",
     "at least {a} and below {rest}",
+    "{a} to {end}, a multiple of {rest}",
     "{a} to {rest}",
     "at least {rest}",
     "above {rest}",

@@ -2332,6 +2332,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>{a} to {end}, a multiple of {rest}</source>
+        <translation>{a} 至 {end}，{rest} 的倍数</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>{a} to {rest}</source>
         <translation>{a} 至 {rest}</translation>
     </message>
