@@ -132,7 +132,7 @@ def _first_frame_s(config_path: Path | None) -> float | None:
     environment = dict(os.environ)
     _without_display(environment)
     started = time.monotonic()
-    command = [sys.executable, str(main), "gui", "--until-first-frame"]
+    command = [sys.executable, str(main), "gui", "--until-first-frame", "--rig", "twin"]
     command += ["--config", str(config_path)] if config_path is not None else []
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)

@@ -307,6 +307,7 @@ TEMPLATES = (
     "scale: {a} mm/px, ±{b} %",
     "seven servos at {a} baud: {ids}",
     "servos at several speeds: {ids} at {a} baud; {others}; set all seven to one",
+    "where the servos stand could not be kept ({why}): learn the steering, which keeps it, too",
     "steering: roll {a}°, way and heading {b}° from a right angle",
     "servo {a}: {b} mm both ways",
     "servo {a}: nothing clear was seen",

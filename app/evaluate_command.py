@@ -212,7 +212,8 @@ def _how_answered(
     done, here = choose_study(answers, study, str(annotations)), {image.sha256 for image in images}
     gone = len({one.key.sha256 for one in done} - here)
     with AnnotationStore(annotations, read_only=True) as store:
-        taken = len([one for one in done if one.key.sha256 in here and one.key in store.taken_over()])
+        taken_over = store.taken_over()
+    taken = sum(one.key.sha256 in here and one.key in taken_over for one in done)
     notes = [f"Of the annotated images {gone} are not where they were; they are in none of the figures."] if gone else []
     if taken:
         notes.append(

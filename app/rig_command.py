@@ -108,6 +108,8 @@ def run_calibrate(options: CalibrateOptions) -> None:
         ended = error
     finally:
         bench.close()
+    if draft.zero is None and "zero" in done:  # a servo failed afterwards, and nobody knows where the wires are
+        done.remove("zero")
     rig = draft.rig_file(options.name)
     path = write_rig(rig)
     if ended is not None:
@@ -148,11 +150,12 @@ def calibrate(draft: RigDraft, steps: tuple[str, ...], pictures: int) -> Iterato
         zeros = draft.find_zeros()
         if zeros.problems:  # to pull on from there would be to measure from nowhere
             raise UserError(f"no zero for all tendons: {'; '.join(zeros.problems)}")
-        if "steering" not in steps:
+        if draft.zero is not None:
             yield "zero"
     if "steering" in steps:
+        was_kept = draft.zero is not None
         draft.learn_steering()  # it stores where the tendons were left, too
-        yield from [step for step in ("zero", "steering") if step in steps]
+        yield from ["steering"] if was_kept or "zero" not in steps else ["zero", "steering"]
 
 
 def quick_sight(config: Config) -> See:

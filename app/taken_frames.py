@@ -19,7 +19,7 @@ from core.images import ImageError, read_image
 from core.learning.dataset import write_png
 from core.session.pictures import packet_times, video_number
 from core.session.reader import SessionReader
-from core.session.video_in import open_video, upright
+from core.session.video_in import decoded, open_video, upright
 from core.study.annotations import AnnotationError
 from core.types import Image
 
@@ -193,16 +193,12 @@ def _video_opened(video: Path) -> Iterator[tuple[int, _Take]]:
 def _decoded(container: av.container.InputContainer, stream: av.VideoStream, pts: int) -> Image | None:
     """The picture of exactly this time, not a neighbour's instead."""
     container.seek(pts, stream=stream, backward=True)
-    packets = container.demux(stream)
-    while True:
-        try:
-            frames = next(packets).decode()
-        except (StopIteration, EOFError):
-            return None
-        except av.error.FFmpegError:
-            continue
-        for frame in frames:
-            if frame.pts == pts and not frame.is_corrupt:
-                return upright(frame, stream)
+    try:
+        for frame in decoded(container, stream):
+            if frame.pts == pts:
+                return upright(frame, stream) if isinstance(frame, av.VideoFrame) else None
             if frame.pts is not None and frame.pts > pts:
                 return None
+    except av.error.FFmpegError:
+        pass  # the file cannot be read on
+    return None

@@ -57,7 +57,7 @@ def window_config(
         camera = "realsense" if source.suffix.lower() == _REALSENSE_ENDING else camera
         if camera == "image_folder" and source.is_file():
             _check_picture(source)
-        chosen = {"rig": {"camera": camera, "robot": "none", "source": str(source)}}
+        chosen = {"rig": {"camera": camera, "robot": "none", "source": str(source), "file": None}}
         config = load_config(config_path, overrides=merge(own or {}, chosen))
     return config, kind_of(config.rig)
 
@@ -88,7 +88,8 @@ def _choose(config: Config, rig: str) -> Config:
         robot, servos = "twin", servos.model_copy(update={"port": None})
     else:
         robot = "servos" if servos.port is not None else "none"
-    chosen = config.rig.model_copy(update={"name": rig, "camera": rig, "robot": robot, "source": None})
+    # Without its file: what was calibrated is another camera's.
+    chosen = config.rig.model_copy(update={"name": rig, "camera": rig, "robot": robot, "source": None, "file": None})
     return config.model_copy(update={"rig": chosen, "servos": servos})
 
 

@@ -259,7 +259,8 @@ def sections_of_rig(running: Config, settings: Config) -> frozenset[str]:
 def read_again(running: Config, settings: Config) -> Config:
     """The running configuration with camera, servos and twin as its rig file has them now: somebody may have edited it.
 
-    A phantom that was picked stays. Settings that name the file themselves keep their own sections.
+    A phantom that was picked stays. Settings that name the file themselves keep their own sections, and so does whoever was chosen
+    instead of them: the twin, another camera, a recording.
 
     Raises
     ------
@@ -268,6 +269,8 @@ def read_again(running: Config, settings: Config) -> Config:
     if running.rig.file is None or not sections_of_rig(running, settings):
         return running
     path = Path(running.rig.file)
+    if running.rig.source is not None or running.rig.name != path.stem:
+        return running
     rig = read_rig(path)
     if rig.twin is not None and running.rig.camera == "twin":
         rig = rig.model_copy(update={"twin": rig.twin.model_copy(update={"phantom": running.twin.phantom})})

@@ -25,13 +25,14 @@ from core.types import Image, Point
 from hardware import servo_wizard
 from hardware.calibration_bench import CalibrationBench
 from hardware.servos.errors import ServoError
+from hardware.servos.probe import Stopped
 from hardware.servos.search import BAUDS, FoundServos, find_servos
 
 _NOTICEABLE_PX = 1.0
 """A lens that moves nothing farther than this in a picture 640 px wide is left alone: straightening costs a millisecond a frame."""
 
-_BOARD_MISSES = 2
-"""So many pictures in a row without the board: a hand over it is not enough."""
+_BOARD_MISSES = 6
+"""So many looks in a row without the board, three seconds: who only lays a hand on it must not find that things begin to move."""
 _BOARD_LOOK_S, _BOARD_GONE_WITHIN_S = 0.5, 180.0
 
 Say = Callable[[str], object]
@@ -110,6 +111,7 @@ class RigDraft:
                 find_board(self.bench.board_picture(self.spec), self.spec)
             except BoardError:
                 misses += 1
+                self.bench.stop.sleep(_BOARD_LOOK_S)
                 continue
             if time.monotonic() > ends_s:
                 raise BoardError("the board is still in the picture: take it away, then go on")
@@ -257,14 +259,21 @@ class RigDraft:
         self.zeros, self.zero = zeros, None
         self._is_displaced = False
         self._nudged.clear()
-        self._keep_zero()
         self.notes += zeros.problems
+        self._keep_zero()
         return zeros
 
     def _keep_zero(self) -> None:
         """Remember where the servos stand, if all tendons are known to be at their zeros: the steering need not be learnt anew."""
-        if self.are_zeros_known:
+        if not self.are_zeros_known:
+            return
+        try:
             self._set_zero(servo_wizard.standing_ticks(self.bench.bench, self.servos))
+        except Stopped:
+            raise
+        except ServoError as error:  # nothing has turned: the steering can be learnt all the same
+            self.zero = None
+            self.say(f"where the servos stand could not be kept ({error}): learn the steering, which keeps it, too")
 
     def _set_zero(self, ticks: tuple[int, ...]) -> None:
         slack = self.zeros.slack_mm if self.zeros is not None else (0.0, 0.0, 0.0, 0.0)
@@ -306,7 +315,7 @@ class RigDraft:
             servo_wizard.nudge(self.bench.bench, self.servos, name, way_mm)
             self.zero = None
             self._nudged.add(name)
-            self._keep_zero()
+        self._keep_zero()
 
     @property
     def head_px(self) -> Point | None:

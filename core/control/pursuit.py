@@ -111,8 +111,10 @@ class Pursuit:
             self._back, self._still_s, self._is_stranded, self._stranded_for = None, 0.0, True, way.target
             return self._backing(way, contact_n, rises, stuck, fed_mm)
         is_unfollowed = self._unfollowed_s > _UNFOLLOWED_S and not way.behind
-        if is_unfollowed or self._back.done(way.behind, -fed_mm):
+        is_done = self._back.done(way.behind, -fed_mm)
+        if is_unfollowed or is_done:
             self._back, self._unfollowed_s = None, 0.0
+            self._is_miss_counted = self._is_miss_counted and not is_done
             return None
         steer_deg = 0.0 if way.behind else self._steer_deg
         # The way back is free, the head follows its own body: only time is lost here, and the body leans meanwhile.

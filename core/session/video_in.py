@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from heapq import heappop, heappush
 from pathlib import Path
 
@@ -24,8 +25,15 @@ def open_video(path: Path) -> InputContainer:
     return av.open(str(path), metadata_errors="replace")
 
 
-def decoded(container: InputContainer, stream: av.VideoStream) -> Iterator[av.VideoFrame | None]:
-    """Each picture in order; None for one that is damaged, or that builds on such a one.
+@dataclass(frozen=True, slots=True)
+class Damaged:
+    """In the place of a picture that is damaged, or builds on such a one; ``pts`` as a frame has it, None: not known."""
+
+    pts: int | None
+
+
+def decoded(container: InputContainer, stream: av.VideoStream) -> Iterator[av.VideoFrame | Damaged]:
+    """Each picture from here on, in order.
 
     Decoders conceal damage: they show something, until the next picture that stands for itself, and that must not be measured.
     Damage that the decoder does not notice (another content of the right form) passes. Raises av.error.FFmpegError where the file
@@ -44,18 +52,17 @@ def decoded(container: InputContainer, stream: av.VideoStream) -> Iterator[av.Vi
         except av.error.FFmpegError:
             is_whole = False
             if not gives_all:
-                yield None
+                yield Damaged(packet.pts)
             continue
         for frame in frames:
             while waiting and frame.pts is not None and waiting[0] < frame.pts:
-                heappop(waiting)
                 is_whole = False
-                yield None
+                yield Damaged(heappop(waiting))
             if waiting and waiting[0] == frame.pts:
                 heappop(waiting)
             is_whole = (is_whole or frame.key_frame) and not frame.is_corrupt
-            yield frame if is_whole else None
-    yield from (None for _ in waiting)
+            yield frame if is_whole else Damaged(frame.pts)
+    yield from (Damaged(pts) for pts in sorted(waiting))
 
 
 def upright(frame: av.VideoFrame, stream: av.VideoStream | None = None) -> Image:

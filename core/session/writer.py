@@ -191,10 +191,9 @@ class SessionWriter:
             else:
                 item()
         except (VideoError, SessionError) as error:
-            self._fail(str(error))
+            self._fail(str(error), is_disk_full=_is_disk_full(error))
         except OSError as error:
-            is_full = error.errno in {errno.ENOSPC, errno.EDQUOT}
-            self._fail(f"{error.filename or self._parent}: {error.strerror or error}", is_disk_full=is_full)
+            self._fail(f"{error.filename or self._parent}: {error.strerror or error}", is_disk_full=_is_disk_full(error))
 
     def _begin(self) -> None:
         with self._changed:
@@ -214,3 +213,12 @@ class SessionWriter:
             self._board.show(disk_free=disk.free, warning=disk.warning)
             if disk.full and self._recording.is_on:
                 self._fail(disk.full, is_disk_full=True)
+
+
+def _is_disk_full(error: BaseException | None) -> bool:
+    """Whether an error, or the one that it was made of, says that there is no room: on the disk, or for this user."""
+    while error is not None:
+        if getattr(error, "errno", None) in {errno.ENOSPC, errno.EDQUOT}:
+            return True
+        error = error.__cause__ or error.__context__
+    return False

@@ -10,7 +10,7 @@ import av.error
 import numpy as np
 
 from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream
-from core.session.video_in import decoded, open_video, upright
+from core.session.video_in import Damaged, decoded, open_video, upright
 from core.types import Frame, Image
 from hardware.cameras.pacing import Pacer
 
@@ -30,7 +30,7 @@ class VideoFile:
     def __init__(self, path: Path, *, paced: bool = True) -> None:
         self._path = path
         self._paced = paced
-        self._frames: Iterator[av.VideoFrame | None] | None = None
+        self._frames: Iterator[av.VideoFrame | Damaged] | None = None
         self._container: av.container.InputContainer | None = None
         self._index = -1
         self._count = 0
@@ -92,7 +92,11 @@ class VideoFile:
         except av.error.FFmpegError as error:
             where = f"after frame {self._index}" if self._count else "before its first frame"
             raise DamagedStream(f"{self._path}: damaged {where} ({error.strerror or error}), and not read on") from None
-        if frame is None:
+        if isinstance(frame, Damaged):
+            assert self._container is not None
+            base = self._container.streams.video[0].time_base
+            if frame.pts is not None and base is not None:
+                self._end_s = max(self._end_s, float(frame.pts * base))
             raise DamagedPicture(f"{self._path}: picture {self._index} is damaged")
         at = frame.time if frame.time is not None and np.isfinite(frame.time) else self._index / 30.0
         if self._first_s is None:

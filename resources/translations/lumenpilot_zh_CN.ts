@@ -1942,6 +1942,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>where the servos stand could not be kept ({why}): learn the steering, which keeps it, too</source>
+        <translation>舵机当前位置未能保存（{why}）：请学习转向，其结果会一并保存</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>steering: roll {a}°, way and heading {b}° from a right angle</source>
         <translation>转向：滚转 {a}°，位移与朝向偏离直角 {b}°</translation>
     </message>

@@ -119,7 +119,7 @@ class Policy:
     def __init__(self) -> None:
         self.resets = 0
 
-    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         return ADVICE if scene.pose is not None else None
 
     def reset(self) -> None:

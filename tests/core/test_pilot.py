@@ -524,7 +524,7 @@ def test_advice_that_is_no_number_is_neither_driven_nor_shown(bench: Bench, monk
     bench.handed_over()
     bend = bench.robot.sent[-1][1].bend
     broken = Advice(Speed.SLOW, 2.0, math.nan, "broken")
-    monkeypatch.setattr(Policy, "__call__", lambda *_: broken)
+    monkeypatch.setattr(Policy, "__call__", lambda *_, **__: broken)
     bench.turn(2)
     assert bench.mode is Mode.HOLD
     assert bench.shown is None

@@ -91,7 +91,7 @@ class ChosenPolicy:
     advice = ADVICE
     given: Advice | None = None
 
-    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         self.given = self.advice if scene.pose is not None else None
         return self.given
 

@@ -18,6 +18,7 @@ from core.rig_file import (
     has_rig,
     list_rigs,
     make_rig,
+    read_again,
     read_rig,
     rig_path,
     rigs_folder,
@@ -100,6 +101,33 @@ def test_the_configuration_takes_the_rig_over() -> None:
     assert sections_of_rig(named, named) == sections_of_rig(REAL, load_config()) == frozenset()
 
 
+def test_a_rig_is_read_again_and_nothing_that_was_chosen_instead_of_it() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    opened = with_rig(load_config(), read_rig(path), path)
+    file = path.read_text(encoding="utf-8")
+    path.write_text(file.replace("max_pull_mm = 2.0", "max_pull_mm = 3.5"), encoding="utf-8")
+    assert read_again(opened, load_config()).servos.max_pull_mm == 3.5
+    assert read_again(opened, load_config()).rig == opened.rig
+    settings = load_config(
+        overrides={"rig": {"file": str(path), "camera": "webcam", "robot": "servos"}, "servos": {"port": "/dev/x"}}
+    )
+    assert read_again(settings, settings) is settings, "its calibration only"
+    for chosen in (
+        {"name": "twin", "camera": "twin", "robot": "twin"},
+        {"name": "webcam", "camera": "webcam", "robot": "none"},
+        {"camera": "video_file", "robot": "none", "source": "clip.mp4"},
+    ):
+        running = settings.model_copy(update={"rig": settings.rig.model_copy(update=chosen)})
+        assert read_again(running, settings) is running
+
+
+def test_the_twins_scale_is_that_of_its_own_pictures() -> None:
+    config = load_config(overrides={"twin": {"image_width_px": 1280, "image_height_px": 720}})
+    known = KNOWN.model_copy(update={"scale": SCALE.model_copy(update={"size_px": (1280, 720), "mm_per_px": 0.2})})
+    assert scaled(config, known).policy.pursuit.pixels_per_mm == pytest.approx(2.5)
+    assert scaled(load_config(), known) == load_config()
+
+
 @pytest.mark.parametrize(
     ("mm_per_px", "size_px", "working_px", "px_per_mm"),
     [
@@ -112,7 +140,12 @@ def test_the_measured_scale_goes_before_the_configured_one(
     mm_per_px: float, size_px: tuple[int, int], working_px: int, px_per_mm: float
 ) -> None:
     camera = {"width_px": size_px[0], "height_px": size_px[1]}
-    said = {"perception": {"working_size_px": working_px}, "policy": {"pursuit": {"pixels_per_mm": 7.0}}, "camera": camera}
+    said = {
+        "rig": {"camera": "realsense", "robot": "none"},
+        "perception": {"working_size_px": working_px},
+        "policy": {"pursuit": {"pixels_per_mm": 7.0}},
+        "camera": camera,
+    }
     config = load_config(overrides=said)
     scale = SCALE.model_copy(update={"mm_per_px": mm_per_px, "size_px": size_px})
     found = scaled(config, KNOWN.model_copy(update={"scale": scale}))

@@ -19,6 +19,7 @@ from core.types import Image
 from hardware import servo_wizard
 from hardware.rig_draft import RigDraft
 from hardware.servo_wizard import Zeros
+from hardware.servos.errors import NoAnswer
 from hardware.servos.probe import Stopped, StopSwitch, Strained
 from hardware.servos.search import FoundServo, FoundServos
 
@@ -110,6 +111,21 @@ def test_a_wire_that_strains_while_it_is_tightened_lets_all_go(draft: RigDraft, 
         draft.learn_steering()
 
 
+def test_a_line_that_hiccups_afterwards_costs_no_zeros(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends(monkeypatch, "standing_ticks", NoAnswer("servo 3: no answer"))
+    monkeypatch.setattr(servo_wizard, "nudge", lambda *_: None)
+    said: list[str] = []
+    draft.say = said.append
+    for step in (draft.find_zeros, lambda: draft.nudge("up", 0.1)):
+        step()
+        assert draft.are_zeros_known
+        assert draft.zero is None
+        assert "learn the steering, which keeps it, too" in said[-1]
+    ends(monkeypatch, "learn_steering", HeadNotSeen("no head"))
+    with pytest.raises(HeadNotSeen):
+        draft.learn_steering()
+
+
 def test_a_head_without_room_costs_no_zero(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
     ends(monkeypatch, "learn_steering", SteeringNotSeen("feed the robot to a place where it has room"))
     for _ in range(2):
@@ -162,7 +178,8 @@ def test_the_servos_wait_until_the_board_is_away(draft: RigDraft, monkeypatch: p
     monkeypatch.setattr("hardware.rig_draft.find_board", find_board)
     draft.say = said.append
     bench = cast("Bench", draft.bench)
-    bench.pictures = iter([board, board, empty, board, empty, empty])
+    monkeypatch.setattr("hardware.rig_draft._BOARD_LOOK_S", 0.0)
+    bench.pictures = iter([board, board, *[empty] * 5, board, *[empty] * 6])
     draft.wait_for_no_board()
     assert said == ["take the board away: the servos move when it is out of sight"]
     assert next(bench.pictures, None) is None, "a hand over it is not enough"

@@ -63,7 +63,7 @@ def test_a_policy_that_gives_up_ends_the_trial_without_waiting_for_progress() ->
 
 
 class _GivesUp:
-    def __call__(self, scene: Scene, status: RobotStatus | None = None) -> Advice | None:
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         return Advice(Speed.STOP, 0.0, 0.0, "missed")
 
     def reset(self) -> None: ...
