@@ -14,12 +14,12 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 
 from core.config import Config
-from core.control.alerts import ALERTS, Alert, AlertKey, AlertQueue, Note, raise_alerts
+from core.control.alerts import Note
 from core.control.command_latency import CommandLatency
 from core.control.deadman import DeadmanReport
 from core.control.drive import Drive
 from core.control.drive_view import DriveNews, DriveView, LeftOver
-from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
+from core.control.faults import Cause, Fault
 from core.control.follow import Follow
 from core.control.frame_reports import FrameReports, is_finite, is_sound
 from core.control.frame_watch import FrameArrived, RouteState
@@ -32,20 +32,18 @@ from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Hindra
 from core.control.policies import Policy
 from core.control.servo_requests import ServoRequests
 from core.control.supervisor import hindrances, supervise
+from core.control.teller import Teller
 from core.devices import DeviceError
 from core.servo_config import JointName
 from core.types import Advice, Command, Frame, RobotStatus, Scene
 
 PERIOD_S = 0.02
 _ARRIVED_S = 0.5
-_MOST_ALERTS = 200
+_MOST_CHANGES = 200
 _SETTLED_S = 1.0
 """What the servos were asked for shows in their status this long after it is done, at the latest."""
 _OVER_WITH_A_FRAME = frozenset(cause.value for cause in (Cause.POSE_STALE, Cause.POSE_LOST, Cause.CAMERA_SILENT, Cause.CAMERA_LOST))
 """What blanks the advice of the frame before says nothing against that of the frame that has come."""
-_NOT_WORTH_A_WORD = frozenset(
-    {RejectReason.NOT_ARMED, RejectReason.WRONG_SOURCE, RejectReason.NO_COMMAND, RejectReason.OUT_OF_ORDER}
-)
 
 
 class Pilot:
@@ -84,12 +82,11 @@ class Pilot:
         self._told_cycle = -1
         self._asked_s: float | None = None
         self._arrived_since_s: float | None = None
-        self._queue = AlertQueue()
+        self._teller = Teller()
         self._lock = threading.Lock()  # of what follows: other threads read or write it
         self._forget = False
         self._turns_back = False
         self._halted = False
-        self._alerts: list[Alert] = []
         self._changes: list[DriveView] = []
         self._stop_asked = False
         self._hand_speed = 1.0
@@ -155,7 +152,7 @@ class Pilot:
         self._inbox.forget_seen()
         self._inbox.post(Act.TAKE_BACK)  # in any mode: a hand-over may have been asked for since the last turn
         if self.view.mode in DRIVING_MODES:
-            self._raise([(Note.NEW_TARGET, "")], self._clock())
+            self._teller.tell([(Note.NEW_TARGET, "")], self._clock())
 
     def jog(self, source: Hashable, jog: Jog) -> None:
         """How a control is held; to be repeated while it is, since its silence counts as let go."""
@@ -191,8 +188,8 @@ class Pilot:
 
     def news(self) -> DriveNews:
         """The newest view, and alerts and changes since the last call."""
+        alerts = self._teller.take()
         with self._lock:
-            alerts, self._alerts = tuple(self._alerts), []
             changes, self._changes = tuple(self._changes), []
             return DriveNews(self._view, alerts, changes)
 
@@ -253,11 +250,11 @@ class Pilot:
             with self._lock:
                 self._forget = True
         commanded = self._send(decision, inputs.jog, seen, sent, now_s)
-        self._tell(before, decision, inputs.jog, sent if is_news else None, kept_back, now_s)
+        self._teller.tell_turn(before, self._state, decision, inputs.jog, sent if is_news else None, kept_back, now_s)
         view = self._look(decision, inputs, seen, commanded, sent, now_s)
         with self._lock:
             if _has_changed(self._view, view):
-                self._changes = [*self._changes, view][-_MOST_ALERTS:]
+                self._changes = [*self._changes, view][-_MOST_CHANGES:]
             self._view = view
             self._turns_back = decision.mode in DRIVING_MODES and not decision.hold_expired
             self._stop_asked = self._stop_asked and Act.STOP not in inputs.events
@@ -283,8 +280,7 @@ class Pilot:
         if reason is None:
             self._busy_s = self._clock()
             return True
-        with self._lock:
-            self._alerts.append(Alert(reason, ALERTS[reason], busy if reason is Hindrance.SERVOS_BUSY else ""))
+        self._teller.refuse(reason, busy if reason is Hindrance.SERVOS_BUSY else "")
         return False
 
     def _hear(self, inputs: Inputs, sent: SentMotion | None, kept_back: Rejection | None, now_s: float) -> None:
@@ -308,7 +304,7 @@ class Pilot:
             events.append(GateReport(kept_back.reason))
         if self._has_arrived(inputs.seen, now_s):
             events.append(Act.TAKE_BACK)
-            self._raise([(Note.REACHED, "")], now_s)
+            self._teller.tell([(Note.REACHED, "")], now_s)
 
     def _has_arrived(self, seen: Seen | None, now_s: float) -> bool:
         """The program drove to the destination and has rested there for a moment."""
@@ -357,43 +353,6 @@ class Pilot:
         # a press that itself ended a hold is a new one
         self._must_rest = self._permitted is None and permitted is Source.OPERATOR and not self._was_at_rest
         self._permitted = permitted
-
-    def _tell(
-        self,
-        before: SupervisorState,
-        decision: Decision,
-        jog: Jog,
-        sent: SentMotion | None,
-        kept_back: Rejection | None,
-        now_s: float,
-    ) -> None:
-        """Alerts of this turn."""
-        raised: list[tuple[AlertKey, str]] = [(f.cause, f.detail) for f in decision.raised if _matters(f, before)]
-        raised += [(reason, "") for refused in decision.refused for reason in refused.reasons]
-        if not jog.is_rest and decision.permitted is None:
-            raised += [(reason, "") for reason in _why_not_by_hand(decision, self._state)]
-        if sent is not None and decision.permitted is not None:
-            if sent.rejection is not None and sent.rejection not in _NOT_WORTH_A_WORD:
-                raised.append((sent.rejection, ""))
-            # The program bends to the end of a tendon's travel as a matter of course; a feed that has none left goes nowhere.
-            by_program = decision.permitted is Source.PROGRAM and jog.is_rest
-            at_end = [name for name in sent.at_end if not by_program or name == "advance"]
-            if at_end and (by_program or not jog.is_rest):
-                raised.append((Note.AT_END, ", ".join(at_end)))
-        is_tried = not jog.is_rest or decision.mode in DRIVING_MODES
-        if kept_back is not None and decision.permitted is not None and is_tried and kept_back.reason not in _NOT_WORTH_A_WORD:
-            raised.append((kept_back.reason, kept_back.detail))
-        self._raise(raised, now_s, before.mode, changed=decision.mode is not before.mode)
-
-    def _raise(
-        self, raised: list[tuple[AlertKey, str]], now_s: float, mode: Mode = Mode.ADVISORY, *, changed: bool = False
-    ) -> None:
-        """`mode` is the one until now."""
-        if raised:
-            armed, driving = mode in ARMED_MODES, mode in DRIVING_MODES
-            with self._lock:
-                self._queue, alerts = raise_alerts(self._queue, raised, now_s, armed=armed, driving=driving, changed=changed)
-                self._alerts = [*self._alerts, *alerts][-_MOST_ALERTS:]
 
     def _look(
         self,
@@ -444,21 +403,3 @@ def _has_changed(before: DriveView, after: DriveView) -> bool:
     if before.mode is not after.mode or before.latched != after.latched:
         return True
     return {fault.cause for fault in before.active} != {fault.cause for fault in after.active}
-
-
-def _why_not_by_hand(decision: Decision, state: SupervisorState) -> tuple[Hindrance, ...]:
-    """What to tell the operator who moves the controls while nobody may drive."""
-    if decision.mode is Mode.STOPPED:
-        return (Hindrance.IS_STOPPED,)
-    if decision.latched is not None:
-        return (Hindrance.UNACKNOWLEDGED,)
-    return (Hindrance.SERVOS_UNCHECKED,) if not state.health.servos_ready else ()
-
-
-def _matters(fault: Fault, before: SupervisorState) -> bool:
-    """Is it worth an alert? In ADVISORY perception's doubts are on the screen anyway, and idle servos endanger nobody."""
-    if before.mode in ARMED_MODES or fault.cause in {Cause.STOP_PRESSED, Cause.SERVOS_WRONG}:
-        return True
-    if AREA[fault.cause] is Area.SERVOS or fault.cause is Cause.CLOCK:
-        return before.health.servos_ready
-    return AREA[fault.cause] is Area.HOST and REACTION[fault.cause] is Reaction.WARN
