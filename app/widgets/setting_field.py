@@ -165,7 +165,9 @@ class SettingField(QFrame):
         value = min(value, bounds.high - inside * bounds.high_open)
         digits = max(0, 2 - math.floor(math.log10(max(abs(value), span / 1e4, 1e-9))))
         text = f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
-        return "0" if text in ("-0", "") else text
+        text = "0" if text in ("-0", "") else text
+        is_out = (bounds.low_open and float(text) <= bounds.low) or (bounds.high_open and float(text) >= bounds.high)
+        return f"{value:.6g}" if is_out else text
 
     def _place_of(self, value: float) -> int:
         bounds = self.setting.bounds
