@@ -102,7 +102,7 @@ def row_from_json(record: Row) -> RecordedRow:
         pts_ms=count(record.get("pts_ms"), "pts_ms"),
         size=_size(record.get("size"), "size"),
         dropped_frames=count(record.get("dropped_frames"), "dropped_frames"),
-        dropped_rows=count(record.get("dropped_rows"), "dropped_rows"),
+        dropped_rows=count(record.get("dropped_rows", 0), "dropped_rows"),
         frames_per_second=maybe_number(record.get("fps"), "fps") or 0.0,
         scene=_scene(record, index, captured_s),
         advice=advice_from(record.get("advice"), "advice"),

@@ -73,7 +73,7 @@ def test_one_click_evaluates_what_was_measured_by_hand_and_opens_the_report(
     assert "Evaluating" in strip.text
     qtbot.waitUntil(lambda: bool(shown), timeout=LONG_MS)
     assert shown == [session / "evaluation" / "report.html"]
-    assert "settings that it was recorded with" in shown[0].read_text()
+    assert "the recorded configuration is lost; the default one is taken" in shown[0].read_text(), "this one kept none"
     metrics = json.loads((session / "evaluation" / "metrics.json").read_text())
     assert metrics["images"]["measured"] == 3
     assert f"0 of 3 pictures answered. Report opened: {shown[0]}" in said[-1]  # there is no robot in these pictures

@@ -20,7 +20,7 @@ def test_frames_are_timed_as_often_seen_as_in_a_stream(configured: str, timed: s
 
 
 def test_pictures_that_are_all_refused_cannot_be_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(benchmark_command, "_first_frame_s", lambda: None)
+    monkeypatch.setattr(benchmark_command, "_first_frame_s", lambda _config_path: None)
     (tmp_path / "dark.toml").write_text("[perception.quality]\nblack_level = 255.0\n")
     with pytest.raises(
         UserError, match=r"refused before there are masks to compare \(image black\); change \[perception.quality\]"

@@ -444,7 +444,7 @@ def test_a_study_goes_before_the_truth_of_its_set(tmp_path: Path) -> None:
     (tmp_path / "truth.jsonl").write_text("")
     result = evaluate(tmp_path, out=tmp_path / "out", study_name="main")
     assert result["source"]["kind"] == "annotated by hand"
-    assert result["notes"] == ["Of the annotated images 1 are not where they were; they are in none of the figures."]
+    assert result["notes"][0] == "Of the annotated images 1 are not where they were; they are in none of the figures."
     with pytest.raises(UserError, match="not a labelled set"):
         evaluate(tmp_path, out=tmp_path / "out")
 

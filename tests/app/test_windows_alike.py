@@ -111,9 +111,9 @@ def test_what_all_windows_have_has_the_same_name_key_and_place(window: QMainWind
         for name in ("File", "View", "Help")
     }
     assert found["File"][-1] == ("Quit", ["Ctrl+Q"])
-    assert found["View"][-1] == ("Full screen", ["F11"])
+    assert found["View"][-1] == ("Full screen", ["F11", "Shift+F11"])
     assert "F" in dict(found["View"])["Whole picture"]
-    assert found["Help"][0] == ("Keys", ["F1"])
+    assert found["Help"][0] == ("Keys", ["F1", "Shift+F1"])
     assert found["Help"][-1][0] == "About LumenPilot"
 
 
@@ -231,7 +231,7 @@ def test_keys_that_move_the_robot_are_those_that_are_listened_to(make_window: Ma
     assert held == tuple((key_names(keys), motion.value) for motion, keys in KEYS.items())
     assert ("\N{LEFTWARDS ARROW}   A", "steer left") in held
     robot = dict(window.panels.help.tables)["Robot"]
-    assert (STOP_KEY, "STOP") in robot
+    assert (f"{STOP_KEY}, Pause", "STOP") in robot
     assert {step.value.name: step.value.key for step in Step}.items() <= {text: key for key, text in robot}.items()
     view = dict(window.panels.help.tables)["View"]
     assert {layer.value.label: layer.value.key for layer in Layer}.items() <= {text: key for key, text in view}.items()
