@@ -6,8 +6,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.sources import expand, is_of_session, is_video
+from app.sources import expand, is_video
 from app.taken_frames import evenly, evenly_over, take_frames, taken_of
+from core.session.session_video import is_of_session
 from core.study.annotation_store import DEFAULT_NAME
 from core.study.annotations import AnnotationError
 

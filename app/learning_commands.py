@@ -235,6 +235,7 @@ def _check_choices(
 ) -> None:
     """Raise DatasetError for options that could have no effect beside the others."""
     from core.learning.dataset import DatasetError
+    from core.learning.training import TrainingPlan
 
     told = {"--base": base is not None, "--shallow": shallow, "--deepen": deepen}
     shapes = [name for name, given in told.items() if given]
@@ -254,7 +255,7 @@ def _check_choices(
         raise DatasetError("--focus needs --init MODEL, which tells what is hard")
     if second_look and plan.strip_share > 0:
         raise DatasetError("--strips is for whole pictures; with --second-look leave it out")
-    if second_look and plan.crop != type(plan)().crop:
+    if second_look and plan.crop != TrainingPlan().crop:
         raise DatasetError("--crop is for whole pictures: the second look has windows of its own size; leave it out")
     if plan.stop_after is not None and plan.stop_after >= plan.steps:
         raise DatasetError(f"--stop-after {plan.stop_after} is no earlier than the end, --steps {plan.steps}; leave it out")

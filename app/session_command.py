@@ -126,7 +126,7 @@ def run_export(folder: Path, outs: list[Path], *, plain: bool, as_json: bool) ->
         lost = losses(reader, reader.events)  # what is wrong with the events is found here
         problems = [*reader.problems, *lost]
         if _is_cut(reader):
-            problems.append(f"it did not end properly; what can be saved of it, saves: session recover {folder}")
+            problems.append(f"it did not end properly: session recover {folder} saves what can be had")
         elif is_being_written(folder):
             problems.append("it is still being recorded: what came later is not in what was written")
     if as_json:

@@ -100,6 +100,7 @@ def frame_of(stem: str, videos: Collection[str]) -> bool:
 
 def _video(path: Path, stem: str) -> Iterator[SourcePicture]:
     """The pictures of a video, damaged ones as problems."""
+    from core.session.session_video import is_of_session
     from hardware.cameras.video_file import VideoFile
 
     if is_of_session(path):
@@ -129,40 +130,25 @@ def _video(path: Path, stem: str) -> Iterator[SourcePicture]:
 
 
 def _session_video(path: Path, stem: str) -> Iterator[SourcePicture]:
-    """Of a recorded session: its rows know how each picture was written, so that no damage passes."""
+    """Of a recorded session: no damage passes."""
     from core.session.manifest import SessionError
-    from core.session.pictures import packet_times, video_number
-    from core.session.reader import SessionReader
-    from core.session.video_in import upright
+    from core.session.session_video import session_video
 
-    number = video_number(path)
-    assert number is not None
     try:
-        with SessionReader(path.absolute().parent) as reader:
-            reader.wait()
-            times_ms = sorted({pts_ms for pts_ms, _ in packet_times(path)})
+        with session_video(path) as (times_ms, take):
             is_first = True
             for index, at_ms in enumerate(times_ms):
-                frame = reader.decoded(number, at_ms)
-                if frame is None:
+                image = take(index)
+                if image is None:
                     yield SourcePicture(*_named(path, stem, index), None, f"{path}: picture {index} is lost or damaged")
                     continue
-                yield SourcePicture(*_named(path, stem, index), upright(frame), None, (at_ms - times_ms[0]) / 1000.0, is_first)
+                yield SourcePicture(*_named(path, stem, index), image, None, (at_ms - times_ms[0]) / 1000.0, is_first)
                 is_first = False
     except SessionError as error:
         yield SourcePicture(str(path), stem, (path.stem,), None, str(error))
         return
     if not times_ms:
         yield SourcePicture(str(path), stem, (path.stem,), None, f"{path}: no picture in it can be read")
-
-
-def is_of_session(video: Path) -> bool:
-    """Whether it is the video of a recorded session."""
-    from core.session.manifest import FRAMES
-    from core.session.pictures import video_number
-
-    is_named_so = video.name.startswith("video_") and video_number(video) is not None
-    return is_named_so and (video.absolute().parent / FRAMES).is_file()
 
 
 def _named(path: Path, stem: str, index: int) -> tuple[str, str, tuple[str, ...]]:

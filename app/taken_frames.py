@@ -14,11 +14,10 @@ import av.error
 import numpy as np
 
 from app.learning_commands import progress_bar
-from app.sources import is_of_session, is_video
+from app.sources import is_video
 from core.images import ImageError, read_image
 from core.learning.dataset import write_png
-from core.session.pictures import packet_times, video_number
-from core.session.reader import SessionReader
+from core.session.session_video import Take, is_of_session, session_video, times_of
 from core.session.video_in import decoded, open_video, upright
 from core.study.annotations import AnnotationError
 from core.types import Image
@@ -27,9 +26,6 @@ _WHOSE = "video.json"
 _END_BYTES = 1_000_000
 _SAME_LEVELS = 8.0
 """By so many grey levels two decoders' pictures of one frame differ at most, on average."""
-
-_Take = Callable[[int], Image | None]
-"""The n-th picture of a video, RGB uint8 (H, W, 3); None: it is lost or damaged."""
 
 
 def taken_of(video: Path) -> list[Path]:
@@ -52,7 +48,7 @@ def evenly(count: int) -> Choose:
 
 def evenly_over(videos: Sequence[Path], count: int) -> dict[Path, Choose]:
     """`count` pictures evenly over several videos that follow each other, as the files of one session do."""
-    lengths = [len({pts_ms for pts_ms, _ in packet_times(video)}) for video in videos]
+    lengths = [len(times_of(video)) for video in videos]
     chosen, begin = evenly(count)(sum(lengths)) if sum(lengths) else [], 0
     shares: dict[Path, Choose] = {}
     for video, length in zip(videos, lengths, strict=True):
@@ -109,7 +105,7 @@ def _pictures_in(folder: Path, video: Path) -> list[Path]:
     return sorted(folder.glob(f"{escape(video.stem)}_*.png"))
 
 
-def _own(folder: Path, video: Path, take: _Take) -> None:
+def _own(folder: Path, video: Path, take: Take) -> None:
     """Write into the folder whose pictures it holds; those that lie in it without a word are compared with the video's."""
     _check_owner(folder, video)
     if (folder / _WHOSE).exists() or is_of_session(video):
@@ -157,7 +153,7 @@ def _is_alike(path: Path, image: Image | None) -> bool:
 
 
 @contextmanager
-def _opened(video: Path) -> Iterator[tuple[int, _Take]]:
+def _opened(video: Path) -> Iterator[tuple[int, Take]]:
     """How many pictures a video has, and how to take one. Raises AnnotationError, av.error.FFmpegError, OSError."""
     with _session_opened(video) if is_of_session(video) else _video_opened(video) as (total, take):
         if not total:
@@ -166,22 +162,13 @@ def _opened(video: Path) -> Iterator[tuple[int, _Take]]:
 
 
 @contextmanager
-def _session_opened(video: Path) -> Iterator[tuple[int, _Take]]:
-    number = video_number(video)
-    assert number is not None
-    with SessionReader(video.absolute().parent) as reader:
-        reader.wait()
-        times_ms = sorted({pts_ms for pts_ms, _ in packet_times(video)})
-
-        def take(index: int) -> Image | None:
-            frame = reader.decoded(number, times_ms[index]) if index < len(times_ms) else None
-            return upright(frame) if frame is not None else None
-
+def _session_opened(video: Path) -> Iterator[tuple[int, Take]]:
+    with session_video(video) as (times_ms, take):
         yield len(times_ms), take
 
 
 @contextmanager
-def _video_opened(video: Path) -> Iterator[tuple[int, _Take]]:
+def _video_opened(video: Path) -> Iterator[tuple[int, Take]]:
     with open_video(video) as container:
         if not container.streams.video:
             raise AnnotationError(f"{video}: has no video in it")
