@@ -88,8 +88,8 @@ def _of_the_largest(values: NDArray[np.float32], rank: int) -> float:
 
 def check_finite(*probabilities: NDArray[np.float32]) -> Refusal | None:
     """LOW_CONFIDENCE, when the network gave what is no number: no geometry can be trusted with it."""
-    # One such value spoils the sum, which takes a tenth of the time of looking at each.
-    if math.isfinite(sum(float(np.sum(probability)) for probability in probabilities)):
+    # One such value spoils the product with itself, the quickest thing that looks at each.
+    if all(math.isfinite(float(np.vdot(probability, probability))) for probability in probabilities):
         return None
     return Refusal(Reason.LOW_CONFIDENCE, "the network's output is not finite")
 
