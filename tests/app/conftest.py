@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -35,8 +36,9 @@ def bench() -> FakeBench:
 
 
 @pytest.fixture(autouse=True)
-def no_leaks(qapp: QApplication) -> Iterator[None]:
+def no_leaks(qapp: QApplication, imported: set[str]) -> Iterator[None]:
     """Every window that a test makes is gone after it."""
+    _leave_out(imported)
     before = set(QApplication.topLevelWidgets())
     yield
     gc.collect()
@@ -44,6 +46,24 @@ def no_leaks(qapp: QApplication) -> Iterator[None]:
     qapp.processEvents()
     left = [widget for widget in QApplication.topLevelWidgets() if widget not in before]
     assert not left, f"left over: {left}"
+    _leave_out(imported)
+
+
+@pytest.fixture(scope="session")
+def imported() -> set[str]:
+    """The modules whose objects the collector no longer looks at."""
+    return set()
+
+
+def _leave_out(imported: set[str]) -> None:
+    """Torch, OpenVINO and the like never become garbage: collections that walk through them after each test take half of all time.
+
+    Asked only between tests: what is alive then and becomes garbage later is never found any more.
+    """
+    if sys.modules.keys() - imported:
+        gc.collect()
+        gc.freeze()
+        imported.update(sys.modules)
 
 
 MakeWindow = Callable[..., OperatorWindow]
