@@ -76,7 +76,7 @@ def test_it_trains_in_a_process_shows_how_it_goes_and_installs_the_model(small_m
     assert state.frames is not None
     assert (state.frames.train_count, state.frames.held_out_count) == (8, 2)
     before, after = state.looks[0].pictures, state.looks[-1].pictures
-    assert [Path(path).name for path in before] == ["frame_02_before.png", "frame_07_before.png"]
+    assert [Path(path).name for path in before] == ["frame_04_before.png", "frame_05_before.png"]
     assert all(Path(path).is_file() for path in (*before, *after))
     info = read_model_info(model_folder("own_1"))  # with its hashes
     assert info.figures["held_out"] is True
