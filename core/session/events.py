@@ -11,7 +11,7 @@ from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.gate_checks import Source
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Mode
-from core.session.checked import choice, finite, finite_tree, group, number, text
+from core.session.checked import finite, finite_tree, group, number, text
 from core.types import Point
 
 
@@ -91,6 +91,7 @@ def event_of_target(point: Point | None, time_s: float) -> Event:
     return Event(time_s, EventKind.TARGET, f"{point[0]:.0f}, {point[1]:.0f}", {"xy": [round(point[0], 2), round(point[1], 2)]})
 
 
+_LONGEST_KIND = 40
 _ADDED_LATER = "added_later"
 
 
@@ -110,10 +111,8 @@ def event_to_json(event: Event) -> dict[str, Any]:
 
 
 def event_from_json(record: dict[str, Any]) -> Event:
-    """Raises Damaged."""
-    return Event(
-        number(record.get("time_s"), "time_s"),
-        choice(EventKind, record.get("kind"), "kind"),
-        text(record.get("text", ""), "text"),
-        group(record.get("data", {}), "data"),
-    )
+    """Raises Damaged. What a later version tells of is kept as a note that names its kind."""
+    kind, said = text(record.get("kind"), "kind"), text(record.get("text", ""), "text")
+    if kind not in set(EventKind):
+        kind, said = EventKind.NOTE, f"{kind[:_LONGEST_KIND]}: {said}"
+    return Event(number(record.get("time_s"), "time_s"), EventKind(kind), said, group(record.get("data", {}), "data"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from core.session.manifest import SessionError
 from core.session.reader import SessionReader
 from core.session.recorded import RecordedRow
-from core.session.video import MS
+from core.session.video import MS, media_name
 from core.types import Command, Image, Point, Tick
 
 Draw = Callable[[Tick], Image]
@@ -32,12 +33,22 @@ def new_file(path: Path) -> Iterator[Path]:
             raise SessionError(f"{path}: is there already; choose another file")
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part
-        part.replace(path)
+        _put_in_place(part, path)
     except (av.error.FFmpegError, OSError) as error:
         raise SessionError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
     finally:
         with suppress(OSError):
             part.unlink()
+
+
+def _put_in_place(part: Path, path: Path) -> None:
+    """Give the file its name, unless somebody else has made one of that name meanwhile."""
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise SessionError(f"{path}: was made by something else meanwhile; choose another file") from None
+    except OSError:  # a drive that knows no second name for a file
+        part.replace(path)
 
 
 def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None) -> int:
@@ -189,7 +200,7 @@ class _Movie:
     def __init__(self, path: Path, first: Image) -> None:
         height, width = first.shape[:2]
         self._size = width + width % 2, height + height % 2
-        self._container = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
+        self._container = av.open(media_name(path), "w", format="mp4", options={"movflags": "faststart"})
         options = {"preset": "veryfast", "crf": "18", "g": "30", "bf": "0"}
         self._stream: Any = self._container.add_stream("libx264", rate=30, options=options)
         self._stream.width, self._stream.height = self._size

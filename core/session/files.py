@@ -12,12 +12,22 @@ import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
 
 from core.record_config import RecordConfig
 from core.session.events import Event, EventKind, as_added_later, event_to_json
 from core.session.lines import sealed
-from core.session.manifest import EVENTS, FRAMES, PREFIX, About, Counts, Manifest, SessionError, new_manifest, write_manifest
+from core.session.manifest import (
+    EVENTS,
+    FRAMES,
+    PREFIX,
+    About,
+    Counts,
+    Manifest,
+    Origin,
+    SessionError,
+    new_manifest,
+    write_manifest,
+)
 from core.session.ring import EncodedFrame
 from core.session.video import FrameEncoder, VideoError, VideoTrack
 
@@ -152,7 +162,7 @@ class SessionFiles:
         *,
         first_s: float,
         now_s: float,
-        origin: Literal["recorded", "last seconds"] = "recorded",
+        origin: Origin = "recorded",
     ) -> None:
         self._split_s = config.split_s
         self.started_s = first_s
@@ -225,7 +235,7 @@ class SessionFiles:
             except VideoError as error:
                 problem = str(error)
         # before the manifest says that all is well, all must be on the disk
-        _sync_files(self.folder)
+        _sync_files(self.folder, all_videos=True)
         self.counts.dropped = dropped
         changes = {"closed": not problem, "ended": ended, "ended_utc": datetime.now(UTC), "counts": self.counts}
         try:
@@ -260,9 +270,13 @@ class _Syncer:
         self._stop.set()
 
 
-def _sync_files(folder: Path) -> None:
-    """Only the newest video changes. What cannot be forced now is written by the system later."""
-    for path in (folder / FRAMES, folder / EVENTS, *sorted(folder.glob("video_*.mkv"))[-1:]):
+def _sync_files(folder: Path, *, all_videos: bool = False) -> None:
+    """Now and then only the newest video, since one that was ended just before may have been forced too early: in the end, all.
+
+    What cannot be forced now is written by the system later.
+    """
+    videos = sorted(folder.glob("video_*.mkv"))
+    for path in (folder / FRAMES, folder / EVENTS, *(videos if all_videos else videos[-1:])):
         with contextlib.suppress(OSError):
             handle = os.open(path, os.O_RDONLY)
             try:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from core.calibration_config import CalibrationConfig
 from core.config import Config
@@ -27,7 +27,8 @@ _MAX_BYTES = 8_000_000
 _PACKAGES = ("av", "mujoco-core", "numba", "numpy", "opencv-python-headless", "openvino", "scikit-image", "scipy", "torch")
 
 Kind = Literal["SIM", "LIVE", "PLAYBACK", "UNKNOWN"]
-"""What the banner said; UNKNOWN only where a damaged manifest can no longer tell."""
+"""What the banner said; UNKNOWN only where a damaged manifest, or one with the word of a later version, cannot tell."""
+Origin = Literal["recorded", "last seconds"]
 
 
 class SessionError(UserError):
@@ -82,7 +83,7 @@ class Manifest(BaseModel):
     id: str = Field(max_length=64)
     kind: Kind
     rig: str = ""
-    origin: Literal["recorded", "last seconds"] = "recorded"
+    origin: Origin = "recorded"
     started_utc: datetime
     started_monotonic_s: float = Field(allow_inf_nan=False)
     codec: str = ""
@@ -95,6 +96,15 @@ class Manifest(BaseModel):
     ended: str = ""
     counts: Counts = Counts()
     recovered: Loss | None = None
+
+    @field_validator("kind", "origin", mode="before")
+    @classmethod
+    def _of_a_later_version(cls, value: Any, info: ValidationInfo) -> Any:
+        """A word that this version does not know costs no session its manifest."""
+        if not isinstance(value, str):
+            return value
+        known, otherwise = (get_args(Kind), "UNKNOWN") if info.field_name == "kind" else (get_args(Origin), "recorded")
+        return value if value in known else otherwise
 
     @property
     def known(self) -> CalibrationConfig | None:

@@ -45,6 +45,7 @@ class SessionReader:
         self._lock = threading.Lock()
         self._problems: list[str] = []
         self._more_problems = 0
+        self._later: set[str] = set()
         self.manifest: Manifest | None = self._read_manifest()
         self._rows: OrderedDict[int, RecordedRow | None] = OrderedDict()
         self._file: IO[bytes] | None = None
@@ -130,10 +131,20 @@ class SessionReader:
 
     def _read_row(self, place: int, data: bytes) -> RecordedRow | None:
         try:
-            return row_from_json(parse(data))
+            row = row_from_json(parse(data))
         except Damaged as error:
             self._problem(f"{FRAMES}: row {place}: {error}; skipped")
             return None
+        for word in row.unknown:
+            self._tell_later(word)
+        return row
+
+    def _tell_later(self, word: str) -> None:
+        with self._lock:
+            is_new = word not in self._later
+            self._later.add(word)
+        if is_new:
+            self._problem(f"{FRAMES}: {word} is a word of a later version, and is left out; update the program to see it")
 
     def frame(self, place: int) -> Frame | None:
         """Picture, index and time of the n-th row; None when row or picture is lost. Raises IndexError."""

@@ -23,6 +23,7 @@ from core.session.checked import (
     points,
     text,
 )
+from core.session.later_words import without_later_words
 from core.session.recorded_drive import advice_from, command_from, drive_from, status_from
 from core.types import (
     Advice,
@@ -77,6 +78,8 @@ class RecordedRow:
     drive: DriveView | None
     bus: dict[str, Any] | None
     camera_lost: int = 0
+    unknown: tuple[str, ...] = ()
+    """Words of a later version, each with its place; what they belonged to is left out."""
 
     @property
     def source_px_per_working_px(self) -> float:
@@ -92,7 +95,8 @@ class RecordedRow:
 
 
 def row_from_json(record: Row) -> RecordedRow:
-    """Raises Damaged, which names the value."""
+    """Raises Damaged, which names the value. A word of a later version damages nothing."""
+    record, unknown = without_later_words(record)
     index, captured_s = count(record.get("index"), "index"), number(record.get("captured_s"), "captured_s")
     return RecordedRow(
         row=count(record.get("row"), "row"),
@@ -111,6 +115,7 @@ def row_from_json(record: Row) -> RecordedRow:
         drive=drive_from(record.get("drive")),
         bus=group(record["bus"], "bus") if record.get("bus") is not None else None,
         camera_lost=count(record.get("camera_lost", 0), "camera_lost"),  # sessions of before have none
+        unknown=unknown,
     )
 
 

@@ -12,7 +12,7 @@ import av
 import av.error
 
 from core.session.packet_check import PacketCheck, PictureRow
-from core.session.video import VideoError
+from core.session.video import VideoError, media_name
 from core.session.video_in import open_video
 
 _MAX_STEP_MS = 5_000
@@ -75,7 +75,7 @@ def has_h264(container: Any) -> bool:
 def _copy(container: Any, target: Path, expected: Sequence[Expected], done: Remuxed) -> None:
     stream = container.streams.video[0]
     try:
-        with av.open(str(target), "w", format="matroska") as output:
+        with av.open(media_name(target), "w", format="matroska") as output:
             copy = output.add_stream_from_template(stream)
             for packet, pts_ms in _whole(container, stream, expected, done):
                 packet.stream = copy

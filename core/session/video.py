@@ -32,6 +32,11 @@ _NOMINAL_FPS = 30
 _GLOBAL_HEADER = 1 << 22
 
 
+def media_name(path: Path) -> str:
+    """The path as the video library takes it: what stands before a colon in a relative one would be a protocol's name."""
+    return os.path.abspath(path)
+
+
 class VideoError(Exception):
     """The encoder or the video file gave up; the recorder stops with this line."""
 
@@ -120,7 +125,7 @@ class VideoTrack:
     def __init__(self, path: Path, template: Any) -> None:
         self._zero_ms: int | None = None
         try:
-            self._container = av.open(str(path), "w", format="matroska", options=LIVE_OPTIONS)
+            self._container = av.open(media_name(path), "w", format="matroska", options=LIVE_OPTIONS)
             self._stream = self._container.add_stream_from_template(template)
         except (av.error.FFmpegError, OSError, ValueError) as error:
             raise VideoError(f"{path}: cannot be written ({_words(error)})") from None

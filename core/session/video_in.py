@@ -12,6 +12,7 @@ import av.error
 import numpy as np
 from av.container import InputContainer
 
+from core.session.video import media_name
 from core.types import Image
 
 _SQUARE = 0.005
@@ -22,7 +23,7 @@ def open_video(path: Path) -> InputContainer:
 
     Titles and tags are decoded when it is opened; a flipped bit in one of them must not cost the pictures.
     """
-    return av.open(str(path), metadata_errors="replace")
+    return av.open(media_name(path), metadata_errors="replace")
 
 
 @dataclass(frozen=True, slots=True)

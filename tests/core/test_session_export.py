@@ -17,6 +17,7 @@ from core.session.export import export_csv, export_mp4
 from core.session.manifest import SessionError, read_manifest
 from core.session.mcap_export import TOPICS, export_mcap
 from core.session.reader import SessionReader
+from core.session.recovery import recover
 from core.session.writer import SessionWriter
 from core.types import Image, Tick
 from tests.core.session_data import ABOUT, QUICK, drive_of, number_in, record, tick_of
@@ -187,3 +188,29 @@ def test_a_session_without_pictures_is_no_mp4(tmp_path: Path) -> None:
     with SessionReader(session) as reader, pytest.raises(SessionError, match="no picture"):
         export_mp4(reader, tmp_path / "x.mp4")
     assert not list(tmp_path.glob("*.mp4*"))
+
+
+def test_a_file_that_was_made_while_exporting_is_not_overwritten(session: Path, tmp_path: Path) -> None:
+    out = tmp_path / "x.csv"
+
+    def meanwhile() -> None:
+        if not out.exists():
+            out.write_text("somebody else's")
+
+    with SessionReader(session) as reader, pytest.raises(SessionError, match="was made by something else meanwhile"):
+        export_csv(reader, out, meanwhile)
+    assert out.read_text() == "somebody else's"
+    assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
+
+
+def test_colons_in_a_relative_path_name_no_protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    session = record(Path("rig:1"), [tick_of(i, 1000.0 + i / 10, full=True) for i in range(5)])
+    assert not session.is_absolute()
+    with SessionReader(session) as reader:
+        assert reader.wait(20.0)
+        frame = reader.frame(4)
+        assert frame is not None
+        assert number_in(frame.image) == 4
+        assert export_mp4(reader, Path("clip:1.mp4")) == 5
+    assert recover(session, Path("copy:1")).pictures == 5

@@ -18,7 +18,7 @@ import pytest
 from core.session.events import Event, EventKind
 from core.session.files import SessionFiles, add_event
 from core.session.lines import lines_of, sealed
-from core.session.manifest import SessionError, read_manifest
+from core.session.manifest import EVENTS, FRAMES, MANIFEST, SessionError, read_manifest
 from core.session.reader import SessionReader
 from core.session.recovery import Recovery, find_cut_sessions, recover
 from core.session.writer import SessionWriter
@@ -200,13 +200,38 @@ def test_a_damaged_manifest_is_named_and_the_rest_is_read(session: Path) -> None
 
 
 @pytest.mark.parametrize(
-    "change", [{"kind": "REAL"}, {"started_utc": 5e300}, {"counts": 3}, {"format": 0}, {"started_monotonic_s": None}]
+    "change", [{"kind": 7}, {"started_utc": 5e300}, {"counts": 3}, {"format": 0}, {"started_monotonic_s": None}]
 )
 def test_a_manifest_with_a_wrong_value_names_it(session: Path, change: dict[str, object]) -> None:
     content = json.loads((session / "manifest.json").read_text()) | change
     (session / "manifest.json").write_text(json.dumps(content))
     with pytest.raises(SessionError, match=next(iter(change))):
         read_manifest(session)
+
+
+def test_a_session_with_words_of_a_later_version_is_read_and_recovered_whole(session: Path, tmp_path: Path) -> None:
+    count = len(read_all(session)[0])
+    lines = (session / FRAMES).read_bytes().splitlines()
+    first = json.loads(lines[0])
+    later = {key: value for key, value in first.items() if key != "crc"} | {"state": "E", "mode": "asleep"}
+    later["refusal"] = {"reason": "too cold", "detail": "-3"}
+    (session / FRAMES).write_bytes(b"\n".join([sealed(json.dumps(later)).encode(), *lines[1:]]) + b"\n")
+    with (session / EVENTS).open("a") as file:
+        file.write(sealed(json.dumps({"time_s": 1.0, "kind": "weather", "text": "rain"})) + "\n")
+    manifest = json.loads((session / MANIFEST).read_text())
+    (session / MANIFEST).write_text(json.dumps(manifest | {"origin": "a dream", "kind": "HOLOGRAM"}))
+    rows, _, problems = read_all(session)
+    assert len(rows) == count
+    assert [line for line in problems if "later version" in line] == [
+        f"{FRAMES}: {word} is a word of a later version, and is left out; update the program to see it"
+        for word in ("state 'E'", "refusal 'too cold'")
+    ]
+    with SessionReader(session) as reader:
+        assert reader.manifest is not None
+        assert (reader.manifest.kind, reader.manifest.origin) == ("UNKNOWN", "recorded")
+        assert any(event.text == "weather: rain" for event in reader.events)
+    done = recover(session, tmp_path / "copy")
+    assert (done.frames, done.loss.rows) == (count, 0)
 
 
 def test_a_session_of_a_newer_version_is_refused_and_left_alone(session: Path) -> None:

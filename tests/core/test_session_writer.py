@@ -122,6 +122,22 @@ def test_a_time_that_is_no_number_is_replaced_by_the_clock(tmp_path: Path) -> No
         assert reader.timeline().time_s.tolist() == [1000.0]
 
 
+def test_all_videos_are_on_the_disk_before_the_manifest_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that was ended between two looks of the syncer would be forced by nobody."""
+    forced: list[str] = []
+    real = os.fdatasync
+
+    def force(handle: int) -> None:
+        forced.append(Path(os.readlink(f"/proc/self/fd/{handle}")).name)
+        real(handle)
+
+    monkeypatch.setattr(session_files.os, "fdatasync", force)
+    session = record(tmp_path, ticks(100), replace_config(split_s=1.0))
+    videos = sorted(path.name for path in session.glob("video_*.mkv"))
+    assert len(videos) > 2
+    assert set(videos) <= set(forced)
+
+
 def test_a_new_video_begins_when_the_size_changes_and_when_it_is_long(tmp_path: Path) -> None:
     odd = [tick_of(i, 1000.0 + i / 30, size=(97, 63)) for i in range(40, 44)]
     session = record(tmp_path, [*ticks(40), *odd], replace_config(split_s=1.0))
