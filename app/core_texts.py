@@ -245,6 +245,9 @@ TEMPLATES = (
     "the robot cannot go back any farther: take over, or choose another destination",
     # faults, and what is being done
     "{joint} off by {a} mm (at most {b} mm)",
+    "{joint} stands {a} mm from its goal for {b} ms",
+    "{joint} went {a} mm where nobody sent it",
+    "{joint} stays at {a} mm, outside its envelope ({b} to {c} mm)",
     "silent for {a} ms",
     "for {a} ms",
     "{a} in {b} s (at most {c})",

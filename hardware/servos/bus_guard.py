@@ -15,7 +15,7 @@ from core.servo_config import JointName, ServosConfig
 from core.types import Command
 from hardware.servos.bus_messages import Heartbeat, Order, Sent
 from hardware.servos.errors import NotReady
-from hardware.servos.jam import JamWatch
+from hardware.servos.follow_watch import FollowWatch
 from hardware.servos.one_step import OneStep
 from hardware.servos.status_block import MissingServo, ServoReading, ServoState
 
@@ -61,7 +61,8 @@ class BusGuard:
         self._watch = BusWatch()
         self._gate = GateState()
         self._one_step = OneStep(servos.joints)
-        self._jam = JamWatch(servos.joints, safety.tracking_time_s)
+        self._follow = FollowWatch(servos.joints, safety)
+        self._written_mm: Joints | None = None
         self._measurement: Measurement | None = None
         self._before: Measurement | None = None
         self.followed: Order | None = None
@@ -109,8 +110,8 @@ class BusGuard:
         """No more goals; nothing is latched."""
         self.armed = False
         self.sent = None  # a record from before tells nothing of where the next motion starts
-        self._gate = GateState()
-        self._jam.forget()
+        self._gate, self._written_mm = GateState(), None
+        self._follow.forget()
         self._orders.clear()
         self.followed = None
         self.rejection, self.clamps, self.at_end = None, (), ()
@@ -144,7 +145,8 @@ class BusGuard:
         """The driver has armed the servos. Orders from before do not count."""
         self._watch = BusWatch()
         self._gate, self._measurement, self._before = GateState(), None, None
-        self._jam.forget()
+        self._written_mm = None
+        self._follow.forget()
         self.armed = True
         self._heard_s = self._cycle_s = self._armed_s = now_s
 
@@ -183,6 +185,7 @@ class BusGuard:
 
     def wrote(self, goals_mm: Joints, order: Order | None, now_s: float) -> None:
         """These goals went out, as the servos count them."""
+        self._written_mm = goals_mm
         right, left, up, down, *_ = goals_mm
         speeds, pull_mm = self._gate.speeds_mm_s, 2.0 * self._servos.max_pull_mm
         motion = Command((right - left) / pull_mm, (up - down) / pull_mm, speeds[4], (speeds[5] + speeds[6]) / 2.0)
@@ -213,10 +216,8 @@ class BusGuard:
             faults.append(Fault(Cause.WORKER_DEAD, f"no heartbeat of the application for {1000 * silence_s:.0f} ms"))
         if not 0.0 <= gap_s <= self._safety.clock_gap_s:
             faults.append(Fault(Cause.CLOCK, f"the bus process stood still for {gap_s:.2f} s"))
-        if self._measurement is not None and self._gate.goals_mm is not None:
-            jammed = self._jam.see(self._gate.goals_mm, self._measurement.positions_mm, now_s)
-            if jammed is not None:
-                faults.append(Fault(Cause.TRACKING, jammed))
+        if self._measurement is not None and (strays := self._follow.see(self._written_mm, self._measurement)) is not None:
+            faults.append(Fault(Cause.TRACKING, strays))
         return faults
 
     def _activate(self, faults: Sequence[Fault]) -> None:

@@ -26,7 +26,7 @@ from hardware.servos.bus_messages import (
     unpack_order,
 )
 from hardware.servos.errors import NotReady
-from hardware.servos.jam import JamWatch
+from hardware.servos.jam import Jam, JamWatch
 from hardware.servos.lock_step import LockStepServos
 from hardware.servos.one_step import OneStep
 from hardware.servos.shared_slot import SharedSlot
@@ -112,7 +112,7 @@ def test_a_joint_that_stands_though_its_goal_is_far_is_jammed() -> None:
     watch, goals, at = JamWatch(SERVOS.joints, 0.2), (0.4,) + (0.0,) * 6, (0.0,) * 7
     seen = [watch.see(goals, at, n * CYCLE_S) for n in range(12)]
     assert seen[:10] == [None] * 10
-    assert seen[10] == "right stands 0.40 mm from its goal for 200 ms"
+    assert seen[10] == Jam(SERVOS.joints[0], 0.4, 0.2)
 
 
 @pytest.mark.parametrize(
