@@ -248,6 +248,7 @@ TEMPLATES = (
     "{joint} stands {a} mm from its goal for {b} ms",
     "{joint} went {a} mm where nobody sent it",
     "{joint} stays at {a} mm, outside its envelope ({b} to {c} mm)",
+    "{joint} up to {a} mA for {b} ms (at most {c} mA)",
     "silent for {a} ms",
     "for {a} ms",
     "{a} in {b} s (at most {c})",

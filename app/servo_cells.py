@@ -76,13 +76,17 @@ def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, ser
     low, sags = servos.min_voltage_v, servos.min_voltage_v + safety.voltage_warn_margin_v
     heat = Tone.BAD if state.temperature_c >= hot else Tone.WARN if state.temperature_c >= warm else Tone.PLAIN
     volts = Tone.BAD if state.voltage_v <= low else Tone.WARN if state.voltage_v <= sags else Tone.PLAIN
+    most_ma = servos.max_current_ma
+    strain = Tone.BAD if state.current_ma is not None and abs(state.current_ma) > most_ma else Tone.PLAIN
     error = _error(state)
     name = Cell(_name(joint), max(Tone.PLAIN, heat, volts, error.tone))
     return (
         name,
         _position(joint, state),
         Cell(_mm(joint, state.goal_mm), Tone.FAINT if not armed else Tone.PLAIN),
-        Cell(NONE if state.current_ma is None else number(state.current_ma, 0)),
+        Cell(NONE)
+        if state.current_ma is None
+        else _signed_cell(number(state.current_ma, 0), strain, tr("limit {most:g} mA for half a second", most=most_ma)),
         _signed_cell(f"{state.temperature_c:.0f}", heat, tr("warning from {warm:g} °C, limit {hot:g} °C", warm=warm, hot=hot)),
         _signed_cell(f"{state.voltage_v:.1f}", volts, tr("warning from {sags:g} V, limit {low:g} V", sags=sags, low=low)),
         Cell(tr("on"), Tone.PLAIN) if state.torque else _signed_cell(tr("off"), Tone.BAD if armed else Tone.FAINT),

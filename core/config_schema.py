@@ -31,6 +31,7 @@ _UNITS = (
     ("_mm", "mm"),
     ("_deg", "°"),
     ("_ms", "ms"),
+    ("_ma", "mA"),
     ("_hz", "Hz"),
     ("_mb", "MB"),
     ("_frames", "frames"),

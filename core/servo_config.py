@@ -85,6 +85,12 @@ class ServosConfig(_Section):
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="the servos' own bus watchdog")
     max_temperature_c: float = Field(70.0, ge=30.0, le=80.0, description="a hotter servo ends the driving")
     min_voltage_v: float = Field(10.5, ge=5.0, le=24.0, description="a lower supply ends the driving")
+    max_current_ma: float = Field(
+        600.0,
+        ge=50.0,
+        le=5000.0,
+        description="a servo that draws more for half a second is stopped; small ones (XL330, XC330) stall at 1500 to 1800",
+    )
     tracking_error_mm: float = Field(1.5, gt=0.0, le=50.0, description="distance of goal and measured position that counts as jam")
     torque_off_on_stop: bool = Field(False, description="also switch the torque off at STOP; it releases the tension of the wires")
     joints: tuple[JointConfig, ...] = Field(

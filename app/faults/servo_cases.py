@@ -1,4 +1,4 @@
-"""Faults 21 to 28: the servos and their line. Always over a pseudo-terminal, with the real driver in its own process."""
+"""Faults 21 to 28, and 44: the servos and their line. Always over a pseudo-terminal, with the real driver in its own process."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from hardware.twin.servo_device import OVERLOAD_BIT, SoftServo
 
 _DISARM, _STOP, _HELD = (Mode.ADVISORY,), (Mode.STOPPED,), (Mode.HOLD, Mode.ADVISORY)
 _ADVANCE = 5
+_CARRIED_TICKS_S = 1000.0
+"""Some 10 mm/s of a joint."""
 
 
 def _line(bench: FaultBench) -> SoftServoBus:
@@ -38,13 +40,18 @@ def _servo_fault(
     cause: Cause,
     *more: Cause,
     alternatives: tuple[tuple[Mode, ...], ...] = (),
+    release: Callable[[FaultBench], object] = lambda bench: None,
     **options: Any,
 ) -> Seen:
-    """Hand over, break something, wait until the pilot has left autonomy; the servos must hold and nothing may be sent any more."""
+    """Hand over, break something, wait until the pilot has left autonomy; the servos must hold and nothing may be sent any more.
+
+    `release` ends what moves the servos from outside.
+    """
     with open_bench(kit, live=True, **options) as bench:
         start = mark(bench.hand_over())
         inject(bench)
         bench.until(lambda view: view.mode is path[-1])
+        release(bench)
         bench.run(0.4)
         wanted = Wanted(path, (cause, *more), cause, alternatives=((Mode.HOLD, *path), *alternatives), may_hold=True)
         return judge(bench, start, wanted, *_still(bench))
@@ -138,11 +145,20 @@ def supply(kit: Kit) -> Seen:
             if supply_v > 10.5:
                 _expect(bench, Cause.VOLTAGE_SAGS)
 
+    return _on_benches(
+        kit,
+        ("heat", lambda part: _servo_fault(part, heat, _DISARM, Cause.HOT, Cause.WARM)),
+        ("supply", lambda part: _servo_fault(part, sag, _DISARM, Cause.VOLTAGE_LOW, Cause.VOLTAGE_SAGS)),
+    )
+
+
+def _on_benches(kit: Kit, *parts: tuple[str, Callable[[Kit], Seen]]) -> Seen:
+    """Several kinds of a fault, each on a bench of its own, told as one."""
     found = []
-    for name, inject, causes in (("heat", heat, (Cause.HOT, Cause.WARM)), ("supply", sag, (Cause.VOLTAGE_LOW, Cause.VOLTAGE_SAGS))):
+    for name, inject in parts:
         part = Kit(kit.folder / name, kit.live)
         part.folder.mkdir()
-        seen = _servo_fault(part, inject, _DISARM, *causes)
+        seen = inject(part)
         found.append(replace(seen, reaction=f"{name}: {seen.reaction}"))
     return Seen(
         "; ".join(seen.reaction for seen in found),
@@ -161,7 +177,8 @@ def _expect(bench: FaultBench, cause: Cause) -> None:
 @fault(
     25,
     "tracking error, jam, slack wire",
-    injected="the advance servo's horn is blocked while the program feeds",
+    injected="the advance servo's horn is blocked while the program feeds; on another bench it is pulled back; on a third it drifts"
+    " while nobody drives",
     wanted="STOP after 200 ms beyond the envelope",
     quick=False,
 )
@@ -169,7 +186,61 @@ def jam(kit: Kit) -> Seen:
     def block(bench: FaultBench) -> None:
         _line(bench).stir(_ADVANCE, lambda servo: servo.freeze(True))
 
-    return _servo_fault(kit, block, _STOP, Cause.TRACKING)
+    def pull(bench: FaultBench) -> None:
+        _line(bench).stir(_ADVANCE, lambda servo: servo.carry(-_CARRIED_TICKS_S))
+
+    return _on_benches(
+        kit,
+        ("jam", lambda part: _servo_fault(part, block, _STOP, Cause.TRACKING)),
+        ("pulled", lambda part: _servo_fault(part, pull, _STOP, Cause.TRACKING, release=_release)),
+        ("drift", _drift),
+    )
+
+
+def _release(bench: FaultBench) -> None:
+    _line(bench).stir(_ADVANCE, lambda servo: servo.carry(0.0))
+
+
+def _drift(kit: Kit) -> Seen:
+    """Armed, and the operator's hand at rest."""
+    with open_bench(kit, live=True) as bench:
+        bench.arm()
+        bench.run(0.3)
+        start = mark(bench)
+        _line(bench).stir(_ADVANCE, lambda servo: servo.carry(_CARRIED_TICKS_S / 4))
+        bench.until(lambda view: view.mode is Mode.STOPPED)
+        _release(bench)
+        bench.run(0.4)
+        return judge(bench, start, Wanted(_STOP, (Cause.TRACKING,), Cause.TRACKING), *_still(bench))
+
+
+@fault(
+    44,
+    "too much current",
+    injected="the advance servo draws 1.5 A for 100 ms; then 0.9 A for good, with a ripple to nothing for a fifth of the time",
+    wanted="the first is no fault; the second STOPs after half a second",
+    quick=False,
+)
+def strain(kit: Kit) -> Seen:
+    with open_bench(kit, live=True) as bench:
+        start = mark(bench.hand_over())
+
+        _line(bench).stir(_ADVANCE, lambda servo: servo.grind(1500.0))
+        bench.run(0.1)
+        _line(bench).stir(_ADVANCE, lambda servo: servo.grind(0.0))
+        bench.run(0.7)
+        peak = bench.mode
+        _line(bench).stir(_ADVANCE, lambda servo: servo.grind(900.0, ripples=True))
+        bench.until(lambda view: view.mode is Mode.STOPPED)
+        bench.run(0.3)
+        problems = [f"a peak already led to {peak}"] if peak not in {Mode.AUTONOMOUS, Mode.HOLD} else []
+        return judge(
+            bench,
+            start,
+            Wanted(_STOP, (Cause.STRAINED,), Cause.STRAINED, alternatives=((Mode.HOLD, *_STOP),), may_hold=True),
+            *problems,
+            *_still(bench),
+        )
 
 
 @fault(

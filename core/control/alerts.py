@@ -60,6 +60,7 @@ _FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
     Cause.PORT_LOST: ("Servo port lost", "plug the servo cable in, check the servos, then acknowledge"),
     Cause.SERVO_ALERT: ("A servo reports a hardware error", "free the wire, restart the servo, acknowledge, then zero it"),
     Cause.TRACKING: ("A servo does not follow: jam or slack wire", "look for a jam or a slack wire, then acknowledge"),
+    Cause.STRAINED: ("A servo draws too much current", "free the wire or what it moves, let it cool, then acknowledge"),
     Cause.SERVOS_WRONG: ("Servos are not as configured", "compare ids, model and mode with the configuration"),
     Cause.CLOCK: ("The clock jumped or the computer slept", "check the robot, acknowledge, arm again"),
     Cause.SERVO_SILENT: ("A servo does not answer", "check its cable and power, then acknowledge"),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from core.control.faults import Cause, Fault
+from core.control.strain import CurrentSample, see_currents, strained
 from core.safety_config import SafetyConfig
 from core.servo_config import JOINT_NAMES, ServosConfig
 
@@ -16,8 +17,8 @@ class BusReport:
     """One cycle of the bus; tuples are per joint, in the order of JOINT_NAMES, and empty when not read in this cycle.
 
     ``misses`` are answers missed in a row by now; ``errors`` the bad packets (CRC, garbage, short) since the last report, after the
-    retry; ``hardware_errors`` the servos' register 70; ``tracking_mm`` goal minus measured position; ``armed`` whether the bus
-    process follows orders, and ``ended`` why it does not any more.
+    retry; ``hardware_errors`` the servos' register 70; ``tracking_mm`` goal minus measured position; ``currents_ma`` None for a
+    servo that tells none; ``armed`` whether the bus process follows orders, and ``ended`` why it does not any more.
     """
 
     port_open: bool = True
@@ -27,6 +28,7 @@ class BusReport:
     temperatures_c: Sequence[float] = ()
     voltages_v: Sequence[float] = ()
     tracking_mm: Sequence[float] = ()
+    currents_ma: Sequence[float | None] = ()
     rebooted: bool = False
     watchdog_tripped: bool = False
     armed: bool = True
@@ -42,6 +44,8 @@ class BusWatch:
     errors: tuple[tuple[float, int], ...] = ()
     astray_since_s: float | None = None
     astray: str = ""
+    currents: tuple[CurrentSample, ...] = ()
+    strained: str = ""
     rebooted: bool = False
     disarmed_run: int = 0
 
@@ -55,6 +59,10 @@ def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConf
         astray = _beyond(report.tracking_mm, servos.tracking_error_mm)
         began_s = since_s if since_s is not None else now_s
         since_s = began_s if astray else None
+    currents, strain = watch.currents, watch.strained
+    if report.currents_ma:
+        currents = see_currents(currents, report.currents_ma, now_s, servos)
+        strain = strained(currents, servos)
     newest = replace(
         report,
         hardware_errors=report.hardware_errors or old.hardware_errors,
@@ -62,7 +70,8 @@ def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConf
         voltages_v=report.voltages_v or old.voltages_v,
     )
     disarmed_run = 0 if report.armed else watch.disarmed_run + 1
-    return BusWatch(now_s, newest, errors, since_s, astray, watch.rebooted or report.rebooted, disarmed_run)
+    rebooted = watch.rebooted or report.rebooted
+    return BusWatch(now_s, newest, errors, since_s, astray, currents, strain, rebooted, disarmed_run)
 
 
 def excused(watch: BusWatch, now_s: float) -> BusWatch:
@@ -104,6 +113,8 @@ def bus_faults(watch: BusWatch, now_s: float, servos: ServosConfig, safety: Safe
         faults.append(Fault(Cause.SERVO_ALERT, ", ".join(alerted)))
     if watch.astray_since_s is not None and now_s - watch.astray_since_s >= safety.tracking_time_s:
         faults.append(Fault(Cause.TRACKING, watch.astray))
+    if watch.strained:
+        faults.append(Fault(Cause.STRAINED, watch.strained))
     if watch.rebooted:
         faults.append(Fault(Cause.REBOOTED))
     if newest.watchdog_tripped:

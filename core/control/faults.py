@@ -39,6 +39,7 @@ class Cause(StrEnum):
     PORT_LOST = "servo port lost"
     SERVO_ALERT = "servo reports a hardware error"
     TRACKING = "servo does not follow"
+    STRAINED = "servo draws too much current"
     SERVOS_WRONG = "servos are not as configured"
     CLOCK = "clock jumped"
     BUS_NOISE = "bad packets on the servo bus"  # before the silence that it makes: what is named first is told
@@ -99,7 +100,7 @@ class Fault:
 _TABLE: dict[tuple[Area, Reaction], tuple[Cause, ...]] = {
     (Area.OPERATOR, Reaction.STOP): (Cause.STOP_PRESSED,),
     (Area.OPERATOR, Reaction.HOLD): (Cause.NO_TARGET, Cause.DEADMAN),
-    (Area.SERVOS, Reaction.STOP): (Cause.PORT_LOST, Cause.SERVO_ALERT, Cause.TRACKING),
+    (Area.SERVOS, Reaction.STOP): (Cause.PORT_LOST, Cause.SERVO_ALERT, Cause.TRACKING, Cause.STRAINED),
     (Area.SERVOS, Reaction.DISARM): (
         Cause.SERVOS_WRONG,
         Cause.SERVO_SILENT,

@@ -37,6 +37,7 @@ def report_of(readings: Sequence[ServoReading], *, armed: bool, errors: int, reb
         voltages_v=tuple(state.voltage_v for state in states) if whole else (),
         # goals mean something only while they are followed; nobody is astray before
         tracking_mm=() if not whole else tuple(astray) if armed and len(astray) == len(readings) else (0.0,) * len(readings),
+        currents_ma=tuple(reading.current_ma if isinstance(reading, ServoState) else None for reading in readings),
         rebooted=rebooted or any(reading.restarted for reading in missing) or (armed and any(not s.torque for s in states)),
         watchdog_tripped=any(state.watchdog_tripped for state in states),
     )

@@ -12,7 +12,7 @@ _TICKS_PER_TURN = 4096
 _VELOCITY_TICKS_S = 0.229 / 60.0 * _TICKS_PER_TURN
 _ACCELERATION_TICKS_S2 = 214.577 / 3600.0 * _TICKS_PER_TURN
 _CURRENT_MA = 2.69
-_WATCHDOG_S = 0.02
+_WATCHDOG_S = _RIPPLE_S = 0.02
 REBOOT_S = 0.3
 VOLTAGE_BIT, HEAT_BIT, OVERLOAD_BIT = 1, 4, 32
 
@@ -39,6 +39,7 @@ class SoftServo:
         self.table["baud_rate"] = baud_code
         self.motor = ServoMotor(float(position))
         self.supply_v = 12.0
+        self._grinds_ma, self._ripples = 0.0, False
         self._lost_turns = 0
         self._heard_s = 0.0
         self._now_s = 0.0
@@ -61,6 +62,7 @@ class SoftServo:
         if self._silent_until_s is not None and now_s >= self._silent_until_s:
             self._silent_until_s = None
         self._watch()
+        self.motor.grinds_ma = 0.0 if self._ripples and int(self._now_s / _RIPPLE_S) % 5 == 0 else self._grinds_ma
         self.motor.step(self._drive(), duration_s)
         self._protect()
         self._refresh()
@@ -162,6 +164,14 @@ class SoftServo:
         """Jam the horn, or free it; freed, it starts from where it is."""
         self.motor.frozen = frozen
         self.motor.stop()
+
+    def grind(self, current_ma: float, *, ripples: bool = False) -> None:
+        """Let the motor draw so much more than it needs, until this is 0 again; with ripples, not in every fifth 20 ms."""
+        self._grinds_ma, self._ripples = current_ma, ripples
+
+    def carry(self, ticks_s: float) -> None:
+        """Let something stronger than the motor turn the horn, until this is 0 again."""
+        self.motor.carried_ticks_s = ticks_s
 
     def heat(self, temperature_c: float) -> None:
         """Put the servo into surroundings of this temperature, long enough to have taken it on."""

@@ -35,7 +35,9 @@ class Drive:
 class ServoMotor:
     """Position in ticks since the twin was built: it turns on whatever the servo's registers make of it.
 
-    ``trajectory`` is where the profile wants the horn, ``position`` where it is: the same, unless the horn is frozen.
+    ``trajectory`` is where the profile wants the horn, ``position`` where it is: the same, unless the horn is frozen. ``grinds_ma``
+    is what it draws beyond friction, as with a damaged gear: it still goes where it shall. ``carried_ticks_s``: something
+    stronger turns the horn, wherever the goal is.
     """
 
     def __init__(self, position: float, ambient_c: float = 25.0) -> None:
@@ -44,6 +46,7 @@ class ServoMotor:
         self.ambient_c = ambient_c
         self.temperature_c = ambient_c
         self.load_mnm = 0.0
+        self.grinds_ma = self.carried_ticks_s = 0.0
         self.frozen = False
         self._overloaded_s = 0.0
 
@@ -52,7 +55,9 @@ class ServoMotor:
         self._warm(drive, duration_s)
         strained = drive.torque and abs(self.current_ma(drive)) > _OVERLOAD_SHARE * STALL_MA
         self._overloaded_s = self._overloaded_s + duration_s if strained else 0.0
-        if not drive.torque:
+        if self.carried_ticks_s:
+            self.position += self.carried_ticks_s * duration_s
+        if not drive.torque or self.carried_ticks_s:
             self.velocity, self.trajectory = 0.0, self.position
             return
         steps = min(_MAX_STEPS, math.ceil(duration_s / _STEP_S - 1e-9))
@@ -92,7 +97,8 @@ class ServoMotor:
             return 0.0
         lag = self.trajectory - self.position
         friction = math.copysign(_FRICTION_MA, self.velocity) if self.velocity else _STAND_MA
-        current = self.load_mnm / _TORQUE_NM_PER_A + friction + _STIFFNESS_MA_PER_TICK * lag
+        grinding = math.copysign(self.grinds_ma, friction)
+        current = self.load_mnm / _TORQUE_NM_PER_A + friction + grinding + _STIFFNESS_MA_PER_TICK * lag
         return max(-STALL_MA, min(STALL_MA, current))
 
     @property

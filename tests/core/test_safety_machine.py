@@ -68,6 +68,7 @@ buses = st.sampled_from(
         {"temperatures_c": (math.nan,) * 7},
         {"voltages_v": (9.0,) * 7},
         {"tracking_mm": (2.0,) * 7},
+        {"currents_ma": (2000.0,) * 7},
         {"rebooted": True},
         {"watchdog_tripped": True},
     ]

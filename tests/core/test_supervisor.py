@@ -167,6 +167,7 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.PORT_LOST: _bus(port_open=False),
     Cause.SERVO_ALERT: _bus(hardware_errors=_joint(0x20, 3, 0)),
     Cause.TRACKING: _bus(ticks=8, tracking_mm=_joint(-1.6, 4, 0.0)),
+    Cause.STRAINED: _bus(ticks=18, currents_ma=_joint(-601.0, 4, 40.0)),
     Cause.SERVOS_WRONG: _events(ServosChecked(("id 4: model 1060 instead of 1020",))),
     Cause.CLOCK: lambda bench: bench.tick(after_s=1.03125),
     Cause.SERVO_SILENT: _bus(misses=_joint(3, 2, 0)),
@@ -231,7 +232,7 @@ REACTIONS = {
         Cause.FRAMES_DROPPED, Cause.OUT_OF_ORDER, Cause.WARM, Cause.VOLTAGE_SAGS, Cause.DISK_LOW, Cause.DISK_FULL,
         Cause.RECORDING_STOPPED, Cause.RECORDER_BEHIND,
     },
-    Reaction.STOP: {Cause.STOP_PRESSED, Cause.PORT_LOST, Cause.SERVO_ALERT, Cause.TRACKING},
+    Reaction.STOP: {Cause.STOP_PRESSED, Cause.PORT_LOST, Cause.SERVO_ALERT, Cause.TRACKING, Cause.STRAINED},
     Reaction.HOLD: {
         Cause.BUS_SILENT, Cause.CAMERA_SILENT, Cause.IMAGE_BLACK, Cause.IMAGE_WHITE, Cause.FRAMES_LOST, Cause.NOT_FINITE,
         Cause.COMMAND_REJECTED, Cause.HEAD_LOST, Cause.HEAD_JUMP, Cause.BRANCH_UNCLEAR, Cause.POOR_VIEW, Cause.CONFIDENCE_LOW,
