@@ -104,7 +104,7 @@ def faults(
     out: Annotated[Path | None, typer.Option(help="also write the table as a page, as docs/faults.md")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="those that need no line, process or window, in lock-step")] = False,
 ) -> None:
-    """Fault campaign: bring all 44 faults about and look for reaction, alert and record."""
+    """Fault campaign: bring all 45 faults about and look for reaction, alert and record."""
     from app.faults_command import run_faults
 
     sys.exit(run_faults(only or [], out, quick=quick, as_json=json))

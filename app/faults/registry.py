@@ -1,4 +1,4 @@
-"""The 44 faults by number: what is injected, what must follow, and the function that does the one and looks for the other."""
+"""The 45 faults by number: what is injected, what must follow, and the function that does the one and looks for the other."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from core.errors import UserError
 
 _log = logging.getLogger(__name__)
 
-COUNT = 44
+COUNT = 45
 _TRIES = 3
 
 

@@ -1,4 +1,4 @@
-"""Faults 21 to 28, and 44: the servos and their line. Always over a pseudo-terminal, with the real driver in its own process."""
+"""Faults 21 to 28, 44 and 45: the servos and their line. Always over a pseudo-terminal, with the real driver in its own process."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 from app.faults.bench import FaultBench, open_bench
 from app.faults.judge import Wanted, judge, mark
 from app.faults.registry import CampaignError, Kit, Seen, fault
+from core.control.alerts import Note
 from core.control.faults import Cause
 from core.control.modes import Act, Mode
 from hardware.servos.bus_messages import BusPhase, BusStatus
@@ -241,6 +242,34 @@ def strain(kit: Kit) -> Seen:
             *problems,
             *_still(bench),
         )
+
+
+@fault(
+    45,
+    "torque-off not proven",
+    injected="the torque is to go off at STOP; it is pressed while one servo obeys but does not answer, which it does 0.6 s later",
+    wanted="STOP; told at once that the torque is not proven to be off, tried again, and told when all servos have said so",
+    quick=False,
+)
+def torque_stays(kit: Kit) -> Seen:
+    with open_bench(kit, live=True, servos={"torque_off_on_stop": True}) as bench:
+        start = mark(bench.hand_over())
+        _line(bench).faults.mute(_ADVANCE)
+        bench.pilot.ask(Act.STOP)
+        bench.until(lambda view: any(fault.cause is Cause.TORQUE_ON for fault in view.active))
+        bench.run(0.6)
+        early = [alert for alert in bench.alerts[start.alerts :] if alert.key is Note.TORQUE_OFF]
+        _line(bench).faults.mute(_ADVANCE, False)
+        bench.until(lambda view: all(fault.cause is not Cause.TORQUE_ON for fault in view.active))
+        bench.run(0.3)
+        problems = ["said to be off before the silent servo had said so"] if early else []
+        problems += [
+            f"the torque of {joint.name} is on"
+            for joint in bench.config.servos.joints
+            if _line(bench).servo(joint.id).table["torque"]
+        ]
+        wanted = Wanted(_STOP, (Cause.STOP_PRESSED, Cause.TORQUE_ON), Cause.STOP_PRESSED, alerts=(Note.TORQUE_OFF,), may_hold=True)
+        return judge(bench, start, wanted, *problems)
 
 
 @fault(

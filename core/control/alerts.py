@@ -22,6 +22,7 @@ class Note(StrEnum):
     REACHED = "destination reached"
     AT_END = "joint at its end"
     NEW_TARGET = "destination changed"
+    TORQUE_OFF = "torque off"
 
 
 AlertKey = Cause | Hindrance | RejectReason | Note
@@ -61,6 +62,7 @@ _FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
     Cause.SERVO_ALERT: ("A servo reports a hardware error", "free the wire, restart the servo, acknowledge, then zero it"),
     Cause.TRACKING: ("A servo does not follow: jam or slack wire", "look for a jam or a slack wire, then acknowledge"),
     Cause.STRAINED: ("A servo draws too much current", "free the wire or what it moves, let it cool, then acknowledge"),
+    Cause.TORQUE_ON: ("The torque is not proven to be off", "cut the servos' power; until they say so it is tried again"),
     Cause.SERVOS_WRONG: ("Servos are not as configured", "compare ids, model and mode with the configuration"),
     Cause.CLOCK: ("The clock jumped or the computer slept", "check the robot, acknowledge, arm again"),
     Cause.SERVO_SILENT: ("A servo does not answer", "check its cable and power, then acknowledge"),
@@ -113,6 +115,7 @@ _FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
 _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Note.REACHED: ("Destination reached", "you drive again: choose the next one, or go on by hand"),
     Note.NEW_TARGET: ("Another destination: you drive again", "hand over again to go there"),
+    Note.TORQUE_OFF: ("The torque is off: all servos have said so", "the wires hang loose; switch the servos on to drive"),
     Note.AT_END: ("A joint is at the end of its travel", "drive the other way"),
     Hindrance.IS_STOPPED: ("Stopped", "acknowledge the stop first"),
     Hindrance.UNACKNOWLEDGED: ("A fault is not acknowledged", "read it and acknowledge it"),

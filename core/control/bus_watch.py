@@ -18,7 +18,9 @@ class BusReport:
 
     ``misses`` are answers missed in a row by now; ``errors`` the bad packets (CRC, garbage, short) since the last report, after the
     retry; ``hardware_errors`` the servos' register 70; ``tracking_mm`` goal minus measured position; ``currents_ma`` None for a
-    servo that tells none; ``armed`` whether the bus process follows orders, and ``ended`` why it does not any more.
+    servo that tells none; ``armed`` whether the bus process follows orders, and ``ended`` why it does not any more;
+    ``torque_off`` that all servos have said since the last report that their torque is off, and ``torque_problem`` why one that was
+    asked for is not proven yet.
     """
 
     port_open: bool = True
@@ -33,6 +35,8 @@ class BusReport:
     watchdog_tripped: bool = False
     armed: bool = True
     ended: Fault | None = None
+    torque_off: bool = False
+    torque_problem: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +119,8 @@ def bus_faults(watch: BusWatch, now_s: float, servos: ServosConfig, safety: Safe
         faults.append(Fault(Cause.TRACKING, watch.astray))
     if watch.strained:
         faults.append(Fault(Cause.STRAINED, watch.strained))
+    if newest.torque_problem:
+        faults.append(Fault(Cause.TORQUE_ON, newest.torque_problem))
     if watch.rebooted:
         faults.append(Fault(Cause.REBOOTED))
     if newest.watchdog_tripped:

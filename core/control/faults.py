@@ -40,6 +40,7 @@ class Cause(StrEnum):
     SERVO_ALERT = "servo reports a hardware error"
     TRACKING = "servo does not follow"
     STRAINED = "servo draws too much current"
+    TORQUE_ON = "torque not proven to be off"
     SERVOS_WRONG = "servos are not as configured"
     CLOCK = "clock jumped"
     BUS_NOISE = "bad packets on the servo bus"  # before the silence that it makes: what is named first is told
@@ -102,6 +103,7 @@ _TABLE: dict[tuple[Area, Reaction], tuple[Cause, ...]] = {
     (Area.OPERATOR, Reaction.HOLD): (Cause.NO_TARGET, Cause.DEADMAN),
     (Area.SERVOS, Reaction.STOP): (Cause.PORT_LOST, Cause.SERVO_ALERT, Cause.TRACKING, Cause.STRAINED),
     (Area.SERVOS, Reaction.DISARM): (
+        Cause.TORQUE_ON,
         Cause.SERVOS_WRONG,
         Cause.SERVO_SILENT,
         Cause.BUS_NOISE,

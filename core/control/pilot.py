@@ -290,6 +290,8 @@ class Pilot:
             events.append(Fault(Cause.BUS_DEAD, failure))
         elif (report := self._robot.report()) is not None:
             events.append(report)
+            if report.torque_off:
+                self._teller.tell([(Note.TORQUE_OFF, "")], now_s)
         if self._requests.busy:
             self._busy_s = now_s
             events.append(ServosBusy())

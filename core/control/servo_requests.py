@@ -34,7 +34,7 @@ class ServoRequests:
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="servo request")
         self._lock = threading.Lock()
         self._stops = 0
-        self._offs = 0
+        self._offs = self._offs_done = 0
         self._blocked = False
         self._waiting: list[str] = []
 
@@ -74,12 +74,20 @@ class ServoRequests:
         """Let the wires go slack, at once after what is under way; servos that are being switched on are not."""
         with self._lock:
             self._offs += 1
-        self._request("switching the torque off", lambda: self._off_and(self._robot.torque_off))
+            asked = self._offs
+        self._request("switching the torque off", lambda: self._switch_off(asked))
 
     def close(self) -> None:
-        """Let nothing more begin. What is under way ends by itself when the robot is closed."""
+        """Let nothing more begin but a torque-off that waits. What is under way ends by itself when the robot is closed."""
         self.stopped()
         self._worker.shutdown(wait=False, cancel_futures=True)
+        with self._lock:
+            owes_off = self._offs_done < self._offs
+        if owes_off:
+            try:
+                self._robot.torque_off()
+            except DeviceError as error:
+                _log.error("the torque is not proven to be off: %s", error)
 
     def _request(self, what: str, do: Callable[[], None]) -> None:
         def run() -> None:
@@ -119,6 +127,17 @@ class ServoRequests:
             robot.stop()
             raise
         self._post(ServosChecked())
+
+    def _switch_off(self, asked: int) -> None:
+        """Also where the bus process is gone: nobody but a new one lets the wires go."""
+        self._post(ServosOff())
+        if self._robot.failure is not None:
+            self._robot.connect()
+        else:
+            self._robot.disarm()
+        self._robot.torque_off()
+        with self._lock:
+            self._offs_done = asked
 
     def _check(self, asked: tuple[int, int]) -> None:
         """Raise Interrupted when something came since that speaks against switching on."""

@@ -84,7 +84,7 @@ def _why_not_by_hand(decision: Decision, state: SupervisorState) -> tuple[Hindra
 
 def _matters(fault: Fault, before: SupervisorState) -> bool:
     """Is it worth an alert? In ADVISORY perception's doubts are on the screen anyway, and idle servos endanger nobody."""
-    if before.mode in ARMED_MODES or fault.cause in {Cause.STOP_PRESSED, Cause.SERVOS_WRONG}:
+    if before.mode in ARMED_MODES or fault.cause in {Cause.STOP_PRESSED, Cause.SERVOS_WRONG, Cause.TORQUE_ON}:
         return True
     if AREA[fault.cause] is Area.SERVOS or fault.cause is Cause.CLOCK:
         return before.health.servos_ready

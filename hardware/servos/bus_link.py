@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import mmap
 import os
 import pickle
@@ -28,8 +29,10 @@ SMALL_BYTES, STATUS_BYTES = 64, 65_536
 MEMORY_BYTES = 2 * SharedSlot.size(SMALL_BYTES) + SharedSlot.size(STATUS_BYTES)
 MODULE = "hardware.servos.bus_process"
 STOP = b"S"
+_log = logging.getLogger(__name__)
 _ROOT = Path(__file__).resolve().parents[2]
-_END_S = 3.0
+_END_S = 5.0
+"""Longer than a torque-off that is owed is tried at the end."""
 _MESSAGE_BYTES = 65_536
 
 
@@ -199,8 +202,13 @@ class BusLink:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+            _log.error("the servo bus process did not end and was killed: the servos hold by their own watchdogs")
         with self._asking:
+            told = self._fatal
+            self._drain()
             self._socket.close()
+        if self._fatal != told:
+            _log.error(self._fatal)
         with self._lock:
             self._memory.close()
 

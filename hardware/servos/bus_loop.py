@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import math
 import os
 import time
@@ -15,7 +16,7 @@ from core.servo_config import ServosConfig
 from hardware.servos.bus_guard import BusGuard
 from hardware.servos.bus_messages import BusPhase, BusStatus
 from hardware.servos.dynamixel import ServoBus
-from hardware.servos.errors import NotReady, PortLost, ServoError
+from hardware.servos.errors import NotReady, PortLost, ServoError, TorqueStillOn
 from hardware.servos.guard_end import GuardEnd, Request
 from hardware.servos.line import LATE_S
 from hardware.servos.status_block import MissingServo, ServoReading, ServoState
@@ -29,6 +30,9 @@ _LOOKS_BEFORE_ARMING = 3
 _SETTLE_CYCLES = 5
 _SETTLED_MM = 0.2
 _WINDOW_S = 10.0
+_TRIES_ON_REQUEST, _TRIES_AT_END = 4, 15
+_NOT_PROVEN = "the torque is not proven to be off: cut the servos' power"
+_log = logging.getLogger(__name__)
 
 
 class BusLoop:
@@ -47,6 +51,7 @@ class BusLoop:
         self._reopen_at_s = 0.0
         self._stop_s = -math.inf
         self._owes_torque_off, self._off_problem = False, ""
+        self._torque_offs = 0
         self._does: dict[str, Callable[[Request], None]] = {
             "open": lambda _: self._open(),
             "zero": lambda request: bus.set_zero(request.details.get("names")),
@@ -62,7 +67,7 @@ class BusLoop:
         self._ended = True
 
     def run(self) -> None:
-        """Turn until the end. Afterwards the servos hold and the port is free."""
+        """Turn until the end. Afterwards the servos hold, a torque-off that was owed is paid, and the port is free."""
         due_s = time.monotonic()
         try:
             while not self._ended:
@@ -71,7 +76,27 @@ class BusLoop:
                     self._turn()
                     due_s = max(due_s + self._period_s, time.monotonic())
         finally:
-            self._bus.close()
+            try:
+                self._pay_at_end()
+            finally:
+                self._bus.close()
+
+    def _pay_at_end(self) -> None:
+        """STOP that nobody has heard yet, and a torque-off that is still owed: after this process nobody pays it."""
+        if self._end.take_stop():
+            self._hear_stop()
+        if self._owes_torque_off and not self._bus.is_open:
+            self._reopen(time.monotonic())
+        for _ in range(_TRIES_AT_END):
+            if self._owes_torque_off and self._bus.is_open:
+                self._guard_port(self._pay_torque_off)
+            if self._owes_torque_off and self._bus.is_open:
+                time.sleep(LATE_S)  # whoever was silent is not asked before
+        self._publish(time.monotonic())
+        if self._owes_torque_off:
+            text = f"the servo bus process ends, and {self._off_problem or _NOT_PROVEN}"
+            _log.error(text)
+            self._end.last_words(text)
 
     def _listen_until(self, due_s: float) -> None:
         """Serve STOP and requests at once, until the next cycle is due."""
@@ -148,6 +173,8 @@ class BusLoop:
         stops = REACTION[fault.cause] is Reaction.STOP and self._servos.torque_off_on_stop
         self._owes_torque_off = self._owes_torque_off or stops
         if not self._bus.is_open:
+            if self._owes_torque_off:
+                self._tell_of_torque(_NOT_PROVEN)
             return
         self._settle = _SETTLE_CYCLES
         self._bus.disarm()
@@ -164,15 +191,16 @@ class BusLoop:
             self._tell_of_torque(str(error))
         else:
             self._owes_torque_off = False
+            self._torque_offs += 1
             self._tell_of_torque("")
 
     def _tell_of_torque(self, problem: str) -> None:
-        """In the line of the first cause, which stays; no longer, once it is over."""
+        """In the status, and in the line of the first cause, which stays; no longer, once it is over."""
         first = self._guard.latched
         if first is not None and problem != self._off_problem:
             detail = first.detail.removesuffix(self._off_problem).strip()
             self._guard.latched = replace(first, detail=f"{detail} {problem}".strip())
-            self._off_problem = problem
+        self._off_problem = problem
 
     def _holds(self) -> bool:
         """Whether all servos that tell have a goal where they are; a hold has no answer, and may have got lost."""
@@ -191,7 +219,9 @@ class BusLoop:
 
     def _lose_port(self) -> None:
         self._guard.end_motion(self._guard.lost_port())
-        self._owes_torque_off = self._servos.torque_off_on_stop
+        self._owes_torque_off = self._owes_torque_off or self._servos.torque_off_on_stop
+        if self._owes_torque_off:
+            self._tell_of_torque(_NOT_PROVEN)
         self._readings = ()
         self._lost = True
         self._reopen_at_s = time.monotonic() + _REOPEN_S
@@ -246,10 +276,21 @@ class BusLoop:
         self._bus.reboot(int(request.details.get("servo_id", -1)))
 
     def _torque_off(self) -> None:
+        """Owed from now on, whatever becomes of the first tries: who asked for it is told, and it is tried with each turn."""
+        """Owed from now on, whatever becomes of the first tries: who asked for it is told, and it is tried with each turn."""
         self._guard.disarm()
         self._settle = 0
-        self._bus.torque_off()
-        self._owes_torque_off = False
+        self._owes_torque_off = True
+        for left in reversed(range(_TRIES_ON_REQUEST)):
+            if not self._bus.is_open:
+                self._tell_of_torque(_NOT_PROVEN)
+                break
+            self._pay_torque_off()
+            if not self._owes_torque_off:
+                return
+            if left:
+                time.sleep(LATE_S)  # whoever was silent is not asked before
+        raise TorqueStillOn(self._off_problem)
 
     def _serve(self, request: Request, *, after_stop: bool) -> None:
         """Do it and answer. `after_stop`: STOP came while the request waited, and nobody can have seen that who asked before."""
@@ -309,6 +350,8 @@ class BusLoop:
                 line=replace(self._bus.counts),
                 bad_packets=self._bad_packets,
                 restarts=guard.restarts,
+                torque_offs=self._torque_offs,
+                torque_problem=self._off_problem if self._owes_torque_off else "",
                 times=self._times.summary,
                 zeroed=tuple(zero is not None for zero in self._bus.zero_ticks),
             )

@@ -77,6 +77,7 @@ class BusStatus:
     rejection, clamps, at_end : what the gate said in this cycle.
     rejections, clamp_count : the same counted.
     zeroed : by joint.
+    torque_offs : how often the torque was switched off and read back; ``torque_problem`` why one that is owed is not proven yet.
     """
 
     cycle: int
@@ -97,6 +98,8 @@ class BusStatus:
     restarts: int
     times: CycleTimes
     zeroed: tuple[bool, ...]
+    torque_offs: int = 0
+    torque_problem: str = ""
 
     @property
     def armed(self) -> bool:

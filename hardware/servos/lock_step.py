@@ -32,7 +32,7 @@ class LockStepServos:
         self._at_mm: tuple[float, ...] = (0.0,) * len(JOINT_NAMES)
         self._order: Order | None = None
         self._beat: Heartbeat | None = None
-        self._torque = False
+        self._torque = self._let_go = False
         self._cycle = self._told = 0
         self.sent: list[tuple[float, tuple[float, ...]]] = []
         """Time and goals (mm) of every cycle that sent some, oldest first."""
@@ -132,14 +132,15 @@ class LockStepServos:
 
     def torque_off(self) -> None:
         self._guard.disarm()
-        self._torque = False
+        self._torque, self._let_go = False, True
 
     def report(self) -> BusReport | None:
         if self._cycle == self._told:
             return None
         self._told = self._cycle
         report = report_of(self._readings(self._clock()), armed=self._guard.armed, errors=0)
-        return replace(report, armed=self._guard.armed, ended=self._guard.latched)
+        let_go, self._let_go = self._let_go, False
+        return replace(report, armed=self._guard.armed, ended=self._guard.latched, torque_off=let_go)
 
     def sent_motion(self) -> SentMotion | None:
         sent = self._guard.sent

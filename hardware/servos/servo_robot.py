@@ -65,6 +65,7 @@ class ServoRobot:
         self._supervised = False
         self._states: tuple[ServoReading, ...] = ()
         self._reported = (0, 0, 0)  # cycle, bad packets and restarts of the last report
+        self._told_offs = 0
         self._not_connected: str | None = None
 
     @property
@@ -99,6 +100,7 @@ class ServoRobot:
                         raise NotReady(f"the {self._name} was closed meanwhile")
                     self._not_connected = None
                     self._reported = (0, 0, 0)
+                    self._told_offs = 0
                     self._states = ()
                     self._supervised = False
                     self._link = link
@@ -253,13 +255,16 @@ class ServoRobot:
                 return None
             self._reported = status.cycle, bad_packets, restarts
             if status.phase is BusPhase.CLOSED:
-                return BusReport(port_open=False)
+                return BusReport(port_open=False, torque_problem=status.torque_problem)
             if not status.servos:
                 return None
+            torque_off, self._told_offs = status.torque_offs > self._told_offs, status.torque_offs
             self._reported = status.cycle, status.bad_packets, status.restarts
         errors, rebooted = status.bad_packets - bad_packets, status.restarts > restarts
         report = report_of(status.servos, armed=status.armed, errors=errors, rebooted=rebooted)
-        return replace(report, armed=status.armed, ended=status.latched)
+        return replace(
+            report, armed=status.armed, ended=status.latched, torque_off=torque_off, torque_problem=status.torque_problem
+        )
 
     def sent_motion(self) -> SentMotion | None:
         """What left the gate in the newest cycle since it was armed; None before that, and when it is not armed. No heartbeat."""

@@ -477,6 +477,63 @@ def test_servo_requests_wait_until_nobody_may_be_driving(bench: Bench) -> None:
     assert bench.mode is Mode.ARMED
 
 
+def test_a_torque_off_that_waits_when_the_program_ends_is_still_done(bench: Bench) -> None:
+    """Asked for while the servos were being checked; it was dropped, and the wires stayed under tension."""
+    go_on, entered = threading.Event(), threading.Event()
+
+    def arm() -> None:
+        entered.set()
+        go_on.wait(5.0)
+
+    bench.seconds(0.2)
+    bench.robot.arm = arm  # type: ignore[method-assign]
+    bench.pilot.switch_on()
+    assert entered.wait(5.0)
+    bench.pilot.torque_off()
+    bench.pilot.close()
+    go_on.set()
+    assert bench.robot.calls.count("torque off") == 1
+
+
+def test_a_torque_off_that_is_done_is_not_done_again_at_the_end(bench: Bench) -> None:
+    bench.seconds(0.2)
+    bench.pilot.torque_off()
+    bench.done().pilot.close()
+    assert bench.robot.calls.count("torque off") == 1
+
+
+def test_a_torque_off_needs_no_bus_process_that_lives(bench: Bench) -> None:
+    bench.seconds(0.2)
+    bench.robot.failure = "the servo bus process ended"
+    bench.pilot.torque_off()
+    bench.done()
+    assert bench.robot.calls[-2:] == ["connect", "torque off"]
+
+
+def test_what_became_of_a_torque_off_is_told(bench: Bench) -> None:
+    bench.on()
+    bench.alerts()
+    bench.robot.bus = replace(WELL, torque_off=True)
+    bench.turn()
+    bench.robot.bus = replace(WELL, torque_problem="torque of up is not proven to be off: cut the servos' power")
+    bench.turn()
+    assert {Note.TORQUE_OFF, Cause.TORQUE_ON} <= set(bench.alerts())
+
+
+@pytest.mark.parametrize("is_on", [True, False])
+def test_torque_that_is_not_proven_to_be_off_is_told_though_the_servos_follow_nobody(bench: Bench, is_on: bool) -> None:
+    """After a STOP they follow nobody: that is when it matters."""
+    bench.seconds(0.2)
+    if is_on:
+        bench.on()
+    bench.pilot.ask(Act.STOP)
+    bench.turn(2)
+    bench.alerts()
+    bench.robot.bus = replace(WELL, armed=False, torque_problem="torque of up is not proven to be off: cut the servos' power")
+    bench.turn(2)
+    assert Cause.TORQUE_ON in bench.alerts()
+
+
 def test_an_unexpected_error_of_a_request_is_told(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
     def broken() -> None:
         raise OSError(24, "Too many open files")

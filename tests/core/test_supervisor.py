@@ -168,6 +168,7 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.SERVO_ALERT: _bus(hardware_errors=_joint(0x20, 3, 0)),
     Cause.TRACKING: _bus(ticks=8, tracking_mm=_joint(-1.6, 4, 0.0)),
     Cause.STRAINED: _bus(ticks=18, currents_ma=_joint(-601.0, 4, 40.0)),
+    Cause.TORQUE_ON: _bus(torque_problem="torque of up is not proven to be off: cut the servos' power"),
     Cause.SERVOS_WRONG: _events(ServosChecked(("id 4: model 1060 instead of 1020",))),
     Cause.CLOCK: lambda bench: bench.tick(after_s=1.03125),
     Cause.SERVO_SILENT: _bus(misses=_joint(3, 2, 0)),

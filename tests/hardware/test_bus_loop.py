@@ -12,6 +12,7 @@ from core.safety_config import SafetyConfig
 from core.servo_config import ServosConfig
 from hardware.servos import bus_loop, servo_robot
 from hardware.servos.bus_loop import BusLoop
+from hardware.servos.bus_messages import BusStatus
 from hardware.servos.errors import NotReady, ServoError, TorqueStillOn
 from hardware.servos.guard_end import Request
 from hardware.servos.line import LineCounts
@@ -41,6 +42,9 @@ class PaperBus:
     def set_zero(self, names: object) -> None:
         self.told.append("zero")
 
+    def close(self) -> None:
+        self.told.append("close")
+
     def torque_off(self) -> None:
         if self.torque_stays:
             raise TorqueStillOn("torque of right is not proven to be off: cut the servos' power")
@@ -51,11 +55,13 @@ class PaperEnd:
     """The application's side: what waits now."""
 
     is_alone = False
+    told: BusStatus
 
     def __init__(self) -> None:
         self.stop = False
         self.waiting: Request | None = None
         self.answers: list[tuple[str, ServoError | None]] = []
+        self.words: list[str] = []
 
     def wait(self, timeout_s: float) -> tuple[bool, bool]:
         return self.stop, self.waiting is not None
@@ -68,7 +74,11 @@ class PaperEnd:
         taken, self.waiting = self.waiting, None
         return taken
 
-    def publish(self, status: object) -> None: ...
+    def publish(self, status: BusStatus) -> None:
+        self.told = status
+
+    def last_words(self, text: str) -> None:
+        self.words.append(text)
 
     def answer(self, request: Request, error: ServoError | None) -> None:
         self.answers.append((request.what, error))
@@ -190,6 +200,95 @@ def test_a_port_that_comes_back_owes_the_torque_off(monkeypatch: pytest.MonkeyPa
     paper.loop._lose_port()
     paper.turn()
     assert paper.bus.told == ["torque off"]
+
+
+def _off_after(paper: Paper, tries: int) -> None:
+    """The servos say so only after so many tries."""
+    left = [tries]
+
+    def torque_off() -> None:
+        left[0] -= 1
+        if left[0] >= 0:
+            raise TorqueStillOn("torque of right is not proven to be off: cut the servos' power")
+        paper.bus.told.append("torque off")
+
+    paper.bus.torque_off = torque_off  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize("tries", [0, 1, 3])
+def test_a_torque_off_that_is_asked_for_is_tried_again_before_it_is_answered(paper: Paper, tries: int) -> None:
+    _off_after(paper, tries)
+    paper.hear(request="torque off")
+    assert paper.end.answers == [("torque off", None)]
+    assert paper.bus.told == ["torque off"]
+
+
+def test_a_torque_off_that_was_asked_for_in_vain_is_told_and_stays_owed(paper: Paper) -> None:
+    """It was forgotten, and the wires stayed under tension although somebody had let them go."""
+    _off_after(paper, 6)
+    paper.hear(request="torque off")
+    _, error = paper.end.answers[0]
+    assert isinstance(error, TorqueStillOn)
+    assert "cut the servos' power" in paper.end.told.torque_problem
+    for _ in range(3):
+        paper.turn()
+    assert paper.bus.told == ["torque off"]
+    paper.loop._publish(paper.now_s)
+    assert (paper.end.told.torque_offs, paper.end.told.torque_problem) == (1, "")
+
+
+def test_a_torque_off_that_was_asked_for_while_the_port_was_gone_is_owed(paper: Paper) -> None:
+    paper.loop._lose_port()
+    paper.bus.is_open = False
+    paper.hear(request="torque off")
+    _, error = paper.end.answers[0]
+    assert isinstance(error, TorqueStillOn)
+    paper.bus.is_open = True
+    paper.turn()
+    assert paper.bus.told == ["torque off"]
+
+
+def test_a_port_that_is_lost_forgets_no_torque_off(paper: Paper) -> None:
+    """Without the policy, too: somebody had asked for it."""
+    _off_after(paper, 4)
+    paper.hear(request="torque off")
+    paper.loop._lose_port()
+    paper.turn()
+    assert paper.bus.told == ["torque off"]
+
+
+@pytest.mark.parametrize("how", ["end", "signal", "alone"])
+def test_a_torque_off_that_is_owed_is_paid_before_the_process_ends(paper: Paper, how: str) -> None:
+    _off_after(paper, 6)
+    paper.hear(request="torque off")
+    if how == "end":
+        paper.end.waiting = Request(2, "end")
+    elif how == "signal":
+        paper.loop.end()
+    else:
+        paper.end.is_alone = True
+    paper.loop.run()
+    assert paper.bus.told == ["torque off", "close"]
+    assert paper.end.words == []
+
+
+def test_a_process_that_cannot_prove_it_says_so_with_its_last_words(paper: Paper, caplog: pytest.LogCaptureFixture) -> None:
+    _off_after(paper, 1000)
+    paper.hear(request="torque off")
+    paper.loop.end()
+    paper.loop.run()
+    assert paper.bus.told == ["close"]
+    assert len(paper.end.words) == 1
+    assert "torque of right is not proven to be off: cut the servos' power" in paper.end.words[0]
+    assert "not proven" in caplog.text
+
+
+def test_a_stop_that_nobody_has_heard_is_heard_before_the_process_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+    paper.end.stop = True
+    paper.loop.end()
+    paper.loop.run()
+    assert paper.bus.told == ["hold", "torque off", "close"]
 
 
 def test_arming_looks_where_the_joints_are_now(paper: Paper) -> None:

@@ -309,6 +309,29 @@ def test_stop_switches_the_torque_off_when_that_is_the_policy(servos: SoftServoB
         robot.close()
 
 
+@pytest.mark.parametrize("comes_back", [True, False])
+def test_a_torque_off_that_is_owed_is_paid_when_the_application_closes(
+    servos: SoftServoBus, comes_back: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The cable falls out, STOP is pressed, the cable is back, and the window closes before the process has looked for it again."""
+    robot = _robot(servos, torque_off_on_stop=True)
+    robot.connect()
+    try:
+        robot.zero()
+        robot.arm()
+        servos.vanish()
+        robot.stop()
+        status = _seen(robot, lambda status: status.phase is BusPhase.CLOSED and status.torque_problem != "")
+        assert "cut the servos' power" in status.torque_problem
+        assert any(servos.servo(joint.id).table["torque"] for joint in CONFIG.joints)
+        if comes_back:
+            servos.reappear()
+    finally:
+        robot.close()
+    assert any(servos.servo(joint.id).table["torque"] for joint in CONFIG.joints) is not comes_back
+    assert ("the torque is not proven to be off" in caplog.text) is not comes_back
+
+
 # --- the application falls silent ------------------------------------------------------------------------------------------------
 
 
