@@ -132,7 +132,12 @@ def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyCon
         state = replace(state, mode=Mode.HOLD, hold_since_s=state.hold_since_s if again else now_s, well_since_s=None)
     elif state.mode is Mode.HOLD:
         state = _clear_hold(state, now_s, safety)
-    return replace(state, health=replace(state.health, servo_problems=None)) if recheck else state
+    if recheck:
+        state = replace(state, health=replace(state.health, servo_problems=None))
+    if state.mode in ARMED_MODES and not state.health.servos_ready:
+        # No fault: the operator has asked for something that they must be checked after.
+        state = replace(state, mode=Mode.ADVISORY, health=disarmed(state.health))
+    return state
 
 
 def _note_unwell(state: SupervisorState, now_s: float) -> SupervisorState:
@@ -214,6 +219,8 @@ def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfi
         reasons.append(Hindrance.NOT_YET_ARMED)
     if state.mode is Mode.AUTONOMOUS:
         reasons.append(Hindrance.ALREADY_AUTONOMOUS)
+    if state.health.servo_problems is None:
+        reasons.append(Hindrance.SERVOS_UNCHECKED)
     reasons += [fault.cause for fault in state.active if _holds(fault) and AREA[fault.cause] is not Area.OPERATOR]
     if state.health.frames.route is RouteState.NONE:
         reasons.append(Hindrance.NO_DESTINATION)
@@ -255,10 +262,12 @@ def _decide(
 
 
 def _permitted(state: SupervisorState) -> Source | None:
+    if not state.health.servos_ready:
+        return None
     if state.mode is Mode.AUTONOMOUS:
         return Source.PROGRAM
     causes = [fault.cause for fault in state.active if _holds(fault)]
     if state.latched is not None:
         causes.append(state.latched.fault.cause)
-    by_hand = state.mode in {Mode.ADVISORY, Mode.ARMED} and state.health.servos_ready
+    by_hand = state.mode in {Mode.ADVISORY, Mode.ARMED}
     return Source.OPERATOR if by_hand and all(AREA[cause] is not Area.SERVOS for cause in causes) else None

@@ -14,7 +14,7 @@ from core.control.deadman import DeadmanReport
 from core.control.faults import AFTER_SOME, AREA, AT_ONCE, CAUSES, REACTION, Area, Cause, Fault, Reaction
 from core.control.frame_watch import FrameArrived, FrameReport, RouteState
 from core.control.gate import RejectReason, Source
-from core.control.health import Beat, FrameLate, GateReport, ModelReport, Part, ServosChecked
+from core.control.health import Beat, FrameLate, GateReport, ModelReport, Part, ServosChecked, ServosOff
 from core.control.supervisor import Act, Decision, Event, Hindrance, Mode, SupervisorState, supervise
 from core.types import Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, TICK_S, Bench
@@ -447,6 +447,24 @@ def test_a_hand_over_needs_a_destination_ahead(route: RouteState, reason: Hindra
     decision = bench.tick(Act.HAND_OVER)
     assert decision.mode is R
     assert _refused(decision, Act.HAND_OVER) == {reason}
+
+
+@pytest.mark.parametrize("mode", [R, U, H])
+def test_nobody_stays_armed_when_the_servos_are_unchecked(mode: Mode) -> None:
+    """Asked for in ADVISORY, begun when the operator had armed already: then it could be handed over to servos that nobody knew."""
+    bench = Bench().in_mode(mode)
+    decision = bench.tick(ServosOff())
+    assert (decision.mode, decision.permitted, decision.latched) == (V, None, None)
+    decision = bench.tick(Act.ARM, Act.HAND_OVER)
+    assert decision.mode is V
+    assert Hindrance.SERVOS_UNCHECKED in _refused(decision, Act.ARM)
+    assert Hindrance.SERVOS_UNCHECKED in _refused(decision, Act.HAND_OVER)
+
+
+def test_a_hand_over_in_the_tick_in_which_the_servos_become_unchecked_is_refused() -> None:
+    decision = _ready_to_hand_over().tick(ServosOff(), Act.HAND_OVER)
+    assert (decision.mode, decision.permitted) == (V, None)
+    assert Hindrance.SERVOS_UNCHECKED in _refused(decision, Act.HAND_OVER)
 
 
 def test_a_hand_over_needs_the_deadman(benches: dict[Mode, Bench]) -> None:
