@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import time
 from collections.abc import Sequence
 
@@ -25,6 +26,7 @@ from hardware.servos.status_block import (
 
 _STATUS_RETURN, _HARDWARE_ERROR = 68, 70
 _REBOOT_S = 1.5
+_log = logging.getLogger(__name__)
 
 
 class ServoBus:
@@ -54,6 +56,7 @@ class ServoBus:
         self._armed = False
         self._identities: tuple[setup.ServoIdentity, ...] = ()
         self._zeros: dict[int, int] = {}
+        self._put_off: set[int] = set()
         self._misses = dict.fromkeys((joint.id for joint in self._joints), 0)
         self._silences = dict(self._misses)
         self._turn = 0
@@ -82,7 +85,9 @@ class ServoBus:
         return self._line.counts
 
     def open(self) -> None:
-        """Open and lock the port, and make sure that the seven servos are those of the configuration. Nothing moves.
+        """Open and lock the port, and make sure that the seven servos are those of the configuration. Nothing moves, none lets go.
+
+        A servo whose torque is on is not set up, which takes the torque off: it may hold a wire. ``arm`` does it.
 
         Raises
         ------
@@ -97,7 +102,11 @@ class ServoBus:
             self._line.broadcast(_STATUS_RETURN, bytes([ANSWERS_ALL]))  # else a servo may be set not to answer writes
             self._identities = setup.identify(self._line, self.config)
             for joint in self._joints:
-                self._configure(joint)
+                if not setup.holds(self._line, joint):
+                    self._configure(joint)
+                elif setup.differences(self._line, joint):
+                    self._put_off.add(joint.id)
+                    _log.warning("%s holds, so it is not set up before the servos are switched on", setup.call(joint))
                 setup.map_block(self._line, joint)
         except ServoError:
             self.close()
@@ -118,12 +127,13 @@ class ServoBus:
         Raises
         ------
         NotReady
-            When armed: goals would jump.
+            When armed: goals would jump. When a servo holds and counts otherwise than it will when it is set up.
         NoAnswer
         """
         if self.is_armed:
             raise NotReady("the servos are armed: disarm before zeroing")
         chosen = [joint for joint in self._joints if names is None or joint.name in names]
+        self._set_up_late(chosen)
         found = {joint.id: units.signed(self._line.read(joint.id, setup.POSITION, 4)) for joint in chosen}
         self._zeros.update(found)
 
@@ -137,7 +147,8 @@ class ServoBus:
         NotReady
             A joint has no zero, has lost it by a restart, or a servo reports a hardware error.
         WrongServo, NoAnswer, Refused
-            The torque of all servos is off again, or the message says of which one it may be on.
+            Before the torque is touched: a servo is missing or another one. Later, the torque of all servos is off again, or the
+            message says of which one it may be on.
         """
         self._armed = False
         self._check_ready()
@@ -274,9 +285,23 @@ class ServoBus:
         setup.goal_to_position(self._line, self.config)
         setup.start_watchdogs(self._line, self.config)
 
+    def _set_up_late(self, chosen: Sequence[JointConfig]) -> None:
+        """Those that held when the port was opened, if they do not any more."""
+        for joint in chosen:
+            if joint.id not in self._put_off:
+                continue
+            if not setup.holds(self._line, joint):
+                self._configure(joint)
+            elif setup.counts_anew(setup.differences(self._line, joint)):
+                raise NotReady(
+                    f"{setup.call(joint)} holds in a mode of another program: switch the torque off (the wires go slack), then zero"
+                )
+
     def _check_ready(self) -> None:
         if not self.is_open:
             raise NotReady("the servo port is not open: open it first")
+        # again, since a servo may have been changed meanwhile
+        self._identities = tuple(setup.identity_of(self._line, joint, self.config) for joint in self._joints)
         self._check_zeroed()
         for joint in self._joints:
             error = HardwareError(self._line.read(joint.id, _HARDWARE_ERROR, 1)[0])
@@ -290,6 +315,7 @@ class ServoBus:
             raise NotReady(f"not zeroed: {names} (or restarted since then): slacken the wires and zero before arming")
 
     def _configure(self, joint: JointConfig) -> None:
+        self._put_off.discard(joint.id)
         if setup.configure(self._line, joint):
             self._zeros.pop(joint.id, None)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from core.servo_config import JointConfig, JointName, ServosConfig
@@ -14,6 +15,7 @@ EXTENDED_POSITION = 4
 TORQUE, WATCHDOG, GOAL, POSITION = 64, 98, 116, 132
 _RETURN_DELAY, _DRIVE_MODE, _MODE, _HOMING_OFFSET, _VELOCITY_LIMIT, _PROFILE = 9, 10, 11, 20, 44, 108
 _EEPROM_BYTES = 48
+_COUNTING = frozenset({_DRIVE_MODE, _MODE, _HOMING_OFFSET})
 _SPEEDS = (57600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
 
 
@@ -41,14 +43,23 @@ def identify(line: ServoLine, config: ServosConfig) -> tuple[ServoIdentity, ...]
     silent = [joint for joint in config.joints if models[joint.id] is None]
     if silent:
         raise _silence(line, config, silent)
-    found = []
-    for joint in config.joints:
-        check_model(joint, models[joint.id], config.model)
-        table = line.read(joint.id, 0, 8)
-        if table[7] != joint.id:
-            raise WrongServo(f"{call(joint)} says that its id is {table[7]}: give every servo an id of its own")
-        found.append(ServoIdentity(joint.name, joint.id, int.from_bytes(table[:2], "little"), table[6]))
-    return tuple(found)
+    return tuple(identity_of(line, joint, config) for joint in config.joints)
+
+
+def identity_of(line: ServoLine, joint: JointConfig, config: ServosConfig) -> ServoIdentity:
+    """Who answers for a joint, by its own words.
+
+    Raises
+    ------
+    NoAnswer, WrongServo
+        Naming the servo.
+    """
+    table = line.read(joint.id, 0, 8)
+    model = int.from_bytes(table[:2], "little")
+    check_model(joint, model, config.model)
+    if table[7] != joint.id:
+        raise WrongServo(f"{call(joint)} says that its id is {table[7]}: give every servo an id of its own")
+    return ServoIdentity(joint.name, joint.id, model, table[6])
 
 
 def check_model(joint: JointConfig, model: int | None, expected: int) -> None:
@@ -76,14 +87,13 @@ def _silence(line: ServoLine, config: ServosConfig, silent: list[JointConfig]) -
     return NoAnswer(f"no servo answers on {line.port} at {config.baud} baud: check the servos' power and the cable")
 
 
-def configure(line: ServoLine, joint: JointConfig) -> bool:
-    """EEPROM as we need it, written only where it differs, because it wears. True: changed, so that positions count anew.
+def holds(line: ServoLine, joint: JointConfig) -> bool:
+    """Whether its torque is on: then it may hold a wire under tension, which only the operator lets go."""
+    return line.read(joint.id, TORQUE, 1) != b"\0"
 
-    Raises
-    ------
-    WrongServo
-        When a register keeps its value.
-    """
+
+def differences(line: ServoLine, joint: JointConfig) -> dict[int, bytes]:
+    """Registers of the EEPROM that are not as we need them, with what they must be."""
     wanted = {
         _RETURN_DELAY: b"\0",
         _DRIVE_MODE: b"\0",  # not reversed, and the profile in velocities
@@ -92,14 +102,30 @@ def configure(line: ServoLine, joint: JointConfig) -> bool:
         _VELOCITY_LIMIT: units.profile_velocity(joint).to_bytes(4, "little"),
     }
     table = line.read(joint.id, 0, _EEPROM_BYTES)
-    wrong = {address: data for address, data in wanted.items() if table[address : address + len(data)] != data}
+    return {address: data for address, data in wanted.items() if table[address : address + len(data)] != data}
+
+
+def counts_anew(wrong: Collection[int]) -> bool:
+    """Whether positions mean something else once these registers were set."""
+    return not _COUNTING.isdisjoint(wrong)
+
+
+def configure(line: ServoLine, joint: JointConfig) -> bool:
+    """EEPROM as we need it, written only where it differs, because it wears; that takes the torque off. True: positions count anew.
+
+    Raises
+    ------
+    WrongServo
+        When a register keeps its value.
+    """
+    wrong = differences(line, joint)
     if wrong:
         line.write(joint.id, TORQUE, b"\0")
     for address, data in wrong.items():
         line.write(joint.id, address, data)
         if line.read(joint.id, address, len(data)) != data:
             raise WrongServo(f"{call(joint)} keeps register {address} as it is: it is no servo that this program can use")
-    return bool(wrong)
+    return counts_anew(wrong)
 
 
 def map_block(line: ServoLine, joint: JointConfig) -> bool:
@@ -112,9 +138,17 @@ def map_block(line: ServoLine, joint: JointConfig) -> bool:
 
 
 def set_profile(line: ServoLine, joint: JointConfig) -> None:
-    """Greatest acceleration and speed on the way to a goal."""
+    """Greatest acceleration and speed on the way to a goal, read back.
+
+    Raises
+    ------
+    Refused
+        When the servo goes by others.
+    """
     profile = units.profile_acceleration(joint).to_bytes(4, "little") + units.profile_velocity(joint).to_bytes(4, "little")
     line.write(joint.id, _PROFILE, profile)
+    if line.read(joint.id, _PROFILE, len(profile)) != profile:
+        raise Refused(f"{call(joint)} did not take its greatest speed and acceleration: reboot it")
 
 
 def start_watchdogs(line: ServoLine, config: ServosConfig) -> None:

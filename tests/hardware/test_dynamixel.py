@@ -428,6 +428,66 @@ def test_the_arming_order(twin: SoftServoBus, closed: ServoBus) -> None:
     assert closed.is_armed
 
 
+def _torques(twin: SoftServoBus) -> list[int]:
+    return [twin.servo(joint.id).table["torque"] for joint in CONFIG.joints]
+
+
+@pytest.mark.parametrize(("model", "servo_id"), [(1060, 4), (1020, 5)])
+def test_a_servo_that_was_changed_since_the_opening_is_not_armed(
+    twin: SoftServoBus, armed: ServoBus, model: int, servo_id: int
+) -> None:
+    """Nor does it cost the others their hold."""
+    armed.disarm()
+    twin.stir(4, lambda servo: (servo.table.__setitem__("model_number", model), servo.table.__setitem__("id", servo_id)))
+    with pytest.raises(WrongServo, match=r"servo down \(id 4\)"):
+        armed.arm()
+    assert not armed.is_armed
+    assert _torques(twin) == [1] * 7
+
+
+def test_a_servo_that_keeps_another_profile_is_not_armed(
+    twin: SoftServoBus, bus: ServoBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would go to its goals as fast as it can."""
+    bus.set_zero()
+    write = ServoLine.write
+    monkeypatch.setattr(
+        ServoLine, "write", lambda line, i, address, data: None if address == 108 else write(line, i, address, data)
+    )
+    with pytest.raises(Refused, match=r"servo right \(id 1\) did not take its greatest speed"):
+        bus.arm()
+    assert _torques(twin) == [0] * 7
+
+
+@pytest.mark.parametrize("register", ["velocity_limit", "return_delay"])
+def test_connecting_lets_go_of_no_wire(twin: SoftServoBus, armed: ServoBus, register: str) -> None:
+    """Another speed in the settings is another velocity limit, and that can only be written with the torque off."""
+    armed.close()
+    twin.stir(3, lambda servo: servo.table.__setitem__(register, 7))
+    before = twin.positions_mm()
+    armed.open()
+    assert _torques(twin) == [1] * 7
+    assert twin.servo(3).table[register] == 7
+    armed.set_zero()
+    assert _torques(twin) == [1] * 7
+    armed.arm()
+    assert twin.servo(3).table[register] == {"velocity_limit": 65, "return_delay": 0}[register]
+    assert twin.positions_mm() == before
+
+
+def test_a_servo_that_holds_in_another_mode_is_not_zeroed_before_it_was_let_go(twin: SoftServoBus, armed: ServoBus) -> None:
+    armed.close()
+    twin.stir(3, lambda servo: servo.table.__setitem__("drive_mode", 1))
+    armed.open()
+    assert _torques(twin) == [1] * 7
+    with pytest.raises(NotReady, match=r"servo up \(id 3\) holds in a mode of another program: switch the torque off"):
+        armed.set_zero()
+    armed.torque_off()
+    armed.set_zero()
+    assert twin.servo(3).table["drive_mode"] == 0
+    armed.arm()
+
+
 def test_opened_again_the_eeprom_is_not_written_again(twin: SoftServoBus, bus: ServoBus) -> None:
     bus.close()
     twin.log.clear()
