@@ -164,6 +164,7 @@ class BusGuard:
         if step.goals_mm is None:
             # There is not even a hold, whoever may drive; and before there was one, nobody is permitted to. So this comes first.
             self.rejection = mistrust(self._measurement, now_s, self._servos, self._safety) or step.rejection
+            self.sent = self.sent.kept() if self.sent is not None else None
         self.at_end = () if step.is_hold else at_end
         self.clamp_count += len(step.clamps)
         if step.rejection is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from core.control.faults import Cause, Fault
@@ -46,12 +46,19 @@ class Heartbeat:
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """The goals that left the gate last, the motion that they are, and the order behind them (None: it was a hold)."""
+    """The goals that left the gate last, the motion that they are, and the order behind them.
+
+    ``order`` None: it was a hold, or nothing has left the gate since, and the servos keep these goals.
+    """
 
     goals_mm: Joints
     motion: Command
     time_s: float
     order: Order | None
+
+    def kept(self) -> Sent:
+        """The same while nothing new is written: these goals stay, and nobody moves anything."""
+        return replace(self, motion=Command(self.motion.bend, self.motion.pitch), order=None)
 
 
 @dataclass(frozen=True, slots=True)

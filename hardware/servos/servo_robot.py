@@ -19,7 +19,7 @@ from core.servo_config import JointConfig, JointName, ServosConfig
 from core.types import Command, RobotStatus
 from hardware.servos.bus_guard import report_of
 from hardware.servos.bus_link import BusLink
-from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order
+from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order, Sent
 from hardware.servos.errors import BusProcessLost, NotReady, ServoError
 from hardware.servos.status_block import ServoReading, ServoState
 from hardware.servos.units import wire_force_mn
@@ -204,8 +204,8 @@ class ServoRobot:
         link = self._connected()
         link.put_order(Order(limited, source, time.monotonic(), captured_s))
         self._live()
-        status = link.status()
-        return status.sent.motion if status is not None and status.armed and status.sent is not None else Command()
+        sent = self._sent(link.status())
+        return sent.motion if sent is not None else Command()
 
     def hold(self) -> None:
         """Stop all motion and keep the bend; stays armed."""
@@ -267,11 +267,15 @@ class ServoRobot:
         )
 
     def sent_motion(self) -> SentMotion | None:
-        """What left the gate in the newest cycle since it was armed; None before that, and when it is not armed. No heartbeat."""
+        """What left the gate in the newest cycle since it was armed; None before that, and when it is not armed. No heartbeat.
+
+        Of a bus that has told nothing for a while nobody knows that it sends anything: then it is a hold.
+        """
         status = self.bus_status()
-        if status is None or status.sent is None or not status.armed:
+        sent = self._sent(status)
+        if status is None or sent is None:
             return None
-        sent, order = status.sent, status.sent.order
+        order = sent.order
         return SentMotion(
             cycle=status.cycle,
             time_s=sent.time_s,
@@ -281,6 +285,12 @@ class ServoRobot:
             rejection=status.rejection.reason if status.rejection is not None else None,
             at_end=status.at_end,
         )
+
+    def _sent(self, status: BusStatus | None) -> Sent | None:
+        if status is None or status.sent is None or not status.armed or self.failure is not None:
+            return None
+        is_late = time.monotonic() - status.time_s > self._safety.bus_hold_s
+        return status.sent.kept() if is_late else status.sent
 
     def kept_back(self) -> Rejection | None:
         """Why nothing at all has left the gate since it was armed; None when something has, and when it is not armed."""

@@ -220,6 +220,37 @@ def test_it_follows_orders_and_tells_what_was_sent(bench: Bench) -> None:
     assert bench.guard.sent.order == bench.order
 
 
+def test_what_was_limited_is_told_as_it_was_sent(bench: Bench) -> None:
+    """Asked for 20 mm/s from rest, the joint may get faster by 200 mm/s^2."""
+    bench.command = Command(advance_mm_s=20.0, bend=1.0)
+    for _ in range(3):
+        bench.cycle()
+    assert bench.guard.clamps
+    assert bench.guard.sent is not None
+    assert bench.guard.sent.motion.advance_mm_s == pytest.approx(8.0)
+    assert 0.0 < bench.guard.sent.motion.bend < 0.3
+
+
+def test_where_nothing_is_written_nothing_is_told_as_sent(bench: Bench) -> None:
+    """Positions that are too old: the servos keep their goals, and the order of long ago was shown as if it still went out."""
+    bench.command = Command(advance_mm_s=5.0, bend=0.5)
+    for _ in range(20):
+        bench.cycle()
+    bench.alter = lambda state: MissingServo(state.name, state.id, state.time_s, 0, "late") if state.id == 3 else state
+    for _ in range(7):
+        bench.cycle()
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.STALE_MEASUREMENT
+    assert bench.guard.sent is not None
+    assert bench.guard.sent.order is None
+    assert bench.guard.sent.motion == Command(bend=pytest.approx(0.5))  # type: ignore[arg-type]
+    assert bench.guard.sent.goals_mm == tuple(bench.goals)
+    bench.alter = lambda state: state
+    bench.cycle()
+    bench.cycle()
+    assert bench.guard.sent.order == bench.order
+
+
 def test_an_order_from_before_the_arming_does_not_count() -> None:
     bench = Bench()
     bench.cycle()

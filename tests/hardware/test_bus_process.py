@@ -332,6 +332,30 @@ def test_a_torque_off_that_is_owed_is_paid_when_the_application_closes(
     assert ("the torque is not proven to be off" in caplog.text) is not comes_back
 
 
+def test_a_bus_process_that_tells_nothing_any_more_sends_nothing(servos: SoftServoBus, armed: ServoRobot) -> None:
+    """It stands still, then it is gone: its last status would say for ever that the robot is being driven."""
+    link = armed._link
+    assert link is not None
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    sent = armed.sent_motion()
+    assert sent is not None
+    assert sent.source is Source.OPERATOR
+    os.kill(link.pid, signal.SIGSTOP)
+    try:
+        time.sleep(SAFETY.bus_hold_s + 0.1)
+        sent = armed.sent_motion()
+        assert sent is not None
+        assert (sent.source, sent.motion.advance_mm_s) == (None, 0.0)
+        assert armed.send(FORWARD).advance_mm_s == 0.0
+    finally:
+        os.kill(link.pid, signal.SIGKILL)
+        os.kill(link.pid, signal.SIGCONT)
+    end_s = time.monotonic() + PATIENCE_S
+    while armed.failure is None and time.monotonic() < end_s:
+        time.sleep(0.01)
+    assert armed.sent_motion() is None
+
+
 # --- the application falls silent ------------------------------------------------------------------------------------------------
 
 
