@@ -93,6 +93,7 @@ class Pilot:
         self._view = DriveView(clock(), mode=self._state.mode, latched=left_over.fault if left_over is not None else None)
         if left_over is not None and left_over.stopped:
             self._requests.stopped()
+            robot.stop()  # pressed while this one was being opened, it has reached no servo yet
 
     # ---- from the window's thread
 

@@ -812,6 +812,7 @@ def test_a_stop_outlives_the_rig_and_needs_its_acknowledgement(bench: Bench) -> 
     assert bench.pilot.left_over == LeftOver(Fault(Cause.STOP_PRESSED), stopped=True)
     after = pilot_after(bench, bench.pilot.left_over)
     assert (after.mode, after.pilot.view.latched) == (Mode.STOPPED, Fault(Cause.STOP_PRESSED))
+    assert after.robot.calls == ["stop"], "pressed while it was being opened, it had reached no servo, and no torque went off"
     after.pilot.switch_on()
     after.done().seconds(0.2)
     assert after.mode is Mode.STOPPED
