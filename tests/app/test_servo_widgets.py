@@ -172,6 +172,12 @@ def test_watchdog_torque_and_zero() -> None:
     assert cells(loose, 0)[Column.POSITION][0] == DASH
 
 
+def test_a_current_beyond_its_limit_is_marked() -> None:
+    assert cells(bus(servo(0, current_ma=600.0)), 0)[Column.CURRENT] == ("600", Tone.PLAIN)
+    assert cells(bus(servo(0, current_ma=-612.0)), 0)[Column.CURRENT] == (f"!!{MINUS}612", Tone.BAD)
+    assert "limit 600 mA for half a second" in servo_rows(bus(), SERVOS, SAFETY)[0][list(Column).index(Column.CURRENT)].tip
+
+
 def test_models_that_report_a_load_have_no_current() -> None:
     assert cells(bus(servo(0, current_ma=None)), 0)[Column.CURRENT][0] == DASH
 
