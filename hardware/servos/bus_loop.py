@@ -21,6 +21,7 @@ from hardware.servos.guard_end import GuardEnd, Request
 from hardware.servos.line import LATE_S
 from hardware.servos.status_block import MissingServo, ServoReading, ServoState
 from hardware.servos.stopwatch import Stopwatch
+from hardware.servos.torque_debt import TorqueDebt
 
 _LINGER_S = 0.2
 """So long after disarming for silence the servos are still polled, to see that they hold."""
@@ -31,7 +32,6 @@ _SETTLE_CYCLES = 5
 _SETTLED_MM = 0.2
 _WINDOW_S = 10.0
 _TRIES_ON_REQUEST, _TRIES_AT_END = 4, 15
-_NOT_PROVEN = "the torque is not proven to be off: cut the servos' power"
 _log = logging.getLogger(__name__)
 
 
@@ -50,8 +50,7 @@ class BusLoop:
         self._ended = self._quiet = self._lost = False
         self._reopen_at_s = 0.0
         self._stop_s = -math.inf
-        self._owes_torque_off, self._off_problem = False, ""
-        self._torque_offs = 0
+        self._debt = TorqueDebt(bus, self._guard)
         self._does: dict[str, Callable[[Request], None]] = {
             "open": lambda _: self._open(),
             "zero": lambda request: bus.set_zero(request.details.get("names")),
@@ -85,16 +84,13 @@ class BusLoop:
         """STOP that nobody has heard yet, and a torque-off that is still owed: after this process nobody pays it."""
         if self._end.take_stop():
             self._hear_stop()
-        if self._owes_torque_off and not self._bus.is_open:
+        if self._debt.owed and not self._bus.is_open:
             self._reopen(time.monotonic())
-        for _ in range(_TRIES_AT_END):
-            if self._owes_torque_off and self._bus.is_open:
-                self._guard_port(self._pay_torque_off)
-            if self._owes_torque_off and self._bus.is_open:
-                time.sleep(LATE_S)  # whoever was silent is not asked before
+        if self._debt.owed:
+            self._guard_port(lambda: self._debt.pay(_TRIES_AT_END))
         self._publish(time.monotonic())
-        if self._owes_torque_off:
-            text = f"the servo bus process ends, and {self._off_problem or _NOT_PROVEN}"
+        if self._debt.owed:
+            text = f"the servo bus process ends, and {self._debt.problem}"
             _log.error(text)
             self._end.last_words(text)
 
@@ -125,7 +121,7 @@ class BusLoop:
         started_s = time.monotonic()
         self._cycle += 1
         silence_s = self._guard.silence_s(self._end.heartbeat(), started_s)
-        is_settled = not self._guard.armed and not self._owes_torque_off
+        is_settled = not self._guard.armed and not self._debt.owed
         self._quiet = is_settled and silence_s > self._servos.heartbeat_timeout_s + _LINGER_S
         self._readings = ()
         if self._bus.is_open and not self._quiet:
@@ -149,8 +145,8 @@ class BusLoop:
             self._end_motion(fault)
         elif self._guard.armed:
             self._drive()
-        elif self._owes_torque_off:
-            self._pay_torque_off()
+        elif self._debt.owed:
+            self._debt.pay()
         elif self._settle > 0:
             self._settle -= 1
             if not self._holds():
@@ -170,37 +166,14 @@ class BusLoop:
     def _end_motion(self, fault: Fault) -> None:
         """Goal = measured; no more goals. What stops may switch the torque off, too."""
         self._guard.end_motion(fault)
-        stops = REACTION[fault.cause] is Reaction.STOP and self._servos.torque_off_on_stop
-        self._owes_torque_off = self._owes_torque_off or stops
+        if REACTION[fault.cause] is Reaction.STOP and self._servos.torque_off_on_stop:
+            self._debt.owe()
         if not self._bus.is_open:
-            if self._owes_torque_off:
-                self._tell_of_torque(_NOT_PROVEN)
             return
         self._settle = _SETTLE_CYCLES
         self._bus.disarm()
-        if self._owes_torque_off:
-            self._pay_torque_off()
-
-    def _pay_torque_off(self) -> None:
-        """Torque off, tried again with each turn until the servos say so: a burst of noise takes three packets in a row."""
-        try:
-            self._bus.torque_off()
-        except PortLost:
-            raise
-        except ServoError as error:
-            self._tell_of_torque(str(error))
-        else:
-            self._owes_torque_off = False
-            self._torque_offs += 1
-            self._tell_of_torque("")
-
-    def _tell_of_torque(self, problem: str) -> None:
-        """In the status, and in the line of the first cause, which stays; no longer, once it is over."""
-        first = self._guard.latched
-        if first is not None and problem != self._off_problem:
-            detail = first.detail.removesuffix(self._off_problem).strip()
-            self._guard.latched = replace(first, detail=f"{detail} {problem}".strip())
-        self._off_problem = problem
+        if self._debt.owed:
+            self._debt.pay()
 
     def _holds(self) -> bool:
         """Whether all servos that tell have a goal where they are; a hold has no answer, and may have got lost."""
@@ -219,9 +192,8 @@ class BusLoop:
 
     def _lose_port(self) -> None:
         self._guard.end_motion(self._guard.lost_port())
-        self._owes_torque_off = self._owes_torque_off or self._servos.torque_off_on_stop
-        if self._owes_torque_off:
-            self._tell_of_torque(_NOT_PROVEN)
+        if self._debt.owed or self._servos.torque_off_on_stop:
+            self._debt.owe()
         self._readings = ()
         self._lost = True
         self._reopen_at_s = time.monotonic() + _REOPEN_S
@@ -246,7 +218,7 @@ class BusLoop:
         self._guard.check_arming()
         self._bus.arm()
         self._settle = 0
-        self._owes_torque_off, self._off_problem = False, ""
+        self._debt.forgive()
         self._guard.set_armed(time.monotonic())
 
     def _look_before_arming(self) -> None:
@@ -280,17 +252,10 @@ class BusLoop:
         """Owed from now on, whatever becomes of the first tries: who asked for it is told, and it is tried with each turn."""
         self._guard.disarm()
         self._settle = 0
-        self._owes_torque_off = True
-        for left in reversed(range(_TRIES_ON_REQUEST)):
-            if not self._bus.is_open:
-                self._tell_of_torque(_NOT_PROVEN)
-                break
-            self._pay_torque_off()
-            if not self._owes_torque_off:
-                return
-            if left:
-                time.sleep(LATE_S)  # whoever was silent is not asked before
-        raise TorqueStillOn(self._off_problem)
+        self._debt.owe()
+        self._debt.pay(_TRIES_ON_REQUEST)
+        if self._debt.owed:
+            raise TorqueStillOn(self._debt.problem)
 
     def _serve(self, request: Request, *, after_stop: bool) -> None:
         """Do it and answer. `after_stop`: STOP came while the request waited, and nobody can have seen that who asked before."""
@@ -350,8 +315,8 @@ class BusLoop:
                 line=replace(self._bus.counts),
                 bad_packets=self._bad_packets,
                 restarts=guard.restarts,
-                torque_offs=self._torque_offs,
-                torque_problem=self._off_problem if self._owes_torque_off else "",
+                torque_offs=self._debt.paid,
+                torque_problem=self._debt.problem,
                 times=self._times.summary,
                 zeroed=tuple(zero is not None for zero in self._bus.zero_ticks),
             )
