@@ -21,7 +21,7 @@ from core.config import PerceptionConfig, choose_model, load_config
 from core.errors import UserError
 from core.names import name_as_text
 from core.study.ablation import OURS, PAPER, STEPS, TRACKING, SameMasks, Variant, make_variants
-from core.study.ablation_figures import draws_groups, figures, frame_rows, refusals
+from core.study.ablation_figures import are_enough, figures, frame_rows, refusals
 from core.study.accuracy import FrameScore, TrueMasks, score_frame
 from core.types import Frame
 
@@ -190,7 +190,7 @@ def _described(
     rows.insert(last, {"name": f"+ {TRACKING}", "kind": "cumulative", "note": ALONE})
     rows.append({"name": f"{OURS} without {TRACKING}", "kind": "without", "note": ALONE})
     expected = [group for group, score in zip(groups, scores[0], strict=True) if score.expected]
-    drawn = f"{len(set(expected))} phantoms" if draws_groups(expected) else f"{len(expected)} frames"
+    drawn = f"{len(set(expected))} phantoms{'' if are_enough(expected) else ' (too few for intervals)'}"
     return {"frames": len(scores[0]), "expected": len(expected), "drawn": drawn, "rows": rows}
 
 

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from app.learning_commands import progress_bar
+from app.taken_frames import recording_of
 from core.config import Config
-from core.names import name_as_text
+from core.names import name_as_text, name_of
 from core.study.annotation_images import FoundImage
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotation_report import agreement_report, choose_study, manual_measurements
@@ -40,7 +41,7 @@ def compared_rows(
         raise AnnotationError(f"{where}: none of its annotated images is here")
     manual = manual_measurements(done, {image.sha256: image.sha256 for image in images})
     pipeline = open_pipeline(config.perception)
-    folders = _names_of({here[row.image].path.parent for row in manual})
+    groups = groups_of([here[row.image].path for row in manual])
     rows: list[Measurement] = []
     reasons: Counter[str] = Counter()
     with progress_bar() as bar:
@@ -49,16 +50,27 @@ def compared_rows(
                 image = here[row.image]
                 scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(image.path)))
                 angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
-                group = folders[image.path.parent] if len(folders) > 1 else None  # pictures of one session are alike
-                rows.append(
-                    replace(row, image=name_as_text(image.path.name), algorithm_angle=angle, algorithm_state=state, group=group)
-                )
+                name, group = name_as_text(image.path.name), groups[image.path]
+                rows.append(replace(row, image=name, algorithm_angle=angle, algorithm_state=state, group=group))
                 if scene.refusal is not None and row.state is not None:
                     reasons[scene.refusal.reason.value] += 1
         except KeyboardInterrupt:
             if not rows:
                 raise
     return rows, dict(sorted(reasons.items())), pipeline.engine, len(manual) - len(rows)
+
+
+def groups_of(pictures: Sequence[Path]) -> dict[Path, str | None]:
+    """The group of each picture: pictures of one recording are alike, and so may those of one folder be.
+
+    None where all lie in one folder that is of no recording: nothing is known of what they show, then.
+    """
+    recordings = {folder: recording_of(folder) for folder in {path.parent for path in pictures}}
+    if len(recordings) == 1 and None in recordings.values():
+        return dict.fromkeys(pictures)
+    places = {found or folder for folder, found in recordings.items()}
+    names = _names_of(places) if len(places) > 1 else {place: name_as_text(name_of(place)) for place in places}
+    return {path: names[recordings[path.parent] or path.parent] for path in pictures}
 
 
 def _names_of(folders: set[Path]) -> dict[Path, str]:

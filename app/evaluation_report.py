@@ -150,11 +150,10 @@ def _drawn(intervals: Mapping[str, Any]) -> str:
     groups = intervals["groups"]
     if intervals["drawn"] == "groups":
         return f"Whole groups (sessions or phantoms; {groups} of them) are drawn, since images of one are alike."
+    if intervals["drawn"] == "nothing":
+        return f"There are too few groups (sessions or phantoms; {groups}) for intervals, since images of one are alike."
     if groups:
-        return (
-            f"Images are taken as independent, since there are too few groups (sessions or phantoms; {groups}) to draw whole ones, "
-            "or as many as images; where several images show the same phantom, the true intervals are wider."
-        )
+        return "Images are taken as independent, each of another session or phantom."
     return "Images are taken as independent; where several show the same phantom, the true intervals are wider."
 
 

@@ -23,6 +23,7 @@ from core.study.annotations import AnnotationError
 from core.types import Image
 
 _WHOSE = "video.json"
+_FRAMES_OF = "_frames"
 _END_BYTES = 1_000_000
 _SAME_LEVELS = 8.0
 """By so many grey levels two decoders' pictures of one frame differ at most, on average."""
@@ -35,6 +36,14 @@ def taken_of(video: Path) -> list[Path]:
     if found:
         _check_owner(folder, video)
     return found
+
+
+def recording_of(folder: Path) -> Path | None:
+    """What the pictures of a folder were taken of: a session, however many files its video has, or the one video that the folder
+    stands for; None: not known."""
+    if folder.name.endswith(_FRAMES_OF) and is_of_session(folder.with_name(f"{folder.name.removesuffix(_FRAMES_OF)}.mkv")):
+        return folder.absolute().parent
+    return folder if (folder / _WHOSE).is_file() else None
 
 
 Choose = Callable[[int], Sequence[int]]
@@ -98,7 +107,7 @@ def take_frames(video: Path, choose: Choose, tell: Callable[[Sequence[str]], obj
 def _folder_of(video: Path) -> Path:
     """Beside the video and called as it is, with its ending where others are called so, too: run.mp4 and run.mkv."""
     twins = [path for path in video.parent.glob(f"{escape(video.stem)}.*") if is_video(path) and path.name != video.name]
-    return video.with_name(f"{video.name if twins else video.stem}_frames")
+    return video.with_name(f"{video.name if twins else video.stem}{_FRAMES_OF}")
 
 
 def _pictures_in(folder: Path, video: Path) -> list[Path]:

@@ -19,7 +19,7 @@ RESAMPLES = 1000
 MIN_DEFINED = 0.9
 """A difference that is undefined in more resamples than the rest of these (a row that hardly answers) has no interval."""
 MIN_GROUPS = 10
-"""Frames of one phantom are alike, so whole phantoms are drawn; with fewer than this many of them, single frames."""
+"""Frames of one phantom are alike, so whole phantoms are drawn; with fewer than this many of them there is no interval."""
 WRONG_DEG, WRONG_PX = 10.0, 15.0
 """An answer is wrong beyond either of these errors, as in ``accuracy.summarise``."""
 
@@ -78,7 +78,8 @@ def figures(
     seed : of the bootstrap.
     """
     expected = [index for index, score in enumerate(scores[0]) if score.expected]
-    weights = draw_weights([groups[index] for index in expected], seed)
+    drawn_from = [groups[index] for index in expected]
+    weights = draw_weights(drawn_from, seed) if are_enough(drawn_from) else np.zeros((1, len(expected)), np.int64)
     once = np.ones((1, len(expected)), np.int64)
     columns = [{measure.of: _column([row[i] for i in expected], measure.of) for measure in MEASURES} for row in scores]
     table: list[dict[str, Figure]] = [{} for _ in scores]
@@ -108,19 +109,15 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def draws_groups(groups: Sequence[Hashable]) -> bool:
-    """Whether whole groups are drawn, or, because there are too few of them, single frames."""
+def are_enough(groups: Sequence[Hashable]) -> bool:
+    """Whether there are groups enough for intervals."""
     return len(set(groups)) >= MIN_GROUPS
 
 
 def draw_weights(groups: Sequence[Hashable], seed: int, resamples: int = RESAMPLES) -> NDArray[np.int64]:
-    """How often each frame is in each bootstrap resample, shape (resamples, frames)."""
-    names = list(dict.fromkeys(groups))
-    if draws_groups(groups):
-        place = {name: index for index, name in enumerate(names)}
-        member = np.array([place[group] for group in groups])
-    else:
-        member = np.arange(len(groups))
+    """How often each frame is in each bootstrap resample of whole groups, shape (resamples, frames)."""
+    place = {name: index for index, name in enumerate(dict.fromkeys(groups))}
+    member = np.array([place[group] for group in groups], np.int64)
     count = int(member.max(initial=-1)) + 1
     if count == 0:
         return np.zeros((resamples, 0), np.int64)

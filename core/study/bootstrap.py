@@ -1,6 +1,7 @@
 """Seeded bootstrap intervals (percentile method). Rows are drawn one by one, or, where they come in groups, by whole groups.
 
-Frames of one session or of one phantom are alike: drawn one by one they would make the intervals too narrow.
+Frames of one session or of one phantom are alike: drawn one by one they would make the intervals too narrow. So groups are drawn
+wherever they are known; where they are too few to tell how groups differ, there is no interval.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ Floats = NDArray[np.float64]
 
 RESAMPLES = 2000
 MIN_GROUPS = 10
-"""With fewer groups than this their own spread is not known well enough: rows are drawn one by one then."""
+"""With fewer groups than this their own spread is not known well enough: no interval is given then."""
 _DEFINED = 0.9
 """A statistic that is undefined in more resamples than the rest of these has no interval."""
 _BLOCK = 500_000
@@ -31,15 +32,23 @@ def interval_95(values: Floats) -> list[float] | None:
 
 
 def members(groups: Sequence[Hashable | None]) -> NDArray[np.int64] | None:
-    """The number of each row's group, shape (n,); None when the rows are to be drawn one by one.
+    """The number of each row's group, shape (n,); None when the rows are to be drawn one by one, since no group is known,
+    or each of many rows is of another one.
 
     A row without a group (None) is one of its own.
     """
+    if all(group is None for group in groups):
+        return None
     names = [("alone", place) if group is None else ("group", group) for place, group in enumerate(groups)]
     numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
-    if len(numbers) < MIN_GROUPS or len(numbers) == len(names):
+    if len(numbers) == len(names) >= MIN_GROUPS:
         return None
     return np.array([numbers[name] for name in names], np.int64)
+
+
+def are_too_few(group: NDArray[np.int64] | None) -> bool:
+    """Whether groups are known, but not enough of them for an interval."""
+    return group is not None and len(np.unique(group)) < MIN_GROUPS
 
 
 def bootstrap_rows(
@@ -60,20 +69,23 @@ def bootstrap_rows(
     Returns
     -------
     dict
-        Name -> [low, high], or None where n < 2 or the statistic is undefined too often.
+        Name -> [low, high], or None where n < 2, there are fewer groups than ``MIN_GROUPS``, or the statistic is undefined too
+        often.
     """
     n = len(columns[0])
+    if n < 2 or are_too_few(group):
+        return dict.fromkeys(statistics(*(column[None, :] for column in columns)))
     collected: dict[str, list[Floats]] = {}
     for rows in _draws(n, group, np.random.default_rng(seed)):
         for name, values in statistics(*(column[rows] for column in columns)).items():
             collected.setdefault(name, []).append(values)
-    return {name: interval_95(np.concatenate(parts)) if n > 1 else None for name, parts in collected.items()}
+    return {name: interval_95(np.concatenate(parts)) for name, parts in collected.items()}
 
 
 def _draws(n: int, group: NDArray[np.int64] | None, rng: np.random.Generator) -> Iterator[NDArray[np.int64]]:
     """Row numbers of some resamples at a time, shape (R, rows). Groups of several sizes make resamples of several lengths."""
-    if group is None or n < 2:
-        left = RESAMPLES if n > 1 else 1
+    if group is None:
+        left = RESAMPLES
         while left:
             count = min(left, max(1, _BLOCK // n))
             yield rng.integers(0, n, (count, n))

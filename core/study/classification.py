@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.metrics import cohen_kappa_score, fowlkes_mallows_score, precision_recall_fscore_support
 
-from core.study.bootstrap import RESAMPLES, Floats, interval_95
+from core.study.bootstrap import RESAMPLES, Floats, are_too_few, interval_95
 
 _AVERAGED = ("precision", "recall", "f1")
 
@@ -78,7 +78,8 @@ def state_metrics(
     ----------
     manual, algorithm : labels of the same n images.
     seed : of the bootstrap.
-    group : of each image, as ``bootstrap.members`` numbers them: whole groups are drawn. None: single images.
+    group : of each image, as ``bootstrap.members`` numbers them: whole groups are drawn, and of too few there is no interval.
+        None: single images.
 
     Returns
     -------
@@ -98,7 +99,6 @@ def state_metrics(
     classes = np.array(_scores(manual, algorithm, labels))
     rows = [{name: _defined(value) for name, value in zip(_AVERAGED, column, strict=True)} for column in classes.T]
     per_class_fm = np.sqrt(classes[0] * classes[1])
-    cells = _drawn_tables(confusion, rows_columns, seed, group)
     point = {
         "accuracy": float(np.trace(confusion) / n),
         "kappa": kappa(manual, algorithm),
@@ -107,7 +107,10 @@ def state_metrics(
     }
     averages = {"macro": _averages(classes, np.ones(len(labels))), "weighted": _averages(classes, confusion.sum(1))}
     known = point | {f"{kind}_f1": averages[kind]["f1"] for kind in _KINDS}
-    intervals = {name: interval_95(values) for name, values in table_statistics(cells).items()} if n > 1 else {}
+    intervals: dict[str, list[float] | None] = {}
+    if n > 1 and not are_too_few(group):
+        cells = _drawn_tables(confusion, rows_columns, seed, group)
+        intervals = {name: interval_95(values) for name, values in table_statistics(cells).items()}
     per_class = {
         label: row | {"fowlkes_mallows": _defined(index), "n": int(count)}
         for label, row, index, count in zip(labels, rows, per_class_fm, confusion.sum(1), strict=True)

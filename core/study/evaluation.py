@@ -6,7 +6,7 @@ import csv
 import difflib
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.study.agreement import RANGE_DEG, angle_metrics, repeat_metrics
-from core.study.bootstrap import members
+from core.study.bootstrap import MIN_GROUPS, are_too_few, members
 from core.study.classification import state_metrics
 from core.types import PoseState
 
@@ -202,7 +202,9 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
         "state": state_metrics(manual, algorithm, seed, _members(labelled)),
         "manual": repeat_metrics(twice[:, 0], twice[:, 1], seed, _members(twice_rows), counts),
     }
-    return metrics | {"notes": _angle_notes(metrics, rows) + _state_notes(metrics["state"])}
+    parts = {"angle": measured, "state": labelled, "manual": twice_rows}
+    notes = _interval_notes({name: part for name, part in parts.items() if are_too_few(_members(part))})
+    return metrics | {"notes": notes + _angle_notes(metrics, rows) + _state_notes(metrics["state"])}
 
 
 def _members(rows: Sequence[Measurement]) -> NDArray[np.int64] | None:
@@ -210,9 +212,28 @@ def _members(rows: Sequence[Measurement]) -> NDArray[np.int64] | None:
 
 
 def _drawn(rows: Sequence[Measurement]) -> dict[str, Any]:
-    """What the bootstrap draws, and how many groups are known (0: none)."""
-    known = len({row.group for row in rows if row.group is not None})
-    return {"drawn": "images" if _members(rows) is None else "groups", "groups": known}
+    """What the bootstrap draws ("nothing": too few groups for an interval), and how many groups are known (0: none)."""
+    group = _members(rows)
+    drawn = "images" if group is None else "nothing" if are_too_few(group) else "groups"
+    return {"drawn": drawn, "groups": len({row.group for row in rows if row.group is not None})}
+
+
+_OF = {"angle": "angles", "state": "states", "manual": "manual measures"}
+
+
+def _interval_notes(without: Mapping[str, Sequence[Measurement]]) -> list[str]:
+    """Why there are no intervals, and of what."""
+    if not without:
+        return []
+    known = max(len({row.group for row in rows if row.group is not None}) for rows in without.values())
+    return [
+        f"No intervals of {_listed([_OF[name] for name in without])}: the images are of {known} "
+        f"group{'s' if known != 1 else ''} (sessions or phantoms), and images of one are alike; intervals need {MIN_GROUPS} groups."
+    ]
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def _counts(rows: Sequence[Measurement]) -> dict[str, int]:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from app.annotate_command import AnnotateOptions, StudyOptions, _config, _queue, run_annotate
-from app.annotate_evaluation import _names_of
+from app.annotate_evaluation import _names_of, groups_of
 from app.annotate_sources import asked_files, default_store, image_files
 from app.evaluate_command import run_evaluate
 from core.config import Config, TwinConfig
@@ -373,3 +373,19 @@ def test_sessions_that_are_called_alike_inside_are_told_apart() -> None:
     one, other = Path("data/run_1/images"), Path("data/run_2/images")
     assert _names_of({one, other}) == {one: "run_1/images", other: "run_2/images"}
     assert _names_of({one}) == {one: "."}
+
+
+def test_pictures_of_one_recording_are_one_group(tmp_path: Path) -> None:
+    """Whatever folders its files have; of plain pictures in one folder nobody knows what they show."""
+    session, video, plain = (tmp_path / name for name in ("session_1", "run_frames", "pictures"))
+    parts = [session / f"video_000{k}_frames" for k in range(2)]
+    for place in (*parts, video, plain):
+        place.mkdir(parents=True)
+    (session / "frames.jsonl").touch()
+    (video / "video.json").touch()
+    of_session = [part / "a.png" for part in parts]
+    assert set(groups_of(of_session).values()) == {"session_1"}
+    assert groups_of([video / "a.png", video / "b.png"]) == {video / "a.png": "run_frames", video / "b.png": "run_frames"}
+    assert groups_of([plain / "a.png", plain / "b.png"]) == {plain / "a.png": None, plain / "b.png": None}
+    mixed = groups_of([*of_session, plain / "a.png"])
+    assert list(mixed.values()) == ["session_1", "session_1", "pictures"]

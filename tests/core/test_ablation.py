@@ -11,7 +11,7 @@ from core.config import GapConfig, PerceptionConfig, PoseConfig, QualityConfig, 
 from core.perception.pipeline import Pipeline
 from core.perception.vectors import fit_line
 from core.study.ablation import OURS, PAPER, STEPS, TRACKING, SameMasks, make_variants
-from core.study.ablation_figures import MEASURES, draw_weights, draws_groups, estimate, figures, frame_rows, refusals
+from core.study.ablation_figures import MEASURES, are_enough, draw_weights, estimate, figures, frame_rows, refusals
 from core.study.ablation_stream import StreamFrame, stream_figures
 from core.study.accuracy import FrameScore, TrueMasks
 from core.types import Frame, Image, Reason
@@ -180,7 +180,7 @@ def test_estimates_leave_out_what_is_not_known() -> None:
 def test_whole_phantoms_are_drawn_where_there_are_enough() -> None:
     groups = [number // 2 for number in range(20)]
     weights = draw_weights(groups, seed=1, resamples=50)
-    assert draws_groups(groups)
+    assert are_enough(groups)
     assert weights.shape == (50, 20)
     np.testing.assert_array_equal(weights[:, ::2], weights[:, 1::2])
     assert (weights.sum(axis=1) == 20).all()
@@ -188,12 +188,16 @@ def test_whole_phantoms_are_drawn_where_there_are_enough() -> None:
     assert (weights != draw_weights(groups, seed=2, resamples=50)).any()
 
 
-def test_frames_are_drawn_where_phantoms_are_few() -> None:
-    groups = [0] * 10 + [1] * 10
-    assert not draws_groups(groups)
-    weights = draw_weights(groups, seed=1, resamples=50)
-    assert (weights.sum(axis=1) == 20).all()
-    assert (weights[:, 0] != weights[:, 1]).any()
+def test_of_too_few_phantoms_no_difference_has_an_interval() -> None:
+    """Drawn one by one, twenty frames of two phantoms would make it too narrow."""
+    rng = np.random.default_rng(4)
+    rows = [[score(float(theta), stem=str(k)) for k, theta in enumerate(rng.normal(shift, 1.0, 20))] for shift in (3.0, 6.0)]
+    assert not are_enough([0] * 10 + [1] * 10)
+    few = figures(rows, [None, 0], [k // 10 for k in range(20)])[1]["theta_mean_deg"]
+    enough = figures(rows, [None, 0], [k // 2 for k in range(20)])[1]["theta_mean_deg"]
+    assert few.difference == enough.difference
+    assert (few.low, few.high, few.is_clear) == (None, None, False)
+    assert enough.is_clear
     assert draw_weights([], seed=1, resamples=5).shape == (5, 0)
 
 

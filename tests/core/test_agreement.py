@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import spearmanr
 
 from core.study.agreement import angle_metrics, correlation, icc_absolute, repeat_metrics, shares
-from core.study.bootstrap import bootstrap_rows, interval_95, members
+from core.study.bootstrap import are_too_few, bootstrap_rows, interval_95, members
 
 MANUAL = np.array([10.0, 20.0, 30.0, 40.0])
 ALGORITHM = np.array([11.0, 19.0, 33.0, 41.0])  # errors 1, -1, 3, 1
@@ -95,14 +95,30 @@ def test_no_value_has_nothing_but_all_names() -> None:
     assert {value for name, value in nothing.items() if name not in {"n", "ci95"}} == {None}
 
 
-def test_rows_come_in_groups_only_where_there_are_enough_of_them() -> None:
-    assert members(["a"] * 40) is None
-    assert members([f"s{k // 5}" for k in range(45)]) is None, "nine groups"
+def test_rows_come_in_groups_wherever_these_are_known() -> None:
+    few = members([f"s{k // 5}" for k in range(45)])
+    assert few is not None, "nine groups: too few for an interval, and no reason to take their images for independent"
+    assert (are_too_few(few), len(set(few.tolist()))) == (True, 9)
+    assert are_too_few(members(["a"] * 40))
+    assert are_too_few(members([f"s{k}" for k in range(9)])), "nine images of nine phantoms are nine groups, too"
     assert members([f"s{k}" for k in range(45)]) is None, "every row a group of its own: the same as one by one"
-    assert members([None] * 40) is None
+    assert members([None] * 5) is None
+    assert not are_too_few(None)
     found = members([*(f"s{k // 2}" for k in range(18)), None, None])
     assert found is not None
     assert found.tolist() == [*(k // 2 for k in range(18)), 9, 10], "rows without a group stand alone"
+
+
+def test_of_too_few_groups_there_is_no_interval_rather_than_a_narrow_one() -> None:
+    """Nine phantoms of twenty images each: taken for 180 images they would seem far surer than nine phantoms can be."""
+    rng = np.random.default_rng(2)
+    manual = rng.uniform(20.0, 160.0, 180)
+    nine, ten = (members([f"phantom {k % count}" for k in range(180)]) for count in (9, 10))
+    found = angle_metrics(manual, manual + rng.normal(0.0, 5.0, 180), group=nine)
+    assert found["mean_error_deg"] is not None
+    assert set(found["ci95"].values()) == {None}
+    assert set(repeat_metrics(manual, manual + 1.0, group=nine)["ci95"].values()) == {None}
+    assert angle_metrics(manual, manual + 1.0, group=ten)["ci95"]["mean_error_deg"] is not None
 
 
 def test_copies_of_an_image_make_no_interval_narrower() -> None:

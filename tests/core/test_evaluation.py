@@ -128,7 +128,8 @@ def test_groups_are_an_optional_column(table, tmp_path: Path) -> None:
     ("groups", "drawn"),
     [
         ([f"session {place // 4}" for place in range(48)], {"drawn": "groups", "groups": 12}),
-        ([f"session {place // 24}" for place in range(48)], {"drawn": "images", "groups": 2}),
+        ([f"session {place // 24}" for place in range(48)], {"drawn": "nothing", "groups": 2}),
+        ([f"session {place}" for place in range(48)], {"drawn": "images", "groups": 48}),
         ([None] * 48, {"drawn": "images", "groups": 0}),
     ],
 )
@@ -137,6 +138,20 @@ def test_it_says_what_the_intervals_draw(groups: list[str | None], drawn: dict[s
     angles = rng.uniform(0.0, 60.0, (48, 2))
     rows = [Measurement(str(k), angles[k, 0], angles[k, 0], "B", angles[k, 1], "B", groups[k]) for k in range(48)]
     assert evaluate(rows)["intervals"] == drawn
+
+
+def test_too_few_groups_give_no_interval_and_a_note() -> None:
+    """Two phantoms: their images are alike, and taken one by one their intervals would be too narrow."""
+    rng = np.random.default_rng(1)
+    angles = rng.uniform(0.0, 60.0, (48, 2))
+    rows = [Measurement(str(k), angles[k, 0], angles[k, 0], "BC"[k % 2], angles[k, 1], "B", f"phantom {k % 2}") for k in range(48)]
+    found = evaluate(rows)
+    assert {value for part in ("angle", "state", "manual") for value in found[part]["ci95"].values()} == {None}
+    (note,) = [note for note in found["notes"] if note.startswith("No intervals")]
+    assert note == (
+        "No intervals of angles, states and manual measures: the images are of 2 groups (sessions or phantoms), "
+        "and images of one are alike; intervals need 10 groups."
+    )
 
 
 def rows_of(*cells: tuple) -> list[Measurement]:
