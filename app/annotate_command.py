@@ -53,6 +53,9 @@ class AnnotateOptions:
     report: bool = False
     export: str | None = None
     imports: tuple[Path, ...] = ()
+    joins: tuple[Path, ...] = ()
+    names: tuple[str, ...] = ()
+    """Of raters in the files of `joins`, as THERE=HERE."""
     salvage: bool = False
     out: Path | None = None
     as_json: bool = False
@@ -61,11 +64,15 @@ class AnnotateOptions:
 
 
 def run_annotate(options: AnnotateOptions) -> int:
-    """Open the window, or report, export, import, salvage; returns the exit code. Raises UserError."""
+    """Open the window, or report, export, import, join, salvage; returns the exit code. Raises UserError."""
     if options.export is not None and options.export not in EXPORTS:
         raise AnnotationError(f"--export {options.export}: must be one of {', '.join(EXPORTS)}")
-    if sum((options.report, options.export is not None, bool(options.imports), options.salvage)) > 1:
-        raise AnnotationError("--report, --export, --import and --salvage are different things: give one of them")
+    if sum((options.report, options.export is not None, bool(options.imports), bool(options.joins), options.salvage)) > 1:
+        raise AnnotationError("--report, --export, --import, --join and --salvage are different things: give one of them")
+    if options.names and not options.joins:
+        raise AnnotationError("--as says who somebody is in a file that is joined: give --join FILE, too")
+    if options.joins and options.study.rater is not None:
+        raise AnnotationError("--join takes all raters of a file; --as THERE=HERE says what one of them is called here")
     if options.export is not None and options.out is None:
         raise AnnotationError("--export needs --out: a folder for dataset, a file for csv and coco")
     if options.as_json and not options.report:
@@ -80,6 +87,8 @@ def run_annotate(options: AnnotateOptions) -> int:
         return _report(store_path, options)
     if options.export is not None:
         return _export(store_path, paths, options, config)
+    if options.joins:
+        return _join(store_path, options)
     if options.imports:
         return _import(store_path, paths, options, config)
     return _window(store_path, paths, options, config)
@@ -269,7 +278,7 @@ def _report(store_path: Path, options: AnnotateOptions) -> int:
     return 0
 
 
-# ---- export, import, salvage
+# ---- export, import, join, salvage
 
 
 def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
@@ -382,6 +391,31 @@ def _import(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     if not counts:
         raise AnnotationError("nothing was imported")
     sys.stderr.write(f"{len(counts)} images got annotations, for rater {rater}, in {store_path}\n")
+    return 0
+
+
+def _join(store_path: Path, options: AnnotateOptions) -> int:
+    from core.study.annotation_join import join
+
+    names = {}
+    for said in options.names:
+        there, _, here = (part.strip() for part in said.partition("="))
+        if not there or not here or names.get(there, here) != here:
+            raise AnnotationError(f"--as {said}: must be THERE=HERE, a rater's name in the file that is joined and his name here")
+        names[there] = here
+    is_new = not store_path.exists()
+    try:
+        with AnnotationStore(store_path) as store:
+            joined = join(store, options.joins, options.study.name or None, names)
+    except AnnotationError:
+        if is_new:
+            store_path.unlink(missing_ok=True)
+        raise
+    tell_problems(joined.told)
+    for path, persons in joined.persons.items():
+        who = ", ".join(here if here == there else f"{here} (there: {there})" for there, here in sorted(persons.items()))
+        sys.stderr.write(f"{path}: {who or 'nobody has answered in it'}\n")
+    sys.stderr.write(f"{joined.new} answers are new in {store_path}, {joined.grown} went on, {joined.known} were there already\n")
     return 0
 
 

@@ -54,6 +54,12 @@ def annotate(
     report: Annotated[bool, typer.Option("--report", help="agreement within and between raters, instead of the window")] = False,
     export: Annotated[str | None, typer.Option(help="dataset (for train), csv (for evaluate) or coco, to --out")] = None,
     import_: Annotated[list[Path] | None, typer.Option("--import", help="labelme or COCO file or folder; may be repeated")] = None,
+    join: Annotated[
+        list[Path] | None, typer.Option("--join", help="take in the answers of another annotation file; may be repeated")
+    ] = None,
+    as_: Annotated[
+        list[str] | None, typer.Option("--as", metavar="THERE=HERE", help="what a rater of joined files is called here")
+    ] = None,
     salvage: Annotated[bool, typer.Option("--salvage", help="copy what is readable of a damaged annotation file")] = False,
     out: Annotated[Path | None, typer.Option(help="where report or export go")] = None,
     json: JsonOption = False,
@@ -71,6 +77,8 @@ def annotate(
         report=report,
         export=export,
         imports=tuple(import_ or ()),
+        joins=tuple(join or ()),
+        names=tuple(as_ or ()),
         salvage=salvage,
         out=out,
         as_json=json,

@@ -25,6 +25,16 @@ CREATE TABLE journal (id INTEGER PRIMARY KEY, annotation_id INTEGER NOT NULL REF
     kind TEXT NOT NULL, base INTEGER NOT NULL, action TEXT NOT NULL, content TEXT, check_sum INTEGER NOT NULL,
     made_utc TEXT NOT NULL, UNIQUE (annotation_id, number));
 """
+EXTRAS = """
+CREATE TABLE IF NOT EXISTS origins (annotation_id INTEGER PRIMARY KEY REFERENCES annotations(id), origin TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS looks (image_id INTEGER NOT NULL REFERENCES images(id), study TEXT NOT NULL, rater TEXT NOT NULL,
+    repeat INTEGER NOT NULL, after INTEGER NOT NULL, UNIQUE (image_id, study, rater, repeat));
+"""
+"""What files of earlier versions lack, and these leave alone.
+
+``origins``: a random number that an annotation gets when it is begun, and keeps in every copy: it tells whose it is.
+``looks``: who was shown the algorithm's answer, and after which of his own edits.
+"""
 ANNOTATION_COLUMNS = (
     "sha256, study, rater, repeat, view, content, check_sum, theta_deg, theta_signed_deg, d_head_px, d_tail_px, crossed,"
     " time_spent_s, changed_utc"

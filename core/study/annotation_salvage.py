@@ -17,7 +17,7 @@ from core.study.annotations import AnnotationError
 _MAX_ROW = 1_000_000
 _MISSES = 2_000
 """After so many rows in a row that cannot be read, nothing more is expected."""
-_TABLES = ("images", "studies", "annotations", "journal")
+_TABLES = ("images", "studies", "annotations", "journal", "origins", "looks")
 
 
 def salvage(damaged: Path, target: Path) -> tuple[int, list[str]]:
@@ -102,11 +102,36 @@ def _read_copy(path: Path) -> _Found:
 def _readable(source: sqlite3.Connection, table: str, problems: list[str]) -> tuple[list[str], list[tuple[Any, ...]]]:
     try:
         names = [str(row[1]) for row in source.execute(f"PRAGMA table_info({table})")]
-        rows = list(_rows(source, table, problems))
+        if not names and table in ("origins", "looks"):  # a file of an earlier version
+            return [], []
+        lost = _astray(source, table)
+        rows = [row for row in _rows(source, table, problems) if row[0] not in lost]
+        if lost:
+            problems.append(f"{len(lost)} of {table} are not what the index of their table says; left out")
     except (sqlite3.Error, UnicodeDecodeError) as error:
         problems.append(f"table {table} is lost ({error})")
         return [], []
     return names, rows
+
+
+_INDEXED = {
+    "images": ("sha256",),
+    "annotations": ("image_id", "study", "rater", "repeat"),
+    "journal": ("annotation_id", "number"),
+}
+
+
+def _astray(source: sqlite3.Connection, table: str) -> set[int]:
+    """Rows that the table's index knows otherwise: one of the two is damaged, and an answer might be given to another image."""
+    if table not in _INDEXED:
+        return set()
+    same = " AND ".join(f"b.{name} IS a.{name}" for name in ("id", *_INDEXED[table]))
+    index = f"sqlite_autoindex_{table}_1"
+    query = f"SELECT a.id FROM {table} a NOT INDEXED WHERE NOT EXISTS (SELECT 1 FROM {table} b INDEXED BY {index} WHERE {same})"
+    try:
+        return {int(row[0]) for row in source.execute(query)}
+    except (sqlite3.Error, UnicodeDecodeError):  # no index to ask
+        return set()
 
 
 def _rows(source: sqlite3.Connection, table: str, problems: list[str]) -> Iterator[tuple[Any, ...]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import secrets
 import sqlite3
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,6 +23,7 @@ from core.study.annotation_records import (
     ANNOTATION_COLUMNS,
     APPLICATION_ID,
     ENTRY_COLUMNS,
+    EXTRAS,
     SCHEMA,
     SCHEMA_VERSION,
     TAKES_LINES,
@@ -99,7 +101,7 @@ class AnnotationStore:
 
     def add_image(self, record: ImageRecord, file_size: int, modified_ns: int) -> None:
         """Make an image known, or renew the name under which it lies."""
-        with self._transaction() as database:
+        with self.transaction() as database:
             database.execute(
                 "INSERT INTO images (sha256, name, width, height, file_size, modified_ns) VALUES (?, ?, ?, ?, ?, ?)"
                 " ON CONFLICT (sha256) DO UPDATE SET name = excluded.name, file_size = excluded.file_size,"
@@ -134,7 +136,7 @@ class AnnotationStore:
         return settings
 
     def begin_study(self, name: str, settings: dict[str, Any]) -> None:
-        with self._transaction() as database:
+        with self.transaction() as database:
             row = (name, json.dumps(settings, allow_nan=False), _now())
             database.execute("INSERT INTO studies (name, settings, made_utc) VALUES (?, ?, ?)", row)
 
@@ -169,7 +171,7 @@ class AnnotationStore:
         }
         names = ", ".join(values)
         renewed = ", ".join(f"{name} = excluded.{name}" for name in values)
-        with self._transaction() as database:
+        with self.transaction() as database:
             image = database.execute("SELECT id FROM images WHERE sha256 = ?", (key.sha256,)).fetchone()
             if image is None:
                 raise AnnotationError(f"{self.path}: image {key.sha256[:12]} is not in it")
@@ -179,6 +181,8 @@ class AnnotationStore:
                 f" ON CONFLICT (image_id, study, rater, repeat) DO UPDATE SET {renewed} RETURNING id",
                 (image[0], key.study, key.rater, key.repeat, now, *values.values()),
             ).fetchone()
+            if database.execute("SELECT 1 FROM journal WHERE annotation_id = ?", (annotation_id,)).fetchone() is None:
+                database.execute("INSERT OR IGNORE INTO origins VALUES (?, ?)", (annotation_id, secrets.token_hex(8)))
             step = entry.content.to_json() if entry.content is not None else None
             database.execute(
                 "INSERT INTO journal (annotation_id, number, kind, base, action, content, check_sum, made_utc)"
@@ -188,7 +192,7 @@ class AnnotationStore:
 
     def save_time(self, key: ItemKey, time_spent_s: float) -> None:
         """Keep how long the rater has looked at an image; nothing when he has not annotated it."""
-        with self._transaction() as database:
+        with self.transaction() as database:
             database.execute(
                 "UPDATE annotations SET time_spent_s = ? WHERE study = ? AND rater = ? AND repeat = ?"
                 " AND image_id = (SELECT id FROM images WHERE sha256 = ?)",
@@ -245,7 +249,7 @@ class AnnotationStore:
 
         So is what belongs to a row that is lost: its number will be another one's.
         """
-        with self._transaction() as database:
+        with self.transaction() as database:
             for table, rows in tables.items():
                 known = {row[1] for row in database.execute(f"PRAGMA table_info({table})")}
                 if not rows or not known.issuperset(columns[table]):
@@ -257,14 +261,31 @@ class AnnotationStore:
                     except sqlite3.IntegrityError as error:
                         problems.append(f"a row of {table} is damaged ({error}); left out")
             # In this order: the edits of an annotation go with it.
-            for table, belongs_to, parents in (("annotations", "image_id", "images"), ("journal", "annotation_id", "annotations")):
+            for table, belongs_to, parents in (
+                ("annotations", "image_id", "images"),
+                ("journal", "annotation_id", "annotations"),
+                ("origins", "annotation_id", "annotations"),
+                ("looks", "image_id", "images"),
+            ):
                 orphans = f"FROM {table} WHERE {belongs_to} NOT IN (SELECT id FROM {parents})"
                 lost, count = database.execute(f"SELECT count(DISTINCT {belongs_to}), count(*) {orphans}").fetchone()
-                if count:
+                if count and table not in ("origins", "looks"):
                     problems.append(f"{lost} of {parents} are lost, and with them {count} of {table}")
-                    database.execute(f"DELETE {orphans}")
+                database.execute(f"DELETE {orphans}")
 
     # ---- the file
+
+    @contextmanager
+    def transaction(self, *, writing: bool = True) -> Iterator[sqlite3.Connection]:
+        """The database, for all or nothing: whatever raises before the end takes everything back."""
+        with self._lock, self._named_errors():
+            self._database.execute("BEGIN IMMEDIATE" if writing else "BEGIN")
+            try:
+                yield self._database
+                self._database.execute("COMMIT")
+            finally:  # whatever ended it before the commit
+                if self._database.in_transaction:
+                    self._database.execute("ROLLBACK")
 
     def _prepare(self, read_only: bool) -> None:
         database = self._database
@@ -288,20 +309,12 @@ class AnnotationStore:
             database.executescript(
                 f"BEGIN; PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {SCHEMA_VERSION}; {SCHEMA} COMMIT;"
             )
-        (verdict,) = database.execute("PRAGMA quick_check(1)").fetchone()
+        # Each table against its indexes, too: a flipped bit in a number would give an answer to another image.
+        (verdict,) = database.execute("PRAGMA integrity_check(1)").fetchone()
         if verdict != "ok":
             raise sqlite3.DatabaseError("malformed")
-
-    @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
-        with self._lock, self._named_errors():
-            self._database.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._database
-                self._database.execute("COMMIT")
-            finally:  # whatever ended it before the commit
-                if self._database.in_transaction:
-                    self._database.execute("ROLLBACK")
+        if not read_only:
+            database.executescript(f"BEGIN; {EXTRAS} COMMIT;")
 
     def _rows(self, query: str, values: Sequence[Any] = ()) -> list[Any]:
         with self._lock, self._named_errors(), closing(self._database.execute(query, values)) as cursor:

@@ -196,6 +196,36 @@ def test_a_damaged_file_is_salvaged_into_a_new_one(folder: Path, capsys: pytest.
         run(folder, salvage=True)
 
 
+def test_two_raters_files_are_joined(folder: Path, pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Ann's file comes from another computer, whose folder has the same pictures; Bob is there, too, and his name tells nothing."""
+    there = tmp_path / "there"
+    shutil.copytree(pictures, there)
+    annotate(folder, "pilot", raters=("bob",))
+    annotate(there, "pilot")
+    with pytest.raises(UserError, match=r"a rater 'bob' is there and here, .*--as bob=NAME \(somebody else\)") as raised:
+        run(folder, joins=(there,))
+    assert "\n" not in str(raised.value)
+    assert run(folder, joins=(there / DEFAULT_NAME,), names=("bob=robert",)) == 0
+    told = capsys.readouterr().err
+    assert f"{there / DEFAULT_NAME}: ann, robert (there: bob)\n" in told
+    assert f"12 answers are new in {folder / DEFAULT_NAME}, 0 went on, 0 were there already\n" in told
+    run(folder, joins=(there,))
+    assert "0 answers are new" in capsys.readouterr().err
+    run(folder, report=True, as_json=True)
+    assert set(json.loads(capsys.readouterr().out)["raters"]) == {"ann", "bob", "robert"}
+
+
+def test_raters_files_may_be_joined_into_a_new_one(folder: Path, tmp_path: Path) -> None:
+    annotate(folder, "pilot")
+    new = tmp_path / "all.sqlite"
+    with pytest.raises(UserError, match="has no answer of study 'other'"):
+        run(folder, store=new, joins=(folder,), study=StudyOptions("other"))
+    assert not new.exists(), "what was refused leaves nothing behind"
+    run(folder, store=new, joins=(folder,))
+    with AnnotationStore(new, read_only=True) as store:
+        assert len(store.annotations()) == 12
+
+
 def test_a_link_that_leads_nowhere_keeps_nobody_from_the_rest(pictures: Path, tmp_path: Path) -> None:
     some, labelled = tmp_path / "some", tmp_path / "labelled"
     some.mkdir()
@@ -323,6 +353,12 @@ def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
         ({"export": "csv"}, "--export needs --out"),
         ({"report": True, "salvage": True}, "give one of them"),
         ({"imports": (Path("nowhere.json"),)}, "nothing was imported"),
+        ({"joins": (Path("nowhere.sqlite"),)}, "nowhere.sqlite: no such annotation file"),
+        ({"joins": (Path("a.sqlite"),), "names": ("ben",)}, "--as ben: must be THERE=HERE"),
+        ({"joins": (Path("a.sqlite"),), "names": ("user=ben", "user=eva")}, "--as user=eva: must be THERE=HERE"),
+        ({"joins": (Path("a.sqlite"),), "study": StudyOptions(rater="ben")}, "--join takes all raters of a file"),
+        ({"joins": (Path("a.sqlite"),), "report": True}, "give one of them"),
+        ({"names": ("user=ben",)}, "give --join FILE, too"),
     ],
 )
 def test_wrong_calls_end_in_one_line(folder: Path, options: dict[str, object], message: str) -> None:
