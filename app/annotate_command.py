@@ -248,6 +248,7 @@ def _sureness(store: AnnotationStore, images: Sequence[FoundImage], order: Order
 
 
 def _report(store_path: Path, options: AnnotateOptions) -> int:
+    from app.annotate_evaluation import groups_of
     from core.study.annotation_report import agreement_report, choose_study, write_measures
 
     with AnnotationStore(store_path, read_only=True) as store:
@@ -256,7 +257,10 @@ def _report(store_path: Path, options: AnnotateOptions) -> int:
         names = {sha256: image.name for sha256, image in store.images().items()}
         tell_problems(store.problems)
     study = annotations[0].key.study
-    report = {"study": study} | agreement_report(annotations, names, options.study.seed or 0)
+    paths = {sha256: store_path.parent / name for sha256, name in names.items()}
+    places = groups_of(list(paths.values()))
+    groups = {sha256: places[path] for sha256, path in paths.items()}
+    report = {"study": study} | agreement_report(annotations, names, options.study.seed or 0, groups)
     if options.out is not None:
         try:
             options.out.mkdir(parents=True, exist_ok=True)

@@ -87,5 +87,7 @@ def raters_agreement(
     raters = {one.key.rater for one in done}
     if len(raters) < 2 and all(one.key.repeat == 1 for one in done):
         return None
-    report = agreement_report(done, {image.sha256: name_as_text(image.path.name) for image in images}, seed)
+    places = groups_of([image.path for image in images])
+    groups = {image.sha256: places[image.path] for image in images}
+    report = agreement_report(done, {image.sha256: name_as_text(image.path.name) for image in images}, seed, groups)
     return {"study": done[0].key.study} | report

@@ -13,15 +13,19 @@ _COLUMNS = 5
 """So many raters or pairs fit beside each other into eighty columns."""
 
 
-def print_agreement(report: Mapping[str, Any]) -> None:
-    """Tables on standard output: first against second measure, then rater against rater, then all together."""
+def print_agreement(report: Mapping[str, Any], *, within: bool = True) -> None:
+    """Tables on standard output: first against second measure, then rater against rater, then all together.
+
+    Without `within` the SD of one manual measure is left to another table.
+    """
     console = Console(markup=False, emoji=False)
     name = f"Study {report['study']}" if report["study"] else "Annotations outside studies"
     console.print(f"{name}: {report['annotations']} answers on {report['images']} images", "", sep="\n", highlight=False)
     for title, columns in agreement_tables(report).items():
         _print(console, title, columns)
-    if words := between_words(report):
-        console.print(words, highlight=False)
+    for words in (within_words(report) if within else "", between_words(report)):
+        if words:
+            console.print(words, highlight=False)
 
 
 def agreement_tables(report: Mapping[str, Any]) -> dict[str, dict[str, dict[str, str]]]:
@@ -31,12 +35,21 @@ def agreement_tables(report: Mapping[str, Any]) -> dict[str, dict[str, dict[str,
     return {"First against second": raters, "Rater against rater": pairs}
 
 
+def within_words(report: Mapping[str, Any]) -> str:
+    """What one measure is uncertain by, over all raters, in one line; empty where nobody measured an image twice."""
+    within = report["within"]
+    if not within["n"]:
+        return ""
+    span = f" (95 % interval {_number(within['ci95'][0], 2)} to {_number(within['ci95'][1], 2)}°)" if within["ci95"] else ""
+    return f"SD of one manual measure, over all repeats of {within['n']} images: {_degrees(within['sd_deg'])}{span}"
+
+
 def between_words(report: Mapping[str, Any]) -> str:
     """All raters together in one line; empty when there is only one."""
     both = report["between"]
     if not both["n"]:
         return ""
-    spread = f"SD of one measure {_number(both['sd_deg'], 2)}°, ICC(2,1) {_number(both['icc'], 3)}"
+    spread = f"SD about an image's mean {_degrees(both['sd_deg'])}, ICC(2,1) {_number(both['icc'], 3)}"
     return f"All {both['raters']} raters on {both['n']} images: {spread}"
 
 
@@ -58,7 +71,7 @@ def _of_rater(row: Mapping[str, Any]) -> dict[str, str]:
         "Answers": str(row["annotations"]),
         "of these can't tell": str(row["cannot_tell"]),
         "Median time an image": f"{_number(row['median_time_s'], 0)} s",
-        "SD of one measure": _degrees(row["sd_deg"]),
+        "SD within an image": _degrees(row["sd_deg"]),
     }
 
 
@@ -73,6 +86,8 @@ def _compared(row: Mapping[str, Any]) -> dict[str, str]:
         "Images with two states": str(state["n"]),
         "Equal states": _NONE if state["equal"] is None else f"{state['equal']:.0%}",
         "Cohen’s kappa": _number(state["kappa"], 3),
+        "Only one can’t tell": str(state["one_cannot_tell"]),
+        "Neither can tell": str(state["neither_can_tell"]),
     }
 
 

@@ -106,6 +106,7 @@ def run_evaluate(
     metrics["notes"] = study.notes + metrics["notes"]
     metrics["paper"] = PAPER
     if study.agreement is not None:
+        _take_within(metrics, study.agreement["within"])
         metrics["agreement"] = {key: value for key, value in study.agreement.items() if key != "measures"}
     if like_paper is not None:
         metrics["against_paper"] = against_paper(metrics)
@@ -122,10 +123,21 @@ def run_evaluate(
     else:
         print_tables(metrics)
         if study.agreement is not None:
-            print_agreement(study.agreement)
+            print_agreement(study.agreement, within=False)  # stands among the angles
         sys.stderr.write(f"report and figures are in {out}\n")
     if study.interrupted:
         raise KeyboardInterrupt
+
+
+def _take_within(metrics: dict[str, Any], within: dict[str, Any]) -> None:
+    """The SD of one manual measure is that of each rater's own repeats, where there are any: the columns are means over raters."""
+    manual = metrics["manual"]
+    if within["n"] > 1:
+        manual["repeatability_sd_deg"], manual["ci95"]["repeatability_sd_deg"] = within["sd_deg"], within["ci95"]
+    elif within["n"] == 0 and manual["repeatability_sd_deg"] is not None:
+        metrics["notes"].append(
+            "No rater measured an image twice: the SD of one manual measure is that of several, and holds their differences."
+        )
 
 
 def _make_folder(out: Path) -> None:

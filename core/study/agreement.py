@@ -7,7 +7,7 @@ None in the dictionaries that leave this module.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -103,15 +103,47 @@ def angle_statistics(manual_deg: Floats, algorithm_deg: Floats) -> dict[str, Flo
 
 
 def _repeat_statistics(first_deg: Floats, second_deg: Floats, spread: Floats) -> dict[str, Floats]:
-    """Of the two manual measures: ICC, and the standard deviation of one measure: that of the differences, each by its `spread`."""
+    """Of the two manual measures: ICC, and the within-subject standard deviation of one measure.
+
+    That is the root of the mean variance within an image: half the squared difference of two measures, or that over ``spread**2``
+    where they are means. A second measure that differs on the whole counts as spread, too: the mean difference tells it apart.
+    """
     difference = second_deg - first_deg
     mean = difference.mean(-1)
-    sd = (difference / spread).std(-1, ddof=1) if difference.shape[-1] > 1 else np.full(mean.shape, np.nan)
+    sd = np.sqrt(((difference / spread) ** 2).mean(-1)) if difference.shape[-1] > 1 else np.full(mean.shape, np.nan)
     return {
         "mean_difference_deg": mean,
         "repeatability_sd_deg": sd,
         "icc": icc_absolute(np.stack([first_deg, second_deg], -1)),
     }
+
+
+def within_subject(measures: Sequence[Sequence[Sequence[float]]], seed: int = 0, group: Group = None) -> dict[str, Any]:
+    """The within-subject standard deviation of one measure: the root of the mean variance of a rater's repeats of an image.
+
+    Parameters
+    ----------
+    measures : by image, by rater: his measures of it, in degrees. Who measured it once says nothing.
+    seed : of the bootstrap interval; whole images are drawn, or whole groups of them.
+    group : of each image, as in ``bootstrap_rows``.
+
+    Returns
+    -------
+    dict
+        ``n`` images with repeats, ``sd_deg`` (None where n is 0) and ``ci95``, its interval.
+    """
+    squares = np.array([sum(float(np.var(own)) * len(own) for own in image if len(own) > 1) for image in measures], np.float64)
+    freedom = np.array([sum(len(own) - 1 for own in image if len(own) > 1) for image in measures], np.float64)
+    repeated = freedom > 0
+    columns = squares[repeated], freedom[repeated]
+    if not repeated.any():
+        return {"n": 0, "sd_deg": None, "ci95": None}
+
+    def statistics(squares: Floats, freedom: Floats) -> dict[str, Floats]:
+        return {"sd_deg": np.sqrt(squares.sum(-1) / freedom.sum(-1))}
+
+    found = bootstrap_rows(statistics, columns, seed, group[repeated] if group is not None else None)
+    return {"n": int(repeated.sum()), "sd_deg": float(statistics(*columns)["sd_deg"]), "ci95": found["sd_deg"]}
 
 
 def angle_metrics(manual_deg: Floats, algorithm_deg: Floats, seed: int = 0, group: Group = None) -> dict[str, Any]:

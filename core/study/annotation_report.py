@@ -5,17 +5,19 @@ from __future__ import annotations
 import csv
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from core.study.agreement import LIMITS_SD, icc_absolute, repeat_metrics
+from core.study.agreement import LIMITS_SD, icc_absolute, repeat_metrics, within_subject
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotations import AnnotationError, Status, status_of
-from core.study.bootstrap import Floats
+from core.study.bootstrap import Floats, members
 from core.study.classification import kappa
 from core.study.evaluation import Measurement
 
@@ -37,7 +39,9 @@ def choose_study(annotations: Sequence[StoredAnnotation], study: str | None, whe
     return chosen
 
 
-def agreement_report(annotations: Iterable[StoredAnnotation], names: Mapping[str, str], seed: int = 0) -> dict[str, Any]:
+def agreement_report(
+    annotations: Iterable[StoredAnnotation], names: Mapping[str, str], seed: int = 0, groups: Mapping[str, str | None] | None = None
+) -> dict[str, Any]:
     """Agreement within and between raters.
 
     Parameters
@@ -45,27 +49,42 @@ def agreement_report(annotations: Iterable[StoredAnnotation], names: Mapping[str
     annotations : finished ones of one study.
     names : image names by SHA-256, for the list of measures.
     seed : of the bootstrap intervals.
+    groups : session or phantom of each image by SHA-256, None: not known; images of one are alike, and drawn together.
 
     Returns
     -------
     dict
-        ``raters``: each rater's first against his second measure (``angle`` with limits of agreement, ICC and SD of one measure;
-        ``state`` with kappa). ``pairs``: two raters' first measures of the same images, likewise. ``between``: over all raters that
-        measured the same images, SD of a rater's measure about the image's mean, and ICC(2,1). Undefined figures are None.
+        ``raters``: each rater's first against his second measure (``angle`` with limits of agreement and ICC, ``state`` with
+        kappa), and the SD of one measure of his, over all his repeats. ``within``: that SD over all raters. ``pairs``: two raters'
+        first measures of the same images, likewise. ``between``: over all raters that measured the same images, SD of a rater's
+        measure about the image's mean, and ICC(2,1). Undefined figures are None.
     """
+    draw = _Draw(seed, groups or {})
     table = {(one.key.rater, one.key.sha256, one.key.repeat): one for one in annotations}
     raters = sorted({rater for rater, _, _ in table})
     return {
         "images": len({image for _, image, _ in table}),
         "annotations": len(table),
-        "raters": {rater: _within(table, rater, seed) for rater in raters},
-        "pairs": [_pair(table, first, second, seed) for first, second in combinations(raters, 2)],
+        "raters": {rater: _within(table, rater, draw) for rater in raters},
+        "within": _all_within(table, draw),
+        "pairs": [_pair(table, first, second, draw) for first, second in combinations(raters, 2)],
         "between": _between(table, raters),
         "measures": [_measure_row(one, names) for one in table.values()],
     }
 
 
-def _within(table: _Table, rater: str, seed: int) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class _Draw:
+    """Of the bootstrap: its seed, and the group of each image by SHA-256."""
+
+    seed: int
+    groups: Mapping[str, str | None]
+
+    def members(self, images: Sequence[str]) -> NDArray[np.int64] | None:
+        return members([self.groups.get(image) for image in images])
+
+
+def _within(table: _Table, rater: str, draw: _Draw) -> dict[str, Any]:
     own = {(image, repeat): one for (who, image, repeat), one in table.items() if who == rater}
     both = [(one, own[image, 2]) for (image, repeat), one in own.items() if repeat == 1 and (image, 2) in own]
     times = [one.time_spent_s for one in own.values()]
@@ -74,7 +93,16 @@ def _within(table: _Table, rater: str, seed: int) -> dict[str, Any]:
         "cannot_tell": sum(one.content.cannot_tell for one in own.values()),
         "median_time_s": median(times) if times else None,
         "sd_deg": _pooled_sd(_grouped_by_image(own)),
-    } | _compare(both, seed)
+    } | _compare(both, draw)
+
+
+def _all_within(table: _Table, draw: _Draw) -> dict[str, Any]:
+    """Over all raters: what one measure of one of them is uncertain by."""
+    measures: dict[str, dict[str, list[float]]] = {}
+    for (who, image, _), one in table.items():
+        if one.theta_deg is not None and not one.content.cannot_tell:
+            measures.setdefault(image, {}).setdefault(who, []).append(one.theta_deg)
+    return within_subject([list(raters.values()) for raters in measures.values()], draw.seed, draw.members(list(measures)))
 
 
 def _grouped_by_image(own: Mapping[tuple[str, int], StoredAnnotation]) -> list[list[float]]:
@@ -92,20 +120,38 @@ def _pooled_sd(groups: Iterable[Sequence[float]]) -> float | None:
     return float(np.sqrt(sum(squares for squares, _ in spread) / freedom)) if freedom else None
 
 
-def _pair(table: _Table, first: str, second: str, seed: int) -> dict[str, Any]:
+def _pair(table: _Table, first: str, second: str, draw: _Draw) -> dict[str, Any]:
     both = [(one, table[second, i, 1]) for (who, i, k), one in table.items() if who == first and k == 1 and (second, i, 1) in table]
-    return {"first": first, "second": second} | _compare(both, seed)
+    return {"first": first, "second": second} | _compare(both, draw)
 
 
-def _compare(both: Sequence[tuple[StoredAnnotation, StoredAnnotation]], seed: int) -> dict[str, Any]:
-    """Two measures of the same images: angles where both have one, states and "can't tell" where both answered."""
-    angles = [(a.theta_deg, b.theta_deg) for a, b in both if not a.content.cannot_tell and not b.content.cannot_tell]
-    known = np.array([pair for pair in angles if None not in pair], np.float64).reshape(-1, 2)
-    angle = repeat_metrics(known[:, 0], known[:, 1], seed) | _limits(known)
-    labels = [(_label(a), _label(b)) for a, b in both]
-    first, second = [a for a, _ in labels], [b for _, b in labels]
-    equal = sum(a == b for a, b in labels) / len(labels) if labels else None
-    return {"angle": angle, "state": {"n": len(labels), "equal": equal, "kappa": kappa(first, second) if labels else None}}
+def _compare(both: Sequence[tuple[StoredAnnotation, StoredAnnotation]], draw: _Draw) -> dict[str, Any]:
+    """Two answers about the same images: angles and states where both have one, and how often one or both could not tell."""
+    telling = [(a, b) for a, b in both if not a.content.cannot_tell and not b.content.cannot_tell]
+    measured = [(a, b) for a, b in telling if a.theta_deg is not None and b.theta_deg is not None]
+    known = np.array([(a.theta_deg, b.theta_deg) for a, b in measured], np.float64).reshape(-1, 2)
+    angle = repeat_metrics(known[:, 0], known[:, 1], draw.seed, draw.members([a.key.sha256 for a, _ in measured]))
+    # The SD of one measure is a rater's own, over all his repeats, and stands in one place: of two raters it would be none.
+    del angle["repeatability_sd_deg"], angle["ci95"]["repeatability_sd_deg"]
+    angle |= _limits(known)
+    return {"angle": angle, "state": _states(both, telling)}
+
+
+_Pairs = Sequence[tuple[StoredAnnotation, StoredAnnotation]]
+
+
+def _states(both: _Pairs, telling: _Pairs) -> dict[str, Any]:
+    """States where both gave one. "Can't tell" is none: to say it of the same images is no agreement about a state."""
+    given = [(str(a.content.state), str(b.content.state)) for a, b in telling if a.content.state and b.content.state]
+    first, second = [a for a, _ in given], [b for _, b in given]
+    neither = sum(a.content.cannot_tell and b.content.cannot_tell for a, b in both)
+    return {
+        "n": len(given),
+        "equal": sum(a == b for a, b in given) / len(given) if given else None,
+        "kappa": kappa(first, second) if given else None,
+        "one_cannot_tell": len(both) - len(telling) - neither,
+        "neither_can_tell": neither,
+    }
 
 
 def _limits(known: Floats) -> dict[str, float | None]:
@@ -176,10 +222,6 @@ def _common(name: str, group: Sequence[StoredAnnotation]) -> Measurement:
     state = Counter(states).most_common(1)[0][0] if states else None
     counts = max(len(first), 1), max(len(later), 1)
     return Measurement(name, fmean(first) if first else None, fmean(later) if later else None, state, None, None, counts=counts)
-
-
-def _label(one: StoredAnnotation) -> str:
-    return Status.CANNOT_TELL.value if one.content.cannot_tell else str(one.content.state)
 
 
 def _status(one: StoredAnnotation) -> Status:

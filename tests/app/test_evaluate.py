@@ -389,7 +389,10 @@ def test_a_study_is_evaluated_with_its_raters_and_repeats(tmp_path: Path, capsys
     out = tmp_path / "out"
     with pytest.raises(UserError, match=r"holds several studies.*choose one with --study NAME"):
         evaluate(tmp_path, out=out)
-    agreement = evaluate(tmp_path, out=out, study_name="main")["agreement"]
+    metrics = evaluate(tmp_path, out=out, study_name="main")
+    agreement = metrics["agreement"]
+    assert agreement["within"]["n"] == 2
+    assert metrics["manual"]["repeatability_sd_deg"] == agreement["within"]["sd_deg"] == pytest.approx(0.0, abs=1e-6)
     assert agreement["annotations"] == 8
     assert sorted(agreement["raters"]) == ["al", "bo"]
     assert agreement["raters"]["al"]["sd_deg"] == pytest.approx(0.0, abs=1e-6)
@@ -398,7 +401,9 @@ def test_a_study_is_evaluated_with_its_raters_and_repeats(tmp_path: Path, capsys
     report = (out / "report.html").read_text()
     for part in ("<h2>Raters</h2>", "First against second", "al, bo", "ICC(2,1)"):
         assert part in report
-    assert "Rater against rater" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "Rater against rater" in printed
+    assert printed.count("SD of one") == report.count("<td>SD of one") == 1, "one figure, in one place"
     assert len((out / "raters.csv").read_text().splitlines()) == 9
 
 

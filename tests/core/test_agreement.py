@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from core.study.agreement import angle_metrics, correlation, icc_absolute, repeat_metrics, shares
+from core.study.agreement import angle_metrics, correlation, icc_absolute, repeat_metrics, shares, within_subject
 from core.study.bootstrap import are_too_few, bootstrap_rows, interval_95, members
 
 MANUAL = np.array([10.0, 20.0, 30.0, 40.0])
@@ -60,9 +60,31 @@ def test_icc_counts_a_bias_that_correlation_does_not_see() -> None:
 
 
 def test_two_manual_measures() -> None:
+    """Variances within the images: half the squared differences, 1/2, 1/2 and 8; their mean is 3."""
     found = repeat_metrics(np.array([10.0, 20.0, 30.0]), np.array([11.0, 21.0, 34.0]))
     assert found["mean_difference_deg"] == pytest.approx(2.0)
-    assert found["repeatability_sd_deg"] == pytest.approx(np.sqrt(3.0) / np.sqrt(2.0))  # differences 1, 1, 4
+    assert found["repeatability_sd_deg"] == pytest.approx(np.sqrt(3.0))
+
+
+def test_a_second_measure_that_is_always_larger_is_no_perfect_repeat() -> None:
+    found = repeat_metrics(MANUAL, MANUAL + 4.0)
+    assert found["repeatability_sd_deg"] == pytest.approx(4.0 / np.sqrt(2.0))
+
+
+def test_the_spread_of_one_measure_over_raters_and_repeats_by_hand() -> None:
+    """First image: ann 1 2 3 (squares 2, two degrees of freedom), bob 5 7 (2, one); second: ann 4 4 (0, one); third: nobody."""
+    found = within_subject([[[1.0, 2.0, 3.0], [5.0, 7.0]], [[4.0, 4.0], [9.0]], [[1.0], [50.0]]])
+    assert (found["n"], found["sd_deg"]) == (2, pytest.approx(np.sqrt((2 + 2 + 0) / (2 + 1 + 1))))
+    assert within_subject([[[1.0], [2.0]]]) == within_subject([]) == {"n": 0, "sd_deg": None, "ci95": None}
+
+
+def test_of_one_rater_with_two_repeats_both_ways_give_one_figure() -> None:
+    rng = np.random.default_rng(2)
+    first = rng.uniform(0.0, 60.0, 48)
+    second = first + rng.normal(0.5, 2.0, 48)
+    pairs, all_repeats = repeat_metrics(first, second), within_subject([[[a, b]] for a, b in zip(first, second, strict=True)])
+    assert all_repeats["sd_deg"] == pytest.approx(pairs["repeatability_sd_deg"])
+    assert all_repeats["ci95"] == pytest.approx(pairs["ci95"]["repeatability_sd_deg"])
 
 
 @pytest.mark.parametrize(("first", "later"), [(1, 1), (3, 1), (3, 3), (4, 8)])

@@ -42,7 +42,8 @@ def test_known_errors_come_out() -> None:
     ann, bob = report["raters"]["ann"], report["raters"]["bob"]
     assert ann["sd_deg"] == pytest.approx(1.0, rel=0.15)
     assert bob["sd_deg"] == pytest.approx(2.0, rel=0.15)
-    assert bob["angle"]["repeatability_sd_deg"] == pytest.approx(bob["sd_deg"], rel=0.05)
+    assert report["within"]["sd_deg"] == pytest.approx(math.sqrt((ann["sd_deg"] ** 2 + bob["sd_deg"] ** 2) / 2))
+    assert "repeatability_sd_deg" not in bob["angle"], "said once"
     assert ann["angle"]["icc"] > 0.99
     (pair,) = report["pairs"]
     assert pair["angle"]["mean_difference_deg"] == pytest.approx(3.0, abs=0.5)
@@ -64,10 +65,23 @@ def test_kappa_by_hand() -> None:
     assert (pair["state"]["n"], pair["state"]["equal"], pair["state"]["kappa"]) == (4, 0.75, pytest.approx(0.5))
 
 
+def test_kappa_is_of_states_and_who_cannot_tell_gives_none() -> None:
+    """As above, with five images that nobody and two that only Bob could tell: they change no agreement of states."""
+    ann = [answer(str(k), "ann", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 3 + [PoseState.C])]
+    bob = [answer(str(k), "bob", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 2 + [PoseState.C] * 2)]
+    dark = [answer(f"dark {k}", who, 1, None, None) for k in range(5) for who in ("ann", "bob")]
+    half = [answer(f"dim {k}", "ann", 1, None, None) for k in (1, 2)]
+    half += [answer(f"dim {k}", "bob", 1, 5.0, PoseState.B) for k in (1, 2)]
+    (pair,) = agreement_report(ann + bob + dark + half, {})["pairs"]
+    assert pair["state"] == {"n": 4, "equal": 0.75, "kappa": pytest.approx(0.5), "one_cannot_tell": 2, "neither_can_tell": 5}
+    (pair,) = agreement_report(dark, {})["pairs"]
+    assert pair["state"] == {"n": 0, "equal": None, "kappa": None, "one_cannot_tell": 0, "neither_can_tell": 5}
+
+
 def test_cant_tell_is_an_answer_without_an_angle() -> None:
     both = [answer("1", "ann", 1, None, None), answer("1", "ann", 2, 4.0, PoseState.B), answer("2", "ann", 1, 3.0, PoseState.B)]
     ann = agreement_report(both, {})["raters"]["ann"]
-    assert (ann["cannot_tell"], ann["angle"]["n"], ann["state"]["n"], ann["state"]["equal"]) == (1, 0, 1, 0.0)
+    assert (ann["cannot_tell"], ann["angle"]["n"], ann["state"]["n"], ann["state"]["one_cannot_tell"]) == (1, 0, 0, 1)
     assert ann["sd_deg"] is None
 
 
