@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ConstantInputWarning, NearConstantInputWarning, pearsonr, rankdata
 
-from core.study.bootstrap import Floats, bootstrap_rows
+from core.study.bootstrap import Floats, bootstrap_rows, share_interval
 
 Group = NDArray[np.int64] | None
 
@@ -147,11 +147,15 @@ def within_subject(measures: Sequence[Sequence[Sequence[float]]], seed: int = 0,
 
 
 def angle_metrics(manual_deg: Floats, algorithm_deg: Floats, seed: int = 0, group: Group = None) -> dict[str, Any]:
-    """Statistics of algorithm against manual angles, both of shape (n,), with 95 % bootstrap intervals under ``ci95``.
+    """Statistics of algorithm against manual angles, both of shape (n,), with 95 % intervals under ``ci95``.
 
-    `group` as in ``bootstrap_rows``.
+    They are of the bootstrap, those of shares as ``share_interval`` says. `group` as in ``bootstrap_rows``.
     """
-    return _with_intervals(angle_statistics, (manual_deg, algorithm_deg), seed, group)
+    found = _with_intervals(angle_statistics, (manual_deg, algorithm_deg), seed, group)
+    for name, drawn in found["ci95"].items():
+        if name.startswith("share_") and found["n"]:
+            found["ci95"][name] = share_interval(found[name], found["n"], group, drawn)
+    return found
 
 
 def repeat_metrics(

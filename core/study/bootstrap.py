@@ -31,6 +31,31 @@ def interval_95(values: Floats) -> list[float] | None:
     return [float(low), float(high)]
 
 
+def wilson_95(share: float, n: int) -> list[float]:
+    """Wilson's 95 % score interval of a share of n independent ones, n >= 1: wide for few, and for none or all of them, too.
+
+    References
+    ----------
+    Wilson, "Probable inference, the law of succession, and statistical inference", J. Am. Stat. Assoc. 22 (1927).
+    """
+    z = 1.959963984540054
+    middle, reach = share + z**2 / (2 * n), z * float(np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2)))
+    low, high = ((middle + side * reach) / (1 + z**2 / n) for side in (-1, 1))
+    return [max(0.0, low) if share > 0 else 0.0, min(1.0, high) if share < 1 else 1.0]
+
+
+def share_interval(share: float, n: int, group: NDArray[np.int64] | None, drawn: list[float] | None) -> list[float] | None:
+    """The interval of a share of n rows: Wilson's where they are independent, else the one that was `drawn` from whole groups.
+
+    Of none or all of the rows every draw gives the same, as if nothing were uncertain: then Wilson's, of the number of groups.
+    """
+    if n < 2 or are_too_few(group):
+        return None
+    if group is None:
+        return wilson_95(share, n)
+    return drawn if 0.0 < share < 1.0 else wilson_95(share, len(np.unique(group)))
+
+
 def members(groups: Sequence[Hashable | None]) -> NDArray[np.int64] | None:
     """The number of each row's group, shape (n,); None when the rows are to be drawn one by one, since no group is known,
     or each of many rows is of another one.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.metrics import cohen_kappa_score, fowlkes_mallows_score, precision_recall_fscore_support
 
-from core.study.bootstrap import RESAMPLES, Floats, are_too_few, interval_95
+from core.study.bootstrap import RESAMPLES, Floats, are_too_few, interval_95, share_interval
 
 _AVERAGED = ("precision", "recall", "f1")
 
@@ -72,7 +72,9 @@ def _mean_of_defined(values: Floats) -> Floats:
 def state_metrics(
     manual: Sequence[str], algorithm: Sequence[str], seed: int = 0, group: NDArray[np.int64] | None = None
 ) -> dict[str, Any]:
-    """Statistics of the algorithm's states against the manual ones, with 95 % bootstrap intervals under ``ci95``.
+    """Statistics of the algorithm's states against the manual ones, with 95 % intervals under ``ci95``.
+
+    They are of the bootstrap, that of the accuracy as ``share_interval`` says.
 
     Parameters
     ----------
@@ -99,7 +101,7 @@ def state_metrics(
     classes = np.array(_scores(manual, algorithm, labels))
     rows = [{name: _defined(value) for name, value in zip(_AVERAGED, column, strict=True)} for column in classes.T]
     per_class_fm = np.sqrt(classes[0] * classes[1])
-    point = {
+    point: dict[str, Any] = {
         "accuracy": float(np.trace(confusion) / n),
         "kappa": kappa(manual, algorithm),
         "fowlkes_mallows_pairs": fowlkes_mallows_pairs(manual, algorithm),
@@ -115,6 +117,7 @@ def state_metrics(
         label: row | {"fowlkes_mallows": _defined(index), "n": int(count)}
         for label, row, index, count in zip(labels, rows, per_class_fm, confusion.sum(1), strict=True)
     }
+    intervals["accuracy"] = share_interval(point["accuracy"], n, group, intervals.get("accuracy"))
     ci95 = {name: intervals.get(name) if known[name] is not None else None for name in known}
     counts = {"n": n, "labels": labels, "confusion": confusion.tolist()}
     return counts | point | {"per_class": per_class} | averages | {"ci95": ci95}

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import spearmanr
 
 from core.study.agreement import angle_metrics, correlation, icc_absolute, repeat_metrics, shares, within_subject
-from core.study.bootstrap import are_too_few, bootstrap_rows, interval_95, members
+from core.study.bootstrap import are_too_few, bootstrap_rows, interval_95, members, wilson_95
 
 MANUAL = np.array([10.0, 20.0, 30.0, 40.0])
 ALGORITHM = np.array([11.0, 19.0, 33.0, 41.0])  # errors 1, -1, 3, 1
@@ -161,6 +161,28 @@ def test_copies_of_an_image_make_no_interval_narrower() -> None:
     assert width(alone) == pytest.approx(width(once) / 4, rel=0.2)
     assert width(whole) == pytest.approx(width(once), rel=0.1)
     assert whole["mean_error_deg"] == pytest.approx(once["mean_error_deg"])
+
+
+@pytest.mark.parametrize(
+    ("share", "n", "low", "high"),
+    # 10 of 10: 1 / (1 + z²/10); none of 10 the other way round; 1 of 29 and 81 of 263 as Newcombe prints them (1998, table I)
+    [(1.0, 10, 0.7225, 1.0), (0.0, 10, 0.0, 0.2775), (1 / 29, 29, 0.0061, 0.1718), (81 / 263, 263, 0.2553, 0.3662)],
+)
+def test_wilsons_interval(share: float, n: int, low: float, high: float) -> None:
+    assert wilson_95(share, n) == pytest.approx([low, high], abs=5e-5)
+
+
+def test_ten_of_ten_are_not_certain() -> None:
+    """The bootstrap draws nothing but hits then, and its interval would be from all to all."""
+    manual = np.linspace(10.0, 100.0, 20)
+    alone = angle_metrics(manual, manual + 1.0)
+    assert (alone["share_0_4"], alone["ci95"]["share_0_4"]) == (1.0, pytest.approx([0.8389, 1.0], abs=5e-5))
+    assert alone["ci95"]["share_over_16"] == pytest.approx([0.0, 0.1611], abs=5e-5)
+    grouped = angle_metrics(manual, manual + 1.0, group=members([k // 2 for k in range(20)]))
+    assert grouped["ci95"]["share_0_4"] == pytest.approx([0.7225, 1.0], abs=5e-5), "of ten groups, not of twenty images"
+    mixed = angle_metrics(manual, manual + np.where(np.arange(20) < 6, 10.0, 1.0), group=members([k // 2 for k in range(20)]))
+    assert mixed["ci95"]["share_0_4"] == pytest.approx([0.4, 1.0], abs=0.1), "whole groups were drawn"
+    assert angle_metrics(manual, manual + 1.0, group=members([k // 4 for k in range(20)]))["ci95"]["share_0_4"] is None
 
 
 def test_intervals_are_seeded_and_hold_the_value() -> None:
