@@ -14,7 +14,8 @@ from core.errors import UserError
 def run_average(models: Sequence[str], out: Path) -> None:
     """Write the mean of the models named to the folder `out`, and say what it lacks; raises UserError."""
     from core.learning.averaging import average_models
-    from core.learning.model_file import INFO, check_can_write, check_outside, model_folder
+    from core.learning.model_file import INFO, model_folder
+    from core.learning.model_writing import check_can_write, check_outside
 
     if len(models) < 2:
         raise UserError("name two models at least: main.py average MODEL MODEL --out DIR")

@@ -190,7 +190,8 @@ def run_accuracy(
     An interruption (Ctrl-C) tells the figures of the frames until then, and stores nothing.
     """
     from core.learning.dataset import POSE_KEYS, find_labelled
-    from core.learning.model_file import model_folder, sha256_of, trained_without, write_figures
+    from core.learning.model_file import model_folder, sha256_of, trained_without
+    from core.learning.model_writing import write_figures
     from core.perception.pipeline import Pipeline, open_pipeline
     from core.study.accuracy import TrueMasks, score_set, summarise, summarise_looks
     from core.study.calibration import describe_confidence

@@ -38,7 +38,8 @@ def run_calibrate(
     """
     from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.eight_bit import renew_eight_bit
-    from core.learning.model_file import changed, model_folder
+    from core.learning.model_file import model_folder
+    from core.learning.model_writing import changed
     from core.study.known_pictures import find_known
 
     samples, truth = find_labelled(folder, POSE_KEYS)
@@ -71,7 +72,8 @@ def _calibrated(
     model: Path, shown: _Shown, config_path: Path | None, bar: Progress
 ) -> list[tuple[str, tuple[Calibration, int, float]]]:
     """Calibrate the model in this folder; returns of each way of looking a title, and what ``_table`` tells of it."""
-    from core.learning.model_file import sha256_of, write_calibration
+    from core.learning.model_file import sha256_of
+    from core.learning.model_writing import write_calibration
     from core.perception.pipeline import open_pipeline, open_sights
     from core.perception.second_look import SecondLook
     from core.perception.segmentation import open_segmenter

@@ -138,7 +138,8 @@ def run_train(
     from app.lessons import FrameLesson, Lesson, SecondLookLesson
     from app.teaching import Classroom, second_plan, teach_second_look
     from core.learning.dataset import DatasetError, find_samples
-    from core.learning.model_file import INFO, check_can_write, check_outside, model_folder
+    from core.learning.model_file import INFO, model_folder
+    from core.learning.model_writing import check_can_write, check_outside
     from core.learning.training import LoaderLost
     from hardware.twin.synth import SynthFolderError
 

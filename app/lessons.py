@@ -17,7 +17,8 @@ from core.errors import UserError
 from core.learning.crops import FrameCrops, Looks, NearCrops
 from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample
 from core.learning.growing import deepened, widened, with_first_look
-from core.learning.model_file import SECOND_LOOK, load_network, model_folder, save_model, save_with_second_look, second_look_of
+from core.learning.model_file import SECOND_LOOK, load_network, model_folder, second_look_of
+from core.learning.model_writing import save_model, save_with_second_look
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX, Planes
 from core.perception.segmentation import Turned, open_second_look, open_segmenter

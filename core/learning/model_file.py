@@ -8,11 +8,7 @@ Nothing is loaded before its hash agrees, and nothing is ever unpickled: a cut, 
 from __future__ import annotations
 
 import hashlib
-import os
-import shutil
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -21,10 +17,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from core.config import RESOURCES
 from core.errors import UserError
-from core.learning.onnx_export import export_eight_bit, export_onnx, whole_strides
 from core.perception.evidence import Calibration
 from core.perception.familiarity import Familiarity
-from core.types import Image
 
 if TYPE_CHECKING:
     from core.perception.unet import DualUNet
@@ -32,11 +26,7 @@ if TYPE_CHECKING:
 WEIGHTS, ONNX, ONNX_INT8, INFO = "weights.safetensors", "network.onnx", "network_int8.onnx", "model.json"
 SECOND_LOOK = "second_look"
 """The folder within a model that holds the network of its second look, where it has one."""
-_INFO_SCRATCH = f".{INFO}.new"
 MODELS = RESOURCES / "models"
-
-
-_PLANES = {"image": "RGB and the first look's vessel and robot, uint8 (1, H, W, 5), working pixels, values 0..255"}
 
 
 class ModelError(UserError):
@@ -200,224 +190,3 @@ def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
         reason = str(error).splitlines()[0]
         raise ModelError(f"{folder / WEIGHTS}: does not fit the shape in {INFO} ({reason}); restore the model folder") from None
     return network.eval(), info
-
-
-def save_model(
-    network: DualUNet,
-    folder: Path,
-    *,
-    training: dict[str, Any],
-    figures: dict[str, Any],
-    examples: Sequence[Image] = (),
-    second_look: Path | None = None,
-) -> ModelInfo:
-    """Write weights, ONNX and manifest. The folder appears whole or not at all; an older model of that name is replaced last.
-
-    From `examples`, typical RGB images at working size, an eight-bit copy learns ranges and rounding; without them there is none.
-    `second_look` is the folder of a second look's network that comes along as it is.
-
-    Raises
-    ------
-    ModelError
-        The folder is something else than a model, or cannot be written.
-    """
-    from safetensors.torch import save
-
-    with _put_in_place(folder) as scratch:
-        state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
-        (scratch / WEIGHTS).write_bytes(save(state))
-        export_onnx(network, network.shape.stride, scratch / ONNX)
-        cuts = whole_strides(examples, network.shape.stride)
-        if cuts:
-            export_eight_bit(network, cuts, scratch / ONNX_INT8)
-        info = ModelInfo(
-            format=1,
-            name=folder.resolve().name,
-            shape=network.shape.to_json(),
-            stride=network.shape.stride,
-            weights_sha256=sha256_of(scratch / WEIGHTS),
-            onnx_sha256=sha256_of(scratch / ONNX),
-            onnx_int8_sha256=sha256_of(scratch / ONNX_INT8) if cuts else None,
-            second_look_sha256=read_model_info(second_look, verify=()).weights_sha256 if second_look is not None else None,
-            training=training,
-            figures=figures,
-            **_PLANES if network.shape.inputs == 5 else {},
-        )
-        (scratch / INFO).write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
-        if second_look is not None:
-            (scratch / SECOND_LOOK).mkdir()
-            _copy(second_look, scratch / SECOND_LOOK)
-    return info
-
-
-@contextmanager
-def _put_in_place(folder: Path) -> Iterator[Path]:
-    """An empty folder that takes the model's place in the end; whatever goes wrong leaves that as it was. Raises ModelError."""
-    check_can_write(folder)
-    folder = folder.resolve()
-    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
-        yield scratch
-        scratch.chmod(0o755)
-        _put(scratch, folder)
-    except OSError as error:
-        places = [Path(os.fsdecode(name)) for name in (error.filename, error.filename2) if name is not None]
-        if places and not any(place in (scratch, folder) or scratch in place.parents for place in places):
-            raise  # a file that is read is at fault
-        reason = error.strerror or str(error)
-        raise ModelError(f"{folder}: cannot be written ({reason}); make room, or choose another folder") from None
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
-
-
-def _put(scratch: Path, folder: Path) -> None:
-    """Move a whole model to its place; where that fails, the one that was there before is there again.
-
-    What else lay in the old one's folder, somebody's notes or frames, lies in the new one's then.
-    """
-    aside = scratch.with_name(scratch.name + ".old")
-    # Aside first, deleted last: whenever this is interrupted, one of the two is whole.
-    if folder.exists():
-        os.replace(folder, aside)
-    try:
-        os.replace(scratch, folder)
-    except BaseException:
-        if aside.exists():
-            os.replace(aside, folder)
-        raise
-    if aside.exists():
-        _carry_over(aside, folder)
-        shutil.rmtree(aside, ignore_errors=True)
-
-
-def _carry_over(old: Path, new: Path) -> None:
-    """Move what is not the model's own to its new folder; what cannot be moved stays where it is, and is told."""
-    own = {WEIGHTS, ONNX, ONNX_INT8, INFO, _INFO_SCRATCH}
-    try:
-        for entry in list(old.iterdir()):
-            if entry.name == SECOND_LOOK and entry.is_dir() and not entry.is_symlink():
-                _carry_over(entry, new / SECOND_LOOK)
-            elif entry.name not in own:
-                new.mkdir(exist_ok=True)
-                os.replace(entry, new / entry.name)
-    except OSError as error:
-        raise ModelError(f"{old}: holds what lay in the older model's folder and cannot be moved ({error.strerror})") from None
-
-
-def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs: Any) -> None:
-    """Write `folder`: the model in `base` with `network` for its second look. The rest of the arguments are ``save_model``'s.
-
-    What was measured of `base`, figures and calibrations, is not true of the new model and left out; but Dice on held-out frames
-    and the kinds of pictures that it knows are its network's alone, and stay.
-    """
-    with _put_in_place(folder) as scratch:
-        _copy(base, scratch)
-        save_model(network, scratch / SECOND_LOOK, **kwargs)
-        figures = read_model_info(scratch, verify=()).figures
-        held_out = figures if figures.get("held_out") else {}
-        near_sha256 = sha256_of(scratch / SECOND_LOOK / WEIGHTS)
-        changes: dict[str, Any] = {"calibration": None, "calibration_mirrored": None, "figures": held_out}
-        _update(scratch, {"name": folder.resolve().name, "second_look_sha256": near_sha256} | changes)
-
-
-@contextmanager
-def changed(folder: Path) -> Iterator[Path]:
-    """A copy of a model to work on, which takes its place in the end; whatever goes wrong leaves the model as it was.
-
-    Raises
-    ------
-    ModelError
-        The model is damaged, or cannot be written.
-    """
-    read_model_info(folder)
-    if (near := second_look_of(folder)) is not None:
-        read_model_info(near)
-    with _put_in_place(folder) as scratch:
-        _copy(folder, scratch)
-        if near is not None:
-            (scratch / SECOND_LOOK).mkdir()
-            _copy(near, scratch / SECOND_LOOK)
-        yield scratch
-
-
-def _copy(folder: Path, to: Path) -> None:
-    """A model's own files, but not their modes: a model that is read only may be worked on elsewhere."""
-    for name in (WEIGHTS, ONNX, ONNX_INT8, INFO):
-        if (folder / name).is_file():
-            shutil.copyfile(folder / name, to / name)
-
-
-def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
-    """Make the eight-bit copy of a model's network anew from `examples`, as ``save_model`` does; its figures are no longer true.
-
-    Raises
-    ------
-    ModelError
-        The model is damaged, or there is no picture of the network's stride or more among the examples.
-    """
-    network = load_network(folder)[0]
-    cuts = whole_strides(examples, network.shape.stride)
-    if not cuts:
-        raise ModelError("nothing to make an eight-bit copy from; give pictures that can be read and show a robot")
-    export_eight_bit(network, cuts, folder / ONNX_INT8)
-    _update(folder, {"onnx_int8_sha256": sha256_of(folder / ONNX_INT8), "figures": {}})
-
-
-def check_can_write(folder: Path) -> None:
-    """Raise ModelError when `folder` is anything but a model, an empty folder, or not there: nothing else is ever replaced."""
-    try:
-        folder = Path(os.path.realpath(folder))  # Path.resolve raises something else on links in a loop
-        if folder.is_symlink():
-            raise ModelError(f"{folder}: is a link that leads nowhere but to itself; choose another folder")
-        if folder.exists() and not (folder / INFO).is_file() and (not folder.is_dir() or any(folder.iterdir())):
-            raise ModelError(f"{folder}: exists and is not a model; choose another folder")
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        if not os.access(folder.parent, os.W_OK):
-            raise ModelError(f"{folder.parent}: cannot be written; choose another folder")
-    except OSError as error:
-        raise ModelError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
-
-
-def check_outside(out: Path, models: Sequence[Path]) -> None:
-    """Raise ModelError when `out` lies within one of these models: what is read there would be changed, or go with it one day."""
-    place = Path(os.path.realpath(out))
-    if any(Path(os.path.realpath(folder)) in place.parents for folder in models):
-        raise ModelError(f"{place}: lies within a model that is read for it; choose another --out")
-
-
-def write_figures(folder: Path, figures: dict[str, Any]) -> None:
-    """Store measured figures in the manifest of a model, atomically."""
-    _update(folder, {"figures": figures})
-
-
-def write_calibration(
-    folder: Path,
-    calibration: Calibration,
-    mirrored: Calibration | None = None,
-    *,
-    second_looks: int = 1,
-    familiarity: Familiarity | None = None,
-) -> None:
-    """Store how evidence becomes confidence in the manifest of a model, atomically. Figures measured before are no longer true.
-
-    `mirrored` is for masks averaged over all orientations of a picture, looked at closely `second_looks` times; None: the same.
-    `familiarity` is what kind of pictures the model knows; None: nobody has looked.
-    """
-    changes: dict[str, Any] = {
-        "calibration": calibration,
-        "calibration_mirrored": mirrored,
-        "mirrored_second_looks": second_looks,
-        "familiarity": familiarity,
-        "figures": {},
-    }
-    _update(folder, changes)
-
-
-def _update(folder: Path, changes: dict[str, Any]) -> None:
-    info = read_model_info(folder).model_copy(update=changes)
-    scratch = folder / _INFO_SCRATCH
-    try:
-        scratch.write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
-        os.replace(scratch, folder / INFO)
-    except OSError as error:
-        raise ModelError(f"{folder / INFO}: cannot be written ({error.strerror}); copy the model to a folder of your own") from None

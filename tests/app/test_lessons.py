@@ -9,7 +9,8 @@ import torch
 
 from app.lessons import SecondLookLesson
 from core.errors import UserError
-from core.learning.model_file import load_network, save_model, save_with_second_look
+from core.learning.model_file import load_network
+from core.learning.model_writing import save_model, save_with_second_look
 from core.perception.unet import DualUNet, UNetShape
 
 SMALL = UNetShape((4, 4, 8, 8, 200), (4, 4, 4, 80), 1, 2)

@@ -44,7 +44,7 @@ def no_models_stay() -> Iterator[None]:
 @pytest.fixture
 def small_model(tmp_path: Path) -> str:
     """A network that is trained in a moment."""
-    from core.learning.model_file import save_model
+    from core.learning.model_writing import save_model
     from core.perception.unet import DualUNet, UNetShape
 
     folder = tmp_path / "small"

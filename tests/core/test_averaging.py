@@ -19,12 +19,11 @@ from core.learning.model_file import (
     ModelError,
     load_network,
     read_model_info,
-    save_model,
-    save_with_second_look,
     second_look_of,
     sha256_of,
     trained_without,
 )
+from core.learning.model_writing import save_model, save_with_second_look
 from core.perception.segmentation import TorchSegmenter, open_second_look, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 

@@ -8,7 +8,8 @@ import pytest
 from pydantic import ValidationError
 
 from core.config import PerceptionConfig
-from core.learning.model_file import ModelError, read_model_info, save_model, write_calibration
+from core.learning.model_file import ModelError, read_model_info
+from core.learning.model_writing import save_model, write_calibration
 from core.perception.evidence import Calibration, Evidence, collect
 from core.perception.unet import DualUNet, UNetShape
 from core.perception.vectors import fit_robot_vector

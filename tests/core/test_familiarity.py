@@ -14,15 +14,8 @@ from core.config import PerceptionConfig, TwinConfig
 from core.errors import UserError
 from core.learning.dataset import DatasetError, write_png
 from core.learning.growing import with_first_look
-from core.learning.model_file import (
-    INFO,
-    MODELS,
-    ModelError,
-    read_model_info,
-    save_model,
-    save_with_second_look,
-    write_calibration,
-)
+from core.learning.model_file import INFO, MODELS, ModelError, read_model_info
+from core.learning.model_writing import save_model, save_with_second_look, write_calibration
 from core.perception.evidence import Calibration, Evidence
 from core.perception.familiarity import Familiarity, signature_of
 from core.perception.pipeline import Pipeline, Sight, open_pipeline, open_sights

@@ -20,18 +20,15 @@ from core.learning.model_file import (
     SECOND_LOOK,
     WEIGHTS,
     ModelError,
-    changed,
     check_files,
     check_model,
     load_network,
     model_folder,
     models_in,
     read_model_info,
-    save_model,
-    save_with_second_look,
     sha256_of,
-    write_figures,
 )
+from core.learning.model_writing import changed, save_model, save_with_second_look, write_figures
 from core.perception.segmentation import OpenVinoSegmenter, TorchSegmenter, open_segmenter, to_working
 from core.perception.unet import DualUNet, UNetShape
 

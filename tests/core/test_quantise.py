@@ -10,7 +10,8 @@ import pytest
 import torch
 
 from core.config import SegmentationConfig
-from core.learning.model_file import ONNX_INT8, ModelError, changed, read_model_info, save_model, write_eight_bit
+from core.learning.model_file import ONNX_INT8, ModelError, read_model_info
+from core.learning.model_writing import changed, save_model, write_eight_bit
 from core.learning.quantise import EightBitUNet, _Conv, _Moments, _rounded
 from core.perception.segmentation import OpenVinoSegmenter, open_segmenter
 from core.perception.unet import DualUNet, UNetShape

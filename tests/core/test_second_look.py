@@ -16,7 +16,8 @@ from core.config import SegmentationConfig
 from core.learning.crops import Looks, NearCrops
 from core.learning.dataset import Sample, write_mask, write_png
 from core.learning.growing import with_first_look
-from core.learning.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, save_model, save_with_second_look
+from core.learning.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info
+from core.learning.model_writing import save_model, save_with_second_look
 from core.learning.training import TrainingPlan
 from core.perception.second_look import MOST_LOOKS, WINDOW_PX, Planes, SecondLook, places_to_look, planes_of
 from core.perception.segmentation import OpenVinoSegmenter, open_second_look

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.learning.model_file import save_model
+from core.learning.model_writing import save_model
 from core.perception.segmentation import OpenVinoSegmenter, Pairing, Turned, see
 from core.perception.unet import DualUNet, UNetShape
 
