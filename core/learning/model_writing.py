@@ -9,7 +9,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +30,7 @@ from core.learning.onnx_export import export_eight_bit, export_onnx, whole_strid
 from core.perception.evidence import Calibration
 from core.perception.familiarity import Familiarity
 from core.types import Image
+from core.whole_file import sync_folder
 
 if TYPE_CHECKING:
     from core.perception.unet import DualUNet
@@ -95,6 +96,7 @@ def _put_in_place(folder: Path) -> Iterator[Path]:
     try:
         yield scratch
         scratch.chmod(0o755)
+        _force_to_disk(scratch)
         _put(scratch, folder)
     except OSError as error:
         places = [Path(os.fsdecode(name)) for name in (error.filename, error.filename2) if name is not None]
@@ -104,6 +106,17 @@ def _put_in_place(folder: Path) -> Iterator[Path]:
         raise ModelError(f"{folder}: cannot be written ({reason}); make room, or choose another folder") from None
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _force_to_disk(scratch: Path) -> None:
+    """The older model is deleted for the new one, which has to be there when the power goes a moment later, too."""
+    for path in (*scratch.rglob("*"), scratch):
+        if path.is_dir():
+            with suppress(OSError):  # some file systems cannot, as in whole_file
+                sync_folder(path)
+        else:
+            with path.open("rb") as file:
+                os.fsync(file.fileno())
 
 
 def _put(scratch: Path, folder: Path) -> None:
@@ -121,6 +134,8 @@ def _put(scratch: Path, folder: Path) -> None:
         if aside.exists():
             os.replace(aside, folder)
         raise
+    with suppress(OSError):
+        sync_folder(folder.parent)
     if aside.exists():
         _carry_over(aside, folder)
         shutil.rmtree(aside, ignore_errors=True)
@@ -253,7 +268,10 @@ def _update(folder: Path, changes: dict[str, Any]) -> None:
     info = read_model_info(folder).model_copy(update=changes)
     scratch = folder / _INFO_SCRATCH
     try:
-        scratch.write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        with scratch.open("wb") as file:
+            file.write(info.model_dump_json(indent=1).encode() + b"\n")
+            file.flush()
+            os.fsync(file.fileno())  # or a power cut would leave an empty manifest, and with it no model
         os.replace(scratch, folder / INFO)
     except OSError as error:
         raise ModelError(f"{folder / INFO}: cannot be written ({error.strerror}); copy the model to a folder of your own") from None

@@ -222,6 +222,40 @@ def test_where_a_new_model_cannot_take_its_place_the_old_one_stays(model: Path, 
     assert [path.name for path in model.parent.iterdir()] == [model.name], "nothing is left lying about"
 
 
+def test_a_new_model_is_on_the_disk_before_the_old_one_goes(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+    sync, rename, remove = os.fsync, os.replace, shutil.rmtree
+
+    def syncs(handle: int) -> None:
+        done.append(f"on disk: {Path(os.readlink(f'/proc/self/fd/{handle}')).name}")
+        sync(handle)
+
+    def renames(source: Path, target: Path) -> None:
+        done.append("moved" if Path(target) == model else "aside")
+        rename(source, target)
+
+    def removes(path: Path, **kwargs: bool) -> None:
+        if Path(path).name.endswith(".old"):
+            done.append("old one deleted")
+        remove(path, **kwargs)
+
+    monkeypatch.setattr(os, "fsync", syncs)
+    monkeypatch.setattr(os, "replace", renames)
+    monkeypatch.setattr(shutil, "rmtree", removes)
+    save_model(DualUNet(TINY).eval(), model, training={}, figures={})
+    assert {f"on disk: {name}" for name in (WEIGHTS, ONNX, INFO)} <= set(done[: done.index("aside")])
+    assert done[done.index("moved") :] == ["moved", f"on disk: {model.parent.name}", "old one deleted"]
+
+
+def test_a_manifest_is_on_the_disk_before_it_takes_the_old_ones_place(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+    sync, rename = os.fsync, os.replace
+    monkeypatch.setattr(os, "fsync", lambda handle: (done.append("on disk"), sync(handle))[1])
+    monkeypatch.setattr(os, "replace", lambda source, target: (done.append("moved"), rename(source, target))[1])
+    write_figures(model, {"robot_dice": 0.5})
+    assert done[:2] == ["on disk", "moved"]
+
+
 def test_figures_that_cannot_be_stored_are_one_clear_error(model: Path) -> None:
     (model / f".{INFO}.new").mkdir()
     with pytest.raises(ModelError, match=r"model\.json: cannot be written .* copy the model"):
