@@ -17,7 +17,7 @@ from core.errors import UserError
 from core.learning.crops import FrameCrops, Looks, NearCrops
 from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample
 from core.learning.growing import deepened, widened, with_first_look
-from core.learning.model_file import SECOND_LOOK, load_network, model_folder, second_look_of
+from core.learning.model_file import SECOND_LOOK, check_model, load_network, model_folder, second_look_of
 from core.learning.model_writing import save_model, save_with_second_look
 from core.learning.training import TrainingPlan
 from core.perception.second_look import WINDOW_PX, Planes
@@ -67,6 +67,7 @@ class FrameLesson:
             self.network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
             return
         self.network = load_network(model_folder(init))[0]
+        check_model(init)  # its second look comes along as it is, and hours of training would end in a model that nobody can open
         self._second_look = second_look_of(model_folder(init))
         if deepen:
             if self.network.shape.encoder_convolutions == default_shape().encoder_convolutions:
@@ -102,6 +103,7 @@ class SecondLookLesson:
             raise UserError("--second-look needs --init MODEL, whose first look it looks again after")
         self._samples, self._init, self._deepen = samples, init, deepen
         self._base = model_folder(init)
+        check_model(init)  # both networks, whichever learns: what was learnt could not be kept beside a damaged one
         self._has_one = has_second_look(init)
         self.network = load_network(self._base / SECOND_LOOK)[0] if self._has_one else with_first_look(load_network(self._base)[0])
         shape = self.network.shape

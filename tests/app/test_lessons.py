@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from app.lessons import SecondLookLesson
+from app.lessons import FrameLesson, SecondLookLesson
 from core.errors import UserError
-from core.learning.model_file import load_network
+from core.learning.model_file import ONNX, SECOND_LOOK, WEIGHTS, ModelError, load_network
 from core.learning.model_writing import save_model, save_with_second_look
 from core.perception.unet import DualUNet, UNetShape
 
@@ -38,3 +38,21 @@ def test_a_second_look_is_made_wider_once(small: Path, tmp_path: Path) -> None:
     assert load_network(whole / "second_look")[0].shape == wider.shape
     with pytest.raises(UserError, match="as wide already; leave --widen out"):
         SecondLookLesson([], str(whole), deepen=False, widen=True)
+
+
+@pytest.mark.parametrize("name", [WEIGHTS, ONNX])
+@pytest.mark.parametrize("place", [".", SECOND_LOOK])
+@pytest.mark.parametrize("lesson", ["frames", "second look"])
+def test_a_model_with_a_damaged_part_is_refused_before_anything_is_taught(
+    small: Path, tmp_path: Path, name: str, place: str, lesson: str
+) -> None:
+    whole = tmp_path / "whole"
+    save_with_second_look(small, SecondLookLesson([], str(small), deepen=False).network, whole, training={}, figures={})
+    file = whole / place / name
+    file.write_bytes(file.read_bytes()[:-1] + b"?")
+    with pytest.raises(ModelError, match=f"{name}: SHA-256 differs") as raised:
+        if lesson == "frames":
+            FrameLesson([], str(whole), None, deepen=False, shallow=False)
+        else:
+            SecondLookLesson([], str(whole), deepen=False)
+    assert len(str(raised.value).splitlines()) == 1
