@@ -157,7 +157,7 @@ class TrackingConfig(_Section):
 
     enabled: bool = Field(True, description="false = every frame by itself")
     max_head_speed_px_s: float = Field(600.0, gt=0.0, le=100_000.0, description="a head that jumps faster is not believed")
-    memory_s: float = Field(0.5, ge=0.0, le=10.0, description="older frames say nothing about this one")
+    memory_s: float = Field(0.5, ge=0.0, le=10.0, description="older frames tell at most which end is the head")
     window_px: int = Field(
         256,
         ge=0,

@@ -17,6 +17,8 @@ END_PART_PX = 20.0
 STILL_HEAD_PX = 15.0
 """An end this near to the last frame's head is that head, also where it has just reached the image border, if the robot's other
 end lies at an end of the vessel."""
+ALONG_PX, ALONG_STEP_PX, ALONG_SHARE = 30.0, 10.0, 0.5
+"""A robot lies along an earlier path if so much of the shorter of both is no farther from it than a lumen is wide."""
 NEAR_PX = 20
 """Where the robot meets the border is looked for this far around an end beside it."""
 OUTSIDE_LEAD_PX = 10.0
@@ -27,13 +29,14 @@ NEARER_BY = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """What tells tail from head, besides the path itself."""
+    """What tells tail from head, besides the path itself. ``earlier`` is the path from before a gap in a stream, or None."""
 
     masks: Masks
     previous: RobotPath | None
     vessel: VesselGraph | None
     port: Point | None
     config: PathConfig
+    earlier: RobotPath | None = None
 
 
 def is_entry(place: Points, around: Surroundings) -> bool:
@@ -61,12 +64,13 @@ def tail_first(points: Points, around: Surroundings) -> Points:
     """The path ordered from tail to head.
 
     Asked in this order, the first clear answer counts: the one end at border or port (unless it is a head that has just arrived
-    there); the last frame's tail and head; the end that lies farther outside the vessel; the one end at an end of the vessel; the
-    thicker end; and at last the end nearer to an end of the vessel.
+    there); the last frame's tail and head, or which way the path from before a gap ran here; the end that lies farther outside the
+    vessel; the one end at an end of the vessel; the thicker end; and at last the end nearer to an end of the vessel.
     """
     for looks_like_tail, margin in (
         (_entry, 0.5),
         (_as_before, 1.0),
+        (_as_earlier, ALONG_STEP_PX),
         (_outside_vessel, OUTSIDE_LEAD_PX),
         (_at_vessel_end, 0.5),
         (_thickness, 0.2),
@@ -79,7 +83,7 @@ def tail_first(points: Points, around: Surroundings) -> Points:
 
 
 def _entry(points: Points, around: Surroundings) -> float:
-    before = around.previous
+    before = around.previous or around.earlier
     arrived = before is not None and float(np.hypot(*(points[0] - before.points[-1]))) <= STILL_HEAD_PX
     if arrived and is_at_vessel_end(points[-1], around):
         return 0.0
@@ -105,6 +109,23 @@ def _as_before(points: Points, around: Surroundings) -> float:
         return 0.0
     before = around.previous.points
     return -float(np.hypot(*(points[0] - before[0])) + np.hypot(*(points[-1] - before[-1])))
+
+
+def _as_earlier(points: Points, around: Surroundings) -> float:
+    """How far the path goes on along the one of before a gap, in its direction; negative: against it. 0 where it lies elsewhere.
+
+    A robot slides along itself and cannot turn about in a vessel, however far it has moved meanwhile.
+    """
+    if around.earlier is None:
+        return 0.0
+    before = around.earlier.points
+    along = polyline.arc_length(before)
+    places = [polyline.nearest(before, (x, y), along) for x, y in polyline.resample(points, ALONG_STEP_PX).tolist()]
+    beside = [position for distance, position, _ in places if distance <= ALONG_PX]
+    shorter_px = min(float(along[-1]), float(polyline.arc_length(points)[-1]))
+    if len(beside) < 2 or ALONG_STEP_PX * len(beside) < ALONG_SHARE * shorter_px:
+        return 0.0
+    return beside[-1] - beside[0]
 
 
 def _outside_vessel(points: Points, around: Surroundings) -> float:

@@ -23,7 +23,7 @@ from core.perception.route import route_or_reason
 from core.perception.route_memory import RouteMemory
 from core.perception.second_look import MOST_LOOKS, SecondLook
 from core.perception.segmentation import Segmenter, Turned, open_second_look, open_segmenter, recognise, to_working
-from core.perception.tracking import Memory, check_in_view, check_jump, recall, remember
+from core.perception.tracking import Memory, check_in_view, check_jump, recall, recall_ends, remember
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
 from core.types import Frame, Image, Mask, Masks, Point, Reason, Refusal, RobotPath, Scene, Skeletons, VesselGraph, Window
@@ -63,15 +63,30 @@ class Sight:
     familiarity: Familiarity | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class _Before:
+    """The path of the last frame, or, after a gap, the one that still tells which end is the head."""
+
+    path: RobotPath | None = None
+    ends: RobotPath | None = None
+
+
+_NOTHING = _Before()
+
+
 class _Past:
     """What a stream remembers of its frames."""
 
     def __init__(self, config: TrackingConfig) -> None:
+        self._config = config
         self.memory: Memory | None = None
         self.routes = RouteMemory(config)
         self.lookalikes = Lookalikes(config)
         self.glances = Glances(config)
         self.unlike = False
+
+    def recall(self, captured_s: float) -> _Before:
+        return _Before(recall(self.memory, captured_s, self._config), recall_ends(self.memory, captured_s, self._config))
 
     def forget(self) -> None:
         self.memory, self.unlike = None, False
@@ -192,12 +207,12 @@ class Pipeline:
         unlike = self._check_kind(scene, past)
         if scene.refusal is not None:
             return replace(scene, refusal=quality.hinted(scene.refusal, unlike))
-        previous = recall(past.memory, frame.captured_s, config.tracking) if past is not None else None
-        scene = self._locate(scene, image, target, watch, previous, past.routes if past is not None else None)
+        before = past.recall(frame.captured_s) if past is not None else _NOTHING
+        scene = self._locate(scene, image, target, watch, before, past.routes if past is not None else None)
         if scene.refusal is None and unlike is not None:
             # What was found is kept: it is what somebody who teaches the model this rig begins with.
             scene = replace(scene, refusal=unlike)
-        return scene if scene.refusal is not None else self._judge(scene, image, target, watch, sight, previous)
+        return scene if scene.refusal is not None else self._judge(scene, image, target, watch, sight, before)
 
     def _check_kind(self, scene: Scene, past: _Past | None) -> Refusal | None:
         """Whether the picture is of a kind that the model does not know. A stream remembers; a window tells nothing of it."""
@@ -267,7 +282,7 @@ class Pipeline:
         image: Image,
         target: Point | None,
         watch: _Stopwatch,
-        previous: RobotPath | None,
+        before: _Before,
         routes: RouteMemory | None = None,
     ) -> Scene:
         """The robot's path, the way to the target, the centerline's piece and both vectors, or why one of them is not to be had."""
@@ -276,7 +291,7 @@ class Pipeline:
         assert skeletons is not None
         assert graph is not None
         with watch.stage("path"):
-            path = robot_path.find(skeletons, found, config, previous, graph, _port(config.path, image))
+            path = robot_path.find(skeletons, found, config, before.path, graph, _port(config.path, image), before.ends)
         if isinstance(path, Refusal):
             return replace(scene, refusal=path)
         with watch.stage("pose"):
@@ -296,9 +311,7 @@ class Pipeline:
                 refusal = Refusal(Reason.NO_VESSEL, "the centerline beside the head has no direction")
             return replace(scene, centerline=centerline, vessel_vector=vessel_vector, refusal=refusal)
 
-    def _judge(
-        self, scene: Scene, image: Image, target: Point | None, watch: _Stopwatch, sight: Sight, previous: RobotPath | None
-    ) -> Scene:
+    def _judge(self, scene: Scene, image: Image, target: Point | None, watch: _Stopwatch, sight: Sight, before: _Before) -> Scene:
         """The pose of what was located, with its evidence and confidence, or the quality gate's word against it."""
         config, found, path, centerline = self._config, scene.masks, scene.path, scene.centerline
         robot, vessel = scene.robot_vector, scene.vessel_vector
@@ -317,7 +330,7 @@ class Pipeline:
             with watch.stage("steadiness"):
                 believed = replace(found, robot_probability=_believed(found, config))
                 others = [
-                    self._answer(scene, image, target, masks.clean(*shifted, config), previous)
+                    self._answer(scene, image, target, masks.clean(*shifted, config), before)
                     for shifted in steadiness.neighbours(believed)
                 ]
                 theta, head = steadiness.swings((path.head, pose.theta_signed_deg), others)
@@ -332,15 +345,13 @@ class Pipeline:
             return replace(scene, refusal=refusal)
         return replace(scene, pose=replace(pose, confidence=confidence))
 
-    def _answer(
-        self, scene: Scene, image: Image, target: Point | None, found: Masks, previous: RobotPath | None
-    ) -> steadiness.Answer | None:
+    def _answer(self, scene: Scene, image: Image, target: Point | None, found: Masks, before: _Before) -> steadiness.Answer | None:
         """Head and signed theta of the same frame with other masks; None for a refusal."""
         watch = _Stopwatch()
         bare = Scene(scene.frame_index, scene.captured_s, scene.source_size, scene.scale, scale_xy=scene.scale_xy)
         bare = self._draw(bare, found, watch)
         if bare.refusal is None:
-            bare = self._locate(bare, image, target, watch, previous)
+            bare = self._locate(bare, image, target, watch, before)
         if bare.refusal is not None or bare.path is None or bare.robot_vector is None or bare.vessel_vector is None:
             return None
         return bare.path.head, measure(bare.robot_vector, bare.vessel_vector, self._config.pose).theta_signed_deg

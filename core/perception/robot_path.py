@@ -42,6 +42,7 @@ def find(
     previous: RobotPath | None = None,
     vessel: VesselGraph | None = None,
     port: Point | None = None,
+    earlier: RobotPath | None = None,
 ) -> RobotPath | Refusal:
     """The robot's path, tail -> head, or why there is none.
 
@@ -57,6 +58,7 @@ def find(
     previous : the path of the last frame, which decides between nearly equal candidates.
     vessel : the vessel graph; its ends tell tail from head where the image border does not.
     port : where the robot is inserted, if known.
+    earlier : in a stream, the path from before a gap; it says nothing but which end is the head.
 
     Returns
     -------
@@ -73,7 +75,7 @@ def find(
     pieces = find_pieces(graph, masks.vessel)
     if not pieces:
         return Refusal(Reason.TOO_SHORT, f"{total_px:.0f} px long (at least {config.path.min_length_px:.0f} px)")
-    around = Surroundings(masks, previous, vessel, port, config.path)
+    around = Surroundings(masks, previous, vessel, port, config.path, earlier)
     pieces = without_reflections(graph, pieces, around, config)
     refusal = check_pieces(graph, pieces, config)
     if refusal is not None:

@@ -12,6 +12,8 @@ from core.types import Mask, Reason, Refusal, RobotPath
 
 SLACK_PX = 12.0
 """A still head may be found this far off from frame to frame: noise of the mask's tip."""
+TURN_S = 10.0
+"""In less nobody takes a robot out of a vessel and brings it in from the other side: so long its head is not its tail."""
 HEAD_AT_BORDER_S = 0.3
 """A head that has just arrived at the image border is there. One that stays so long may have gone on beyond it for all one sees."""
 
@@ -31,6 +33,16 @@ def recall(memory: Memory | None, captured_s: float, config: TrackingConfig) -> 
     if memory is None or not config.enabled:
         return None
     return memory.path if 0.0 <= captured_s - memory.captured_s <= config.memory_s else None
+
+
+def recall_ends(memory: Memory | None, captured_s: float, config: TrackingConfig) -> RobotPath | None:
+    """The remembered path, where it is too old to tell anything but which way the robot lies; None where it tells more, or nothing.
+
+    Frames without an answer, however they come about, must not make the tail the head.
+    """
+    if memory is None or not config.enabled or not config.memory_s or recall(memory, captured_s, config) is not None:
+        return None
+    return memory.path if 0.0 <= captured_s - memory.captured_s <= TURN_S else None
 
 
 def check_jump(path: RobotPath, memory: Memory | None, captured_s: float, config: TrackingConfig) -> Refusal | None:

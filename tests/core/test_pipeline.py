@@ -11,6 +11,7 @@ from core.perception import steadiness
 from core.perception.evidence import WITHOUT_SWINGS, Evidence
 from core.perception.pipeline import NoPerception, Pipeline, Sight, open_pipeline
 from core.perception.segmentation import OpenVinoSegmenter, Turned
+from core.perception.tracking import TURN_S
 from core.types import Frame, Image, Masks, Points, PoseState, Reason, Scene
 from hardware.twin.world import TwinWorld
 from tests.core.drawing import SIZE, curve, depth, probability
@@ -249,6 +250,53 @@ def test_a_head_that_has_left_the_picture_is_refused_within_half_a_second_until_
     assert not any(answered[arrived + 10 : 40])
     assert {reason(scene) for _, scene in told[arrived + 10 : 40]} == {Reason.AMBIGUOUS_PATH}
     assert all(answered[-3:])
+
+
+def _draw_tapered(network: DrawnNetwork, left_x: float, right_x: float, *, thick: str) -> None:
+    """A robot both of whose ends lie in the picture, thicker at one of them: by itself that one is taken for the tail."""
+    line = VESSEL[(VESSEL[:, 0] >= left_x) & (VESSEL[:, 0] <= right_x)]
+    middle_x = 0.5 * (left_x + right_x)
+    part = line[line[:, 0] < middle_x] if thick == "left" else line[line[:, 0] > middle_x]
+    network.robot = probability(depth(line, 3.0), depth(part, 5.0))
+
+
+@pytest.mark.parametrize("lost_s", [0.2, 1.0, 5.0])
+@pytest.mark.parametrize("lost", ["not seen", "refused"])
+def test_frames_that_were_lost_do_not_make_the_tail_the_head(
+    pipeline: Pipeline, network: DrawnNetwork, lost: str, lost_s: float
+) -> None:
+    _draw_tapered(network, 180.0, 420.0, thick="left")
+    before = pipeline(frame(0.0))
+    assert before.path is not None
+    assert before.path.head[0] == pytest.approx(420.0, abs=3.0)
+    clear = network.vessel
+    for step in range(1, round(lost_s / FRAME_S)):
+        if lost == "refused":
+            network.vessel = cv2.GaussianBlur(clear, (0, 0), 7.0)
+        else:
+            network.draw()
+        assert reason(pipeline(frame(step * FRAME_S))) is not None
+    network.vessel = clear
+    _draw_tapered(network, 200.0, 430.0, thick="right")
+    alone, after = pipeline.perceive_single(frame(lost_s)).path, pipeline(frame(lost_s)).path
+    assert alone is not None
+    assert alone.head[0] == pytest.approx(200.0, abs=3.0)
+    assert after is not None
+    assert after.head[0] == pytest.approx(430.0, abs=3.0)
+
+
+@pytest.mark.parametrize("change", ["long ago", "elsewhere", "wound back", "switched off"])
+def test_a_robot_that_may_have_turned_about_is_judged_by_itself(network: DrawnNetwork, change: str) -> None:
+    memory_s = 0.0 if change == "switched off" else CONFIG.tracking.memory_s
+    pipeline = Pipeline(network, PerceptionConfig(tracking=TrackingConfig(memory_s=memory_s)))
+    left_x, right_x = (20.0, 170.0) if change == "elsewhere" else (180.0, 420.0)
+    _draw_tapered(network, left_x, right_x, thick="left")
+    assert pipeline(frame(20.0)).path is not None
+    _draw_tapered(network, 200.0, 430.0, thick="right")
+    later_s = {"long ago": TURN_S + 0.1, "wound back": -1.0}.get(change, 1.0)
+    path = pipeline(frame(20.0 + later_s)).path
+    assert path is not None
+    assert path.head[0] == pytest.approx(200.0, abs=3.0)
 
 
 def test_a_single_image_leaves_the_streams_memory_alone(pipeline: Pipeline, network: DrawnNetwork) -> None:
