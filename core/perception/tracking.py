@@ -16,16 +16,23 @@ TURN_S = 10.0
 """In less nobody takes a robot out of a vessel and brings it in from the other side: so long its head is not its tail."""
 HEAD_AT_BORDER_S = 0.3
 """A head that has just arrived at the image border is there. One that stays so long may have gone on beyond it for all one sees."""
+HEAD_BACK_S = 0.08
+"""The end of a mask that runs out of the picture comes and goes with the noise: a head that was there is back once it has been clear
+of the border for so long, and not in a single frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Memory:
-    """The last path that was believed, and when its frame was captured. ``border_s``: since when the robot's mask has met the image
-    border at its head; None where it does not."""
+    """The last path that was believed, and when its frame was captured.
+
+    ``border_s``: since when the robot's mask has met the image border at its head, but for moments; None where it does not.
+    ``clear_s``: the first frame of such a moment, while it lasts.
+    """
 
     path: RobotPath
     captured_s: float
     border_s: float | None = None
+    clear_s: float | None = None
 
 
 def recall(memory: Memory | None, captured_s: float, config: TrackingConfig) -> RobotPath | None:
@@ -63,17 +70,20 @@ def check_jump(path: RobotPath, memory: Memory | None, captured_s: float, config
 
 def remember(path: RobotPath, mask: Mask, memory: Memory | None, captured_s: float, config: PerceptionConfig) -> Memory:
     """A path that was believed, found in the robot's mask (h, w), beside what is remembered of the frames before."""
-    if not may_go_on_outside(path.points[-1], mask, config.path):
-        return Memory(path, captured_s)
     is_known = memory is not None and recall(memory, captured_s, config.tracking) is not None
-    before_s = memory.border_s if memory is not None and is_known else None
-    return Memory(path, captured_s, captured_s if before_s is None else before_s)
+    border_s, clear_s = (memory.border_s, memory.clear_s) if memory is not None and is_known else (None, None)
+    if may_go_on_outside(path.points[-1], mask, config.path):
+        return Memory(path, captured_s, captured_s if border_s is None else border_s)
+    clear_s = captured_s if clear_s is None else clear_s
+    if border_s is None or captured_s - clear_s >= HEAD_BACK_S:
+        return Memory(path, captured_s)
+    return Memory(path, captured_s, border_s, clear_s)
 
 
 def check_in_view(memory: Memory, config: PerceptionConfig) -> Refusal | None:
     """AMBIGUOUS_PATH, when the robot has met the image border at its head for longer than ``HEAD_AT_BORDER_S``.
 
-    Where it does, the border is all that is found of the head, however far outside it is. The refused path stays the memory: so its
+    Where it does, or did a moment ago, the border is all that is found of the head, however far outside it is. The refused path stays the memory: so its
     head remains the head, and not the tail of a robot that comes in there, and is known again when it comes back into view.
     """
     if not config.quality.enabled or memory.border_s is None or memory.captured_s - memory.border_s <= HEAD_AT_BORDER_S:

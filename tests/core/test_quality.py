@@ -7,7 +7,7 @@ import pytest
 from core.config import PerceptionConfig, QualityConfig
 from core.perception import quality
 from core.perception.evidence import wall_blur_px
-from core.perception.tracking import Memory, check_in_view, check_jump, recall, remember
+from core.perception.tracking import HEAD_AT_BORDER_S, Memory, check_in_view, check_jump, recall, remember
 from core.types import Centerline, GraphEdge, Masks, Points, Reason, Refusal, RobotPath, VesselGraph
 from tests.core.drawing import depth, probability
 
@@ -259,19 +259,48 @@ def test_a_head_that_has_met_the_border_for_longer_than_a_moment_may_be_out_of_v
     inside, outside = (np.array([[20.0, 240.0], [tip, 240.0]]) for tip in (600.0, 639.0))
     memory: Memory | None = None
     told = []
-    for step, line in enumerate([inside, *[outside] * 5, inside, *[outside] * 3]):
+    for step, line in enumerate([inside, *[outside] * 5, *[inside] * 3, *[outside] * 5]):
         mask = probability(depth(line + [[0.0, 0.0], [2.0, 0.0]], 4.0)) >= 0.5
         memory = remember(path(line), mask, memory, 0.09 * step, CONFIG)
         refusal = check_in_view(memory, CONFIG)
         assert refusal is None or refusal.reason is Reason.AMBIGUOUS_PATH
         told.append(refusal is None)
-    assert told == [True, True, True, True, True, False, True, True, True, True]
+    assert told == [True, True, True, True, True, False, False, True, True, True, True, True, True, False]
     # After a pause it has arrived anew.
     assert remember(path(outside), mask, memory, 9.0, CONFIG).border_s == 9.0
     assert check_in_view(Memory(path(outside), 9.0, 5.0), PerceptionConfig(quality=QualityConfig(enabled=False))) is None
 
 
+@pytest.mark.parametrize("frame_s", [1 / 30, 0.05, 0.2])
+def test_a_mask_that_flickers_at_the_border_shows_no_head(frame_s: float) -> None:
+    """Its end is cut off in single frames: the head is where it was, out of view or at the border, and does not come and go."""
+    outside, cut_off = (np.array([[20.0, 240.0], [tip, 240.0]]) for tip in (639.0, 622.0))
+    flicker = [cut_off if step % 3 == 2 else outside for step in range(30)]
+    memory: Memory | None = None
+    told = []
+    for step, line in enumerate([*flicker, *[cut_off] * 6]):
+        mask = probability(depth(line + [[0.0, 0.0], [2.0, 0.0]], 4.0)) >= 0.5
+        memory = remember(path(line), mask, memory, frame_s * step, CONFIG)
+        told.append(check_in_view(memory, CONFIG) is None)
+    refused = told.index(False)
+    assert frame_s * refused == pytest.approx(HEAD_AT_BORDER_S, abs=frame_s)
+    assert not any(told[refused:30])
+    assert told[-2:] == [True, True], "it has come back"
+
+
+def test_a_head_beside_the_border_that_touches_it_in_single_frames_is_in_view() -> None:
+    short_of_it, touching = (np.array([[20.0, 240.0], [tip, 240.0]]) for tip in (628.0, 639.0))
+    memory: Memory | None = None
+    for step in range(40):
+        line = touching if step % 5 == 4 else short_of_it
+        mask = probability(depth(line + [[0.0, 0.0], [2.0, 0.0]], 4.0)) >= 0.5
+        memory = remember(path(line), mask, memory, step / 30, CONFIG)
+        assert check_in_view(memory, CONFIG) is None
+
+
 def test_a_head_beside_the_border_that_does_not_meet_it_is_in_view() -> None:
     line = np.array([[20.0, 6.0], [600.0, 6.0]])  # runs along the border, 2 px of background beside it
     mask = probability(depth(line, 3.6)) >= 0.5
-    assert remember(path(line), mask, Memory(path(line), 0.0, 0.0), 0.1, CONFIG).border_s is None
+    assert remember(path(line), mask, Memory(path(line), 0.0), 0.1, CONFIG).border_s is None
+    left_border = Memory(path(line), 0.0, -1.0, -0.1)
+    assert remember(path(line), mask, left_border, 0.1, CONFIG).border_s is None
