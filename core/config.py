@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from core.camera_config import CameraConfig
 from core.errors import UserError
@@ -122,7 +122,16 @@ class PoseConfig(_Section):
     theta_allow_deg: float = Field(10.0, gt=0.0, le=180.0, description="angle that is still along the centerline")
     hysteresis_px: float = Field(1.0, ge=0.0, le=50.0, description="so much farther before a state is left again")
     hysteresis_deg: float = Field(1.5, ge=0.0, le=45.0, description="so much more angle before state A is left again")
-    dwell_frames: int = Field(3, ge=1, le=100, description="a new state must be seen this often in a row to be shown")
+    dwell_s: float = Field(0.1, ge=0.0, le=5.0, description="a new state must have been seen for so long to be shown")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _count_no_frames(cls, values: Any) -> Any:
+        """Older sessions and files say `dwell_frames`, of 30 a second."""
+        if not isinstance(values, dict) or not isinstance(values.get("dwell_frames"), int):
+            return values
+        rest = {key: value for key, value in values.items() if key != "dwell_frames"}
+        return {"dwell_s": min(values["dwell_frames"] / 30.0, 5.0), **rest}
 
 
 class QualityConfig(_Section):

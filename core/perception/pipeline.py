@@ -154,7 +154,7 @@ class Pipeline:
     def reset(self) -> None:
         """Forget the stream's past."""
         self._past.forget()
-        self._states.update(None)
+        self._states.forget()
 
     def perceive_single(self, frame: Frame, target: Point | None = None) -> Scene:
         """A frame by itself; `target` is the operator's destination in source pixels."""
@@ -173,7 +173,7 @@ class Pipeline:
         watch = _Stopwatch()
         scene = self._perceive(frame, target, watch, self._stream, past)
         if past.memory is not None and tracking.memory_s and recall(past.memory, frame.captured_s, tracking) is None:
-            self._states.update(None)  # after a pause, or wound back: the state of then says nothing of now
+            self._states.forget()  # after a pause, or wound back: the state of then says nothing of now
         if scene.pose is not None and scene.path is not None:
             refusal = check_jump(scene.path, past.memory, frame.captured_s, tracking)
             if refusal is None:
@@ -187,7 +187,7 @@ class Pipeline:
                 scene = replace(scene, pose=None, refusal=refusal)
         if self._glance is not None:
             past.glances.remember(scene)
-        return watch.finish(replace(scene, pose=self._states.update(scene.pose)))
+        return watch.finish(replace(scene, pose=self._states.update(scene.pose, scene.captured_s)))
 
     def _perceive(self, frame: Frame, target: Point | None, watch: _Stopwatch, sight: Sight, past: _Past | None = None) -> Scene:
         config = self._config

@@ -76,26 +76,48 @@ def classify(
 class StateFilter:
     """Steadies the state of a stream: a hysteresis on every threshold and a dwell time, so that the badge does not chatter.
 
-    A state is left once it was contradicted for ``dwell_frames`` frames in a row, for the one seen most often in them (of equals
-    the latest): frames that waver between two others do not keep it. A frame without a pose forgets everything: the next pose
-    starts anew, and no stale state is ever shown.
+    A state is left once it has been contradicted for ``dwell_s``, to half a frame, by more than two thirds of the frames since, for
+    the one seen most often in them (of equals the latest): neither an odd frame nor frames that waver between two others keep it.
+    Where frames come so seldom that the next one would be too late, one is enough. A frame without a pose forgets everything: the
+    next pose starts anew, and no stale state is ever shown.
     """
 
     def __init__(self, config: PoseConfig) -> None:
         self._config = config
-        self._current: PoseState | None = None
-        self._against: list[PoseState] = []
+        self.forget()
 
-    def update(self, pose: Pose | None) -> Pose | None:
-        """The same pose with the steadied state; None for None."""
+    def forget(self) -> None:
+        """The next pose starts anew."""
+        self._current: PoseState | None = None
+        self._last_s = math.inf
+        self._votes: list[tuple[float, PoseState]] = []
+
+    def update(self, pose: Pose | None, captured_s: float) -> Pose | None:
+        """The same pose with the steadied state; None for None. `captured_s` is the frame's."""
         if pose is None:
-            self._current, self._against = None, []
+            self.forget()
             return None
         shown = classify(pose.c_head_px, pose.c_tail_px, pose.theta_deg, self._config, self._current)
-        if self._current is None or shown is self._current:
-            self._current, self._against = shown, []
-        else:
-            self._against.append(shown)
-            if len(self._against) >= self._config.dwell_frames:
-                self._current, self._against = max(reversed(self._against), key=self._against.count), []
+        half_frame_s = 0.5 * max(0.0, captured_s - self._last_s)
+        self._last_s = captured_s
+        if self._current is None:
+            self._current = shown
+        elif self._votes or shown is not self._current:
+            self._vote(captured_s, shown)
+            self._decide(captured_s + half_frame_s)
         return replace(pose, state=self._current)
+
+    def _vote(self, captured_s: float, shown: PoseState) -> None:
+        """Keep what was seen since the first contradiction, for twice the dwell time."""
+        self._votes.append((captured_s, shown))
+        oldest_s = captured_s - 2.0 * self._config.dwell_s
+        kept = [vote for vote in self._votes if vote[0] >= oldest_s]
+        first = next((place for place, (_, state) in enumerate(kept) if state is not self._current), len(kept))
+        self._votes = kept[first:]
+
+    def _decide(self, until_s: float) -> None:
+        against = [state for _, state in self._votes if state is not self._current]
+        if 2 * len(against) < len(self._votes):  # it was noise
+            self._votes = []
+        elif 3 * len(against) > 2 * len(self._votes) and until_s - self._votes[0][0] >= self._config.dwell_s:
+            self._current, self._votes = max(reversed(against), key=against.count), []

@@ -17,8 +17,8 @@ TURN_S = 10.0
 HEAD_AT_BORDER_S = 0.3
 """A head that has just arrived at the image border is there. One that stays so long may have gone on beyond it for all one sees."""
 HEAD_BACK_S = 0.08
-"""The end of a mask that runs out of the picture comes and goes with the noise: a head that was there is back once it has been clear
-of the border for so long, and not in a single frame."""
+"""The end of a mask that runs out of the picture comes and goes with the noise: a head that was there is back once it has been
+clear of the border for so long, and not in a single frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,8 +83,9 @@ def remember(path: RobotPath, mask: Mask, memory: Memory | None, captured_s: flo
 def check_in_view(memory: Memory, config: PerceptionConfig) -> Refusal | None:
     """AMBIGUOUS_PATH, when the robot has met the image border at its head for longer than ``HEAD_AT_BORDER_S``.
 
-    Where it does, or did a moment ago, the border is all that is found of the head, however far outside it is. The refused path stays the memory: so its
-    head remains the head, and not the tail of a robot that comes in there, and is known again when it comes back into view.
+    Where it does, or did a moment ago, the border is all that is found of the head, however far outside it is. The refused path
+    stays the memory: so its head remains the head, and not the tail of a robot that comes in there, and is known again when it
+    comes back into view.
     """
     if not config.quality.enabled or memory.border_s is None or memory.captured_s - memory.border_s <= HEAD_AT_BORDER_S:
         return None

@@ -202,7 +202,9 @@ def test_arrows_go_by_what_a_setting_is_a_multiple_of(dialog: SettingsDialog) ->
     assert "a multiple of 32" in shown._note()
 
 
-@pytest.mark.parametrize("key", ["perception.pose.dwell_frames", "perception.path.weight_length", D_ALLOW, THETA])
+@pytest.mark.parametrize(
+    "key", ["perception.pose.dwell_s", "perception.cleaning.min_robot_area_px", "perception.path.weight_length", D_ALLOW, THETA]
+)
 def test_a_slider_comes_back_to_the_value_that_it_shows(dialog: SettingsDialog, key: str) -> None:
     shown = field(dialog, key)
     default = dialog.draft.default_value(key)

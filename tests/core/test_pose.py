@@ -10,7 +10,7 @@ from core.perception.pose import StateFilter, classify, measure, signed_distance
 from core.types import Pose, PoseState, Vector
 
 A, B, C, D = PoseState.A, PoseState.B, PoseState.C, PoseState.D
-CONFIG = PoseConfig(d_allow_px=6.0, theta_allow_deg=10.0, hysteresis_px=1.0, hysteresis_deg=1.5, dwell_frames=3)
+CONFIG = PoseConfig(d_allow_px=6.0, theta_allow_deg=10.0, hysteresis_px=1.0, hysteresis_deg=1.5, dwell_s=0.1)
 
 
 def vector(start: tuple[float, float], end: tuple[float, float]) -> Vector:
@@ -115,26 +115,54 @@ def pose(c_head: float, c_tail: float, theta: float) -> Pose:
     return Pose(theta, theta, c_head, c_tail, c_head * c_tail < 0, classify(c_head, c_tail, theta, CONFIG), 1.0)
 
 
-def states(stream: list[Pose | None]) -> str:
+def states(stream: list[Pose | None], frame_s: float = 1 / 30) -> str:
     steady = StateFilter(CONFIG)
-    return "".join("-" if (out := steady.update(one)) is None else out.state.value for one in stream)
+    return "".join(
+        "-" if (out := steady.update(one, step * frame_s)) is None else out.state.value for step, one in enumerate(stream)
+    )
 
 
-def test_the_first_pose_counts_at_once_and_a_new_state_after_its_dwell() -> None:
-    inside, far = pose(2, 2, 2), pose(20, 10, 30)
-    assert states([inside, far, far, far, far]) == "AAACC"
-    assert states([inside, far, far, inside, far, far, far]) == "AAAAAAC"
+INSIDE, AWAY, CROSSED = pose(2, 2, 2), pose(20, 10, 30), pose(-9, 15, 40)
+
+
+@pytest.mark.parametrize(
+    ("frame_s", "told"),
+    [(1 / 60, "AAAAAACCC"), (1 / 30, "AAACCCCCC"), (1 / 20, "AACCCCCCC"), (0.1, "ACCCCCCCC"), (0.3, "CCCCCCCCC")],
+)
+def test_the_first_pose_counts_at_once_and_a_new_state_after_its_dwell(frame_s: float, told: str) -> None:
+    """A tenth of a second after it was first seen, to half a frame, however many frames that are."""
+    assert states([INSIDE, *[AWAY] * 9], frame_s) == "A" + told
+
+
+def test_an_odd_frame_among_contradictions_does_not_keep_the_old_state() -> None:
+    assert states([INSIDE, AWAY, AWAY, INSIDE, AWAY, AWAY]) == "AAAACC"
+    assert states([INSIDE, AWAY, INSIDE, AWAY, AWAY, AWAY]) == "AAAACC"
+
+
+@pytest.mark.parametrize("frame_s", [1 / 60, 1 / 30, 1 / 20, 0.1])
+def test_an_odd_frame_among_agreements_changes_nothing(frame_s: float) -> None:
+    assert states([INSIDE, INSIDE, AWAY, INSIDE, INSIDE] * 8, frame_s) == "A" * 40
+    assert states([INSIDE, AWAY] * 20, frame_s) == "A" * 40, "nor does a state that flickers from frame to frame"
+
+
+def test_what_flickered_before_does_not_delay_a_change() -> None:
+    assert states([*[INSIDE, AWAY] * 10, INSIDE, *[AWAY] * 4]) == "A" * 23 + "CC"
+
+
+def test_frames_that_come_unevenly_count_by_their_time() -> None:
+    steady = StateFilter(CONFIG)
+    told = [steady.update(one, at_s) for one, at_s in [(INSIDE, 0.0), (AWAY, 0.03), (AWAY, 0.04), (AWAY, 0.05), (AWAY, 0.13)]]
+    assert [out.state for out in told if out is not None] == [A, A, A, A, C]
 
 
 def test_frames_that_waver_between_two_other_states_do_not_keep_the_old_one() -> None:
-    inside, away, crossed = pose(2, 2, 2), pose(20, 10, 30), pose(-9, 15, 40)
-    assert states([inside, away, crossed, away, away, away]) == "AAACCC"  # two of three spoke for C
-    assert states([inside, *[crossed, away] * 2, crossed]) == "AAADDD"
+    assert states([INSIDE, AWAY, CROSSED, AWAY, AWAY, AWAY]) == "AAAACC"  # three of four spoke for C
+    assert states([INSIDE, *[CROSSED, AWAY] * 2, CROSSED]) == "AAAACC"  # of equals the latest
 
 
 def test_noise_within_the_band_does_not_change_the_state() -> None:
     assert states([pose(5.5, 5.5, 5), *[pose(6.5, 5.5, 11)] * 6]) == "AAAAAAA"
-    assert states([pose(5.5, 5.5, 5), *[pose(7.5, 5.5, 5)] * 6]) == "AAACCCC"
+    assert states([pose(5.5, 5.5, 5), *[pose(7.5, 5.5, 5)] * 6]) == "AAAACCC"
     wobble = [pose(10, 10.4, 20), pose(10.4, 10, 20)]
     assert states(wobble * 5) == "BBBBBBBBBB"
     assert states([wobble[1], *wobble * 5]) == "CCCCCCCCCCC"
@@ -146,6 +174,14 @@ def test_a_frame_without_pose_shows_no_state_and_forgets() -> None:
     assert states([pose(2, 2, 2), None, pose(20, 10, 30)]) == "A-C"
 
 
+def test_settings_that_count_frames_are_understood() -> None:
+    """Sessions keep the settings that they were recorded with."""
+    assert PoseConfig.model_validate({"dwell_frames": 6}).dwell_s == 0.2
+    assert PoseConfig.model_validate({"dwell_frames": 6, "dwell_s": 0.3}).dwell_s == 0.3
+    with pytest.raises(ValueError, match="dwell_frames"):
+        PoseConfig.model_validate({"dwell_frames": "many"})
+
+
 def test_the_filter_never_shows_a_state_that_no_frame_had() -> None:
     seen = [pose(2, 2, 2), pose(20, 10, 30), pose(8, 15, 12), pose(-9, 15, 40)]
     for order in itertools.permutations(seen):
@@ -155,7 +191,7 @@ def test_the_filter_never_shows_a_state_that_no_frame_had() -> None:
 
 def test_only_the_state_is_changed() -> None:
     steady = StateFilter(CONFIG)
-    steady.update(pose(2, 2, 2))
-    out = steady.update(pose(20, 10, 30))
+    steady.update(pose(2, 2, 2), 0.0)
+    out = steady.update(pose(20, 10, 30), 1 / 30)
     assert out is not None
     assert (out.state, out.c_head_px, out.theta_deg) == (A, 20, 30)
