@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from core.config import VectorConfig
 from core.perception import polyline
+from core.perception.lumen import foot, is_walled_off
 from core.perception.route import incidence_of, plan_route
 from core.perception.vessel_graph import build_graph
 from core.types import Centerline, Mask, Point, Points, Route, VesselGraph
@@ -35,6 +36,16 @@ TIE_ANGLE_DEG = 20.0
 """Two nearly as good paths that differ by this much make the answer fully ambiguous; by less, proportionally less so."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Foot:
+    """The place on an edge nearest to the head within its lumen: its distance, its arc-length position, the radius there."""
+
+    distance: float
+    edge: int
+    position: float
+    radius: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Candidate:
     """One path of the graph past the head, cut to the wanted length and oriented; lower cost fits better.
@@ -56,12 +67,18 @@ class _Candidate:
 
 
 def find(
-    graph: VesselGraph, skeleton: Mask, head: Point, robot_direction: Point, config: VectorConfig, route: Route | None = None
+    graph: VesselGraph,
+    skeleton: Mask,
+    head: Point,
+    robot_direction: Point,
+    config: VectorConfig,
+    route: Route | None = None,
+    vessel: Mask | None = None,
 ) -> Centerline | None:
     """The piece beside the head by the configured rule: along one path of the graph, or the paper's window of skeleton pixels."""
     if config.vessel_rule == "window":
         return window_at(skeleton, head, robot_direction, config.vessel_half_length_px)
-    return centerline_at(graph, head, robot_direction, config.vessel_half_length_px, route)
+    return centerline_at(graph, head, robot_direction, config.vessel_half_length_px, route, vessel)
 
 
 def window_at(skeleton: Mask, head: Point, robot_direction: Point, half_length_px: float) -> Centerline | None:
@@ -88,7 +105,12 @@ def window_at(skeleton: Mask, head: Point, robot_direction: Point, half_length_p
 
 
 def centerline_at(
-    graph: VesselGraph, head: Point, robot_direction: Point, half_length_px: float, route: Route | None = None
+    graph: VesselGraph,
+    head: Point,
+    robot_direction: Point,
+    half_length_px: float,
+    route: Route | None = None,
+    vessel: Mask | None = None,
 ) -> Centerline | None:
     """The piece of centerline beside the head, along one path of the vessel graph, in the robot's direction of travel.
 
@@ -105,27 +127,32 @@ def centerline_at(
     robot_direction : unit vector of the robot's last 40 px, pointing to the head.
     half_length_px : arc length of the piece to each side of the nearest point; cut short where the vessel ends.
     route : the operator's route; it decides between branches where it passes the head.
+    vessel : its mask (h, w), if there is one: what lies beyond a wall from the head is not beside it, however near.
 
     Returns
     -------
     The piece, or None when the graph is empty or ends too soon (less than ``MIN_PIECE_SHARE`` of the wanted length).
     """
-    feet = _feet(graph, head, half_length_px)
+    feet = _feet(graph, head, half_length_px, vessel)
     incidence = incidence_of(graph)
     # One scale for all candidates: a narrow branch must not count the same distance for more than its wide trunk does.
-    scale = max((radius for _, _, radius in feet), default=1.0)
-    ahead = _route_ahead(route, head, half_length_px, scale)
+    scale = max((near.radius for near in feet), default=1.0)
+    ahead = _route_ahead(route, head, half_length_px, scale, vessel)
     direction = np.asarray(robot_direction, np.float64)
     candidates = []
-    for edge, position, radius in feet:
-        backward = _walks(graph, incidence, edge, position, False, 2.0 * half_length_px)
-        forward = _walks(graph, incidence, edge, position, True, 2.0 * half_length_px)
+    for near in feet:
+        backward = _walks(graph, incidence, near.edge, near.position, False, 2.0 * half_length_px)
+        forward = _walks(graph, incidence, near.edge, near.position, True, 2.0 * half_length_px)
         for back, used_behind in backward:
             for onward, used_ahead in forward:
                 if used_behind & used_ahead:
                     continue
                 line = np.concatenate([back[:0:-1], onward])
-                candidate = _candidate(line, radius, scale, head, direction, half_length_px, ahead)
+                along = polyline.arc_length(line)
+                place = polyline.nearest(line, head, along)
+                if vessel is not None and place[0] < near.distance - SAME_COST and is_walled_off(head, place[2], vessel):
+                    place = near.distance, float(along[len(back) - 1]), (float(onward[0, 0]), float(onward[0, 1]))
+                candidate = _candidate(line, along, place, near.radius, scale, head, direction, half_length_px, ahead)
                 if candidate is not None:
                     candidates.append(candidate)
     if not candidates:
@@ -139,24 +166,33 @@ def centerline_at(
     return Centerline(best.piece, best.nearest, best.radius, ambiguity)
 
 
-def _feet(graph: VesselGraph, head: Point, half_length: float) -> list[tuple[int, float, float]]:
-    """Edges that the head may belong to, as (edge, arc-length position of its foot, radius there)."""
-    usable = [index for index, edge in enumerate(graph.edges) if len(edge.points) >= 2]
-    if not usable:
-        return []
-    found = []
-    for index in usable:
-        edge = graph.edges[index]
-        along = polyline.arc_length(edge.points)
-        distance, position, _ = polyline.nearest(edge.points, head, along)
-        radius = float(np.interp(position, along, edge.radius))
-        found.append((distance, index, position, max(radius, 0.25 * half_length)))
-    least, _, _, radius_there = min(found)
-    return [
-        (index, position, radius)
-        for distance, index, position, radius in found
-        if distance <= max(least + 0.25 * radius_there, REACH_RADII * radius)
-    ]
+def _feet(graph: VesselGraph, head: Point, half_length: float, vessel: Mask | None) -> list[_Foot]:
+    """The edges that the head may belong to, in the graph's order."""
+    plain = []
+    for index, edge in enumerate(graph.edges):
+        if len(edge.points) >= 2:
+            along = polyline.arc_length(edge.points)
+            distance, position, place = polyline.nearest(edge.points, head, along)
+            radius = float(np.interp(position, along, edge.radius))
+            plain.append((_Foot(distance, index, position, max(radius, 0.25 * half_length)), place, distance <= radius))
+    plain.sort(key=lambda one: (one[0].distance, one[0].edge))
+    found: list[_Foot] = []
+    for near, place, is_inside in plain:
+        if found and not _is_in_reach(near, found):
+            continue
+        if vessel is None or is_inside or not is_walled_off(head, place, vessel):
+            found.append(near)
+        elif (within := foot(graph.edges[near.edge].points, head, vessel)) is not None:
+            edge = graph.edges[near.edge]
+            radius = float(np.interp(within[1], polyline.arc_length(edge.points), edge.radius))
+            found.append(_Foot(within[0], near.edge, within[1], max(radius, 0.25 * half_length)))
+    found = found or [near for near, *_ in plain]
+    return sorted((one for one in found if _is_in_reach(one, found)), key=lambda one: one.edge)
+
+
+def _is_in_reach(one: _Foot, found: list[_Foot]) -> bool:
+    first = min(found, key=lambda near: (near.distance, near.edge))
+    return one.distance <= max(first.distance + 0.25 * first.radius, REACH_RADII * one.radius)
 
 
 def _walks(
@@ -193,21 +229,31 @@ def _walks(
     return walks
 
 
-def _route_ahead(route: Route | None, head: Point, half_length: float, radius: float) -> Points | None:
+def _route_ahead(route: Route | None, head: Point, half_length: float, radius: float, vessel: Mask | None) -> Points | None:
     """The part of the route that lies ahead of the head, or None where the route does not pass by."""
     if route is None or len(route.points) < 2:
         return None
-    distance, position, _ = polyline.nearest(route.points, head)
+    place = foot(route.points, head, vessel)
+    if place is None:
+        return None
+    distance, position, _ = place
     ahead = polyline.cut(route.points, position, position + 2.0 * half_length)
     near = distance <= max(1.5 * radius, 0.5 * half_length)
     return ahead if near and float(polyline.arc_length(ahead)[-1]) > MIN_PIECE_SHARE * half_length else None
 
 
 def _candidate(
-    line: Points, radius: float, scale: float, head: Point, direction: NDArray[np.float64], half_length: float, ahead: Points | None
+    line: Points,
+    along: NDArray[np.float64],
+    place: tuple[float, float, Point],
+    radius: float,
+    scale: float,
+    head: Point,
+    direction: NDArray[np.float64],
+    half_length: float,
+    ahead: Points | None,
 ) -> _Candidate | None:
-    along = polyline.arc_length(line)
-    distance, position, nearest = polyline.nearest(line, head, along)
+    distance, position, nearest = place
     piece = polyline.cut(line, position - half_length, position + half_length, along)
     before, after = min(position, half_length), min(float(along[-1]) - position, half_length)
     length = before + after

@@ -304,7 +304,9 @@ class Pipeline:
             refusal = quality.check_path(path, found, config)
             if robot_vector is None or refusal is not None:
                 return replace(scene, refusal=refusal or Refusal(Reason.TOO_SHORT, "it has no direction"))
-            centerline = find_centerline(graph, skeletons.vessel, path.head, robot_vector.direction, config.vectors, scene.route)
+            centerline = find_centerline(
+                graph, skeletons.vessel, path.head, robot_vector.direction, config.vectors, scene.route, found.vessel
+            )
             vessel_vector = fit_vessel_vector(centerline, config.vectors.line_fit) if centerline is not None else None
             refusal = quality.check_centerline(centerline, path.head, config.quality)
             if refusal is None and vessel_vector is None:
@@ -373,7 +375,7 @@ def _believed(found: Masks, config: PerceptionConfig) -> NDArray[np.float32]:
 
 def _with_route(scene: Scene, graph: VesselGraph, head: Point, target: Point, vessel: Mask, routes: RouteMemory | None) -> Scene:
     """The way to the target in working px, or why there is none; in a stream `routes` remembers what was found before."""
-    way = route_or_reason(graph, head, target)
+    way = route_or_reason(graph, head, target, vessel)
     if routes is not None:
         way = routes.follow(way, head, target, vessel, scene.captured_s)
     return replace(scene, route_problem=way) if isinstance(way, str) else replace(scene, route=way)

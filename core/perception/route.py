@@ -7,13 +7,14 @@ import heapq
 import numpy as np
 
 from core.perception import polyline
-from core.types import Point, Route, VesselGraph
+from core.perception.lumen import foot, is_walled_off
+from core.types import Mask, Point, Route, VesselGraph
 
 OFF_VESSEL_PX = 15.0
 """A click so far beside the lumen is still taken for one on the vessel."""
 
 
-def route_or_reason(graph: VesselGraph, start: Point, target: Point) -> Route | str:
+def route_or_reason(graph: VesselGraph, start: Point, target: Point, vessel: Mask | None = None) -> Route | str:
     """The route, or in plain words why there is none: the target is beside the vessel, or no vessel that was found leads there."""
     there = _lumen(graph, target)
     if there is None:
@@ -21,17 +22,19 @@ def route_or_reason(graph: VesselGraph, start: Point, target: Point) -> Route | 
     beside_px, *_ = there
     if beside_px > OFF_VESSEL_PX:
         return f"the target is {beside_px:.0f} px beside the vessel"
-    return plan_route(graph, start, target) or "no vessel that was found leads there"
+    return plan_route(graph, start, target, vessel) or "no vessel that was found leads there"
 
 
-def plan_route(graph: VesselGraph, start: Point, target: Point) -> Route | None:
+def plan_route(graph: VesselGraph, start: Point, target: Point, vessel: Mask | None = None) -> Route | None:
     """The shortest way along the graph from the place beside `start` to the one beside `target`, in the vessel that this lies in.
+
+    With the vessel's mask (h, w), in pixels, no wall lies between `start` and the place beside it.
 
     Returns
     -------
     The route, or None when the graph is empty or has no way between the two places.
     """
-    here, there = _place(graph, start), _lumen(graph, target)
+    here, there = _place(graph, start, vessel), _lumen(graph, target)
     if here is None or there is None:
         return None
     (edge, position), (_, last_edge, last_position) = here, there
@@ -65,13 +68,18 @@ def plan_route(graph: VesselGraph, start: Point, target: Point) -> Route | None:
     return Route(points[distinct], length, target)
 
 
-def _place(graph: VesselGraph, point: Point) -> tuple[int, float] | None:
-    """The edge nearest to a point and the arc-length position on it."""
-    best = min(
-        ((*polyline.nearest(edge.points, point)[:2], index) for index, edge in enumerate(graph.edges) if len(edge.points) > 1),
-        default=None,
-    )
-    return None if best is None else (best[2], best[1])
+def _place(graph: VesselGraph, point: Point, vessel: Mask | None) -> tuple[int, float] | None:
+    """The edge nearest to a point and the arc-length position on it; beyond a wall only where nothing lies before it."""
+    lines = [(index, edge.points) for index, edge in enumerate(graph.edges) if len(edge.points) > 1]
+    nearest = [(*polyline.nearest(points, point), index) for index, points in lines]
+    if not nearest:
+        return None
+    _, position, place, index = min(nearest, key=lambda found: (found[0], found[1]))
+    if vessel is not None and is_walled_off(point, place, vessel):
+        feet = [(found[0], found[1], index) for index, points in lines if (found := foot(points, point, vessel)) is not None]
+        if feet:
+            _, position, index = min(feet)
+    return index, position
 
 
 def _lumen(graph: VesselGraph, point: Point) -> tuple[float, int, float] | None:

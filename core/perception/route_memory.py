@@ -8,6 +8,7 @@ import numpy as np
 
 from core.config import TrackingConfig
 from core.perception import polyline
+from core.perception.lumen import foot
 from core.types import Mask, Point, Points, Route
 
 _STEP_PX = 1.0
@@ -50,7 +51,10 @@ class RouteMemory:
         if known is None or known.target != target:
             self._route = None
             return None
-        away_px, position, _ = polyline.nearest(known.points, head)
+        beside = foot(known.points, head, vessel)
+        if beside is None:
+            return None
+        away_px, position, _ = beside
         rest = polyline.cut(known.points, position, math.inf)
         if away_px > self._config.route_reach_px or _outside_px(rest, vessel) > self._config.route_gap_px:
             return None

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from core.config import VectorConfig, load_config
 from core.perception import centerline, polyline
-from core.perception.centerline import centerline_at, window_at
+from core.perception.centerline import centerline_at, plan_route, window_at
 from core.perception.vectors import fit_vessel_vector
-from core.types import GraphEdge, Point, Points, Route, VesselGraph
+from core.types import GraphEdge, Mask, Point, Points, Route, VesselGraph
 from tests.core.drawing import direction
 
 EAST, WEST = (1.0, 0.0), (-1.0, 0.0)
@@ -137,6 +137,54 @@ def test_a_robot_in_another_vessel_than_the_routes_is_not_said_to_be_in_it() -> 
     beyond = centerline_at(FORK, (170, 65), direction(-26.57), HALF, route)
     assert beyond is not None
     assert beyond.nearest[1] < 80
+
+
+def _side_by_side(*, joined: bool) -> tuple[VesselGraph, Mask]:
+    """A wide vessel (y = 100, 40 px) and a narrow one (y = 129, 10 px) with 3 px of wall between: one edge round a bend, or two."""
+    vessel = np.zeros((200, 400), np.bool_)
+    vessel[80:121], vessel[124:135] = True, True
+    wide, narrow = np.linspace((0.0, 100.0), (380.0, 100.0), 381), np.linspace((380.0, 129.0), (0.0, 129.0), 381)
+    if joined:
+        vessel[80:135, 360:] = True
+        line = np.concatenate([wide, np.linspace((380.0, 101.0), (380.0, 128.0), 28), narrow])
+        radius = np.where(line[:, 1] == 100.0, 20.0, 5.0)
+        return VesselGraph(np.array([line[0], line[-1]]), (GraphEdge(0, 1, line, radius),)), vessel
+    edges = (GraphEdge(0, 1, wide, np.full(381, 20.0)), GraphEdge(2, 3, narrow, np.full(381, 5.0)))
+    return VesselGraph(np.array([wide[0], wide[-1], narrow[0], narrow[-1]]), edges), vessel
+
+
+@pytest.mark.parametrize("joined", [True, False])
+@pytest.mark.parametrize(("y", "own"), [(116.0, 100.0), (119.5, 100.0), (125.0, 129.0), (133.0, 129.0)])
+def test_the_centerline_is_that_of_the_lumen_that_holds_the_head(joined: bool, y: float, own: float) -> None:
+    """Beside the wall of the wide vessel the narrow one's centerline is nearer."""
+    graph, vessel = _side_by_side(joined=joined)
+    found = centerline_at(graph, (150.5, y), EAST, HALF, vessel=vessel)
+    assert found is not None
+    assert found.nearest == pytest.approx((150.5, own))
+    assert found.piece[[0, -1]].tolist() == [pytest.approx([130.5, own]), pytest.approx([170.5, own])]
+    assert found.ambiguity == 0.0
+
+
+@pytest.mark.parametrize("joined", [True, False])
+def test_a_route_that_bends_back_leads_on_in_the_heads_own_lumen(joined: bool) -> None:
+    graph, vessel = _side_by_side(joined=joined)
+    target = (20.0, 129.0) if joined else (370.0, 100.0)
+    route = plan_route(graph, (100.0, 118.0), target, vessel)
+    assert route is not None
+    assert route.points[0] == pytest.approx((100.0, 100.0))
+    assert route.length_px == pytest.approx(280.0 + 29.0 + 360.0 if joined else 270.0)
+    found = centerline_at(graph, (150.0, 118.0), direction(100), HALF, route, vessel)
+    assert found is not None
+    assert found.piece[[0, -1]].tolist() == [pytest.approx([130.0, 100.0]), pytest.approx([170.0, 100.0])]
+
+
+def test_where_everything_lies_beyond_a_wall_the_nearest_is_better_than_none() -> None:
+    graph, vessel = _side_by_side(joined=False)
+    narrow = VesselGraph(graph.nodes[2:], (GraphEdge(0, 1, graph.edges[1].points, graph.edges[1].radius),))
+    assert plan_route(narrow, (150.0, 118.0), (20.0, 129.0), vessel) is not None
+    found = centerline_at(narrow, (150.0, 118.0), EAST, HALF, vessel=vessel)
+    assert found is not None
+    assert found.nearest == pytest.approx((150.0, 129.0))
 
 
 def test_a_route_that_does_not_pass_by_is_ignored() -> None:

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from core.perception import polyline
 from core.perception.compiled.loops import maps
-from core.perception.lumen import RadiusMap
+from core.perception.lumen import RadiusMap, foot, is_walled_off
+from core.types import Mask, Point, Points
 
 AT = np.array([[60.0, 100.0], [80.0, 100.0], [100.0, 100.0]])
 DOWN = np.tile([0.0, 1.0], (3, 1))
@@ -63,3 +65,70 @@ def test_a_soft_wall_is_told_from_a_sharp_one() -> None:
     assert slopes == sorted(slopes)
     assert slopes[0] == pytest.approx(0.05, rel=0.2)
     assert slopes[2] > 4 * slopes[0]
+
+
+# ---- one lumen, or two side by side ----
+
+
+def _bent_back(bridge: tuple[int, int] = (0, 0)) -> tuple[Mask, Points]:
+    """A vessel that bends back beside itself: wide (40 px) on its way out, narrow (10 px) on its way back, 3 px of wall between.
+
+    `bridge`: columns in which there is no wall. The line is the whole centerline, drawn from the wide strand's beginning.
+    """
+    mask = np.zeros((200, 300), np.bool_)
+    mask[80:121, :260] = True
+    mask[124:135, :260] = True
+    mask[80:135, 220:270] = True
+    mask[121:124, bridge[0] : bridge[1]] = True
+    line = np.concatenate(
+        [
+            np.linspace((0.0, 100.0), (240.0, 100.0), 241),
+            np.linspace((240.0, 101.0), (240.0, 128.0), 28),
+            np.linspace((240, 129), (0, 129), 241),
+        ]
+    )
+    return mask, line
+
+
+@pytest.mark.parametrize(
+    ("other", "walled_off"),
+    [((150.0, 100.0), False), ((150.0, 129.0), True), ((190.0, 129.0), True), ((245.0, 129.0), False), ((150.0, 122.0), False)],
+)
+def test_a_wall_between_two_places_parts_them(other: Point, walled_off: bool) -> None:
+    mask, _ = _bent_back()
+    head = (245.0, 100.0) if other[0] > 220 else (150.0, 117.0)
+    assert is_walled_off(head, other, mask) is walled_off
+    assert is_walled_off(other, head, mask) is walled_off
+
+
+def test_a_line_that_touches_the_corner_of_a_pixel_meets_no_wall() -> None:
+    mask = np.ones((20, 20), np.bool_)
+    mask[10, 10] = False
+    assert not is_walled_off((0.0, 9.0), (19.0, 9.4), mask)
+    assert is_walled_off((0.0, 10.0), (19.0, 10.0), mask)
+
+
+def test_what_lies_outside_at_an_end_is_no_wall() -> None:
+    mask, _ = _bent_back()
+    assert not is_walled_off((100.0, 76.0), (100.0, 90.0), mask), "the robot bulges its vessel"
+    assert not is_walled_off((100.0, 150.0), (100.0, 170.0), mask)
+    assert not is_walled_off((-3.0, 100.0), (2.0, 100.0), mask), "nor does what lies beyond the picture matter"
+
+
+def test_the_foot_on_a_line_that_bends_back_lies_in_the_strand_that_holds_the_place() -> None:
+    mask, line = _bent_back()
+    place = (100.25, 117.0)
+    assert polyline.nearest(line, place)[2] == pytest.approx((100.25, 129.0)), "the other strand is nearer"
+    found = foot(line, place, mask)
+    assert found is not None
+    assert found[0] == pytest.approx(17.0)
+    assert found[1] == pytest.approx(100.25)
+    assert found[2] == pytest.approx((100.25, 100.0))
+    assert foot(line, place, None) == polyline.nearest(line, place)
+    open_mask, _ = _bent_back(bridge=(90, 110))
+    assert foot(line, place, open_mask) == polyline.nearest(line, place), "without a wall it is one lumen"
+
+
+def test_beyond_a_wall_from_everything_there_is_no_foot() -> None:
+    mask, line = _bent_back()
+    assert foot(line[-200:], (100.0, 117.0), mask) is None
