@@ -395,18 +395,23 @@ def _cut_at(vessel: np.ndarray, left: int, right: int) -> np.ndarray:
 
 def test_in_a_stream_a_way_that_was_seen_holds_over_a_gap(pipeline: Pipeline, network: DrawnNetwork) -> None:
     target, whole = (560.0, 246.0), network.vessel
-    first = pipeline(frame(), target)
-    assert first.route is not None
+    for step in range(17, 0, -1):
+        first = pipeline(frame(1.0 - step * FRAME_S), target)
+        assert first.route is not None
     network.vessel = _cut_at(whole, 440, 465)
-    later = pipeline(frame(FRAME_S), target)
+    later = pipeline(frame(1.0), target)
     assert later.route is not None
     assert later.route_problem == ""
     assert later.route.length_px == pytest.approx(first.route.length_px, abs=6.0)
-    alone = pipeline.perceive_single(frame(2 * FRAME_S), target)
+    alone = pipeline.perceive_single(frame(1.0 + FRAME_S), target)
     assert alone.route is None
     assert alone.route_problem == "no vessel that was found leads there"
     pipeline.reset()
-    assert pipeline(frame(3 * FRAME_S), target).route is None
+    assert pipeline(frame(1.0 + 2 * FRAME_S), target).route is None
+    network.vessel = whole
+    assert pipeline(frame(1.0 + 3 * FRAME_S), target).route is not None
+    network.vessel = _cut_at(whole, 440, 465)
+    assert pipeline(frame(1.0 + 4 * FRAME_S), target).route is None, "it was seen for one frame only"
 
 
 def test_no_way_is_remembered_once_the_destination_was_taken_back(pipeline: Pipeline, network: DrawnNetwork) -> None:

@@ -29,10 +29,18 @@ def _vessel(gap: tuple[int, int] = (0, 0)) -> NDArray[np.bool_]:
 
 @pytest.fixture
 def memory() -> RouteMemory:
+    """It has been found for half a second."""
     memory = RouteMemory(CONFIG)
-    found = _route()
-    assert memory.follow(found, (20.0, 100.0), TARGET, _vessel(), 0.0) is found
+    for at_s in (-CONFIG.memory_s, 0.0):
+        found = _route()
+        assert memory.follow(found, (20.0, 100.0), TARGET, _vessel(), at_s) is found
     return memory
+
+
+DETOUR = Route(np.array([(120.0, 100.0), (120.0, 10.0), (380.0, 10.0), TARGET]), 440.0, TARGET)
+"""Round a loop there is another way when a reflection cuts this one."""
+SHORT_CUT = Route(np.array([(120.0, 100.0), (200.0, 130.0), TARGET]), 150.0, TARGET)
+"""Where another turn of the vessel seems to touch this one."""
 
 
 def test_a_short_gap_ahead_does_not_undo_it(memory: RouteMemory) -> None:
@@ -58,12 +66,35 @@ def test_another_destination_has_to_be_found_itself(memory: RouteMemory) -> None
     assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel(), 0.0) == WHY, "and the old one is forgotten with it"
 
 
-def test_what_is_found_anew_replaces_it(memory: RouteMemory) -> None:
+def test_what_is_found_anew_and_lasts_replaces_it(memory: RouteMemory) -> None:
     around = Route(np.linspace((120.0, 100.0), (120.0, 190.0), 50), 500.0, TARGET)
-    assert memory.follow(around, (120.0, 100.0), TARGET, _vessel(), 1.0) is around
-    left = memory.follow(WHY, (120.0, 120.0), TARGET, np.ones((200, 400), np.bool_), 0.0)
+    assert memory.follow(around, (120.0, 100.0), TARGET, _vessel(), 1.0) is not around
+    assert memory.follow(around, (120.0, 100.0), TARGET, _vessel(), 1.5) is around
+    left = memory.follow(WHY, (120.0, 120.0), TARGET, np.ones((200, 400), np.bool_), 1.6)
     assert isinstance(left, Route)
     assert left.points[-1] == pytest.approx((120.0, 190.0))
+
+
+def test_a_way_that_was_found_for_a_moment_only_holds_over_nothing() -> None:
+    """One frame in which two vessels seem to touch must not lead the robot for as long as nothing else is found."""
+    memory = RouteMemory(CONFIG)
+    head, cut = (120.0, 100.0), _vessel((200, 212))
+    assert memory.follow(SHORT_CUT, head, TARGET, _vessel(), 0.0) is SHORT_CUT
+    assert memory.follow(WHY, head, TARGET, cut, 0.03) == WHY
+    found = _route(120.0)
+    assert memory.follow(found, head, TARGET, _vessel(), 0.06) is found, "and stands against nothing"
+    for at_s in (0.1, 0.3, 0.5):
+        assert memory.follow(_route(120.0), head, TARGET, _vessel(), at_s)
+        assert memory.follow(WHY, head, TARGET, cut, at_s + 0.01) == WHY
+    memory.follow(_route(120.0), head, TARGET, _vessel(), 0.56)
+    assert isinstance(memory.follow(WHY, head, TARGET, cut, 0.6), Route), "found for half a second, but for moments"
+
+
+def test_finds_long_apart_are_no_lasting(memory: RouteMemory) -> None:
+    memory.forget()
+    for at_s in (1.0, 3.0, 5.0):
+        memory.follow(_route(120.0), (120.0, 100.0), TARGET, _vessel(), at_s)
+        assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel(), at_s + 0.1) == WHY
 
 
 def test_parts_outside_the_picture_are_gaps(memory: RouteMemory) -> None:
@@ -83,13 +114,29 @@ def test_forgotten_is_forgotten(memory: RouteMemory) -> None:
     assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel(), 0.0) == WHY
 
 
-def test_a_detour_of_a_moment_is_not_taken(memory: RouteMemory) -> None:
-    """Round a loop there is another way when a reflection cuts this one."""
-    points = np.array([(120.0, 100.0), (120.0, 10.0), (380.0, 10.0), TARGET])
-    detour = Route(points, 440.0, TARGET)
+@pytest.mark.parametrize("other", [DETOUR, SHORT_CUT], ids=["detour", "short cut"])
+def test_another_way_of_a_moment_is_not_taken(memory: RouteMemory, other: Route) -> None:
     head, cut = (120.0, 100.0), _vessel((200, 212))
-    left = memory.follow(detour, head, TARGET, cut, 0.1)
+    left = memory.follow(other, head, TARGET, cut, 0.1)
     assert isinstance(left, Route)
     assert left.length_px == pytest.approx(260.0, abs=2.0)
-    assert memory.follow(detour, head, TARGET, cut, CONFIG.memory_s + 0.1) is detour, "what lasts is true: perhaps the way was none"
-    assert memory.follow(detour, head, TARGET, cut, CONFIG.memory_s + 0.2) is detour
+    assert memory.follow(other, head, TARGET, cut, CONFIG.memory_s + 0.1) is other, "what lasts is true: perhaps the way was none"
+    assert memory.follow(other, head, TARGET, cut, CONFIG.memory_s + 0.2) is other
+
+
+@pytest.mark.parametrize("other", [DETOUR, SHORT_CUT], ids=["detour", "short cut"])
+def test_nor_is_it_when_the_way_was_not_found_for_long(memory: RouteMemory, other: Route) -> None:
+    head, cut = (120.0, 100.0), _vessel((200, 212))
+    assert isinstance(memory.follow(WHY, head, TARGET, cut, 5.0), Route)
+    left = memory.follow(other, head, TARGET, cut, 5.03)
+    assert left is not other
+    assert memory.follow(_route(120.0), head, TARGET, _vessel(), 5.3) is not left
+    assert memory.follow(other, head, TARGET, cut, 5.6) is not other, "it has been seen to be none meanwhile"
+
+
+def test_other_ways_that_contradict_each_other_are_not_taken(memory: RouteMemory) -> None:
+    head, cut = (120.0, 100.0), _vessel((200, 212))
+    for step in range(40):
+        told = memory.follow((DETOUR, SHORT_CUT)[step % 2], head, TARGET, cut, 0.1 + step / 30)
+        assert isinstance(told, Route)
+        assert told.length_px == pytest.approx(260.0, abs=2.0)
