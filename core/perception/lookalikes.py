@@ -51,6 +51,8 @@ class Lookalikes:
 
     def _begin(self, shape: tuple[int, ...]) -> None:
         self._last_s = -math.inf
+        self.none: Mask | None = None
+        """What the last ``without`` took out of the mask (h, w); None for nothing."""
         self._end: tuple[Point, float] | None = None
         self._pieces: list[_Piece] = []
         self._checked_s = -math.inf
@@ -69,6 +71,7 @@ class Lookalikes:
         robot, image : mask (h, w) and RGB picture (h, w, 3).
         window : (x, y, width, height) of what was looked at anew; None for all of it.
         """
+        self.none = None
         if self._travel_px == 0.0:
             return robot
         is_rewound = captured_s < self._last_s
@@ -81,6 +84,8 @@ class Lookalikes:
             if self._was_robot(piece, captured_s):
                 self._robots_s[piece.box][piece.mask] = captured_s
         self._sight(self._apart(pieces, captured_s, window), image, captured_s)
+        if left is not robot:
+            self.none = robot & ~left
         return left
 
     def learn(self, path: RobotPath, captured_s: float) -> None:

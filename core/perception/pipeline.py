@@ -63,15 +63,18 @@ class Sight:
     familiarity: Familiarity | None = None
 
 
-@dataclass(frozen=True, slots=True)
+_EDGE_PX = 4
+"""Around what a mask shows the probability falls off so far."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Before:
-    """The path of the last frame, or, after a gap, the one that still tells which end is the head."""
+    """The path of the last frame, or, after a gap, the one that still tells which end is the head; and which pixels (h, w) of this
+    frame are known to be no robot."""
 
     path: RobotPath | None = None
     ends: RobotPath | None = None
-
-
-_NOTHING = _Before()
+    none: Mask | None = None
 
 
 class _Past:
@@ -86,7 +89,8 @@ class _Past:
         self.unlike = False
 
     def recall(self, captured_s: float) -> _Before:
-        return _Before(recall(self.memory, captured_s, self._config), recall_ends(self.memory, captured_s, self._config))
+        memory, config = self.memory, self._config
+        return _Before(recall(memory, captured_s, config), recall_ends(memory, captured_s, config), self.lookalikes.none)
 
     def forget(self) -> None:
         self.memory, self.unlike = None, False
@@ -207,7 +211,7 @@ class Pipeline:
         unlike = self._check_kind(scene, past)
         if scene.refusal is not None:
             return replace(scene, refusal=quality.hinted(scene.refusal, unlike))
-        before = past.recall(frame.captured_s) if past is not None else _NOTHING
+        before = past.recall(frame.captured_s) if past is not None else _Before()
         scene = self._locate(scene, image, target, watch, before, past.routes if past is not None else None)
         if scene.refusal is None and unlike is not None:
             # What was found is kept: it is what somebody who teaches the model this rig begins with.
@@ -327,10 +331,10 @@ class Pipeline:
             if refusal is not None:
                 return replace(scene, refusal=refusal)
             pose = measure(robot, vessel, config.pose)
-            evidence = collect(path, robot, centerline, found, config)
+            believed = _believed(found, before.none)
+            evidence = collect(path, robot, centerline, believed, config)
         if sight.swings:
             with watch.stage("steadiness"):
-                believed = replace(found, robot_probability=_believed(found, config))
                 others = [
                     self._answer(scene, image, target, masks.clean(*shifted, config), before)
                     for shifted in steadiness.neighbours(believed)
@@ -364,13 +368,16 @@ def _unseen(scene: Scene, vessel: NDArray[np.float32], robot: NDArray[np.float32
     return replace(scene, masks=Masks(np.zeros(vessel.shape, bool), np.zeros(robot.shape, bool), vessel, robot), refusal=why)
 
 
-def _believed(found: Masks, config: PerceptionConfig) -> NDArray[np.float32]:
-    """The robot's probability (h, w), 0 around what a stream knows to be none."""
-    none = masks.clean_robot(found.robot_probability, config) & ~found.robot
-    if not none.any():
-        return found.robot_probability
-    around = cv2.dilate(none.view(np.uint8), np.ones((9, 9), np.uint8)) > 0
-    return np.where(around & ~found.robot, np.float32(0), found.robot_probability)
+def _believed(found: Masks, none: Mask | None) -> Masks:
+    """The masks with a robot's probability (h, w) of 0 around `none` (h, w), what a stream knows to be no robot."""
+    if none is None:
+        return found
+    x, y, width, height = cv2.boundingRect(none.view(np.uint8))
+    box = slice(max(0, y - _EDGE_PX), y + height + _EDGE_PX), slice(max(0, x - _EDGE_PX), x + width + _EDGE_PX)
+    around = cv2.dilate(none[box].view(np.uint8), np.ones((2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1), np.uint8)) > 0
+    probability = found.robot_probability.copy()
+    probability[box][around & ~found.robot[box]] = 0.0
+    return replace(found, robot_probability=probability)
 
 
 def _with_route(scene: Scene, graph: VesselGraph, head: Point, target: Point, vessel: Mask, routes: RouteMemory | None) -> Scene:

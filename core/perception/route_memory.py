@@ -29,7 +29,7 @@ class RouteMemory:
 
     The phantom stands still, but a fitting or a reflection can cut the mask of the vessel in two, in one frame and not in the next,
     or join two vessels. The route of before then still holds if it has lasted for ``memory_s``, the head is beside it, and the
-    vessel is still where it leads, but for a short gap. Another way, longer or shorter, is taken for true once it has lasted as long.
+    vessel is still where it leads, but for a short gap. Another way, longer or shorter, is taken once it has lasted as long.
     """
 
     def __init__(self, config: TrackingConfig) -> None:

@@ -171,6 +171,26 @@ def test_in_a_stream_what_is_known_to_be_no_robot_does_not_shake_an_answer(netwo
         assert scene.evidence[-1] < np.log1p(3.0), f"at column {x}"
 
 
+def test_in_a_stream_what_is_known_to_be_no_robot_does_not_lower_the_confidence(network: DrawnNetwork) -> None:
+    """The same stream with printed text ahead and without gives the same evidence, and so the same confidence."""
+    text = VESSEL[(VESSEL[:, 0] >= 420) & (VESSEL[:, 0] <= 450)]
+    told = []
+    for others in ((), (text,)):
+        pipeline = Pipeline(network, CONFIG)
+        for k, x in enumerate(range(270, 411, 5)):
+            network.draw(VESSEL[VESSEL[:, 0] <= x], *others)
+            scene = pipeline(frame(k * FRAME_S))
+        assert scene.evidence is not None
+        assert scene.pose is not None
+        told.append((scene.evidence, scene.pose.confidence))
+        if others:
+            assert scene.masks is not None
+            assert scene.masks.robot_probability[:, 420:450].max() > 0.9, "it is still shown"
+    (without, sure), (beside, as_sure) = told
+    assert beside == pytest.approx(without, abs=0.01)
+    assert as_sure == pytest.approx(sure, abs=0.01)
+
+
 # ---- single images and streams ----
 
 STEM = [(-20.0, 240.0), (120.0, 240.0), (200.0, 240.0)]
