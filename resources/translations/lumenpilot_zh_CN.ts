@@ -952,6 +952,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the torque is not proven to be off: cut the servos' power</source>
+        <translation>未能证实力矩已关闭：请切断舵机电源</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>acknowledging</source>
         <translation>正在确认</translation>
     </message>
@@ -1639,6 +1644,31 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>{joint} off by {a} mm (at most {b} mm)</source>
         <translation>{joint}偏差 {a} mm（最多 {b} mm）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{joint} stands {a} mm from its goal for {b} ms</source>
+        <translation>{joint}停在距目标 {a} mm 处已 {b} ms</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{joint} went {a} mm where nobody sent it</source>
+        <translation>{joint}未经指令移动了 {a} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{joint} stays at {a} mm, outside its envelope ({b} to {c} mm)</source>
+        <translation>{joint}停在 {a} mm，超出行程范围（{b} 至 {c} mm）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{joint} up to {a} mA for {b} ms (at most {c} mA)</source>
+        <translation>{joint}电流达 {a} mA，持续 {b} ms（最多 {c} mA）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>torque of {names} is not proven to be off: cut the servos' power</source>
+        <translation>未能证实{names}的力矩已关闭：请切断舵机电源</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -4244,6 +4274,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/servo_cells.py"/>
         <source>cycle not measured yet</source>
         <translation>周期尚未测量</translation>
+    </message>
+    <message>
+        <location filename="../../app/servo_cells.py"/>
+        <source>limit {most:g} mA for half a second</source>
+        <translation>上限 {most:g} mA，持续半秒</translation>
     </message>
     <message>
         <location filename="../../app/servo_cells.py"/>
@@ -8009,6 +8044,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>servo draws too much current</source>
+        <translation>舵机电流过大</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>torque not proven to be off</source>
+        <translation>未能证实力矩已关闭</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>servos are not as configured</source>
         <translation>舵机与配置不符</translation>
     </message>
@@ -8446,6 +8491,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>look for a jam or a slack wire, then acknowledge</source>
         <translation>查找卡住处或松弛的驱动丝，然后确认</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>A servo draws too much current</source>
+        <translation>有舵机电流过大</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>free the wire or what it moves, let it cool, then acknowledge</source>
+        <translation>松开驱动丝或被带动的部件，待其冷却，然后确认</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>The torque is not proven to be off</source>
+        <translation>未能证实力矩已关闭</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>cut the servos' power; until they say so it is tried again</source>
+        <translation>请切断舵机电源；在舵机证实之前会反复尝试</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8901,6 +8966,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>hand over again to go there</source>
         <translation>重新移交以前往</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>The torque is off: all servos have said so</source>
+        <translation>力矩已关闭：所有舵机均已证实</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the wires hang loose; switch the servos on to drive</source>
+        <translation>驱动丝已松弛；驾驶前请开启舵机</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -9914,13 +9989,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>Dwell frames</source>
-        <translation>停留帧数</translation>
+        <source>Dwell</source>
+        <translation>停留时间</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>a new state must be seen this often in a row to be shown</source>
-        <translation>新状态须连续出现这么多次才显示</translation>
+        <source>a new state must have been seen for so long to be shown</source>
+        <translation>新状态须已出现这么久才会显示</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -10084,8 +10159,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>older frames say nothing about this one</source>
-        <translation>更早的帧对当前帧没有意义</translation>
+        <source>older frames tell at most which end is the head</source>
+        <translation>更早的帧至多说明哪一端是头部</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -10671,6 +10746,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>a lower supply ends the driving</source>
         <translation>供电更低则结束驾驶</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Max current</source>
+        <translation>最大电流</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>a servo that draws more for half a second is stopped; small ones (XL330, XC330) stall at 1500 to 1800</source>
+        <translation>舵机电流超过此值达半秒即停止；小型舵机（XL330、XC330）的堵转电流为 1500 至 1800</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
