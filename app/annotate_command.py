@@ -401,7 +401,7 @@ def _import(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
 def _join(store_path: Path, options: AnnotateOptions) -> int:
     from core.study.annotation_join import join
 
-    names = {}
+    names: dict[str, str] = {}
     for said in options.names:
         there, _, here = (part.strip() for part in said.partition("="))
         if not there or not here or names.get(there, here) != here:

@@ -66,14 +66,18 @@ def read_kept(database: sqlite3.Connection) -> list[KeptAnnotation]:
     edits: dict[int, dict[int, _Edit]] = {}
     journal = "SELECT annotation_id, number, kind, base, check_sum, content, made_utc FROM journal"
     for row_id, number, *edit in database.execute(journal).fetchall():
-        edits.setdefault(row_id, {})[number] = tuple(edit)  # type: ignore[assignment]
+        edits.setdefault(row_id, {})[number] = tuple(edit)
     has_origins = has_table(database, "origins")
     origin, beside = ("o.origin", "LEFT JOIN origins o ON o.annotation_id = a.id") if has_origins else ("NULL", "")
     rows = database.execute(
         f"SELECT a.id, i.sha256, a.study, a.rater, a.repeat, a.content, a.check_sum, a.begun_utc, {origin} FROM annotations a"
         f" JOIN images i ON i.id = a.image_id {beside} ORDER BY a.id"
     )
-    return [KeptAnnotation(*row, edits.get(row[0], {})) for row in rows.fetchall()]
+    found: list[KeptAnnotation] = []
+    for row_id, sha256, study, rater, repeat, content, check_sum, begun_utc, came_from in rows.fetchall():
+        kept = edits.get(row_id, {})
+        found.append(KeptAnnotation(row_id, sha256, study, rater, repeat, content, check_sum, begun_utc, came_from, kept))
+    return found
 
 
 def has_table(database: sqlite3.Connection, name: str) -> bool:
