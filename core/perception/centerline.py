@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from core.config import VectorConfig
 from core.perception import polyline
+from core.perception.feet import feet_of
 from core.perception.lumen import foot, is_walled_off
 from core.perception.route import incidence_of, plan_route
 from core.perception.vessel_graph import build_graph
@@ -27,23 +28,11 @@ ROUTE_WEIGHT = 1.0
 WALL_WEIGHT = 4.0
 LEAVES_ROUTE, SAME_ROUTE = 0.5, 0.1
 """Off the route by more than the first (0 to 1), a path leaves it; by up to the second more than another one, both keep to it."""
-REACH_RADII = 1.5
-"""Vessels farther from the head than this many of their radii are not looked at."""
 TIE_COST = 0.2
 """A path whose cost is this much above the best one's no longer counts as nearly as good."""
 SAME_COST = 1e-9
 TIE_ANGLE_DEG = 20.0
 """Two nearly as good paths that differ by this much make the answer fully ambiguous; by less, proportionally less so."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Foot:
-    """The place on an edge nearest to the head within its lumen: its distance, its arc-length position, the radius there."""
-
-    distance: float
-    edge: int
-    position: float
-    radius: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +122,7 @@ def centerline_at(
     -------
     The piece, or None when the graph is empty or ends too soon (less than ``MIN_PIECE_SHARE`` of the wanted length).
     """
-    feet = _feet(graph, head, half_length_px, vessel)
+    feet = feet_of(graph, head, half_length_px, vessel)
     incidence = incidence_of(graph)
     # One scale for all candidates: a narrow branch must not count the same distance for more than its wide trunk does.
     scale = max((near.radius for near in feet), default=1.0)
@@ -164,35 +153,6 @@ def centerline_at(
     best = next(candidate for candidate in candidates if candidate.cost <= least + SAME_COST)
     ambiguity = max(_rivalry(best, other) for other in candidates)
     return Centerline(best.piece, best.nearest, best.radius, ambiguity)
-
-
-def _feet(graph: VesselGraph, head: Point, half_length: float, vessel: Mask | None) -> list[_Foot]:
-    """The edges that the head may belong to, in the graph's order."""
-    plain = []
-    for index, edge in enumerate(graph.edges):
-        if len(edge.points) >= 2:
-            along = polyline.arc_length(edge.points)
-            distance, position, place = polyline.nearest(edge.points, head, along)
-            radius = float(np.interp(position, along, edge.radius))
-            plain.append((_Foot(distance, index, position, max(radius, 0.25 * half_length)), place, distance <= radius))
-    plain.sort(key=lambda one: (one[0].distance, one[0].edge))
-    found: list[_Foot] = []
-    for near, place, is_inside in plain:
-        if found and not _is_in_reach(near, found):
-            continue
-        if vessel is None or is_inside or not is_walled_off(head, place, vessel):
-            found.append(near)
-        elif (within := foot(graph.edges[near.edge].points, head, vessel)) is not None:
-            edge = graph.edges[near.edge]
-            radius = float(np.interp(within[1], polyline.arc_length(edge.points), edge.radius))
-            found.append(_Foot(within[0], near.edge, within[1], max(radius, 0.25 * half_length)))
-    found = found or [near for near, *_ in plain]
-    return sorted((one for one in found if _is_in_reach(one, found)), key=lambda one: one.edge)
-
-
-def _is_in_reach(one: _Foot, found: list[_Foot]) -> bool:
-    first = min(found, key=lambda near: (near.distance, near.edge))
-    return one.distance <= max(first.distance + 0.25 * first.radius, REACH_RADII * one.radius)
 
 
 def _walks(
