@@ -295,6 +295,8 @@ TEMPLATES = (
     "{a} frames in {b} s",
     "the last seconds were not saved: {why}",
     "of the last seconds only {a} of {b} frames were saved: {why}",
+    "{why}; make room and save them again",
+    "disk full ({left} MB left in {folder})",
     "{folder}: {a} GB free of {b} GB",
     "{a} as pinned",
     "{a} can be loaded",

@@ -111,7 +111,7 @@ def look_at_disk(folder: Path, config: RecordConfig) -> Disk | None:
     except (OSError, StopIteration):
         return None
     is_low = free < config.warn_free_mb * _MB or free < config.warn_free_share * total
-    left = f"{free / _MB:,.0f} MB left"
-    warning = f"disk nearly full: {left}" if is_low else ""
-    full = f"disk full ({left} in {folder}); make room and record again" if free < config.stop_free_mb * _MB else ""
+    left = f"{free / _MB:,.0f}"
+    warning = f"disk nearly full: {left} MB left" if is_low else ""
+    full = f"disk full ({left} MB left in {folder})" if free < config.stop_free_mb * _MB else ""
     return Disk(free, warning, full)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from collections.abc import Callable
@@ -68,6 +69,7 @@ class Recording:
         self._target: Event | None = None
         self._dropped_told = 0
         self._dropped_told_s = -math.inf
+        self._last_s = 0.0
         self._lost: _Lost | None = None
         # read by other threads
         self.dropped_before = 0
@@ -103,6 +105,7 @@ class Recording:
             self._board.show(ring_s=self._ring.seconds)
         if self._files is not None:
             self._files.write_frame(encoded)
+            self._last_s = encoded.captured_s
             self._tell_dropped(picture)
             self._board.show(frames=self._files.counts.frames, bytes=self._files.counts.bytes)
 
@@ -141,9 +144,9 @@ class Recording:
         """At most once a second: a recorder that is behind must not be kept busy with saying so."""
         total, now_s = picture.dropped - self.dropped_before, picture.tick.frame.captured_s
         if total > self._dropped_told and now_s - self._dropped_told_s >= _TELL_EVERY_S:
-            count = total - self._dropped_told
+            event = _dropped_event(now_s, total - self._dropped_told, total)
             self._dropped_told, self._dropped_told_s = total, now_s
-            self.take_event(Event(now_s, EventKind.DROPPED, f"{count} frames", {"count": count, "total": total}))
+            self.take_event(event)
 
     def _tell_lost(self, frame: Frame) -> None:
         """Frames that never came from the camera; at most once a second, too. A camera that was opened again counts from 0."""
@@ -163,7 +166,7 @@ class Recording:
 
     def _open(self, picture: Picture) -> None:
         self._is_armed = False
-        first_s = picture.tick.frame.captured_s
+        first_s = self._last_s = picture.tick.frame.captured_s
         self._files = SessionFiles(self._parent, self._about, self._config, first_s=first_s, now_s=self._clock())
         self.dropped_before = self._files.dropped_before = picture.dropped
         self._dropped_told, self._dropped_told_s = 0, -math.inf
@@ -192,6 +195,9 @@ class Recording:
             self._board.show(armed=False)
             return
         count, elapsed_s = dropped - self.dropped_before, max(0.0, self._clock() - self.began_s)
+        if count > self._dropped_told:
+            with contextlib.suppress(OSError):  # the disk may be why it ends; the manifest has the count, too
+                files.write_event(_dropped_event(self._last_s, count - self._dropped_told, count))
         problem = files.close(ended, count)
         self._board.show(recording=False, elapsed_s=elapsed_s, dropped=count, bytes=files.counts.bytes)
         if problem:
@@ -226,3 +232,8 @@ class Recording:
         encoder, self._encoder = self._encoder, None
         if encoder is not None and self._ring is None:
             encoder.close()
+
+
+def _dropped_event(time_s: float, count: int, total: int) -> Event:
+    """So many more frames were dropped, so many since the session began."""
+    return Event(time_s, EventKind.DROPPED, f"{count} frames", {"count": count, "total": total})

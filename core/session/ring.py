@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from core.session.events import Event, EventKind
 from core.session.video import FrameEncoder, Packet
 
+_MAX_EVENTS = 2000
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EncodedFrame:
@@ -34,7 +36,8 @@ class Ring:
         self._seconds = seconds
         self._max_bytes = max_bytes
         self._groups: deque[list[EncodedFrame]] = deque()
-        self._events: deque[Event] = deque(maxlen=2000)
+        self._events: deque[Event] = deque()
+        self._target: Event | None = None
         self._bytes = 0
 
     @property
@@ -65,7 +68,12 @@ class Ring:
         return age_s >= self._seconds or age_s < 0.0
 
     def add_event(self, event: Event) -> None:
+        """Take it in and let the oldest go; the destination among these stays in force."""
         self._events.append(event)
+        while len(self._events) > _MAX_EVENTS:
+            old = self._events.popleft()
+            if old.kind is EventKind.TARGET:
+                self._target = old
 
     def content(self) -> tuple[list[EncodedFrame], list[Event]]:
         """A copy: the frames in order, and the events since the first of them, with the destination that was chosen before."""
@@ -73,11 +81,13 @@ class Ring:
         if not frames:
             return [], []
         first_s = frames[0].captured_s
-        chosen = [event for event in self._events if event.kind is EventKind.TARGET and event.time_s < first_s]
+        chosen = [] if self._target is None else [self._target]
+        chosen += [event for event in self._events if event.kind is EventKind.TARGET and event.time_s < first_s]
         before = [replace(event, time_s=first_s) for event in chosen[-1:] if event.data]
         return frames, before + [event for event in self._events if event.time_s >= first_s]
 
     def clear(self) -> None:
         self._groups.clear()
         self._events.clear()
+        self._target = None
         self._bytes = 0

@@ -9,7 +9,7 @@ from core.record_config import RecordConfig
 from core.session.events import Event
 from core.session.files import SessionFiles
 from core.session.manifest import About, SessionError
-from core.session.record_status import StatusBoard
+from core.session.record_status import StatusBoard, look_at_disk
 from core.session.ring import EncodedFrame
 from core.session.video import VideoError
 
@@ -45,12 +45,14 @@ class RingSaver:
         files: SessionFiles | None = None
         problem, written = "", 0
         try:
+            self._check_room()
             first_s = frames[0].captured_s
             files = SessionFiles(self._parent, about, self._config, first_s=first_s, now_s=now_s, origin="last seconds")
             files.dropped_before = frames[0].dropped
             for event in events:
                 files.write_event(event)
             for frame in frames:
+                self._check_room()
                 files.write_frame(frame)
                 written += 1
         except (VideoError, SessionError) as error:
@@ -61,10 +63,19 @@ class RingSaver:
             # The folder itself says that it is not whole: a message in a window is soon forgotten.
             at_end = files.close(problem or "saved from memory", frames[-1].dropped - frames[0].dropped + len(frames) - written)
             problem = problem or at_end
+        self._tell(problem, files, written, len(frames))
+
+    def _check_room(self) -> None:
+        """The last room of a disk is not for this, as it is for no recording: what is open must still be closed. SessionError."""
+        disk = look_at_disk(self._parent, self._config)
+        if disk is not None and disk.full:
+            raise SessionError(f"{disk.full}; make room and save them again")
+
+    def _tell(self, problem: str, files: SessionFiles | None, written: int, frames: int) -> None:
         self._board.show(saving=False)
         if not problem:
             self._board.show(saved=files.folder if files is not None else None)
         elif not written:
             self._board.notice(f"the last seconds were not saved: {problem}")
         else:
-            self._board.notice(f"of the last seconds only {written} of {len(frames)} frames were saved: {problem}")
+            self._board.notice(f"of the last seconds only {written} of {frames} frames were saved: {problem}")

@@ -53,6 +53,7 @@ class SessionWriter:
         self._pictures_waiting = 0
         self._starts_waiting = 0
         self._dropped = 0
+        self._ends_waiting: deque[int] = deque()
         self._is_closing = False
         self._board = StatusBoard()
         self._recording = Recording(config, about, self._parent, clock, self._board)
@@ -72,7 +73,7 @@ class SessionWriter:
 
     def stop(self, ended: str = "stopped") -> None:
         """End the session after what was put before; `ended` goes into the manifest."""
-        self._order(lambda: self._recording.end(ended, self._dropped))
+        self._order_end(lambda dropped: self._recording.end(ended, dropped))
 
     def save_last(self) -> None:
         """Write what the ring holds as a session, in the background; the status tells when it is there."""
@@ -80,7 +81,7 @@ class SessionWriter:
 
     def set_about(self, about: About) -> None:
         """Another rig was opened: the running session ends, and the ring begins anew, for a session never mixes two rigs."""
-        self._order(lambda: self._recording.change_rig(about, self._dropped))
+        self._order_end(lambda dropped: self._recording.change_rig(about, dropped))
 
     def put(self, tick: Tick, drive: DriveView | None = None, bus: Any = None) -> bool:
         """Hand a tick over, with who drives and the newest status of the servo bus (a dataclass) where there are such.
@@ -136,7 +137,7 @@ class SessionWriter:
         if not status.recording:
             return status
         elapsed_s = max(0.0, self._clock() - self._recording.began_s)
-        return replace(status, elapsed_s=elapsed_s, dropped=max(0, self._dropped - self._recording.dropped_before))
+        return replace(status, elapsed_s=elapsed_s, dropped=max(0, self._dropped_until_end() - self._recording.dropped_before))
 
     def close(self, timeout_s: float = 10.0) -> bool:
         """End the session and the thread, after all that was put; False when the disk has not answered in time."""
@@ -155,6 +156,27 @@ class SessionWriter:
                 self._waiting.append(order)
                 self._changed.notify()
 
+    def _order_end(self, end: Callable[[int], None]) -> None:
+        """An order that ends the session. It hears how many frames were dropped until it was given: later ones are not its."""
+
+        def order() -> None:
+            try:
+                end(self._ends_waiting[0])
+            finally:
+                with self._changed:
+                    self._ends_waiting.popleft()
+
+        with self._changed:
+            if not self._is_closing:
+                self._ends_waiting.append(self._dropped)
+                self._waiting.append(order)
+                self._changed.notify()
+
+    def _dropped_until_end(self) -> int:
+        """Frames dropped until now, ever, or until somebody asked for the end of the session that is being written."""
+        with self._changed:
+            return self._ends_waiting[0] if self._ends_waiting else self._dropped
+
     def _run(self) -> None:
         """The thread."""
         try:
@@ -164,7 +186,7 @@ class SessionWriter:
             _log.error("the recorder stopped", exc_info=error)
             self._fail(f"unexpected {type(error).__name__}: {' '.join(str(error).split())}")
         finally:
-            self._recording.end("closed", self._dropped)
+            self._recording.end("closed", self._dropped_until_end())
             self._recording.drop_encoder()
 
     def _next(self) -> Picture | Event | _Order | None:
@@ -201,7 +223,7 @@ class SessionWriter:
         self._recording.begin()
 
     def _fail(self, problem: str, *, is_disk_full: bool = False) -> None:
-        self._recording.fail(problem, self._dropped, is_disk_full=is_disk_full)
+        self._recording.fail(problem, self._dropped_until_end(), is_disk_full=is_disk_full)
 
     def _watch_disk(self) -> None:
         now_s = time.monotonic()
@@ -212,7 +234,7 @@ class SessionWriter:
         if disk is not None:
             self._board.show(disk_free=disk.free, warning=disk.warning)
             if disk.full and self._recording.is_on:
-                self._fail(disk.full, is_disk_full=True)
+                self._fail(f"{disk.full}; make room and record again", is_disk_full=True)
 
 
 def _is_disk_full(error: BaseException | None) -> bool:

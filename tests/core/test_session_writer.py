@@ -203,6 +203,37 @@ def test_a_full_queue_drops_counts_and_tells(tmp_path: Path, monkeypatch: pytest
         assert any(e.kind is EventKind.NOTE for e in reader.events)
 
 
+def test_what_is_dropped_after_the_stop_was_asked_is_not_the_sessions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what was dropped just before it is told, though no picture came after it."""
+    go, entered = threading.Event(), threading.Event()
+    real = SessionFiles.write_frame
+
+    def slow(self: SessionFiles, frame: EncodedFrame) -> None:
+        entered.set()
+        assert go.wait(10.0)
+        real(self, frame)
+
+    monkeypatch.setattr(SessionFiles, "write_frame", slow)
+    with writer_in(tmp_path, replace_config(max_queue=2)) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0))
+        assert entered.wait(10.0)
+        assert [writer.put(tick) for tick in ticks(3, start=1)] == [True, True, False]
+        writer.stop()
+        assert [writer.put(tick) for tick in ticks(4, start=4)] == [False] * 4
+        assert writer.status().dropped == 1
+        go.set()
+        wait_for(lambda: writer.status().saved is not None)
+        assert writer.status().dropped == 1
+    session = writer.status().saved
+    assert session is not None
+    assert read_manifest(session).counts.dropped == 1
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        assert [event.data for event in reader.events if event.kind is EventKind.DROPPED] == [{"count": 1, "total": 1}]
+        assert read_manifest(session).counts.events == len(reader.events)
+
+
 def test_events_of_driving_and_the_mode_at_the_start_are_written(tmp_path: Path) -> None:
     with writer_in(tmp_path) as writer:
         writer.start()
@@ -391,6 +422,34 @@ def test_the_destination_that_was_chosen_before_is_told_at_the_start(tmp_path: P
     assert targets_of(writer.status().saved) == []
 
 
+def test_the_destination_outlasts_what_the_ring_keeps_of_events(tmp_path: Path) -> None:
+    """It was chosen once, before the last seconds began and before thousands of alerts; it is in force all the same."""
+
+    def targets_of(session: Path | None) -> list[tuple[float, object]]:
+        assert session is not None
+        with SessionReader(session) as reader:
+            return [(event.time_s, event_target(event)) for event in reader.events if event.kind is EventKind.TARGET]
+
+    def alerts(count: int) -> None:
+        for _ in range(count):
+            assert writer.event(EventKind.ALERT, "again", time_s=999.5)
+
+    with writer_in(tmp_path, replace_config(ring_s=2.0)) as writer:
+        writer.add_event(event_of_target((10.0, 20.0), 999.0))
+        alerts(5000)
+        for tick in ticks(3):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().saved is not None)
+        first = writer.status().saved
+        assert targets_of(first) == [(1000.0, (10.0, 20.0))]
+        writer.add_event(event_of_target(None, 999.5))
+        alerts(5000)
+        writer.save_last()
+        wait_for(lambda: writer.status().saved != first)
+        assert targets_of(writer.status().saved) == []
+
+
 def test_a_session_that_waits_for_its_first_picture_says_so_and_can_be_taken_back(tmp_path: Path) -> None:
     with writer_in(tmp_path) as writer:
         writer.start()
@@ -472,6 +531,36 @@ def test_last_seconds_that_were_saved_in_part_say_so(tmp_path: Path, monkeypatch
     manifest = read_manifest(session)
     assert (manifest.counts.frames, manifest.counts.dropped) == (20, 30)
     assert manifest.ended.endswith("No space left on device")
+
+
+def test_the_last_seconds_leave_the_last_room_of_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rule of a recording: what is open must still be closed, and the system must go on."""
+    free = [30_000_000]
+    writes = SessionFiles.write_frame
+
+    def shrinking(files: SessionFiles, frame: EncodedFrame) -> None:
+        writes(files, frame)
+        free[0] -= 1_000_000
+
+    monkeypatch.setattr(SessionFiles, "write_frame", shrinking)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: (100_000_000_000, 0, free[0]))
+    with writer_in(tmp_path, replace_config(ring_s=60.0, stop_free_mb=40.0)) as writer:
+        for tick in ticks(50):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().notices == 1)
+        left = f"MB left in {tmp_path}); make room and save them again"
+        assert writer.status().notice == f"the last seconds were not saved: disk full (30 {left}"
+        assert list(tmp_path.iterdir()) == []
+        free[0] = 59_500_000
+        writer.save_last()
+        wait_for(lambda: writer.status().notices == 2)
+        assert writer.status().notice == f"of the last seconds only 20 of 50 frames were saved: disk full (40 {left}"
+        assert not writer.status().problem
+    (session,) = tmp_path.iterdir()
+    manifest = read_manifest(session)
+    assert (manifest.closed, manifest.counts.frames) == (True, 20)
+    assert manifest.ended.startswith("disk full")
 
 
 def test_a_recording_and_the_last_seconds_share_one_encoder(tmp_path: Path) -> None:
