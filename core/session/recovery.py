@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -12,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from core.names import name_as_text
-from core.session.checked import Damaged
+from core.session.checked import Damaged, count
 from core.session.events import EventKind, event_from_json, was_added_later
 from core.session.files import alone_in, is_being_written
-from core.session.lines import Line, lines_of, parse_line
+from core.session.lines import Line, is_sealed, lines_of, parse_line
 from core.session.manifest import (
     EVENTS,
     FRAMES,
@@ -124,7 +126,7 @@ def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda 
     SessionError
         Not a session, being recorded or recovered, recovered before, nothing left in it, or the copy cannot be written.
     """
-    session = session.absolute()
+    session = Path(os.path.abspath(session))  # "." and ".." have names, too
     check_is_session(session)
     if is_being_written(session):
         raise SessionError(f"{session}: is being recorded; stop the recording first")
@@ -138,7 +140,8 @@ def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda 
             for path in work.iterdir():
                 _sync(path)
             work.rename(target)
-            sync_folder(parent)
+            with contextlib.suppress(OSError):  # some file systems cannot; the copy is in place by now
+                sync_folder(parent)
     except VideoError as error:
         raise SessionError(f"{error}; make room or choose another folder") from None
     except OSError as error:
@@ -161,11 +164,12 @@ def expected_loss(session: Path, on_bytes: OnBytes = lambda _: None) -> Recovery
     SessionError
         Not a session, being recorded, of a newer version, or nothing left in it.
     """
-    session = session.absolute()
+    session = Path(os.path.abspath(session))  # "." and ".." have names, too
     check_is_session(session)
     if is_being_written(session):
         raise SessionError(f"{session}: is being recorded; stop the recording first")
-    found, manifest = _Salvage(), _manifest_of(session)
+    manifest, problems = _manifest_of(session)
+    found = _Salvage(problems)
     nowhere = Path(os.devnull)
     _copy_lines(session / FRAMES, nowhere, found, _take_row, on_bytes)
     _copy_lines(session / EVENTS, nowhere, found, _take_event, lambda _: None)
@@ -175,7 +179,7 @@ def expected_loss(session: Path, on_bytes: OnBytes = lambda _: None) -> Recovery
         on_bytes(path.stat().st_size)
     if not found.rows and not found.kept:
         raise SessionError(f"{session}: nothing left to recover: neither rows nor pictures can be read")
-    return Recovery(session, len(found.rows), len(found.kept), _loss(session, manifest[0], found))
+    return Recovery(session, len(found.rows), len(found.kept), _loss(session, manifest, found))
 
 
 def _manifest_of(session: Path) -> tuple[Manifest, list[str]]:
@@ -190,6 +194,7 @@ def _manifest_of(session: Path) -> tuple[Manifest, list[str]]:
 
 def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Recovery:
     manifest, problems = _manifest_of(session)
+    is_unknown = bool(problems)
     found = _Salvage(problems)
     _copy_lines(session / FRAMES, work / FRAMES, found, _take_row, on_bytes)
     _copy_lines(session / EVENTS, work / EVENTS, found, _take_event, lambda _: None)
@@ -198,12 +203,13 @@ def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Reco
         on_bytes(path.stat().st_size)
     if not found.rows and not found.kept:
         raise SessionError(f"{session}: nothing left to recover: neither rows nor pictures can be read")
-    if manifest.kind == "UNKNOWN" and found.places:
+    if is_unknown and found.places:
         # The rows' clock began anywhere; its moment that the folder's name tells of is the first row's.
         manifest = manifest.model_copy(update={"started_monotonic_s": found.places[0][2]})
     loss = _loss(session, manifest, found)
     if found.last_row is not None:  # a session that was cut has no count in its manifest
-        found.dropped = max(found.dropped, row_from_json(parse_line(found.last_row)).dropped_rows)
+        with contextlib.suppress(Damaged):
+            found.dropped = max(found.dropped, count(parse_line(found.last_row).get("dropped_rows", 0), "dropped_rows"))
     counts = Counts(frames=len(found.rows), events=found.events, videos=found.videos)
     counts.dropped = max(found.dropped, manifest.counts.dropped)
     counts.bytes = sum(path.stat().st_size for path in work.iterdir())
@@ -218,23 +224,33 @@ def _unknown(session: Path) -> Manifest:
         started = datetime.strptime(session.name.removeprefix(PREFIX)[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
     except ValueError:
         started = datetime.fromtimestamp(0, UTC)
-    return Manifest(id=session.name.rpartition("_")[2][:64], kind="UNKNOWN", started_utc=started, started_monotonic_s=0.0)
+    name = name_as_text(session.name)
+    return Manifest(id=name.rpartition("_")[2][:64], kind="UNKNOWN", started_utc=started, started_monotonic_s=0.0)
 
 
 def _copy_lines(source: Path, target: Path, found: _Salvage, take: _Take, on_bytes: OnBytes) -> None:
     """Copy the good lines as they are; name the others."""
     with target.open("wb") as output:
-        try:
-            for line in lines_of(source):
-                on_bytes(len(line.data or b""))
-                try:
-                    take(line, found)
-                except Damaged as error:
-                    found.problems.append(f"{source.name}: line {line.number}: {error}; left out")
-                else:
-                    output.write((line.data or b"") + b"\n")
-        except FileNotFoundError:
-            found.problems.append(f"{source.name}: missing")
+        for line in _readable(source, found):
+            on_bytes(len(line.data or b""))
+            try:
+                take(line, found)
+            except Damaged as error:
+                found.problems.append(f"{source.name}: line {line.number}: {error}; left out")
+            else:
+                output.write((line.data or b"") + b"\n")
+
+
+def _readable(source: Path, found: _Salvage) -> Iterator[Line]:
+    """The lines until the file ends or the disk gives no more of it. Raises OSError for what may be read another time."""
+    try:
+        yield from lines_of(source)
+    except FileNotFoundError:
+        found.problems.append(f"{source.name}: missing")
+    except OSError as error:
+        if error.errno != errno.EIO:
+            raise
+        found.problems.append(f"{source.name}: cannot be read further ({error.strerror})")
 
 
 def _take_row(line: Line, found: _Salvage) -> None:
@@ -242,7 +258,8 @@ def _take_row(line: Line, found: _Salvage) -> None:
     if columns is None:
         record = parse_line(line)
         columns = columns_of(record)
-        row_from_json(record)
+        if not is_sealed(line):  # what is sealed is as it was written, whatever of it this version understands
+            row_from_json(record)
     row, captured_s, video, pts_ms, *_, crc = columns
     found.last_row = line
     if found.rows and row <= found.rows[-1]:
@@ -287,7 +304,8 @@ def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:
     """Rows that should be there and are not, pictures that rows tell of and that are not there, and how long all that lasted."""
     told = {(video, pts_ms) for video, pts_ms, _ in found.places}
     pictures = len(told - found.kept)
-    whole = max(found.rows[-1] + 1 if found.rows else 0, manifest.counts.frames)
+    before = manifest.recovered  # of a copy that is recovered again: it has counted the rows that it has
+    whole = max(found.rows[-1] + 1 if found.rows else 0, manifest.counts.frames + (before.rows if before else 0))
     rows = max(whole - len(found.rows), len(found.kept - told))
     times = np.array([captured_s for *_, captured_s in found.places])
     period_s = _period_s(np.diff(times), found)
@@ -295,14 +313,15 @@ def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:
     if found.last_event_s is not None and len(times) and not manifest.closed:
         # an event after the last row: at least until then it was recording
         seconds = max(seconds, found.last_event_s - float(times[-1]))
-    problems = found.problems[:_PROBLEMS_KEPT]
+    told_before = before.problems if before else ()
+    problems = [*told_before, *found.problems[:_PROBLEMS_KEPT]]
     if len(found.problems) > _PROBLEMS_KEPT:
         problems.append(f"and {len(found.problems) - _PROBLEMS_KEPT} more")
     return Loss(
         origin=name_as_text(session),
         recovered_utc=datetime.now(UTC).isoformat(timespec="seconds"),
-        seconds=round(seconds, 3),
+        seconds=round(max(seconds, before.seconds if before else 0.0), 3),
         rows=rows,
         pictures=pictures,
-        problems=tuple(problems),
+        problems=tuple(name_as_text(problem) for problem in problems),
     )

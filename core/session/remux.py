@@ -91,10 +91,14 @@ def _whole(container: Any, stream: Any, expected: Sequence[Expected], done: Remu
     known = {one.pts_ms: PictureRow(place, one.row, one.crc) for place, one in enumerate(expected)}
     check, gaps = PacketCheck(known.get), _gaps(expected)
     last_ms, left_out = -1, 0
+    # Rows that were cut off leave their pictures, each soon after the one before; a damaged time leaps.
+    end_ms = expected[-1].pts_ms if expected else _NO_END_MS
     for packet in _packets(container, stream, done):
         pts_ms = round(packet.pts * stream.time_base * 1000)
         # a time that no row tells of is a damaged time, unless rows are missing there
-        is_possible = pts_ms > last_ms and (pts_ms in known or any(low < pts_ms < high for low, high in gaps))
+        is_told = pts_ms in known or any(low < pts_ms < high for low, high in gaps)
+        is_after = end_ms < pts_ms < max(last_ms, end_ms) + _MAX_STEP_MS
+        is_possible = pts_ms > last_ms and (is_told or is_after)
         if not is_possible or not check.take(pts_ms, bytes(packet), is_key=packet.is_keyframe, is_corrupt=packet.is_corrupt):
             left_out += 1
             continue
@@ -105,13 +109,13 @@ def _whole(container: Any, stream: Any, expected: Sequence[Expected], done: Remu
 
 
 def _gaps(expected: Sequence[Expected]) -> list[tuple[int, int]]:
-    """Between which times (ms) pictures may be of which no row tells: where rows are missing, and after the last one."""
+    """Between which times (ms) pictures may be of which no row tells: where rows are missing."""
     if not expected:
         return [(-1, _NO_END_MS)]
     gaps = [(a.pts_ms, b.pts_ms) for a, b in pairwise(expected) if b.row > a.row + 1]
     if expected[0].pts_ms > 0:
         gaps.append((-1, expected[0].pts_ms))
-    return [*gaps, (expected[-1].pts_ms, expected[-1].pts_ms + _MAX_STEP_MS)]
+    return gaps
 
 
 def _packets(container: Any, stream: Any, done: Remuxed) -> Iterator[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -10,17 +11,20 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import av
 import pytest
 
+from core.session import recovery
 from core.session.events import Event, EventKind
 from core.session.files import SessionFiles, add_event
 from core.session.lines import lines_of, sealed
 from core.session.manifest import EVENTS, FRAMES, MANIFEST, SessionError, read_manifest
 from core.session.reader import SessionReader
-from core.session.recovery import Recovery, find_cut_sessions, recover
+from core.session.recovery import Recovery, expected_loss, find_cut_sessions, recover
 from core.session.writer import SessionWriter
 from tests.core.session_data import ABOUT, QUICK, number_in, record, tick_of, wait_for
 
@@ -360,6 +364,99 @@ def test_what_a_killed_recovery_left_is_in_nobodys_way(session: Path) -> None:
     done = recover(session)
     assert not (done.folder / "video_0007.mkv").exists()
     assert checked(session, done) == (list(range(COUNT)), list(range(COUNT)))
+
+
+def with_value(line: bytes, name: str, value: object) -> bytes:
+    """A row with another value, as its writer would have written it."""
+    record = json.loads(line)
+    del record["crc"]
+    return sealed(json.dumps(record | {name: value}, separators=(",", ":"))).encode()
+
+
+def test_a_row_that_this_version_cannot_read_costs_no_recovery(session: Path) -> None:
+    """Its checksum says that it is what was written: another version may read it."""
+    path = session / "frames.jsonl"
+    lines = path.read_bytes().splitlines()
+    for place in (10, COUNT - 1):
+        lines[place] = with_value(lines[place], "sent", "in another way")
+    path.write_bytes(b"\n".join(lines) + b"\n")
+    set_open(session)
+    done = recover(session)
+    assert (done.frames, done.loss.rows, done.loss.problems) == (COUNT, 0, ())
+    assert (done.folder / "frames.jsonl").read_bytes() == path.read_bytes()
+
+
+def test_a_copy_that_is_recovered_again_still_tells_what_was_lost_before(session: Path) -> None:
+    path = session / "frames.jsonl"
+    lines = path.read_bytes().splitlines()
+    path.write_bytes(b"\n".join([*lines[:20], b"garbage", *lines[25:70]]) + b"\n")
+    first = recover(session)
+    assert first.loss.rows == 10
+    lines = (first.folder / "frames.jsonl").read_bytes().splitlines()
+    (first.folder / "frames.jsonl").write_bytes(b"\n".join(lines[:-3]) + b"\n")
+    second = recover(first.folder)
+    assert (second.loss.rows, second.loss.origin) == (13, str(first.folder))
+    assert second.loss.seconds == pytest.approx(13 / FPS, abs=0.01)
+    assert any("line 21" in problem for problem in second.loss.problems)
+
+
+def test_a_copy_that_is_recovered_again_keeps_its_clock(session: Path) -> None:
+    (session / "manifest.json").unlink()
+    first = recover(session).folder
+    lines = (first / "frames.jsonl").read_bytes().splitlines()
+    (first / "frames.jsonl").write_bytes(b"\n".join(lines[30:]) + b"\n")
+    assert read_manifest(recover(first).folder).started_monotonic_s == 1000.0
+
+
+def test_pictures_whose_rows_were_cut_off_are_kept_however_many(tmp_path: Path) -> None:
+    """Two pictures a second: the rows of half a minute are gone, its pictures are not."""
+    session = record(tmp_path, (tick_of(i, 1000.0 + i / 2) for i in range(COUNT)))
+    lines = (session / "frames.jsonl").read_bytes().splitlines()
+    (session / "frames.jsonl").write_bytes(b"\n".join(lines[:10]) + b"\n" + lines[10][:40])
+    set_open(session)
+    expected, done = expected_loss(session), recover(session)
+    assert done.pictures == COUNT
+    assert (done.loss.rows, done.loss.seconds) == (COUNT - 10, (COUNT - 10) / 2)
+    assert (expected.frames, expected.pictures, expected.loss.rows) == (done.frames, done.pictures, done.loss.rows)
+
+
+def test_a_disk_that_cannot_be_read_any_further_costs_only_what_comes_after(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def bad_sector(path: Path) -> Iterator[Any]:
+        for line in lines_of(path):
+            if path.name == "frames.jsonl" and line.number > 40:
+                raise OSError(errno.EIO, os.strerror(errno.EIO))
+            yield line
+
+    monkeypatch.setattr(recovery, "lines_of", bad_sector)
+    done = recover(session)
+    assert done.frames == 40
+    assert done.loss.problems == ("frames.jsonl: cannot be read further (Input/output error)",)
+
+
+def test_a_drive_that_cannot_force_a_folder_to_the_disk_gets_its_copy(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def cannot(_: Path) -> None:
+        raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+
+    monkeypatch.setattr(recovery, "sync_folder", cannot)
+    assert checked(session, recover(session)) == (list(range(COUNT)), list(range(COUNT)))
+
+
+def test_a_session_is_called_by_its_own_name_however_it_is_given(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (session / "evaluation").mkdir()
+    monkeypatch.chdir(session / "evaluation")
+    assert recover(Path("..")).folder == session.with_name(f"{session.name}_recovered")
+
+
+def test_a_name_of_other_letters_costs_no_recovery(session: Path) -> None:
+    """As archives of other systems give them; the manifest is lost, too."""
+    odd = session.rename(session.with_name(os.fsdecode(b"session_\xe9")))
+    (odd / "manifest.json").unlink()
+    assert read_manifest(recover(odd).folder).id == "\\xe9"
+
+
+def test_what_is_wrong_with_the_manifest_is_told_before_anything_is_written(session: Path) -> None:
+    (session / "manifest.json").write_text("{")
+    assert any("manifest.json: damaged" in problem for problem in expected_loss(session).loss.problems)
 
 
 def test_a_picture_that_is_lost_with_its_row_takes_along_what_builds_on_it(session: Path) -> None:
