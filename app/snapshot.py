@@ -6,6 +6,7 @@ import json
 import logging
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import count
 from pathlib import Path
 
 import cv2
@@ -39,15 +40,16 @@ def pictures_folder(configured: str | None) -> Path:
 def write_snapshot(folder: Path, tick: Tick, origin: Origin, now: datetime) -> Path:
     """Write ``<time>.png``, ``<time>_overlay.png`` and ``<time>.json``; returns the first path. Raises OSError.
 
+    What is there already stays: the later one of the same millisecond is called ``<time>_2``.
     The JSON object is that of one image, with ``rig``, ``phantom``, ``model``, ``frame`` (index since the rig's start) and
     ``captured_s`` (seconds of the camera's clock) added.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    name = f"{now:%Y-%m-%d_%H-%M-%S}_{now.microsecond // 1000:03d}"
+    name = _free_name(folder, f"{now:%Y-%m-%d_%H-%M-%S}_{now.microsecond // 1000:03d}")
     first = folder / f"{name}.png"
-    first.write_bytes(_png(tick.frame.image))
+    _write_new(first, _png(tick.frame.image))
     overlay = draw_overlay(tick.frame.image, tick.scene, tick.advice, stamp=origin.rig)
-    (folder / f"{name}_overlay.png").write_bytes(_png(overlay))
+    _write_new(folder / f"{name}_overlay.png", _png(overlay))
     record = scene_to_json(first.name, tick.scene) | {
         "rig": origin.rig,
         "phantom": origin.phantom,
@@ -55,8 +57,20 @@ def write_snapshot(folder: Path, tick: Tick, origin: Origin, now: datetime) -> P
         "frame": tick.frame.index,
         "captured_s": round(tick.frame.captured_s, 6),
     }
-    (folder / f"{name}.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    _write_new(folder / f"{name}.json", (json.dumps(record, indent=1, allow_nan=False) + "\n").encode())
     return first
+
+
+def _free_name(folder: Path, name: str) -> str:
+    """The name, or the first one numbered after it, of which none of the three files is there."""
+    names = (name if k == 1 else f"{name}_{k}" for k in count(1))
+    return next(free for free in names if not any((folder / f"{free}{end}").exists() for end in (".png", "_overlay.png", ".json")))
+
+
+def _write_new(path: Path, data: bytes) -> None:
+    """Raises OSError, also when somebody else has made one of that name meanwhile."""
+    with path.open("xb") as file:
+        file.write(data)
 
 
 def _png(image: Image) -> bytes:
