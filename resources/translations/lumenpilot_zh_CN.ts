@@ -1887,6 +1887,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>{why}; make room and save them again</source>
+        <translation>{why}；请腾出空间后再次保存</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>disk full ({left} MB left in {folder})</source>
+        <translation>磁盘已满（{folder} 中仅剩 {left} MB）</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>{folder}: {a} GB free of {b} GB</source>
         <translation>{folder}：{b} GB 中剩余 {a} GB</translation>
     </message>
