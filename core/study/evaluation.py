@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
-import difflib
 import io
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -18,6 +19,8 @@ from core.errors import UserError
 from core.study.agreement import RANGE_DEG, angle_metrics, repeat_metrics
 from core.study.bootstrap import MIN_GROUPS, are_too_few, members
 from core.study.classification import state_metrics
+from core.study.measure_notes import missing_notes, other_side_notes
+from core.study.table_headings import places
 from core.types import PoseState
 
 _FULL_TURN_DEG = 360.0
@@ -60,48 +63,69 @@ _MAY_BE = (GROUP, *COUNTS)
 def read_measurements(path: Path) -> list[Measurement]:
     """Rows of a CSV file with the columns ``COLUMNS`` in any order, and ``group``, ``count_1`` and ``count_2`` if there are such.
 
-    Others are ignored, blank cells mean "not measured".
+    Others are ignored, blank cells mean "not measured". Headings may be spelt with capitals, spaces and units.
 
     Commas, semicolons or tabs separate cells, as the header shows; where it is not the comma, numbers may have a decimal comma.
 
     Raises
     ------
     EvaluationError
-        With file, line and column in one line.
+        With file, line and column in one line. An image that is there twice is refused: it would count twice.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise EvaluationError(f"{path}: no such file") from None
-    except OSError as error:
-        raise EvaluationError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise EvaluationError(f"{path}: not a text file in UTF-8; save the table as CSV (UTF-8)") from None
-    if not text.strip():
+    text = _text_of(path)
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
         raise EvaluationError(f"{path}: empty; needs the columns {', '.join(COLUMNS)}")
-    separator = max(",;\t", key=text.partition("\n")[0].count)
+    # Spreadsheets may say in a line before the header what separates the cells.
+    said = re.fullmatch(r"sep=([,;\t])", lines[0].strip(' "'))
+    separator = said[1] if said else max(",;\t", key=lines[0].count)
     table = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
     try:
-        place = _places(path, [cell.strip() for cell in next(table)])
-        filled = (cells for cells in table if any(map(str.strip, cells)))
-        rows = [_measurement(f"{path}: line {table.line_num}", cells, place, separator) for cells in filled]
+        filled = ((table.line_num, cells) for cells in table if any(map(str.strip, cells)))
+        if said:
+            next(filled, None)
+        place = _places(path, [cell.strip() for cell in next(filled, (0, [""]))[1]])
+        rows = {line: _measurement(f"{path}: line {line}", cells, place, separator) for line, cells in filled}
     except csv.Error as error:
         raise EvaluationError(f"{path}: line {table.line_num}: not valid CSV ({error})") from None
     if not rows:
         raise EvaluationError(f"{path}: has a header but no rows")
-    return rows
+    _check_once(path, rows)
+    return list(rows.values())
+
+
+def _text_of(path: Path) -> str:
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise EvaluationError(f"{path}: no such file") from None
+    except OSError as error:
+        raise EvaluationError(f"{path}: cannot be read ({error.strerror})") from None
+    try:
+        # UTF-16 is what spreadsheets call Unicode text.
+        return data.decode("utf-16" if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig")
+    except UnicodeDecodeError:
+        raise EvaluationError(f"{path}: not a text file in UTF-8; save the table as CSV (UTF-8)") from None
 
 
 def _places(path: Path, header: list[str]) -> dict[str, int]:
-    """Where each column stands."""
-    for name in (*COLUMNS, *_MAY_BE):
-        if header.count(name) > 1:
-            raise EvaluationError(f"{path}: column {name!r} occurs {header.count(name)} times")
-        if name not in header and name not in _MAY_BE:
-            alike = difflib.get_close_matches(name, [h for h in header if h not in COLUMNS], 1, cutoff=0.75)
-            found = f"; is {alike[0]!r} meant?" if alike else f"; needs {', '.join(COLUMNS)} (blank where not measured)"
-            raise EvaluationError(f"{path}: column {name!r} is missing{found}")
-    return {name: header.index(name) for name in (*COLUMNS, *_MAY_BE) if name in header} | {"": len(header)}
+    """Where each column stands, and under "" how many there are."""
+    try:
+        return places(header, COLUMNS, _MAY_BE) | {"": len(header)}
+    except ValueError as error:
+        raise EvaluationError(f"{path}: {error}") from None
+
+
+def _check_once(path: Path, rows: Mapping[int, Measurement]) -> None:
+    """Raise EvaluationError where an image has two rows; pictures of several sessions may be called alike."""
+    first: dict[tuple[str | None, str], int] = {}
+    for line, row in rows.items():
+        before = first.setdefault((row.group, row.image), line)
+        if row.image and before != line:
+            raise EvaluationError(
+                f"{path}: line {line}: image {row.image!r} is in line {before} already; give it one row, with a second manual "
+                "measure as angle_2, and images of one name different groups"
+            )
 
 
 def _measurement(where: str, cells: list[str], place: dict[str, int], separator: str) -> Measurement:
@@ -113,7 +137,8 @@ def _measurement(where: str, cells: list[str], place: dict[str, int], separator:
         if not text[name]:
             return None
         try:
-            value = float(text[name] if separator == "," else text[name].replace(",", "."))
+            plain = text[name].removesuffix("°").replace("\N{MINUS SIGN}", "-")
+            value = float(plain if separator == "," else plain.replace(",", "."))
         except ValueError:
             value = math.nan
         if not abs(value) <= _FULL_TURN_DEG:
@@ -204,6 +229,7 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
     }
     parts = {"angle": measured, "state": labelled, "manual": twice_rows}
     notes = _interval_notes({name: part for name, part in parts.items() if are_too_few(_members(part))})
+    notes += missing_notes(rows) + other_side_notes(rows)
     return metrics | {"notes": notes + _angle_notes(metrics, rows) + _state_notes(metrics["state"])}
 
 

@@ -188,8 +188,8 @@ def test_a_figure_of_an_earlier_evaluation_does_not_stay(paper_csv: Path, tmp_pa
     "rows",
     [
         [Measurement("a", 10.0, None, "B", 12.0, "B")],
-        [Measurement("a", 10.0, 10.0, "B", 10.0, "B")] * 3,
-        [Measurement("a", 0.0, 0.0, None, 0.0, None)] * 2,
+        [Measurement(name, 10.0, 10.0, "B", 10.0, "B") for name in "abc"],
+        [Measurement(name, 0.0, 0.0, None, 0.0, None) for name in "ab"],
         [Measurement("a", 5.0, 6.0, "D", 179.0, "A"), Measurement("b", -170.0, None, "A", 180.0, "D")],
     ],
 )

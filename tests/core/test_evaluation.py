@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,10 +53,29 @@ def test_a_row_as_it_stands(table) -> None:
         f"{HEADER}\n{ROW}".replace(",", ";").replace("14.5", "14,5"),  # where a comma is the decimal mark
         f"{HEADER}\n{ROW}".replace(",", "\t"),
         f"{HEADER}\n,,,,,\n{ROW},,\n",
+        f"{HEADER.upper()}\n{ROW}",
+        f"Image,Angle 1, angle-2 ,State,Algorithm angle,ALGORITHM STATE\n{ROW}",
+        f"image,angle_1 (deg),angle_2 [°],state,algorithm_angle_deg,algorithmState\n{ROW}",
+        "image,angle1,Angle2,state,algorithm_angle,algorithm_state\na.png,10°,12,B,14.5,C",
+        f"sep=;\n{HEADER}\n{ROW}".replace(",", ";"),
+        f"\n\n{HEADER}\n{ROW}",
     ],
 )
 def test_ways_to_write_the_same_table(table, text: str) -> None:
     assert read_measurements(table(text)) == [Measurement("a.png", 10.0, 12.0, "B", 14.5, "C")]
+
+
+def test_a_table_as_unicode_text_of_a_spreadsheet(table) -> None:
+    assert len(read_measurements(table(f"{HEADER}\n{ROW}".replace(",", "\t"), "utf-16"))) == 1
+
+
+def test_images_of_one_name_may_be_of_several_sessions(table) -> None:
+    assert len(read_measurements(table(f"{HEADER},group\n{ROW},one\n{ROW},two\n,1,1,B,1,B\n,1,1,B,1,B"))) == 4
+
+
+def test_a_minus_of_a_word_processor_is_one(table) -> None:
+    (row,) = read_measurements(table(f"{HEADER}\na,\N{MINUS SIGN}3,,,,"))
+    assert row.angle_1 == -3.0
 
 
 def test_blank_means_not_measured(table) -> None:
@@ -78,7 +98,12 @@ def test_blank_means_not_measured(table) -> None:
             HEADER.replace("algorithm_angle", "algoritm_angle") + "\n" + ROW,
             "'algorithm_angle' is missing; is 'algoritm_angle' meant?",
         ),
-        (HEADER.replace("state,", "State,", 1) + "\n" + ROW, "is 'State' meant?"),
+        (
+            HEADER.replace("angle_1", "winkel") + "\n" + ROW,
+            "'angle_1' is missing; needs the columns image, angle_1, angle_2, state, algorithm_angle, algorithm_state",
+        ),
+        (HEADER + ",Angle 1\n" + ROW + ",1", "column 'angle_1' occurs 2 times ('angle_1', 'Angle 1')"),
+        (f"{HEADER}\n{ROW}\nb,1,2,B,14,B\n{ROW}", "line 4: image 'a.png' is in line 2 already; give it one row"),
         (HEADER + ",state\n" + ROW + ",B", "'state' occurs 2 times"),
         (f"{HEADER}\n{ROW}\nb,ten,12,B,14,B", "line 3: angle_1 is 'ten'; must be an angle in degrees"),
         (f"{HEADER}\nb,1,nan,B,14,B", "line 2: angle_2 is 'nan'"),
@@ -173,6 +198,46 @@ def test_each_statistic_takes_the_rows_that_have_what_it_needs() -> None:
     assert found["manual"]["n"] == 2
     assert found["images"] == {"n": 5, "measured": 4, "answered": 3, "unanswered": 1}
     assert any("no answer for 1 of 4" in note for note in found["notes"])
+
+
+def test_what_is_missing_is_counted() -> None:
+    """Of each kind: measured by hand only, by the algorithm only, not at all; and the states likewise."""
+    rows = rows_of(
+        (10.0, 12.0, "B", 13.0, "B"),
+        (10.0, None, "B", 13.0, None),
+        (20.0, 21.0, "B", None, "B"),
+        (20.0, 21.0, None, None, "C"),
+        (None, None, "C", 7.0, "C"),
+        (None, None, None, None, None),
+    )
+    notes = evaluate(rows)["notes"]
+    lacking = "without the algorithmic one: 2, the manual one: 1, both: 1."
+    assert f"Rows with a manual and an algorithmic angle: 2 of 6; {lacking}" in notes
+    lacking = "without the algorithmic one: 1, the manual one: 1, both: 1."
+    assert f"Rows with a manual and an algorithmic state: 3 of 6; {lacking}" in notes
+    assert "Images that were measured once by hand, and not twice: 1." in notes
+    assert not any("without" in note or "once" in note for note in evaluate(rows[:1] * 2)["notes"])
+    nameless = "Rows that name no image: 1; whether one is there twice cannot be seen."
+    assert nameless in evaluate([replace(rows[0], image="")])["notes"]
+
+
+def test_angles_measured_to_the_other_side_are_told_and_not_turned() -> None:
+    """180 minus, and with the other sign. A right angle goes to both sides, and a plain error of 30 degrees to neither."""
+    rows = rows_of(
+        (170.0, 172.0, "B", 10.0, "B"),
+        (-20.0, -21.0, "B", 22.0, "B"),
+        (90.0, 92.0, "B", 91.0, "B"),
+        (10.0, 12.0, "B", 41.0, "B"),
+        (10.0, 169.0, "B", 90.0, "B"),
+    )
+    found = evaluate(rows)
+    told = [note for note in found["notes"] if "other side" in note]
+    assert [note.split(" are more")[0] for note in told] == [
+        "Images on which manual and algorithmic angle",
+        "Images on which the two manual angles",
+    ]
+    assert "its sign changed): 2 (0, 1). They are taken as they are; look at them." in told[0]
+    assert found["angle"]["mean_abs_error_deg"] == pytest.approx((161 + 42.5 + 0 + 30 + 0.5) / 5)
 
 
 @pytest.mark.parametrize(
