@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import multiprocessing
 import os
@@ -15,11 +14,13 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, cast, get_args
 
 from rich.console import Console
 
+from app.cluster import over_cluster
 from app.learning_commands import progress_bar
 from app.trial_store import Job, KeptTrials, TrialError
 from core.config import choose_model, load_config
@@ -138,27 +139,34 @@ def _results(campaign: Campaign, jobs: list[Job]) -> Iterator[Row]:
     if not jobs:
         return iter(())
     if campaign.scheduler is not None:
-        return _over_dask(campaign, jobs, campaign.scheduler)
+        return over_cluster(campaign.scheduler, partial(run_one, campaign.plan), jobs)
     if campaign.workers > 1:
         return _over_processes(campaign, jobs)
     return (run_one(campaign.plan, job) for job in jobs)
 
 
-_pipelines: dict[str, tuple[Any, Any]] = {}
-"""The perception of this process, by its settings: loading the network takes longer than a second."""
+class _Opened(threading.local):
+    """The perception of this thread, by its settings: loading the network takes over a second, and none serves two at once."""
+
+    def __init__(self) -> None:
+        self.pipelines: dict[str, tuple[Any, Any]] = {}
+
+
+_opened = _Opened()
 
 
 def run_one(plan: TrialPlan, job: Job) -> Row:
-    """One trial in this process."""
+    """One trial in this thread."""
     from core.perception.pipeline import Pipeline, open_pipeline
     from core.study.accuracy import TrueMasks
     from hardware.twin.trial import Trial
 
     key = f"{plan.true_masks} {plan.config.perception.model_dump_json()}"
-    if key not in _pipelines:
+    pipelines = _opened.pipelines
+    if key not in pipelines:
         masks = TrueMasks() if plan.true_masks else None
-        _pipelines[key] = open_pipeline(plan.config.perception) if masks is None else Pipeline(masks, plan.config.perception), masks
-    pipeline, masks = _pipelines[key]
+        pipelines[key] = open_pipeline(plan.config.perception) if masks is None else Pipeline(masks, plan.config.perception), masks
+    pipeline, masks = pipelines[key]
     return Trial(plan, job[1], job[0], pipeline, masks).run()
 
 
@@ -206,24 +214,6 @@ def _start_worker() -> None:
             os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def _over_dask(campaign: Campaign, jobs: list[Job], address: str) -> Iterator[Row]:
-    try:
-        distributed = importlib.import_module("distributed")
-    except ImportError:
-        raise TrialError("--scheduler needs Dask: install it with 'pip install distributed', or use --workers") from None
-    try:
-        client = distributed.Client(address, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise TrialError(f"--scheduler {address}: no Dask scheduler answers there ({error}); start one or use --workers") from None
-    with client:
-        futures = client.map(run_one, [campaign.plan] * len(jobs), jobs, pure=False)
-        try:
-            for future in distributed.as_completed(futures):
-                yield future.result()
-        finally:
-            client.cancel(futures)
 
 
 def _tell(campaign: Campaign, rows: list[Row], as_json: bool) -> None:

@@ -7,9 +7,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -181,51 +179,6 @@ def test_an_interruption_keeps_what_is_done(
     assert json.loads(shown.out.splitlines()[-1])["summary"]["trials"] == 1
     assert "1 of 3 trials were done" in shown.err
     assert len((tmp_path / "trials.jsonl").read_text().splitlines()) == 1
-
-
-def test_without_dask_the_scheduler_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(TrialError, match="needs Dask: install it"):
-        call(scheduler="tcp://127.0.0.1:8786")
-
-
-def test_trials_run_on_a_dask_cluster(
-    faked: list[Any], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Against a stand-in that has what is used of ``distributed``."""
-
-    class Future:
-        def __init__(self, row: Row) -> None:
-            self._row = row
-
-        def result(self) -> Row:
-            return self._row
-
-    class Client:
-        def __init__(self, address: str, timeout: str) -> None:
-            if address != "tcp://here:1":
-                raise OSError("Timed out")
-
-        def __enter__(self) -> Client:
-            return self
-
-        def __exit__(self, *_: object) -> None: ...
-
-        def map(self, function: Callable[..., Row], plans: list[TrialPlan], jobs: list[Any], pure: bool) -> list[Future]:
-            return [Future(function(*each)) for each in zip(plans, jobs, strict=True)]
-
-        def cancel(self, futures: list[Future]) -> None: ...
-
-    def as_completed(futures: list[Future]) -> Iterator[Future]:
-        return reversed(futures)
-
-    module = ModuleType("distributed")
-    module.Client, module.as_completed = Client, as_completed  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "distributed", module)
-    call("0:3", scheduler="tcp://here:1")
-    assert [json.loads(line).get("seed") for line in capsys.readouterr().out.splitlines()] == [0, 1, 2, None]
-    with pytest.raises(TrialError, match="no Dask scheduler answers there"):
-        call("0:3", scheduler="tcp://elsewhere:1")
 
 
 def test_figures_that_miss_their_target_are_marked() -> None:

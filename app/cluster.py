@@ -1,0 +1,95 @@
+"""Work on the machines of a Dask cluster: ``--scheduler ADDRESS``. Each of them has LumenPilot's folder, at the same state."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+from core.errors import UserError
+
+_ROOT = Path(__file__).resolve().parent.parent
+_CODE = ("app", "core", "hardware")
+_TIMEOUT = "10s"
+_START = "in LumenPilot's folder: .venv/bin/python -m dask worker {address} --nworkers 2 --nthreads 1"
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+class ClusterError(UserError):
+    """The cluster cannot be used; the message says what to do."""
+
+
+def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
+    """Results as they come. What has not begun when the iterator is closed is cancelled.
+
+    Raises
+    ------
+    ClusterError
+        No scheduler answers, it has no workers, or a worker cannot run this code or has other code.
+    """
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
+    distributed = importlib.import_module("distributed")  # a second that only who asks for it pays
+    try:
+        client = distributed.Client(address, timeout=_TIMEOUT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        why = str(error).partition("\n")[0]
+        raise ClusterError(
+            f"--scheduler {address}: no Dask scheduler answers there ({why}); start one (.venv/bin/python -m dask scheduler), "
+            "or use --workers"
+        ) from None
+    with client:
+        _check_workers(client, address)
+        futures = client.map(function, tasks, pure=False)
+        try:
+            for future in distributed.as_completed(futures, loop=client.loop):
+                yield future.result()
+        except distributed.KilledWorker:
+            raise ClusterError(
+                f"--scheduler {address}: a task ended its worker again and again (out of memory?); start fewer workers a machine"
+            ) from None
+        except (OSError, distributed.CancelledError) as error:
+            why = str(error).partition("\n")[0]
+            raise ClusterError(f"--scheduler {address}: the scheduler has gone ({why}); start it and its workers again") from None
+        finally:
+            client.cancel(futures)
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """Without workers a campaign would wait for ever, and with another version's its figures would be of two programs."""
+    start = _START.format(address=address)
+    if not client.scheduler_info(n_workers=-1)["workers"]:
+        raise ClusterError(f"--scheduler {address}: has no workers; start some, {start}")
+
+    def code() -> str | None:  # goes there by value: a worker without LumenPilot could not even find it
+        try:
+            from app.cluster import code_of_worker
+        except ImportError:
+            return None
+        return code_of_worker()
+
+    found: dict[str, str | None] = client.run(code)
+    without = sorted(worker for worker, its in found.items() if its is None)
+    if without:
+        raise ClusterError(f"--scheduler {address}: LumenPilot is not to be found by {', '.join(without)}; start them {start}")
+    others = sorted(worker for worker, its in found.items() if its != code_of_worker())
+    if others:
+        raise ClusterError(
+            f"--scheduler {address}: another version of LumenPilot runs on {', '.join(others)}; bring its folder to the state of "
+            "this one, and start the worker again"
+        )
+
+
+@cache
+def code_of_worker() -> str:
+    """What this process runs: SHA-256 of the program's files, as they were when it was asked first."""
+    told = hashlib.sha256()
+    for folder in _CODE:
+        for path in sorted((_ROOT / folder).rglob("*.py")):
+            told.update(f"{path.relative_to(_ROOT).as_posix()} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return told.hexdigest()
