@@ -10,6 +10,7 @@ import faulthandler
 import io
 import os
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, TextIO
@@ -59,6 +60,7 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # a file's name need not be text that this terminal has
     try:
         try:
+            _refuse_empty(sys.argv[1:])
             code = app(prog_name="main.py", standalone_mode=False)
         finally:
             _finish_output()
@@ -87,6 +89,15 @@ def main() -> None:
         _tell("interrupted")
     if isinstance(code, int) and code:
         sys.exit(code)
+
+
+def _refuse_empty(words: Sequence[str]) -> None:
+    """No option and no argument takes an empty text: as a path it would mean this folder, and as a name nothing at all."""
+    for before, word in zip(["", *words], words, strict=False):
+        option, has_value, value = word.partition("=") if word.startswith("--") else (before, word == "", word)
+        if has_value and not value:
+            what = option if option.startswith("-") and option.strip("-") else "an argument"
+            raise UserError(f"{what} is empty: give it a value, or leave it out (is a variable of a script not set?)")
 
 
 def _tell(line: str) -> None:

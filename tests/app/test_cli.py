@@ -83,6 +83,30 @@ def test_a_command_line_that_makes_no_sense_is_one_line(
     assert capsys.readouterr().err == told.format(**names)
 
 
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (("perceive", ""), "an argument"),
+        (("perceive", "a.png", "--jsonl", ""), "--jsonl"),
+        (("perceive", "a.png", "--overlay="), "--overlay"),
+        (("annotate", "pictures", "--study", ""), "--study"),
+        (("--config", "", "gui"), "--config"),
+        (("evaluate", "--out", "o", "--csv", ""), "--csv"),
+        (("perceive", "--", ""), "an argument"),
+        (("annotate", "-", ""), "an argument"),
+    ],
+)
+def test_an_empty_text_is_no_value(
+    words: tuple[str, ...], what: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["main.py", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    shown = capsys.readouterr()
+    assert (ended.value.code, shown.out) == (2, "")
+    assert shown.err == f"error: {what} is empty: give it a value, or leave it out (is a variable of a script not set?)\n"
+
+
 def test_an_interrupted_command_ends_with_130(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
