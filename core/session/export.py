@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,12 +23,13 @@ from core.types import Command, Image, Point, Tick
 
 Draw = Callable[[Tick], Image]
 Advance = Callable[[], None]
+_MADE_MEANWHILE = "{path}: was made by something else meanwhile; choose another file"
 
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
     """A temporary path beside `path` that takes its place when all went well. Raises SessionError."""
-    part = path.with_name(f".{path.name}.part")
+    part = path.with_name(f".{secrets.token_hex(8)}.part")  # its own: of two that write the same file the second is refused
     try:
         if path.exists():
             raise SessionError(f"{path}: is there already; choose another file")
@@ -46,8 +48,12 @@ def _put_in_place(part: Path, path: Path) -> None:
     try:
         os.link(part, path)
     except FileExistsError:
-        raise SessionError(f"{path}: was made by something else meanwhile; choose another file") from None
+        raise SessionError(_MADE_MEANWHILE.format(path=path)) from None
     except OSError:  # a drive that knows no second name for a file
+        try:
+            path.touch(exist_ok=False)
+        except FileExistsError:
+            raise SessionError(_MADE_MEANWHILE.format(path=path)) from None
         part.replace(path)
 
 

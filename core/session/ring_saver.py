@@ -43,7 +43,7 @@ class RingSaver:
 
     def _write(self, about: About, frames: list[EncodedFrame], events: list[Event], now_s: float) -> None:
         files: SessionFiles | None = None
-        problem, written = "", 0
+        problem, written = "an error of the program; its log says more", 0
         try:
             self._check_room()
             first_s = frames[0].captured_s
@@ -55,15 +55,20 @@ class RingSaver:
                 self._check_room()
                 files.write_frame(frame)
                 written += 1
+            problem = ""
         except (VideoError, SessionError) as error:
             problem = str(error)
         except OSError as error:
             problem = f"{error.filename or self._parent}: {error.strerror or error}"
-        if files is not None:
-            # The folder itself says that it is not whole: a message in a window is soon forgotten.
-            at_end = files.close(problem or "saved from memory", frames[-1].dropped - frames[0].dropped + len(frames) - written)
-            problem = problem or at_end
-        self._tell(problem, files, written, len(frames))
+        finally:  # also after what nobody has thought of, which goes on to the log
+            try:
+                if files is not None:
+                    # The folder itself says that it is not whole: a message in a window is soon forgotten.
+                    lost = frames[-1].dropped - frames[0].dropped + len(frames) - written
+                    at_end = files.close(problem or "saved from memory", lost)
+                    problem = problem or at_end
+            finally:
+                self._tell(problem, files, written, len(frames))
 
     def _check_room(self) -> None:
         """The last room of a disk is not for this, as it is for no recording: what is open must still be closed. SessionError."""

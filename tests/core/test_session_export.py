@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import csv
+import errno
 import json
+import os
 from pathlib import Path
 
 import av
@@ -182,6 +184,10 @@ def test_nothing_is_overwritten_and_nothing_half_is_left(session: Path, tmp_path
     assert there.read_text() == "mine"
 
 
+def no_links(*_: object) -> None:
+    raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+
 def test_a_session_without_pictures_is_no_mp4(tmp_path: Path) -> None:
     session = record(tmp_path, [tick_of(0, 1000.0)])
     (session / "video_0000.mkv").unlink()
@@ -190,8 +196,14 @@ def test_a_session_without_pictures_is_no_mp4(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("*.mp4*"))
 
 
-def test_a_file_that_was_made_while_exporting_is_not_overwritten(session: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("knows_links", [True, False])
+def test_a_file_that_was_made_while_exporting_is_not_overwritten(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, knows_links: bool
+) -> None:
+    """On a drive that knows no second name for a file, either, as those of cameras and memory sticks."""
     out = tmp_path / "x.csv"
+    if not knows_links:
+        monkeypatch.setattr(os, "link", no_links)
 
     def meanwhile() -> None:
         if not out.exists():
@@ -201,6 +213,32 @@ def test_a_file_that_was_made_while_exporting_is_not_overwritten(session: Path, 
         export_csv(reader, out, meanwhile)
     assert out.read_text() == "somebody else's"
     assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
+
+
+def test_a_drive_without_links_takes_an_export_too(session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "link", no_links)
+    with SessionReader(session) as reader:
+        written = export_csv(reader, tmp_path / "x.csv")
+    assert len((tmp_path / "x.csv").read_text().splitlines()) == written + 1
+    assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
+
+
+def test_of_two_that_export_to_one_file_the_first_one_stands(session: Path, tmp_path: Path) -> None:
+    out = tmp_path / "x.csv"
+    begun: list[int] = []
+
+    def another() -> None:
+        if not begun:
+            begun.append(1)
+            with SessionReader(session) as other:
+                export_csv(other, out)
+
+    with SessionReader(session) as reader, pytest.raises(SessionError, match="was made by something else meanwhile"):
+        export_csv(reader, out, another)
+    with SessionReader(session) as reader:
+        export_csv(reader, tmp_path / "y.csv")
+    assert out.read_bytes() == (tmp_path / "y.csv").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["x.csv", "y.csv"]
 
 
 def test_colons_in_a_relative_path_name_no_protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

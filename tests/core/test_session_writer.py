@@ -533,6 +533,32 @@ def test_last_seconds_that_were_saved_in_part_say_so(tmp_path: Path, monkeypatch
     assert manifest.ended.endswith("No space left on device")
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_fault_of_the_program_while_the_last_seconds_are_saved_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the next ones can be saved: it does not stand there as being saved for ever."""
+    calls: list[int] = []
+    writes = SessionFiles.write_frame
+
+    def breaks_once(files: SessionFiles, frame: EncodedFrame) -> None:
+        calls.append(1)
+        if len(calls) == 3:
+            raise RuntimeError("nobody has thought of this")
+        writes(files, frame)
+
+    monkeypatch.setattr(SessionFiles, "write_frame", breaks_once)
+    with writer_in(tmp_path, replace_config(ring_s=60.0)) as writer:
+        for tick in ticks(10):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().notice)
+        told = "of the last seconds only 2 of 10 frames were saved: an error of the program; its log says more"
+        assert (writer.status().notice, writer.status().saving) == (told, False)
+        wait_for(lambda: all(thread.name != "ring saver" for thread in threading.enumerate()))
+        writer.save_last()
+        wait_for(lambda: writer.status().saved)
+    assert sorted(read_manifest(path).counts.frames for path in tmp_path.iterdir()) == [2, 10]
+
+
 def test_the_last_seconds_leave_the_last_room_of_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The rule of a recording: what is open must still be closed, and the system must go on."""
     free = [30_000_000]
