@@ -395,7 +395,7 @@ class PlayerWindow(WindowFrame):
         self.panels.toast.show_message(message, is_fault=is_fault)
 
     def go_to_time(self) -> None:
-        """Type a time in ms."""
+        """Type a time, as the clock shows it or in seconds."""
         self.panels.bar.position.setFocus()
         self.panels.bar.position.selectAll()
 

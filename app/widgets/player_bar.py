@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QFontMetrics
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSlider, QSpinBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSlider, QVBoxLayout, QWidget
 
 from app import theme
 from app.language import tr
 from app.play_clock import SPEEDS
 from app.session_marks import JumpKind, clock_text
 from app.widgets.quiet_combo import name_list
+from app.widgets.time_field import TimeField
 
 _BUTTON = 34
 _STYLE = """
@@ -48,15 +49,13 @@ class PlayerBar(QWidget):
         self.slider.setAccessibleName(tr("Position in milliseconds"))
         self.slider.setSingleStep(100)
         self.slider.setPageStep(1000)
-        self.position = QSpinBox()
-        self.position.setSuffix(" ms")
-        self.position.setGroupSeparatorShown(True)
+        self.position = TimeField()
         self.position.setKeyboardTracking(False)
-        self.position.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
+        self.position.setButtonSymbols(TimeField.ButtonSymbols.NoButtons)
         self.position.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.position.setFixedWidth(124)
-        self.position.setAccessibleName(tr("Go to, in milliseconds"))
-        self.position.setToolTip(tr("Position from the first frame; type one and press Enter  (key T)"))
+        self.position.setAccessibleName(tr("Go to a time"))
+        self.position.setToolTip(tr("Time from the first frame; type one as 1:23.4 or in seconds, and press Enter  (key T)"))
         self.length = _label(tr("of {time}", time="0:00.000"))
         self.frame = _label("")
         self.frame.setObjectName("card_note")
@@ -110,8 +109,7 @@ class PlayerBar(QWidget):
 
     def abandon(self) -> None:
         """Forget a time that was typed and not confirmed; leaving the field would count it otherwise."""
-        field = self.position
-        field.lineEdit().setText(f"{field.prefix()}{field.textFromValue(field.value())}{field.suffix()}")
+        self.position.lineEdit().setText(self.position.textFromValue(self.position.value()))
 
     def show_playing(self, on: bool) -> None:
         self.play.setText("\N{DOUBLE VERTICAL BAR}" if on else "\N{BLACK RIGHT-POINTING TRIANGLE}")

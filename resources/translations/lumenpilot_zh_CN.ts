@@ -6310,13 +6310,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/player_bar.py"/>
-        <source>Go to, in milliseconds</source>
-        <translation>转到，毫秒</translation>
+        <source>Go to a time</source>
+        <translation>转到某一时刻</translation>
     </message>
     <message>
         <location filename="../../app/widgets/player_bar.py"/>
-        <source>Position from the first frame; type one and press Enter  (key T)</source>
-        <translation>从第一帧起的位置；输入后按 Enter  (T)</translation>
+        <source>Time from the first frame; type one as 1:23.4 or in seconds, and press Enter  (key T)</source>
+        <translation>从第一帧算起的时间；按 1:23.4 的形式或以秒为单位输入，然后按 Enter（T 键）</translation>
     </message>
     <message>
         <location filename="../../app/widgets/player_bar.py"/>

@@ -229,9 +229,9 @@ def test_n_and_p_jump_to_the_chosen_kind(player: PlayerWindow, qtbot: QtBot) -> 
     at(qtbot, player, 30)
 
 
-def test_a_time_in_ms_is_typed_and_dragged(player: PlayerWindow, qtbot: QtBot) -> None:
+def test_a_time_is_typed_and_dragged(player: PlayerWindow, qtbot: QtBot) -> None:
     press(player, Key.Key_T)
-    QTest.keyClicks(player.focusWidget(), "2500")
+    QTest.keyClicks(player.focusWidget(), "2.5")
     press(player, Key.Key_Return)
     at(qtbot, player, 25)
     assert player.focusWidget() is player.panels.live
@@ -349,10 +349,29 @@ def test_a_note_stays_at_its_time_and_is_lost_by_nothing(open_player: Open, tmp_
 def test_escape_takes_back_a_time_that_was_typed(player: PlayerWindow, qtbot: QtBot) -> None:
     player.seek(1.0)
     press(player, Key.Key_T)
-    QTest.keyClicks(player.panels.bar.position, "4500")
+    QTest.keyClicks(player.panels.bar.position, "4.5")
     QTest.keyClick(player.panels.bar.position, Key.Key_Escape)
     qtbot.wait(50)
     assert player.time_s == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("typed", ["0:03.5", "3.5", "3,5", "3.5 s", "3500 ms", "0:0:3.5"])
+def test_a_time_is_typed_as_the_clock_shows_it_or_in_seconds(player: PlayerWindow, typed: str) -> None:
+    press(player, Key.Key_T)
+    QTest.keyClicks(player.panels.bar.position, typed)
+    QTest.keyClick(player.panels.bar.position, Key.Key_Return)
+    assert player.time_s == pytest.approx(3.5)
+    assert player.panels.bar.position.text() == "0:03.500"
+    assert not player.panels.bar.position.hasFocus()
+
+
+@pytest.mark.parametrize(("typed", "shown"), [("1:", "0:01.000"), ("abc", "0:01.000"), ("..", "0:01.000"), ("99:00", "0:05.900")])
+def test_what_is_no_time_changes_nothing_and_one_beyond_the_end_is_the_end(player: PlayerWindow, typed: str, shown: str) -> None:
+    player.seek(1.0)
+    press(player, Key.Key_T)
+    QTest.keyClicks(player.panels.bar.position, typed)
+    QTest.keyClick(player.panels.bar.position, Key.Key_Return)
+    assert player.panels.bar.position.text() == shown
 
 
 def test_notes_that_the_disk_does_not_take_are_not_lost(
