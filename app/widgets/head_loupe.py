@@ -11,14 +11,17 @@ from PySide6.QtWidgets import QWidget
 from app import theme
 from app.language import tr
 from app.palette import ON_PICTURE
+from app.widgets.loupe_corner import LoupeCorner
 from app.widgets.marks_label import MarksLabel
 from app.widgets.overlays import Marks
+from app.widgets.pencil import on_screen
 from core.types import Image, Point, Scene
 
 _SPAN_PX = 110.0
 _SHARE_OF_VIEW = 0.36
 _ASPECT = 0.75
-_LABEL_PX = 16
+_LABEL_PX = (11, 16)
+_WIDTH_PER_LABEL_PX = 13  # two labels have room beside each other
 _CORNERS = ((1, 0), (0, 0), (1, 1), (0, 1))
 
 
@@ -26,7 +29,7 @@ class HeadLoupe(QWidget):
     """Shows about 110 working pixels around the head with the same marks as the live view.
 
     ``clicked`` carries the place that was clicked in it, in source pixels: what it hides of the picture is not meant. It stays in
-    its corner as long as the head is elsewhere, and moves to the opposite side when the head comes near.
+    a corner in which it hides little, and leaves it when the head comes near.
     """
 
     clicked = Signal(float, float)
@@ -38,26 +41,28 @@ class HeadLoupe(QWidget):
         self._image: QImage | None = None
         self._pixels: Image | None = None
         self._to_widget = QTransform()
-        self._corner = 0
+        self._corner = LoupeCorner()
         self._drawn = MarksLabel(self)
         self._drawn.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setAccessibleName(tr("Magnified head"))
         self.hide()
 
-    def show_head(self, image: Image, scene: Scene, head_in_view: QPointF) -> None:
-        """Magnify the surroundings of the head; `head_in_view` is where it is on the parent widget."""
+    def show_head(self, image: Image, scene: Scene, head_in_view: QPointF, to_view: QTransform) -> None:
+        """Magnify the surroundings of the head; `head_in_view` is where it is on the parent widget, `to_view` leads there."""
         middle = _middle(scene)
         if middle is None:
             self.hide()
             return
-        self._place(head_in_view)
+        self._place(head_in_view, to_view)
         span = _SPAN_PX / scene.scale
         zoom = self.width() / span
         left, top = middle[0] + 0.5 - span / 2, middle[1] + 0.5 - self.height() / zoom / 2
         self._cut(image, left, top, span, self.height() / zoom)
         self._to_widget = QTransform(zoom, 0.0, 0.0, zoom, -left * zoom, -top * zoom)
         self._drawn.setGeometry(self.rect())
-        self._drawn.record(self._marks, self._to_widget, _LABEL_PX, self._glass(3.0))
+        least, most = _LABEL_PX
+        label_px = max(least, min(self.width() // _WIDTH_PER_LABEL_PX, most))
+        self._drawn.record(self._marks, self._to_widget, label_px, self._glass(3.0))
         self.show()
         self.update()
 
@@ -71,14 +76,13 @@ class HeadLoupe(QWidget):
         self._image = QImage(self._pixels.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32)
         self._image.setOffset(QPointF(x0, y0).toPoint())
 
-    def _place(self, head: QPointF) -> None:
+    def _place(self, head: QPointF, to_view: QTransform) -> None:
         room = self._parent.rect()
         width = int(_SHARE_OF_VIEW * min(room.width(), room.height() / _ASPECT))
-        size = (width, int(width * _ASPECT))
-        if self._rect(self._corner, size).adjusted(-20, -20, 20, 20).contains(head):
-            far = [k for k in range(len(_CORNERS)) if not self._rect(k, size).adjusted(-60, -60, 60, 60).contains(head)]
-            self._corner = far[0] if far else self._corner
-        self.setGeometry(self._rect(self._corner, size).toRect())
+        corners = [self._rect(k, (width, int(width * _ASPECT))) for k in range(len(_CORNERS))]
+        places, weights = self._marks.places()
+        corner = self._corner.choose(corners, head, on_screen(places, to_view), weights)
+        self.setGeometry(corners[corner].toRect())
 
     def _rect(self, corner: int, size: tuple[int, int]) -> QRectF:
         right, bottom = _CORNERS[corner]

@@ -195,9 +195,15 @@ class LiveView(QWidget):
     def _draw_marks(self) -> None:
         if self._size is None:
             return
-        to_view = self._box.childGroup.sceneTransform() * self._view.viewportTransform()
         self._drawn.setGeometry(self._view.geometry())
-        self._drawn.record(self._marks, to_view, 0 if self._loupe_on else _LABEL_PX)  # the loupe shows the same values larger
+        self._drawn.record(
+            self._marks, self._to_view(), 0 if self._loupe_on else _LABEL_PX
+        )  # the loupe shows the same values larger
+
+    def _to_view(self) -> QTransform:
+        """From source pixels to the view's."""
+        to_view: QTransform = self._box.childGroup.sceneTransform() * self._view.viewportTransform()
+        return to_view
 
     def _show_loupe(self) -> None:
         scene, image = self._scene, self._image
@@ -206,7 +212,7 @@ class LiveView(QWidget):
             return
         x, y = scene.to_source(scene.path.head)
         at = self._box.mapViewToScene(QPointF(x + 0.5, y + 0.5))
-        self._loupe.show_head(image, scene, QPointF(self._view.mapFromScene(at)))
+        self._loupe.show_head(image, scene, QPointF(self._view.mapFromScene(at)), self._to_view())
 
     def _on_left_click(self, point: QPointF) -> None:
         self._on_place(point.x() - 0.5, point.y() - 0.5)

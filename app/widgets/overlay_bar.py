@@ -1,10 +1,10 @@
-"""The switches of the overlays: a row of chips, each with its key."""
+"""The switches of the overlays: a row of chips, each with its key, or two rows where one has no room for their names."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QWidget
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from app import palette, theme
 from app.language import tr
@@ -12,6 +12,7 @@ from app.palette import ON_PICTURE
 from app.widgets.overlays import Layer
 
 _SEEN = 3.0
+_HEIGHT, _NARROW, _GAP = 30, 54, 5
 _SWATCH = {
     Layer.MASKS: ON_PICTURE.VESSEL,
     Layer.VESSEL: ON_PICTURE.VESSEL,
@@ -33,16 +34,49 @@ class OverlayBar(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(5)
         self._chips: dict[Layer, _Chip] = {}
         for layer in Layer:
-            chip = _Chip(layer)
+            chip = _Chip(layer, self)
             chip.toggled.connect(lambda on, which=layer: self.toggled.emit(which, on))
-            row.addWidget(chip, chip.sizeHint().width())
             self._chips[layer] = chip
+        policy = QSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Minimum)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
         self.setAccessibleName(tr("Overlays"))
+
+    def sizeHint(self) -> QSize:
+        return QSize(_wanted(list(self._chips.values())), _HEIGHT)
+
+    def minimumSizeHint(self) -> QSize:
+        widest = max(map(len, self._rows(2)))
+        return QSize(widest * (_NARROW + _GAP) - _GAP, _HEIGHT)
+
+    def heightForWidth(self, width: int) -> int:
+        rows = self._rows_at(width)
+        return rows * (_HEIGHT + _GAP) - _GAP
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        top = 0
+        for row in self._rows(self._rows_at(self.width())):
+            left = 0.0
+            # As much more, or less, for each as its name is long.
+            share = (self.width() + _GAP) / (_wanted(row) + _GAP)
+            for chip in row:
+                step = (chip.sizeHint().width() + _GAP) * share
+                chip.setGeometry(round(left), top, round(left + step) - _GAP - round(left), _HEIGHT)
+                left += step
+            top += _HEIGHT + _GAP
+
+    def _rows_at(self, width: int) -> int:
+        return 1 if width >= _wanted(list(self._chips.values())) else 2
+
+    def _rows(self, count: int) -> list[list[_Chip]]:
+        chips = list(self._chips.values())
+        if count == 1:
+            return [chips]
+        half = (len(chips) + 1) // 2
+        return [chips[:half], chips[half:]]
 
     def is_on(self, layer: Layer) -> bool:
         return self._chips[layer].isChecked()
@@ -55,24 +89,27 @@ class OverlayBar(QWidget):
             chip.setChecked(on)
 
 
+def _wanted(row: list[_Chip]) -> int:
+    """The width that shows all of their names and colours."""
+    return sum(chip.sizeHint().width() + _GAP for chip in row) - _GAP
+
+
 class _Chip(QAbstractButton):
     """Key cap, colour and name; filled when on, outlined when off."""
 
-    def __init__(self, layer: Layer) -> None:
-        super().__init__()
+    def __init__(self, layer: Layer, bar: OverlayBar) -> None:
+        super().__init__(bar)
         self._layer = layer
         self.setCheckable(True)
         self.setChecked(True)
         self.setText(tr(layer.value.label))
-        self.setFixedHeight(30)
-        self.setMinimumWidth(54)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setToolTip(tr("{meaning}  (key {key})", meaning=tr(layer.value.meaning), key=layer.value.key))
         self.setAccessibleName(tr("Overlay {label}", label=tr(layer.value.label)))
 
     def sizeHint(self) -> QSize:
-        return QSize(40 + QFontMetrics(theme.font(12)).horizontalAdvance(self.text()), 30)
+        return QSize(40 + QFontMetrics(theme.font(12)).horizontalAdvance(self.text()), _HEIGHT)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)

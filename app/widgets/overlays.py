@@ -6,15 +6,17 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QPainter, QTransform
 
 from app.language import mark
 from app.palette import ON_PICTURE
 from app.scene_shapes import SceneShapes
+from app.widgets.loupe_corner import seen_places
 from app.widgets.pencil import Pencil
 from app.wording import signed_degrees
-from core.types import Point, Pose
+from core.types import Point, Points, Pose
 
 _CLEAR_OFFSET_PX = 3.0
 
@@ -76,6 +78,10 @@ class Marks:
             self._visible.add(layer)
         else:
             self._visible.discard(layer)
+
+    def places(self) -> tuple[Points, NDArray[np.float64]]:
+        """What there is to see, drawn or not, (N, 2) in source pixels, and how much each place matters (N,)."""
+        return seen_places(self._overlay.shapes, self._overlay.target)
 
     def draw(self, painter: QPainter, to_screen: QTransform, room: QRectF, label_px: int, *, tags: bool = True) -> None:
         """Draw with `to_screen` (source pixels to the screen) within `room` on the screen; labels in that size, 0 for none.

@@ -14,6 +14,8 @@ from core.types import Point, Points, Vector
 
 _ARC_RADIUS = 44.0
 _LABEL_GAP = 16.0
+_LABEL_PLACES = ((0, 0), (1, 0), (0, -1), (0, 1), (2, 0), (1, -1), (1, 1))
+"""Rows outward and places along the line, in the order in which a label would have them: beside its point first."""
 _MARGIN = 60.0
 _TAG_PX = 15
 _TUBE_MIN, _TUBE_DASH = 14.0, 6.0
@@ -100,9 +102,7 @@ class Pencil:
         """A see-through tube along `line` (N, 2), `width_px` wide in the picture, with broken edges and an arrow at its end."""
         t = self._to_screen
         half = max(_TUBE_MIN, width_px * float(np.hypot(t.m11(), t.m12()))) / 2
-        x, y = line[:, 0] + 0.5, line[:, 1] + 0.5
-        way = np.column_stack([x * t.m11() + y * t.m21() + t.dx(), x * t.m12() + y * t.m22() + t.dy()])
-        way = polyline.resample(way, _TUBE_DASH)
+        way = polyline.resample(on_screen(line, t), _TUBE_DASH)
         if len(way) < 2:
             return
         across = half * polyline.normals(way)
@@ -133,16 +133,29 @@ class Pencil:
             return
         text_font = theme.semi_bold(self._label_px)
         width, height = QFontMetricsF(text_font).horizontalAdvance(text) + 12.0, self._label_px + 7.0
-        across = QPointF(-line.direction[1], line.direction[0]) * side
+        along = QPointF(*line.direction)
+        across = QPointF(-along.y(), along.x()) * side
         reach = _LABEL_GAP + (abs(across.x()) * width + abs(across.y()) * height) / 2
-        middle = self._at(point) + across * reach
-        box = QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height)
-        if any(box.intersects(other) for other in self._labels):
-            box.translate(across * (height + 2.0))
-        box.moveLeft(max(self._room.left() + 4, min(box.left(), self._room.right() - width - 4)))
-        box.moveTop(max(self._room.top() + 4, min(box.top(), self._room.bottom() - height - 4)))
+        step = abs(along.x()) * width + abs(along.y()) * height
+        boxes = []
+        for out in (across, -across):
+            for row, place in _LABEL_PLACES:
+                middle = self._at(point) + out * (reach + row * (height + 2.0)) + along * (place * step)
+                boxes.append(self._inside(QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height)))
+        box = min(boxes, key=self._covered)
         self._labels.append(box)
         self._text_box(box, text, text_font, name)
+
+    def _covered(self, box: QRectF) -> float:
+        """How much of other labels it would cover."""
+        both = (box.intersected(other) for other in self._labels)
+        return sum(part.width() * part.height() for part in both)
+
+    def _inside(self, box: QRectF) -> QRectF:
+        """Moved into the room, as far as it has room."""
+        left = max(self._room.left() + 4, min(box.left(), self._room.right() - box.width() - 4))
+        top = max(self._room.top() + 4, min(box.top(), self._room.bottom() - box.height() - 4))
+        return QRectF(left, top, box.width(), box.height())
 
     def tag(self, point: Point, text: str, name: str) -> None:
         """A text of fixed size below `point`, or above it or lower where another label is; kept inside the window."""
@@ -189,6 +202,13 @@ class Pencil:
             path.moveTo(at + QPointF(x, y) * radius * 0.4)
             path.lineTo(at + QPointF(x, y) * radius * 1.3)
         self._stroke(path, name, 2.5)
+
+
+def on_screen(places: Points, to_screen: QTransform) -> Points:
+    """Places (N, 2) of the source picture on the screen."""
+    x, y = places[:, 0] + 0.5, places[:, 1] + 0.5  # as Pencil._at
+    t = to_screen
+    return np.column_stack([x * t.m11() + y * t.m21() + t.dx(), x * t.m12() + y * t.m22() + t.dy()])
 
 
 def _unit(vector: QPointF) -> QPointF:

@@ -46,3 +46,18 @@ def test_a_tag_makes_way_for_a_label_that_is_there_already(pencil: _Noted) -> No
     pencil.tag((120.0, 100.0), "8 px to go", ON_PICTURE.TARGET)
     assert not pencil.boxes[1].intersects(pencil.boxes[0])
     assert pencil.boxes[1].bottom() < 100.0
+
+
+@pytest.mark.parametrize("start", [(100.0, 100.0), (8.0, 150.0), (340.0, 285.0), (10.0, 20.0)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_labels_beside_one_line_do_not_cover_each_other(pencil: _Noted, start: Point, side: float) -> None:
+    """At its middle and both of its ends, also beside the window's edge."""
+    end = (start[0] + 40.0, start[1] + 6.0)
+    middle = ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2)
+    line = Vector(start, middle, end)
+    pencil.label_beside(middle, line, -side, "θ -9°", ON_PICTURE.THETA)
+    pencil.label_beside(end, line, side, "d_head 13", ON_PICTURE.D_HEAD)
+    pencil.label_beside(start, line, side, "d_tail 10", ON_PICTURE.D_TAIL)
+    for k, box in enumerate(pencil.boxes):
+        assert QRectF(0, 0, 400, 300).contains(box)
+        assert not any(box.intersects(other) for other in pencil.boxes[:k])
