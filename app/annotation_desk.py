@@ -97,6 +97,7 @@ class AnnotationDesk(QObject):
         self._status: dict[ItemKey, Status] = {}
         self._times: dict[ItemKey, float] = {}
         self._proposals: dict[str, Proposal] = {}
+        self._looks: set[ItemKey] = set()
         self._histories: dict[int, History] = {}
         self._perceive: Perceive | None = None
         self._to_write: deque[Callable[[], None]] = deque()
@@ -336,6 +337,16 @@ class AnnotationDesk(QObject):
             return proposal_of(self._perceive(Frame(0, 0.0, read_image(path))))
 
         self._perceiving.submit(sha256, perceive, urgent=True, once=True)
+
+    def keep_look(self) -> None:
+        """The rater sees the algorithm's answer to the item in hand: what he draws from now on is told apart."""
+        item, store = self.item, self._store
+        if item is None or self.proposal is None or item.key in self._looks:
+            return
+        self._looks.add(item.key)
+        after = self.history.last
+        self._to_write.append(lambda: store.keep_look(item.key, after))
+        self._saving.submit("edit", self._write_all)
 
     def _on_perceived(self, sha256: str, proposal: Proposal) -> None:
         self._proposals[sha256] = proposal

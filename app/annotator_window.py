@@ -300,6 +300,7 @@ class AnnotatorWindow(WindowFrame):
         proposal, item = self._desk.proposal, self._desk.item
         if proposal is None or item is None or not self._desk.is_open or not self.panels.bar.is_on("H"):
             return
+        self._desk.keep_look()
         self.panels.canvas.show_proposal(turn_annotation(proposal.annotation, item.view, item.image.record.size))
         if proposal.pose is not None:
             pose = proposal.pose

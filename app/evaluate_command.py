@@ -217,20 +217,26 @@ def _perceive_annotated(
 def _how_answered(
     annotations: Path, answers: Sequence[StoredAnnotation], images: Sequence[FoundImage], study: str | None
 ) -> list[str]:
-    """What a reader must know of the manual answers: which are not among the figures, and which began with the algorithm's own."""
+    """What a reader must know of the manual answers: which are not among the figures, and which know the algorithm's own."""
     from core.study.annotation_report import choose_study
     from core.study.annotation_store import AnnotationStore
 
     done, here = choose_study(answers, study, str(annotations)), {image.sha256 for image in images}
     gone = len({one.key.sha256 for one in done} - here)
     with AnnotationStore(annotations, read_only=True) as store:
-        taken_over = store.taken_over()
+        taken_over, after_look = store.taken_over(), store.given_after_look()
     taken = sum(one.key.sha256 in here and one.key in taken_over for one in done)
     notes = [f"Of the annotated images {gone} are not where they were; they are in none of the figures."] if gone else []
     if taken:
         notes.append(
             f"Of the manual answers {taken} began with the algorithm's own lines (key G): they agree with it the more for that. "
             "A blind study (annotate --study NAME) hides them."
+        )
+    looked = sum(one.key.sha256 in here and one.key in after_look - taken_over for one in done)
+    if looked:
+        notes.append(
+            f"Of the manual answers {looked} were given, or changed, after the algorithm's lines had been shown (key H): they may "
+            "agree with it the more for that."
         )
     return notes
 

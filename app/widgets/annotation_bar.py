@@ -18,7 +18,12 @@ _SWITCHES = (
     ("L", mark("Loupe"), "TEXT", mark("The surroundings of the cursor, magnified")),
     ("K", mark("Masks"), "VESSEL", mark("Show the drawn masks")),
     ("T", mark("Brush"), "ORANGE", mark("Paint the mask instead of moving its points")),
-    ("H", mark("Algorithm"), "TEXT", mark("Show what the algorithm says; hidden in a blind study")),
+    (
+        "H",
+        mark("Algorithm"),
+        "TEXT",
+        mark("Show what the algorithm says: answers after it are told apart. Not in a blind study"),
+    ),
 )
 
 

@@ -51,6 +51,11 @@ class History:
         return self._contents[self._now]
 
     @property
+    def last(self) -> int:
+        """The newest entry's number, 0 before the first."""
+        return self._last
+
+    @property
     def can_undo(self) -> bool:
         return self._now != 0
 

@@ -34,6 +34,7 @@ from core.study.annotation_records import (
     entry_from,
     stored_from,
 )
+from core.study.annotation_rows import has_table
 from core.study.annotations import Annotation, AnnotationError, Readout, View
 
 DEFAULT_NAME = "annotations.lumenpilot.sqlite"
@@ -239,6 +240,30 @@ class AnnotationStore:
             "SELECT DISTINCT i.sha256, a.study, a.rater, a.repeat FROM journal j JOIN annotations a ON a.id = j.annotation_id"
             " JOIN images i ON i.id = a.image_id WHERE j.action = ?",
             (TAKES_LINES,),
+        )
+        return {ItemKey(str(sha256), str(study), str(rater), int(repeat)) for sha256, study, rater, repeat in rows}
+
+    def keep_look(self, key: ItemKey, after: int) -> None:
+        """Keep that the rater was shown the algorithm's answer, after his own edit of that number (0: before all).
+
+        The first look counts.
+        """
+        with self.transaction() as database:
+            database.execute(
+                "INSERT INTO looks (image_id, study, rater, repeat, after) SELECT id, ?, ?, ?, ? FROM images WHERE sha256 = ?"
+                " ON CONFLICT (image_id, study, rater, repeat) DO UPDATE SET after = min(after, excluded.after)",
+                (key.study, key.rater, key.repeat, after, key.sha256),
+            )
+
+    def given_after_look(self) -> set[ItemKey]:
+        """Annotations that were edited after their rater had been shown the algorithm's answer; older files tell none."""
+        with self.transaction(writing=False) as database:
+            if not has_table(database, "looks"):
+                return set()
+        rows = self._rows(
+            "SELECT DISTINCT i.sha256, a.study, a.rater, a.repeat FROM looks l JOIN images i ON i.id = l.image_id"
+            " JOIN annotations a ON a.image_id = l.image_id AND a.study = l.study AND a.rater = l.rater AND a.repeat = l.repeat"
+            " JOIN journal j ON j.annotation_id = a.id AND j.number > l.after"
         )
         return {ItemKey(str(sha256), str(study), str(rater), int(repeat)) for sha256, study, rater, repeat in rows}
 

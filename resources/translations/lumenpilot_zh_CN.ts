@@ -5380,8 +5380,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/annotation_bar.py"/>
-        <source>Show what the algorithm says; hidden in a blind study</source>
-        <translation>显示算法的结果；盲法研究中隐藏</translation>
+        <source>Show what the algorithm says: answers after it are told apart. Not in a blind study</source>
+        <translation>显示算法的结果：此后给出的答案会单独注明。盲法研究中不显示</translation>
     </message>
     <message>
         <location filename="../../app/widgets/annotation_bar.py"/>

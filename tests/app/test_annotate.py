@@ -138,12 +138,16 @@ def test_an_annotated_folder_is_evaluated_as_its_table_is(folder: Path, tmp_path
     rows = read_measurements(tmp_path / "table.csv")
     assert [row.image for row in rows] == ["0.png", "1.png", "2.png"]
     assert all(row.angle_1 is not None and row.angle_2 is not None and row.state is not None for row in rows)
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        store.keep_look(store.annotations()[0].key, 0)
     nothing = {"as_json": False, "model": None, "preset": None, "config_path": None, "like_paper": None, "seed": 0}
     run_evaluate(None, tmp_path / "table.csv", tmp_path / "by_table", **nothing)  # type: ignore[arg-type]
     run_evaluate(folder, None, tmp_path / "by_folder", **nothing)  # type: ignore[arg-type]
     first, second = (json.loads((tmp_path / name / "metrics.json").read_text()) for name in ("by_table", "by_folder"))
     assert (first["angle"], first["state"], first["manual"]) == (second["angle"], second["state"], second["manual"])
     assert second["source"]["kind"] == "annotated by hand"
+    looked = "Of the manual answers 1 were given, or changed, after the algorithm's lines had been shown (key H)"
+    assert any(note.startswith(looked) for note in second["notes"])
 
 
 def test_annotated_images_that_are_elsewhere_are_counted(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -387,10 +387,13 @@ def test_the_algorithms_answer_is_shown_and_taken_over_on_demand(rater: Rater) -
     assert rater.canvas.proposal is not None
     assert "G takes it over" in rater.window.panels.toast.text()
     assert drawn(rater) == Annotation(), "seen is not taken"
+    assert rater.desk.store.given_after_look() == set(), "nothing was answered yet"
     rater.press(Key.Key_G)
     assert (drawn(rater).robot, drawn(rater).vessel, drawn(rater).state, drawn(rater).masks) == (ROBOT, VESSEL, None, ())
     rater.press(Key.Key_4, Key.Key_G)
     assert drawn(rater).masks == (box,)
+    rater.qtbot.waitUntil(lambda: rater.desk.unsaved == 0)
+    assert rater.desk.store.given_after_look() == {item.key}
 
 
 def test_an_answer_that_comes_after_it_was_switched_off_is_not_shown(rater: Rater) -> None:

@@ -85,6 +85,36 @@ def test_answers_that_began_with_the_algorithms_are_known(tmp_path: Path) -> Non
         assert store.taken_over() == {KEY}
 
 
+def test_answers_that_were_given_after_a_look_at_the_algorithms_are_known(tmp_path: Path) -> None:
+    """And those are not that were complete before it, nor those of whoever never looked."""
+    before, after, never, again = (ItemKey(SHA, "", rater) for rater in ("ann", "bob", "eve", "kim"))
+    with known(tmp_path / "a.sqlite") as store:
+        assert store.given_after_look() == set()
+        done = History()
+        save(store, done, DRAWN, before)
+        store.keep_look(before, done.last)
+        store.keep_look(after, 0)
+        save(store, History(), DRAWN, after)
+        save(store, History(), DRAWN, never)
+        changed = History()
+        save(store, changed, DRAWN, again)
+        store.keep_look(again, changed.last)
+        save(store, changed, Annotation(DRAWN.robot, DRAWN.vessel, PoseState.C), again)
+        store.keep_look(again, changed.last)
+        assert store.given_after_look() == {after, again}, "the first look counts"
+    with AnnotationStore(tmp_path / "a.sqlite", read_only=True) as store:
+        assert store.given_after_look() == {after, again}
+
+
+def test_a_file_of_a_version_that_knew_no_looks_tells_none(tmp_path: Path) -> None:
+    with known(tmp_path / "a.sqlite") as store:
+        save(store, History(), DRAWN)
+    with closing(sqlite3.connect(tmp_path / "a.sqlite")) as database:
+        database.execute("DROP TABLE looks")
+    with AnnotationStore(tmp_path / "a.sqlite", read_only=True) as store:
+        assert store.given_after_look() == set()
+
+
 def test_a_second_window_is_told_and_the_file_is_free_after_closing(tmp_path: Path) -> None:
     path = tmp_path / "a.sqlite"
     with known(path):
