@@ -687,6 +687,13 @@ def test_a_deadman_that_is_let_go_is_no_loss_while_another_is_held(benches: dict
     assert late.raw([*key, *late.reports()], late.now_s + 0.125).mode is U
 
 
+def test_a_second_deadman_that_is_pressed_before_the_first_one_is_heard_of_again_is_no_loss(benches: dict[Mode, Bench]) -> None:
+    """In a late tick: a press lets nothing go, whatever was heard of the other one by then."""
+    late = benches[U].copy()
+    press = DeadmanReport(True, late.now_s + 0.11, "key")
+    assert late.raw([press, *late.reports()], late.now_s + 0.125).mode is U
+
+
 @pytest.mark.parametrize("pressed", [False, None])
 def test_the_last_deadman_that_is_let_go_or_cannot_tell_is_a_loss(benches: dict[Mode, Bench], pressed: bool | None) -> None:
     bench = benches[U].copy()
