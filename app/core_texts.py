@@ -308,6 +308,8 @@ TEMPLATES = (
     "{a} answer, model {b}, firmware {rest}",
     "no permission for {node}",
     # calibration
+    "the feed goes by about {a} mm at one turn of the servo's horn, as the camera saw it, and is configured with {b} mm: measure "
+    "it, and set servos.joints, advance, mm_per_turn",
     "board {a}: {b} of {c} corners",
     "a board of {a} x {b} squares needs {c} markers, and there are {count}: take fewer squares",
     "lens: up to {a} px at the border, {b} px left over",

@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from core.calibration.board import BoardError, BoardSpec, find_board
+from core.calibration.feed_way import feed_disagreement
 from core.calibration.identify import Assignment, Finding, NotIdentified, assign
 from core.calibration.lens import BoardView, LensError, distort, fit_lens, straighten
 from core.calibration.look import HeadNotSeen
@@ -213,6 +214,11 @@ class RigDraft:
         """Name the servos after what was found; raises NotIdentified."""
         assigned = assign(self.findings)
         self.set_assignments(assigned)
+        if self.scale is not None:
+            feed = feed_disagreement(self.findings, assigned, self.servos, self.scale, self._picture_size())
+            if feed:
+                self.say(feed)
+                self.notes.append(feed)
         if any(one.assumed for one in assigned):
             self.notes.append(
                 "up and down are assumed by the order of their ids: one camera cannot tell them apart; swap them if it is wrong"

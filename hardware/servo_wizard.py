@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from core.calibration.identify import Assignment, Finding, Wiggle, assign, classify
+from core.calibration.identify import Assignment, Finding, Function, Wiggle, assign, classify
 from core.calibration.look import HeadNotSeen, Look, head_move
 from core.calibration.steering import Pull, learn
 from core.calibration.taut import NeverTaut, Step, is_begun, is_enough, taut_at_mm
@@ -119,17 +119,29 @@ def identify_servo(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], ser
     with bench.hands.probe(servos, servo_id, limits, 1, ids) as probe, _or_back(lambda: probe.move_to(0.0)):
         for amplitude_mm in _AMPLITUDES_MM:
             say(f"servo {servo_id}: {amplitude_mm:g} mm both ways")
-            rest = _look(bench, probe)
-            seen = []
-            for target_mm in (amplitude_mm, -amplitude_mm):
-                probe.move_to(target_mm)
-                seen.append(_look(bench, probe))
-            probe.move_to(0.0)
-            if (finding := classify(Wiggle(amplitude_mm, rest, *seen))) is not None:
+            finding = classify(_wiggled(bench, probe, amplitude_mm))
+            if finding is not None and finding.function is Function.ADVANCE and amplitude_mm < most_mm:
+                # It is clear who this is; how far it goes is clear only after a longer way.
+                say(f"servo {servo_id}: {most_mm:g} mm both ways")
+                farther = classify(_wiggled(bench, probe, most_mm))
+                if farther is not None and (farther.function, farther.sign) == (finding.function, finding.sign):
+                    finding = farther
+            if finding is not None:
                 say(f"servo {servo_id} {finding.function} ({finding.seen}), direction {'+' if finding.sign > 0 else '-'}")
                 return finding
     say(f"servo {servo_id}: nothing clear was seen")
     return None
+
+
+def _wiggled(bench: Bench, probe: Probe, amplitude_mm: float) -> Wiggle:
+    """What is seen at rest, so far one way and so far the other; the servo stands where it stood then."""
+    rest = _look(bench, probe)
+    seen = []
+    for target_mm in (amplitude_mm, -amplitude_mm):
+        probe.move_to(target_mm)
+        seen.append(_look(bench, probe))
+    probe.move_to(0.0)
+    return Wiggle(amplitude_mm, rest, *seen)
 
 
 def identify_servos(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], say: Say) -> tuple[Assignment, ...]:

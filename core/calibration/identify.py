@@ -16,6 +16,7 @@ from core.calibration.look import Look, head_move
 from core.calibration.sheath import sheath_growth
 from core.errors import UserError
 from core.servo_config import JOINT_NAMES, JointName
+from core.types import Point
 
 _CLEAR_LATERAL_PX, _CLEAR_FEED_PX, _CLEAR_PITCH_PX, _CLEAR_SHEATH_PX = 3.0, 1.5, 1.4, 3.0
 _SHEATH_FROM_MM = 1.4
@@ -49,12 +50,26 @@ class Wiggle:
 
 
 @dataclass(frozen=True, slots=True)
+class FeedWay:
+    """How far the robot went: source px for each mm that was sent, of ``amplitude_mm`` both ways.
+
+    ``scale``: working px in a source px. ``head``: where it was seen, source px.
+    """
+
+    px_per_mm: float
+    amplitude_mm: float
+    head: Point
+    scale: float
+
+
+@dataclass(frozen=True, slots=True)
 class Finding:
     """What a servo does. ``sign``: the servo's own direction that tightens the wire or feeds forward. ``seen`` for people."""
 
     function: Function
     sign: Literal[-1, 1]
     seen: str
+    way: FeedWay | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +96,9 @@ def classify(wiggle: Wiggle) -> Finding | None:
         return Finding(function, sign, f"head {abs(lateral_px):.0f} px to the {'right' if lateral_px > 0 else 'left'}")
     longer = plus.longer_px, minus.longer_px
     if longer[0] * longer[1] < 0 and min(abs(longer[0]), abs(longer[1])) >= _CLEAR_FEED_PX:
-        return Finding(Function.ADVANCE, 1 if longer[0] > 0 else -1, f"head {max(longer):.0f} px forward")
+        px_per_mm = abs(longer[0] - longer[1]) / wiggle.rest.scale / (2.0 * wiggle.amplitude_mm)
+        way = FeedWay(px_per_mm, wiggle.amplitude_mm, wiggle.rest.head, wiggle.rest.scale)
+        return Finding(Function.ADVANCE, 1 if longer[0] > 0 else -1, f"head {max(longer):.0f} px forward", way)
     shorter = -plus.longer_px, -minus.longer_px
     if max(shorter) >= _CLEAR_PITCH_PX and max(shorter) > _ONE_SIDED * abs(min(shorter)):
         sign = 1 if shorter[0] > shorter[1] else -1

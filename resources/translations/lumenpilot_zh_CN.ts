@@ -1947,6 +1947,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>the feed goes by about {a} mm at one turn of the servo's horn, as the camera saw it, and is configured with {b} mm: measure it, and set servos.joints, advance, mm_per_turn</source>
+        <translation>相机观察到舵盘每转一圈进给约 {a} mm，而配置为 {b} mm：请实测后设置 servos.joints 中 advance 的 mm_per_turn</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>board {a}: {b} of {c} corners</source>
         <translation>标定板 {a}：{c} 个角点中的 {b} 个</translation>
     </message>

@@ -217,7 +217,7 @@ def test_an_empty_name_is_no_model(command: tuple[object, ...], tmp_path: Path) 
     out = ("--out", tmp_path / "out") if command[0] in ("trial", "ablation") else ()
     done = run(*command, *out, "--model", "")
     assert done.returncode == 2
-    assert "segmentation.model" in done.stderr
+    assert "--model is empty" in done.stderr
 
 
 def test_an_unknown_look_is_named(tmp_path: Path) -> None:

@@ -7,12 +7,14 @@ import math
 import numpy as np
 import pytest
 
+from core.calibration.feed_way import feed_disagreement
 from core.calibration.identify import Finding, Function, NotIdentified, Wiggle, assign, classify
 from core.calibration.look import HeadMove, HeadNotSeen, Look, angle_deg, head_move, turn_deg
 from core.calibration.sheath import sheath_growth
 from core.calibration.steering import Pull, SteeringNotSeen, learn
 from core.calibration.taut import NeverTaut, Step, is_begun, is_enough, taut_at_mm
-from core.servo_config import JOINT_NAMES
+from core.calibration_config import ScaleConfig
+from core.servo_config import JOINT_NAMES, ServosConfig
 from core.types import Image, Points
 
 BLANK: Image = np.full((480, 640, 3), 120, np.uint8)
@@ -252,3 +254,35 @@ def test_a_wire_that_is_hung_out_is_told() -> None:
         taut_at_mm([Step(at, _move(0.2)) for at in (0.0, 0.5, 1.0)])
     with pytest.raises(NeverTaut):
         taut_at_mm([Step(0.0, _move()), Step(0.5, _move(8.0))])
+
+
+# ---- how far the feed goes
+
+
+@pytest.mark.parametrize(("mm_per_px", "told"), [(0.25, ""), (0.22, ""), (0.36, "about 58 mm"), (0.15, "about 24 mm")])
+def test_a_feed_that_goes_another_way_than_it_was_sent_is_told(mm_per_px: float, told: str) -> None:
+    """3 mm both ways are 12 px at 0.25 mm/px; the scale is one of pictures half as large."""
+    fed = classify(Wiggle(3.0, look(path()), look(path(length_px=312.0)), look(path(length_px=288.0))))
+    assert fed is not None
+    findings = {servo_id: Finding(function, 1, "") for servo_id, function in ALL.items()} | {1: fed}
+    scale = ScaleConfig(mm_per_px=2.0 * mm_per_px, size_px=(320, 240), method="board", uncertainty_share=0.01)
+    servos = ServosConfig()
+    assert {joint.mm_per_turn for joint in servos.joints} == {40.0}
+    line = feed_disagreement(findings, assign(findings), servos, scale, (640, 480))
+    assert bool(line) is bool(told)
+    assert told in line
+
+
+def test_a_way_too_short_to_tell_says_nothing() -> None:
+    """0.75 mm are 3 px, and a look is off by one."""
+    fed = classify(Wiggle(0.75, look(path()), look(path(length_px=304.0)), look(path(length_px=296.0))))
+    assert fed is not None
+    findings = {servo_id: Finding(function, 1, "") for servo_id, function in ALL.items()} | {1: fed}
+    scale = ScaleConfig(mm_per_px=0.25, size_px=(640, 480), method="board", uncertainty_share=0.01)
+    assert feed_disagreement(findings, assign(findings), ServosConfig(), scale, (640, 480)) == ""
+
+
+def test_where_nobody_has_seen_the_feed_nothing_is_said() -> None:
+    findings = {servo_id: Finding(function, 1, "") for servo_id, function in ALL.items()}
+    scale = ScaleConfig(mm_per_px=0.25, size_px=(640, 480), method="board", uncertainty_share=0.01)
+    assert feed_disagreement(findings, assign(findings), ServosConfig(), scale, (640, 480)) == ""

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 import numpy as np
 import pytest
 
-from core.calibration.identify import NotIdentified
+from core.calibration.identify import Function, NotIdentified
 from core.calibration.look import HeadMove, HeadNotSeen, Look, angle_deg, turn_deg
 from core.config import Config
 from core.devices import DeviceError
@@ -18,6 +18,7 @@ from hardware import servo_wizard
 from hardware.servo_wizard import Bench
 from hardware.servos import units
 from hardware.servos.probe import ProbeFailed, ProbeLimits, Stopped, StopSwitch, probe_config
+from hardware.twin.appearance import default_appearance
 from tests.hardware.lock_bench import LockTwin, lock_bench
 
 WIRING = "3,-7,1,-12,-5,2,-4"  # tendons right, left, up, down; advance; two of the catheter
@@ -51,6 +52,19 @@ def test_seven_servos_are_told_apart_whatever_their_ids_and_directions(straight:
     assert len([line for line in said if "direction" in line]) == 7
     identified = servo_wizard.identified(ServosConfig(), found)
     assert [(joint.id, joint.sign) for joint in identified.joints] == [(joint.id, joint.sign) for joint in twin.wiring.joints]
+
+
+def test_how_far_the_feed_goes_is_measured_over_its_longest_way(straight: tuple[LockTwin, Bench]) -> None:
+    twin, bench = straight
+    feed = twin.wiring.joints[JOINT_NAMES.index("advance")]
+    start = dict(twin.turned_mm)
+    finding = servo_wizard.identify_servo(bench, ServosConfig(), IDS, feed.id, lambda _: None)
+    assert finding is not None
+    assert (finding.function, finding.sign) == (Function.ADVANCE, feed.sign)
+    assert finding.way is not None
+    assert finding.way.amplitude_mm == 3.0
+    assert finding.way.px_per_mm == pytest.approx(default_appearance().pixels_per_mm, rel=0.1)
+    assert twin.turned_mm == pytest.approx(start, abs=0.02)
 
 
 @pytest.mark.slow
