@@ -39,9 +39,10 @@ def run_calibrate(
     from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.eight_bit import renew_eight_bit
     from core.learning.model_file import model_folder
-    from core.learning.model_writing import changed
+    from core.learning.model_writing import changed, check_can_change
     from core.study.known_pictures import find_known
 
+    check_can_change(model)  # said before anything is looked at
     samples, truth = find_labelled(folder, POSE_KEYS)
     pictures = [picture for known in (folder, *knows) for picture in find_known(known)]
     shown = _Shown(folder, samples, truth, pictures, [also.name for also in knows])

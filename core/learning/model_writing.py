@@ -21,7 +21,9 @@ from core.learning.model_file import (
     WEIGHTS,
     ModelError,
     ModelInfo,
+    check_model,
     load_network,
+    model_folder,
     read_model_info,
     second_look_of,
     sha256_of,
@@ -227,6 +229,14 @@ def check_can_write(folder: Path) -> None:
             raise ModelError(f"{folder.parent}: cannot be written; choose another folder")
     except OSError as error:
         raise ModelError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+
+
+def check_can_change(name: str) -> None:
+    """Raise ModelError when the manifest of the model of this name could not be rewritten after long work: damaged, or not ours."""
+    check_model(name)
+    folder = model_folder(name)
+    if not os.access(folder, os.W_OK):
+        raise ModelError(f"{folder}: cannot be written; copy the model to a folder of yours, and give that as --model")
 
 
 def check_outside(out: Path, models: Sequence[Path]) -> None:

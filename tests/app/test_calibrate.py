@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 import core.study.calibration as fitting
 import core.study.known_pictures as knowing
+from app.benchmark_command import run_accuracy
 from app.calibrate_command import run_calibrate
 from core.config import PerceptionConfig
 from core.images import read_image
@@ -138,3 +140,35 @@ def test_a_damaged_network_is_said_before_the_work(frames: Path, model: Path) ->
     with pytest.raises(ModelError, match=r"older/network\.onnx: SHA-256 differs"):
         run_calibrate(frames, model=str(model), config_path=None, eight_bit=True)
     assert _files(model) == before
+
+
+@pytest.mark.parametrize("name", [WEIGHTS, f"{SECOND_LOOK}/{ONNX}"])
+def test_any_damaged_file_is_said_before_the_work(frames: Path, model: Path, name: str, looked_at: list[object]) -> None:
+    """It would be said in the end otherwise, when the manifest is written."""
+    (model / name).write_bytes(b"cut")
+    told = rf"older/{name}: SHA-256 differs"
+    with pytest.raises(ModelError, match=told):
+        run_calibrate(frames, model=str(model), config_path=None)
+    with pytest.raises(ModelError, match=told):
+        run_accuracy(frames, model=str(model), preset=None, config_path=None, as_json=False, store=True)
+    assert not looked_at
+
+
+def test_a_model_that_cannot_be_written_is_said_before_the_work(
+    frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch, looked_at: list[object]
+) -> None:
+    can = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK and can(path, mode))
+    with pytest.raises(ModelError, match="cannot be written; copy the model to a folder of yours"):
+        run_calibrate(frames, model=str(model), config_path=None)
+    with pytest.raises(ModelError, match="cannot be written; copy the model to a folder of yours"):
+        run_accuracy(frames, model=str(model), preset=None, config_path=None, as_json=False, store=True)
+    assert not looked_at
+
+
+@pytest.fixture
+def looked_at(monkeypatch: pytest.MonkeyPatch) -> list[object]:
+    """The sets that were perceived."""
+    seen: list[object] = []
+    monkeypatch.setattr("core.study.accuracy.score_set", lambda samples, *_: seen.append(samples) or iter(()))
+    return seen
