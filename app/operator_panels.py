@@ -65,6 +65,7 @@ class OperatorPanels(ScenePanels):
         self.trends = TrendPlot(config.perception.pose)
         self.performance = PerformancePanel()
         self.jog = JogPanel(config.servos.max_pull_mm)
+        self.jog.set_speeds(config.hand, config.servos)
         self.mode_bar = ModeBar()
         self.servos = ServoTable()
         self.commands = CommandPanel()
@@ -97,6 +98,7 @@ class OperatorPanels(ScenePanels):
         self.live.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)  # for the ghost, which may be rough
         self.servos.set_safety(config.safety)
         self.jog.max_pull_mm = config.servos.max_pull_mm
+        self.jog.set_speeds(config.hand, config.servos)
         self._servo_config = config.servos
         self._scale = known.scale if known is not None else None
         if self.picker is not None:

@@ -121,6 +121,17 @@ QUANTITY = {
         mark("share of full pull"),
         mark("How far the head is bent, as the tendons are pulled: left and right of the middle."),
     ),
+    "pitch": Quantity(
+        mark("pitch"), mark("share of full pull"), mark("How far the head is bent out of the picture's plane: right is lifted.")
+    ),
+    "hand_speeds": Quantity(
+        mark("Speeds by hand"),
+        "mm/s",
+        mark(
+            "What a key makes while it is held, at the chosen share of full speed: way of the feed, of the sheath, and pull of the "
+            "tendons' wires. A press of a tenth of a second makes about a tenth of that way."
+        ),
+    ),
     "insertion": Quantity(mark("in"), "mm", mark("How far the robot is in, by the feed's servo.")),
     "mode": Quantity(
         mark("Mode"), "", mark("Who drives: ADVISORY and ARMED you, AUTONOMOUS the program, HOLD and STOPPED nobody.")

@@ -8,12 +8,18 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QSizePolicy, QVBoxLayout, 
 
 from app import palette, theme
 from app.jog_keys import Motion
-from app.language import tr
-from app.tool_tips import tip
+from app.language import mark, tr
+from app.widgets.jog_readout import JogReadout, speeds_in_words
 from app.widgets.mouse_held import MouseHeld
 from app.widgets.quiet_combo import QuietCombo
+from core.control.hand import HandSpeeds, hand_speeds
+from core.policy_config import HandConfig
+from core.servo_config import ServosConfig
 from core.types import RobotStatus
 
+_FEEDS = (Motion.ADVANCE, Motion.RETRACT, Motion.DELIVER, Motion.WITHDRAW)
+_FED = mark("{motion}: hold to move, release to stop; {speed:.3g} mm/s")
+_PULLED = mark("{motion}: hold to move, release to stop; the tendons are pulled {speed:.3g} mm/s")
 _LEFT, _RIGHT, _UP, _DOWN = (QPointF(-1, 0), QPointF(1, 0), QPointF(0, -1), QPointF(0, 1))
 
 
@@ -31,6 +37,7 @@ class JogPanel(QWidget):
         super().__init__()
         self.max_pull_mm = max_pull_mm
         self._caps: dict[Motion, _Cap] = {}
+        self._rig: tuple[HandConfig, ServosConfig] | None = None
         grid = QGridLayout()
         grid.setSpacing(4)
         for motion, row, column, arrow, key, text in (
@@ -57,8 +64,9 @@ class JogPanel(QWidget):
         straighten.released.connect(lambda: self.released.emit(Motion.STRAIGHTEN))
         grid.addWidget(straighten, 2, 0, 1, 2)
         self._caps[Motion.STRAIGHTEN] = straighten
-        grid.addWidget(self._speed_choice(), 2, 2, 1, 2)
-        self._readout = _Readout()
+        self._speed = self._speed_choice()
+        grid.addWidget(self._speed, 2, 2, 1, 2)
+        self._readout = JogReadout()
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
         rows.setSpacing(4)
@@ -69,6 +77,25 @@ class JogPanel(QWidget):
     @property
     def readout(self) -> str:
         return self._readout.text
+
+    @property
+    def speeds(self) -> str:
+        """What a held key makes, as it is written below the keys; "" as long as no rig is known."""
+        return self._readout.speeds
+
+    def set_speeds(self, hand: HandConfig, servos: ServosConfig) -> None:
+        """Whose speeds the keys have: a share of `hand`'s full speeds, as far as the joints may go that fast."""
+        self._rig = hand, servos
+        self._tell_speeds()
+
+    def _tell_speeds(self) -> None:
+        if self._rig is None:
+            return
+        speeds = hand_speeds(*self._rig, self._speed.currentData())
+        self._readout.show_speeds(speeds_in_words(speeds))
+        for motion, speed_mm_s in _speed_of(speeds).items():
+            text = _FED if motion in _FEEDS else _PULLED
+            self._caps[motion].setToolTip(tr(text, motion=tr(motion.value), speed=speed_mm_s))
 
     def show_held(self, held: frozenset[Motion]) -> None:
         """Light the caps of what is held."""
@@ -90,8 +117,12 @@ class JogPanel(QWidget):
         choice.setToolTip(tr("Speed of all motions by hand, of the configured full speed"))
         for share in (1.0, 0.5, 0.2):
             choice.addItem(f"{100 * share:.0f} %", share)
-        choice.currentIndexChanged.connect(lambda place: self.speed_changed.emit(choice.itemData(place)))
+        choice.currentIndexChanged.connect(self._on_speed)
         return choice
+
+    def _on_speed(self, place: int) -> None:
+        self._tell_speeds()
+        self.speed_changed.emit(self._speed.itemData(place))
 
     def set_enabled(self, enabled: bool, why: str = "") -> None:
         """Grey the caps out when there is nothing to move."""
@@ -170,51 +201,15 @@ class _Cap(MouseHeld):
         painter.drawPolygon(QPolygonF([middle + direction * 5, back + across * 5, back - across * 5]))
 
 
-class _Readout(QWidget):
-    """How far the head is bent (bar from the middle), and how far the robot is in."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._bend = self._pitch = 0.0
-        self._insertion_mm: float | None = None
-        self.setFixedHeight(18)
-        self.setAccessibleName(tr("Bend and insertion"))
-        self.setAccessibleDescription(self.text)
-        self.setToolTip(tip("bend", "insertion"))
-
-    @property
-    def text(self) -> str:
-        return tr(
-            "bend {bend:.2f}, pitch {pitch:.2f}, in {inserted} mm", bend=self._bend, pitch=self._pitch, inserted=self._inserted
-        )
-
-    @property
-    def _inserted(self) -> str:
-        return "\N{EN DASH}" if self._insertion_mm is None else f"{self._insertion_mm:.0f}"
-
-    def show_values(self, bend: float, pitch: float, insertion_mm: float | None) -> None:
-        values = (round(bend, 2), round(pitch, 2), None if insertion_mm is None else round(insertion_mm))
-        if values != (self._bend, self._pitch, self._insertion_mm):
-            self._bend, self._pitch, self._insertion_mm = values
-            self.setAccessibleDescription(self.text)
-            self.update()
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setFont(theme.font(theme.Size.LABEL))
-        painter.setPen(QColor(palette.TEXT_DIM))
-        middle = Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(QRectF(0, 0, 36, self.height()), middle, tr("bend"))
-        track = QRectF(38, self.height() / 2 - 4, self.width() - 38 - 96, 8)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(palette.RAISED))
-        painter.drawRoundedRect(track, 3, 3)
-        center = track.center().x()
-        end = center + self._bend * track.width() / 2
-        painter.setBrush(QColor(palette.SKY))
-        painter.drawRect(QRectF(min(center, end), track.top(), max(2.0, abs(end - center)), track.height()))
-        painter.setPen(QColor(palette.TEXT_DIM))
-        right = Qt.AlignmentFlag.AlignRight | middle
-        painter.drawText(QRectF(self.width() - 94, 0, 94, self.height()), right, tr("in {inserted} mm", inserted=self._inserted))
-        painter.end()
+def _speed_of(speeds: HandSpeeds) -> dict[Motion, float]:
+    """What each key makes, mm/s."""
+    return {
+        Motion.ADVANCE: speeds.advance_mm_s,
+        Motion.RETRACT: speeds.advance_mm_s,
+        Motion.DELIVER: speeds.delivery_mm_s,
+        Motion.WITHDRAW: speeds.delivery_mm_s,
+        Motion.STEER_LEFT: speeds.bend_mm_s,
+        Motion.STEER_RIGHT: speeds.bend_mm_s,
+        Motion.PITCH_UP: speeds.pitch_mm_s,
+        Motion.PITCH_DOWN: speeds.pitch_mm_s,
+    }

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from core.policy_config import HandConfig
+from core.servo_config import JointConfig, ServosConfig
 from core.types import Command
 
 _LONGEST_STEP_S = 0.1
@@ -29,6 +30,28 @@ class Jog:
 
 
 AT_REST = Jog()
+
+
+@dataclass(frozen=True, slots=True)
+class HandSpeeds:
+    """What a held key makes of the joints, mm/s: robot and catheter are fed, tendons pulled by ``bend_mm_s`` and ``pitch_mm_s``."""
+
+    advance_mm_s: float
+    delivery_mm_s: float
+    bend_mm_s: float
+    pitch_mm_s: float
+
+
+def hand_speeds(hand: HandConfig, servos: ServosConfig, share: float = 1.0) -> HandSpeeds:
+    """As fast as `hand` asks for at `share` (0..1) of full speed, and not faster than the slowest joint that takes part may go."""
+    right, left, up, down, advance, *delivery = servos.joints
+    pull_mm_s = share * hand.bend_rate_per_s * servos.max_pull_mm
+    return HandSpeeds(
+        _as_they_may(share * hand.advance_mm_s, advance),
+        _as_they_may(share * hand.delivery_mm_s, *delivery),
+        _as_they_may(pull_mm_s, right, left),
+        _as_they_may(pull_mm_s, up, down),
+    )
 
 
 def combined(jogs: Iterable[Jog]) -> Jog:
@@ -86,6 +109,10 @@ class Hand:
             advance_mm_s=speed * config.advance_mm_s * _limited(jog.advance, 1.0),
             delivery_mm_s=speed * config.delivery_mm_s * _limited(jog.delivery, 1.0),
         )
+
+
+def _as_they_may(speed_mm_s: float, *joints: JointConfig) -> float:
+    return min(speed_mm_s, *(joint.max_speed_mm_s for joint in joints))
 
 
 def _limited(value: float, limit: float) -> float:

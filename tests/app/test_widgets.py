@@ -27,6 +27,8 @@ from app.widgets.state_badge import StateBadge
 from app.widgets.theta_gauge import ThetaGauge
 from app.widgets.trend_plot import SPAN_S, TrendPlot
 from core.config import PoseConfig
+from core.policy_config import HandConfig
+from core.servo_config import ServosConfig
 from core.types import Advice, PoseState, Reason, Refusal, RobotStatus, Speed
 from hardware.rig import RigKind
 from tests.app.fakes import make_pose, make_scene, make_tick
@@ -320,6 +322,35 @@ def test_jog_panel_says_aloud_what_it_shows(qtbot: QtBot) -> None:
     assert panel._readout.accessibleDescription() == panel.readout
     panel.set_enabled(False, "Fault")
     assert panel.accessibleDescription() == "Fault"
+
+
+def test_jog_panel_says_what_a_held_key_makes(qtbot: QtBot) -> None:
+    panel = JogPanel(2.0)
+    qtbot.addWidget(panel)
+    assert panel.speeds == "", "no rig is known"
+    panel.set_speeds(HandConfig(bend_rate_per_s=1.2, advance_mm_s=10.0, delivery_mm_s=8.0), ServosConfig(max_pull_mm=2.0))
+    assert panel.speeds == "feed 10, sheath 8, wires 2.4 mm/s"
+    assert panel.speeds in panel._readout.accessibleDescription()
+    assert panel._caps[Motion.WITHDRAW].toolTip() == "sheath back: hold to move, release to stop; 8 mm/s"
+    assert panel._caps[Motion.PITCH_UP].toolTip().endswith("the tendons are pulled 2.4 mm/s")
+    heard: list[float] = []
+    panel.speed_changed.connect(heard.append)
+    panel._speed.setCurrentIndex(1)
+    assert heard == [0.5]
+    assert panel.speeds == "feed 5, sheath 4, wires 1.2 mm/s"
+    panel.set_speeds(HandConfig(), ServosConfig(max_pull_mm=1.0))
+    assert panel.speeds == "feed 5, sheath 5, wires 0.6 mm/s", "another rig has the chosen share, too"
+
+
+def test_pitch_is_seen_and_not_only_said(qtbot: QtBot) -> None:
+    panel = JogPanel(2.0)
+    qtbot.addWidget(panel)
+    panel.resize(203, 170)
+    panel.show()
+    panel.show_status(RobotStatus(0.0, 84.0, 0.0, (0.3, 0.3, 0.3, 0.3), (0.0,) * 4))
+    before = panel._readout.grab().toImage()
+    panel.show_status(RobotStatus(0.0, 84.0, 0.0, (0.3, 0.3, 1.7, -1.1), (0.0,) * 4))
+    assert panel._readout.grab().toImage() != before
 
 
 def test_picker_shows_a_random_phantom_of_the_configuration(qtbot: QtBot) -> None:
