@@ -4930,6 +4930,21 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/tool_tips.py"/>
+        <source>How far the head is bent out of the picture's plane: right is lifted.</source>
+        <translation>头端弯出图像平面的程度：右侧为上仰。</translation>
+    </message>
+    <message>
+        <location filename="../../app/tool_tips.py"/>
+        <source>Speeds by hand</source>
+        <translation>手动速度</translation>
+    </message>
+    <message>
+        <location filename="../../app/tool_tips.py"/>
+        <source>What a key makes while it is held, at the chosen share of full speed: way of the feed, of the sheath, and pull of the tendons' wires. A press of a tenth of a second makes about a tenth of that way.</source>
+        <translation>按住一个键时的运动速度（按所选的全速比例）：推送、鞘管的行程，以及驱动丝的收放。按十分之一秒，行程约为其十分之一。</translation>
+    </message>
+    <message>
+        <location filename="../../app/tool_tips.py"/>
         <source>in</source>
         <translation>进深</translation>
     </message>
@@ -6000,8 +6015,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
-        <source>bend {bend:.2f}, pitch {pitch:.2f}, in {inserted} mm</source>
-        <translation>弯曲 {bend:.2f}，俯仰 {pitch:.2f}，进深 {inserted} mm</translation>
+        <source>{motion}: hold to move, release to stop; {speed:.3g} mm/s</source>
+        <translation>{motion}：按住移动，松开停止；{speed:.3g} mm/s</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_panel.py"/>
+        <source>{motion}: hold to move, release to stop; the tendons are pulled {speed:.3g} mm/s</source>
+        <translation>{motion}：按住移动，松开停止；驱动丝收放 {speed:.3g} mm/s</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
@@ -6030,16 +6050,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
-        <source>Bend and insertion</source>
-        <translation>弯曲与进深</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/jog_panel.py"/>
-        <source>in {inserted} mm</source>
-        <translation>进深 {inserted} mm</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/jog_panel.py"/>
         <source>dip</source>
         <translation>下俯</translation>
     </message>
@@ -6062,6 +6072,26 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/jog_panel.py"/>
         <source>{motion}: hold to move, release to stop</source>
         <translation>{motion}：按住移动，松开停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_readout.py"/>
+        <source>feed {feed:.3g}, sheath {sheath:.3g}, wires {wires} mm/s</source>
+        <translation>推送 {feed:.3g}，鞘管 {sheath:.3g}，驱动丝 {wires} mm/s</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_readout.py"/>
+        <source>bend {bend:.2f}, pitch {pitch:.2f}, in {inserted} mm</source>
+        <translation>弯曲 {bend:.2f}，俯仰 {pitch:.2f}，进深 {inserted} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_readout.py"/>
+        <source>in {inserted} mm</source>
+        <translation>进深 {inserted} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_readout.py"/>
+        <source>Bend, pitch and insertion</source>
+        <translation>弯曲、俯仰与进深</translation>
     </message>
     <message>
         <location filename="../../app/widgets/key_page.py"/>
