@@ -13,7 +13,8 @@ from typing import Any, TypeVar
 from core.errors import UserError
 
 _ROOT = Path(__file__).resolve().parent.parent
-_CODE = ("app", "core", "hardware")
+_STATE = ("app/**/*.py", "core/**/*.py", "hardware/**/*.py", "resources/models/**/*.safetensors")
+"""What decides of a trial: the code, and the weights that a model's name stands for."""
 _TIMEOUT = "10s"
 _START = "in LumenPilot's folder: .venv/bin/python -m dask worker {address} --nworkers 2 --nthreads 1"
 
@@ -87,9 +88,9 @@ def _check_workers(client: Any, address: str) -> None:
 
 @cache
 def code_of_worker() -> str:
-    """What this process runs: SHA-256 of the program's files, as they were when it was asked first."""
+    """What this process runs: SHA-256 of the program's files and models, as they were when it was asked first."""
     told = hashlib.sha256()
-    for folder in _CODE:
-        for path in sorted((_ROOT / folder).rglob("*.py")):
+    for pattern in _STATE:
+        for path in sorted(_ROOT.glob(pattern)):
             told.update(f"{path.relative_to(_ROOT).as_posix()} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
     return told.hexdigest()

@@ -54,7 +54,11 @@ def _put_in_place(part: Path, path: Path) -> None:
             path.touch(exist_ok=False)
         except FileExistsError:
             raise SessionError(_MADE_MEANWHILE.format(path=path)) from None
-        part.replace(path)
+        try:
+            part.replace(path)
+        except OSError:
+            path.unlink()  # the empty one that held the name
+            raise
 
 
 def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None) -> int:

@@ -170,8 +170,9 @@ def test_lossless_keeps_every_pixel(tmp_path: Path) -> None:
         assert np.array_equal(frame.image, noise)
 
 
-def test_a_full_queue_drops_counts_and_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    go, entered = threading.Event(), threading.Event()
+def slow_disk(monkeypatch: pytest.MonkeyPatch) -> tuple[threading.Event, threading.Event]:
+    """A frame has come to be written; and let it, and all later ones, be."""
+    entered, go = threading.Event(), threading.Event()
     real = SessionFiles.write_frame
 
     def slow(self: SessionFiles, frame: EncodedFrame) -> None:
@@ -180,6 +181,11 @@ def test_a_full_queue_drops_counts_and_tells(tmp_path: Path, monkeypatch: pytest
         real(self, frame)
 
     monkeypatch.setattr(SessionFiles, "write_frame", slow)
+    return entered, go
+
+
+def test_a_full_queue_drops_counts_and_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    entered, go = slow_disk(monkeypatch)
     with writer_in(tmp_path, replace_config(max_queue=2)) as writer:
         writer.start()
         assert writer.put(tick_of(0, 1000.0))
@@ -205,15 +211,7 @@ def test_a_full_queue_drops_counts_and_tells(tmp_path: Path, monkeypatch: pytest
 
 def test_what_is_dropped_after_the_stop_was_asked_is_not_the_sessions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And what was dropped just before it is told, though no picture came after it."""
-    go, entered = threading.Event(), threading.Event()
-    real = SessionFiles.write_frame
-
-    def slow(self: SessionFiles, frame: EncodedFrame) -> None:
-        entered.set()
-        assert go.wait(10.0)
-        real(self, frame)
-
-    monkeypatch.setattr(SessionFiles, "write_frame", slow)
+    entered, go = slow_disk(monkeypatch)
     with writer_in(tmp_path, replace_config(max_queue=2)) as writer:
         writer.start()
         writer.put(tick_of(0, 1000.0))
