@@ -8,16 +8,10 @@ from PySide6.QtCore import QPointF, QRectF
 
 from app.widgets.loupe_corner import LoupeCorner, seen_places
 from core.types import Points
+from tests.app.hand_clock import Clock
 
 CORNERS = [QRectF(300, 0, 100, 80), QRectF(0, 0, 100, 80), QRectF(300, 220, 100, 80), QRectF(0, 220, 100, 80)]
 MIDDLE = QPointF(200, 150)
-
-
-class Clock:
-    now_s = 0.0
-
-    def __call__(self) -> float:
-        return self.now_s
 
 
 @pytest.fixture
@@ -52,20 +46,20 @@ def test_with_nothing_to_hide_it_lies_at_the_upper_right(corner: LoupeCorner) ->
 
 def test_a_corner_that_is_a_little_better_is_no_reason_to_move(corner: LoupeCorner, clock: Clock) -> None:
     assert choose(corner, crowd(left_top=50, right_bottom=60, left_bottom=70)) == 0
-    for clock.now_s in range(10):
+    for clock.now_s in range(100, 110):
         assert choose(corner, crowd(right_top=50, left_top=30, right_bottom=60, left_bottom=70)) == 0
 
 
 def test_it_moves_for_a_much_better_one_once_that_has_lasted(corner: LoupeCorner, clock: Clock) -> None:
     better_elsewhere = crowd(right_top=100, right_bottom=60, left_bottom=70)
     assert choose(corner, crowd(left_top=9, right_bottom=9, left_bottom=9)) == 0
-    clock.now_s = 5.0
+    clock.now_s = 105.0
     assert choose(corner, better_elsewhere) == 0
-    clock.now_s = 5.9
+    clock.now_s = 105.9
     assert choose(corner, crowd(left_top=9, right_bottom=9, left_bottom=9)) == 0
-    clock.now_s = 6.1
+    clock.now_s = 106.1
     assert choose(corner, better_elsewhere) == 0  # it counts anew
-    clock.now_s = 7.1
+    clock.now_s = 107.1
     assert choose(corner, better_elsewhere) == 1
 
 

@@ -25,6 +25,7 @@ from core.control.drive_view import DriveView
 from core.control.faults import CAUSES, Cause, Fault
 from core.control.gate_checks import RejectReason, Source
 from core.control.modes import Hindrance, Mode
+from tests.app.hand_clock import Clock
 
 LEFT = Qt.MouseButton.LeftButton
 NARROWEST_AT_720 = 760
@@ -45,16 +46,6 @@ def words(key: AlertKey) -> str:
 
 def arming_refused(*reasons: Hindrance | Cause, time_s: float = 0.0) -> DriveView:
     return DriveView(time_s, permitted=Source.OPERATOR, servos_on=True, against_arming=reasons)
-
-
-class Clock:
-    """Seconds that pass when the test says so."""
-
-    def __init__(self) -> None:
-        self.now_s = 100.0
-
-    def __call__(self) -> float:
-        return self.now_s
 
 
 @pytest.fixture

@@ -31,19 +31,10 @@ from hardware.servos.bus_messages import BusPhase, BusStatus, CycleTimes
 from hardware.servos.line import LineCounts
 from hardware.servos.status_block import HardwareError, MissingServo, ServoReading, ServoState
 from tests.app.fakes import FakeBench, make_pose, make_scene
+from tests.app.hand_clock import Clock
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
-
-
-class Clock:
-    """A clock that the test turns."""
-
-    def __init__(self) -> None:
-        self.now_s = 100.0
-
-    def __call__(self) -> float:
-        return self.now_s
 
 
 def servo(place: int, **changes: object) -> ServoState:
