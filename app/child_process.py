@@ -11,10 +11,13 @@ import sys
 import tempfile
 import threading
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
-from PySide6.QtCore import QObject, Qt, Signal, Slot
+from PySide6.QtCore import QObject, Signal
+
+from app.letterbox import Letters
 
 ROOT = Path(__file__).resolve().parent.parent
 LOW_PRIORITY = 14
@@ -48,8 +51,6 @@ class ChildProcess(QObject):
 
     told = Signal(object)
     ended = Signal(int, str)
-    _heard = Signal(object)
-    _over = Signal(int, str)
 
     def __init__(
         self, command: Sequence[str], parent: QObject | None = None, *, given: str = "", priority: int = LOW_PRIORITY
@@ -58,9 +59,7 @@ class ChildProcess(QObject):
         self._command, self._given, self._priority = list(command), given, priority
         self._process: subprocess.Popen[bytes] | None = None
         self._is_left = False
-        # what the listening thread says is said again in the window's
-        self._heard.connect(self._on_heard, Qt.ConnectionType.QueuedConnection)
-        self._over.connect(self._on_over, Qt.ConnectionType.QueuedConnection)
+        self._letters = Letters(self)
 
     @property
     def is_running(self) -> bool:
@@ -86,11 +85,13 @@ class ChildProcess(QObject):
         except OSError as error:
             if errors is not None:
                 errors.close()
-            self._over.emit(NOT_STARTED, f"cannot be started ({error.strerror or error})")
+            why = f"cannot be started ({error.strerror or error})"
+            self._letters.send(lambda it: it._on_over(NOT_STARTED, why))
             return
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, self._process.pid, os.getpriority(os.PRIO_PROCESS, 0) + self._priority)
-        threading.Thread(target=self._listen, args=(self._process, errors), name="child process", daemon=True).start()
+        listening = (self._process, errors, self._given, self._letters)
+        threading.Thread(target=_listen, args=listening, name="child process", daemon=True).start()
 
     def ask_to_end(self) -> None:
         """A termination request: long work keeps what it has."""
@@ -107,31 +108,28 @@ class ChildProcess(QObject):
         if self.is_running and self._process is not None:
             self._process.send_signal(number)
 
-    def _listen(self, process: subprocess.Popen[bytes], errors: IO[bytes]) -> None:
-        """The thread."""
-        if process.stdin is not None:
-            with contextlib.suppress(OSError), process.stdin:  # one that ends without having read it all is no fault here
-                process.stdin.write(self._given.encode())
-        assert process.stdout is not None
-        with process.stdout as lines:
-            for line in lines:
-                record = _record(line)
-                if record is not None:
-                    with contextlib.suppress(RuntimeError):  # the window is gone, and this object with it
-                        self._heard.emit(record)
-        code, last = process.wait(), _last_line(errors)
-        with contextlib.suppress(RuntimeError):
-            self._over.emit(code, last)
-
-    @Slot(object)
     def _on_heard(self, record: dict[str, Any]) -> None:
         if not self._is_left:
             self.told.emit(record)
 
-    @Slot(int, str)
     def _on_over(self, code: int, last: str) -> None:
         if not self._is_left:
             self.ended.emit(code, last)
+
+
+def _listen(process: subprocess.Popen[bytes], errors: IO[bytes], given: str, letters: Letters[ChildProcess]) -> None:
+    """The thread."""
+    if process.stdin is not None:
+        with contextlib.suppress(OSError), process.stdin:  # one that ends without having read it all is no fault here
+            process.stdin.write(given.encode())
+    assert process.stdout is not None
+    with process.stdout as lines:
+        for line in lines:
+            record = _record(line)
+            if record is not None:
+                letters.send(partial(ChildProcess._on_heard, record=record))
+    code, last = process.wait(), _last_line(errors)
+    letters.send(lambda it: it._on_over(code, last))
 
 
 def _record(line: bytes) -> dict[str, Any] | None:

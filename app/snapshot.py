@@ -14,6 +14,7 @@ import platformdirs
 from PySide6.QtCore import QObject, QRunnable, QThreadPool, Signal
 
 from app.language import tr
+from app.letterbox import Letters
 from app.overlay_picture import draw_overlay
 from app.scene_json import scene_to_json
 from core.types import Image, Tick
@@ -102,7 +103,7 @@ class SnapshotWriter(QObject):
 
     def write(self, tick: Tick, origin: Origin) -> None:
         """Start to write; returns at once."""
-        self._pool.start(_Job(self, tick, origin, datetime.now()))
+        self._pool.start(_Job(Letters(self), self._folder, tick, origin, datetime.now()))
 
     def finish(self, within_ms: int = _FINISH_WITHIN_MS) -> bool:
         """Wait until everything is on the disk; False when the disk has not answered in time."""
@@ -110,25 +111,27 @@ class SnapshotWriter(QObject):
 
 
 class _Job(QRunnable):
-    def __init__(self, writer: SnapshotWriter, tick: Tick, origin: Origin, now: datetime) -> None:
+    def __init__(self, letters: Letters[SnapshotWriter], folder: Path, tick: Tick, origin: Origin, now: datetime) -> None:
         super().__init__()
-        self._writer = writer
+        self._letters = letters
+        self._folder = folder
         self._tick = tick
         self._origin = origin
         self._now = now
 
     def run(self) -> None:
-        folder = self._writer.folder
         try:
-            path = write_snapshot(folder, self._tick, self._origin, self._now)
+            path = write_snapshot(self._folder, self._tick, self._origin, self._now)
         except OSError as error:
-            self._writer.failed.emit(
-                tr("Snapshot not saved: {file}: {why}", file=error.filename or folder, why=error.strerror or error)
-            )
+            self._fail(tr("Snapshot not saved: {file}: {why}", file=error.filename or self._folder, why=error.strerror or error))
         except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible line
             _log.error("the snapshot was not written", exc_info=error)
-            self._writer.failed.emit(
+            self._fail(
                 tr("Snapshot not saved: unexpected {kind}: {why}", kind=type(error).__name__, why=" ".join(str(error).split()))
             )
         else:
-            self._writer.saved.emit(tr("Snapshot saved: {path} (with _overlay.png and .json)", path=path))
+            line = tr("Snapshot saved: {path} (with _overlay.png and .json)", path=path)
+            self._letters.send(lambda writer: writer.saved.emit(line))
+
+    def _fail(self, line: str) -> None:
+        self._letters.send(lambda writer: writer.failed.emit(line))

@@ -82,29 +82,41 @@ def test_one_that_computes_for_long_waits_behind_the_window(qtbot: QtBot) -> Non
 
 
 DESTROYED = """
-import os, random, time
+import random, threading, time
 from PySide6.QtCore import QCoreApplication, QEvent, QObject
 from app.work_thread import WorkThread
 
 app = QCoreApplication([])
+heard = []
 for _ in range(400):
     window = QObject()
     threads = [WorkThread("test", window) for _ in range(4)]
     for thread in threads:
-        thread.done.connect(lambda *_: None)
+        thread.done.connect(lambda *_: heard.append(1))
         for k in range(30):
             thread.submit(k, lambda: bytes(100))
-    time.sleep(random.uniform(0, 0.004))
+    until = time.monotonic() + random.uniform(0, 0.004)
+    while time.monotonic() < until:
+        app.processEvents()
     window.deleteLater()
     del window
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    before = len(heard)
     app.processEvents()
-print("fine", flush=True)
-os._exit(0)
+    assert len(heard) == before, "one that is gone has reported"
+    del threads, thread
+assert heard
+until = time.monotonic() + 30
+while threading.active_count() > 1 and time.monotonic() < until:
+    time.sleep(0.01)
+print("fine", threading.active_count(), flush=True)
 """
 
 
 def test_one_that_is_destroyed_with_its_window_while_it_reports_ends_nothing() -> None:
-    """Its signal would be that of freed memory, which now and then ended the program when a window was closed."""
+    """Its signal would be that of freed memory, which now and then ended the program when a window was closed.
+
+    Its threads end after their jobs, and so does the program by itself.
+    """
     done = subprocess.run([sys.executable, "-c", DESTROYED], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "fine\n", "")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "fine 1\n", "")
