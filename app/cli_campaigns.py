@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from app.cli_options import ConfigOption, JsonOption, ModelOption, PresetOption, check_masks
+from app.cli_options import ConfigOption, JsonOption, ModelOption, PresetOption, SchedulerOption, check_masks
 from core.errors import UserError
 
 _FRAMES = 120
@@ -26,7 +26,7 @@ def trial(
     true_masks: Annotated[bool, typer.Option("--true-masks", help="the twin's own masks instead of the network's")] = False,
     max_seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="simulated time after which a trial has failed")] = 120.0,
     look: Annotated[str, typer.Option(help="random: every trial another picture; bench: the default clear one")] = "random",
-    scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler that takes the place of --workers")] = None,
+    scheduler: SchedulerOption = None,
     model: ModelOption = None,
     config: ConfigOption = None,
 ) -> None:

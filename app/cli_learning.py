@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from app.cli_options import ConfigOption, ProgressOption, tell_asked_progress
+from app.cli_options import ConfigOption, ProgressOption, SchedulerOption, tell_asked_progress
 from core.errors import UserError
 
 
@@ -19,12 +19,13 @@ def synth(
     height: Annotated[int, typer.Option(min=120, max=4096)] = 480,
     family: Annotated[list[str] | None, typer.Option(help="only these families of looks, or bench: the twin's own")] = None,
     phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,
-    workers: Annotated[int, typer.Option(min=1, max=64)] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="processes")] = 1,
+    scheduler: SchedulerOption = None,
 ) -> None:
     """Randomised labelled frames from the bench twin: images, masks, truth."""
     from app.learning_commands import run_synth
 
-    run_synth(out, count, seed, (width, height), tuple(family) if family else None, phantom, workers)
+    run_synth(out, count, seed, (width, height), tuple(family) if family else None, phantom, workers=workers, scheduler=scheduler)
 
 
 def train(

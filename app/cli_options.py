@@ -12,6 +12,7 @@ from core.errors import UserError
 ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file; keys that differ from the defaults are enough")]
 PresetOption = Annotated[str | None, typer.Option("--preset", help="'paper' takes the paper literally")]
 ModelOption = Annotated[str | None, typer.Option(help="model name or folder")]
+SchedulerOption = Annotated[str | None, typer.Option(help="address of a Dask scheduler that takes the place of --workers")]
 RigOption = Annotated[
     str | None,
     typer.Option("--rig", help="twin (needs no hardware), realsense, webcam, or a name of rig list; default: the configured one"),

@@ -14,7 +14,7 @@ from core.errors import UserError
 
 _ROOT = Path(__file__).resolve().parent.parent
 _STATE = ("app/**/*.py", "core/**/*.py", "hardware/**/*.py", "resources/models/**/*.safetensors")
-"""What decides of a trial: the code, and the weights that a model's name stands for."""
+"""What decides of a trial or a frame: the code, and the weights that a model's name stands for."""
 _TIMEOUT = "10s"
 _START = "in LumenPilot's folder: .venv/bin/python -m dask worker {address} --nworkers 2 --nthreads 1"
 
@@ -49,7 +49,9 @@ def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequen
         futures = client.map(function, tasks, pure=False)
         try:
             for future in distributed.as_completed(futures, loop=client.loop):
-                yield future.result()
+                result = future.result()
+                future.release()  # or its worker would keep it until the last one is done
+                yield result
         except distributed.KilledWorker:
             raise ClusterError(
                 f"--scheduler {address}: a task ended its worker again and again (out of memory?); start fewer workers a machine"

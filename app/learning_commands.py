@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -24,6 +25,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from app.cluster import over_cluster
 from app.outputs import is_same
 from app.progress_lines import ProgressLines, Teller, asked_teller
 
@@ -39,9 +41,17 @@ def progress_bar() -> Progress:
 
 
 def run_synth(
-    out: Path, count: int, seed: int, size: tuple[int, int], families: tuple[str, ...] | None, phantom: str | None, workers: int
+    out: Path,
+    count: int,
+    seed: int,
+    size: tuple[int, int],
+    families: tuple[str, ...] | None,
+    phantom: str | None,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
 ) -> None:
-    """Write a labelled set; raises SynthError."""
+    """Write a labelled set; raises SynthError, and ClusterError with `scheduler`."""
     from hardware.twin.phantoms import make_phantom
     from hardware.twin.synth import LOOKS, SynthError, SynthPlan, write_set
 
@@ -54,9 +64,10 @@ def run_synth(
         except ValueError as error:
             raise SynthError(str(error)) from None
     plan = SynthPlan(out, count, seed, size, families, phantom)
+    elsewhere = None if scheduler is None else partial(over_cluster, scheduler)
     with progress_bar() as bar:
         task = bar.add_task(f"frames -> {out}", total=count)
-        write_set(plan, workers=workers, on_progress=lambda frames: bar.advance(task, frames))
+        write_set(plan, workers=workers, elsewhere=elsewhere, on_progress=lambda frames: bar.advance(task, frames))
     _console.print(f"{count} labelled frames of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}", soft_wrap=True)
 
 
@@ -166,7 +177,7 @@ def run_train(
         folder = out.with_name(out.name + "_frames")
         first = 1_000_000 + plan.seed % 10 * 100_000  # trials have the seeds from 2000000 on
         try:
-            run_synth(folder, inputs.synthetic, first, (640, 480), looks, None, 1)
+            run_synth(folder, inputs.synthetic, first, (640, 480), looks, None)
         except SynthFolderError as error:  # the folder goes with --out, and the set in it with these options
             made = "frames are made there: give --seed, --without and their number as before, or choose another --out"
             raise DatasetError(f"{error.problem}; {made}") from None

@@ -127,7 +127,7 @@ def study_figures(studio: Studio) -> None:
     """The figures of an evaluation like the paper's, on frames of the twin; none of them was trained on."""
     labelled, result = studio.folder / "labelled", studio.folder / "result"
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        run_synth(labelled, _STUDY_FRAMES, _STUDY_SEED, (640, 480), None, None, 1)
+        run_synth(labelled, _STUDY_FRAMES, _STUDY_SEED, (640, 480), None, None)
         run_evaluate(
             labelled,
             None,

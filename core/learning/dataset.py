@@ -207,14 +207,24 @@ def leave_out_looks(folder: Path, samples: Sequence[Sample], looks: Sequence[str
 
 def write_mask(path: Path, mask: Mask) -> None:
     """A mask as 0/255 PNG; raises OSError when it cannot be written (OpenCV alone would only return False)."""
-    write_png(path, mask.astype(np.uint8) * 255)
+    write_whole(path, mask_png(mask))
+
+
+def mask_png(mask: Mask) -> bytes:
+    """A mask as a 0/255 PNG."""
+    return png(mask.astype(np.uint8) * 255)
 
 
 def write_png(path: Path, image: np.ndarray) -> None:
     """RGB or grey uint8 as PNG, never half a file; raises OSError."""
+    write_whole(path, png(image))
+
+
+def png(image: np.ndarray) -> bytes:
+    """RGB or grey uint8 as PNG; raises OSError when it cannot be encoded."""
     ok, data = cv2.imencode(
         ".png", image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 1]
     )
     if not ok:
-        raise OSError(f"{path}: cannot be encoded")
-    write_whole(path, data.tobytes())
+        raise OSError(f"a picture of {image.shape} cannot be encoded")
+    return data.tobytes()

@@ -11,10 +11,11 @@ import json
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ import numpy as np
 
 from core.config import PerceptionConfig
 from core.errors import UserError
-from core.learning.dataset import write_mask, write_png
+from core.learning.dataset import mask_png, png
 from core.types import Points
 from core.whole_file import is_aside, sweep_unfinished, write_whole
 from hardware.twin.appearance import LOOK_FAMILIES, Appearance, default_appearance, make_view, random_appearance
@@ -66,6 +67,19 @@ class LabelledFrame:
     stem: str
     picture: Picture
     truth: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Episode:
+    """One made episode: what to write where in a set's folder, and the truth of its frames, a line each."""
+
+    number: int
+    files: dict[str, bytes]
+    truth: tuple[str, ...]
+
+
+Elsewhere = Callable[[Callable[[int], Episode], Sequence[int]], Iterable[Episode]]
+"""Makes the episodes of these numbers on other machines, in any order."""
 
 
 def robot_shapes(phantom: Phantom, seed: int, count: int) -> list[tuple[Points, float, float]]:
@@ -126,19 +140,31 @@ def _look(plan: SynthPlan, look_seed: int, rng: np.random.Generator) -> Appearan
     return random_appearance(look_seed, family)
 
 
-def _write_episode(plan: SynthPlan, episode: int) -> int:
-    """Write one episode; its truth file comes last, by rename, and marks it as complete."""
+def make_episode(plan: SynthPlan, number: int) -> Episode:
+    """Make an episode; nothing is written."""
     import cv2
 
     cv2.setNumThreads(1)
-    rows = []
-    for frame in episode_frames(plan, episode):
-        write_png(plan.out / "images" / f"{frame.stem}.png", frame.picture.image)
-        write_mask(plan.out / "masks" / f"{frame.stem}_vessel.png", frame.picture.vessel)
-        write_mask(plan.out / "masks" / f"{frame.stem}_robot.png", frame.picture.robot)
-        rows.append(json.dumps(frame.truth, allow_nan=False))
-    write_whole(_episode_file(plan, episode), ("\n".join(rows) + "\n").encode())
-    return len(rows)
+    files: dict[str, bytes] = {}
+    truth = []
+    for frame in episode_frames(plan, number):
+        files[f"images/{frame.stem}.png"] = png(frame.picture.image)
+        files[f"masks/{frame.stem}_vessel.png"] = mask_png(frame.picture.vessel)
+        files[f"masks/{frame.stem}_robot.png"] = mask_png(frame.picture.robot)
+        truth.append(json.dumps(frame.truth, allow_nan=False))
+    return Episode(number, files, tuple(truth))
+
+
+def _write_episode(plan: SynthPlan, number: int) -> int:
+    return _keep(plan, make_episode(plan, number))
+
+
+def _keep(plan: SynthPlan, made: Episode) -> int:
+    """Write an episode; its truth file comes last, by rename, and marks it as complete. Returns how many frames it has."""
+    for name, data in made.files.items():
+        write_whole(plan.out / name, data)
+    write_whole(_episode_file(plan, made.number), ("\n".join(made.truth) + "\n").encode())
+    return len(made.truth)
 
 
 def _episode_file(plan: SynthPlan, episode: int) -> Path:
@@ -163,8 +189,12 @@ class SynthFolderError(SynthError):
         self.problem = problem
 
 
-def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int], None] = lambda _: None) -> int:
+def write_set(
+    plan: SynthPlan, *, workers: int = 1, elsewhere: Elsewhere | None = None, on_progress: Callable[[int], None] = lambda _: None
+) -> int:
     """Write the set; frames that are there already are kept. Returns the number of frames in it.
+
+    With `elsewhere` other machines make the frames, in place of `workers` processes here; what they make is written here.
 
     `on_progress` is given the number of frames that were completed since its last call. An interruption (Ctrl-C) loses the episodes
     in hand only; the same call goes on from there.
@@ -176,7 +206,7 @@ def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int],
     """
     _prepare(plan)
     try:
-        _write_missing(plan, workers, on_progress)
+        _write_missing(plan, workers, elsewhere, on_progress)
     except OSError as error:
         raise SynthError(f"{error.filename or plan.out}: cannot be written ({error.strerror}); free some space and go on") from None
     except BrokenProcessPool:
@@ -187,10 +217,13 @@ def write_set(plan: SynthPlan, *, workers: int = 1, on_progress: Callable[[int],
     return plan.count
 
 
-def _write_missing(plan: SynthPlan, workers: int, on_progress: Callable[[int], None]) -> None:
+def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, on_progress: Callable[[int], None]) -> None:
     missing = [episode for episode in range(plan.episodes) if not _is_complete(plan, episode)]
     on_progress(plan.count - sum(min(FRAMES_PER_EPISODE, plan.count - e * FRAMES_PER_EPISODE) for e in missing))
-    if workers <= 1:
+    if elsewhere is not None and missing:
+        for made in elsewhere(partial(make_episode, plan), missing):
+            on_progress(_keep(plan, made))
+    elif workers <= 1:
         for episode in missing:
             on_progress(_write_episode(plan, episode))
     elif missing:

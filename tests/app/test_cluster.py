@@ -1,4 +1,4 @@
-"""``trial --scheduler`` on a real Dask scheduler and worker, on this machine."""
+"""``--scheduler`` of ``trial`` and ``synth`` on a real Dask scheduler and worker, on this machine."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from app import cluster
 from app.cluster import ClusterError, code_of_worker, over_cluster
 from app.trial_command import run_one
 from core.config import Config
+from hardware.twin.synth import Episode, SynthPlan, write_set
 from hardware.twin.trial import TrialPlan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -85,6 +86,40 @@ def test_trials_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Pa
     rows = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text().splitlines()]
     alone = run_one(TrialPlan(Config(), true_masks=True, max_seconds=1.0), ("pursuit", 1))
     assert next(row for row in rows if row["seed"] == 1) == json.loads(json.dumps(alone))
+
+
+def test_frames_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Path) -> None:
+    plan = ("synth", "--count", "20", "--seed", "3", "--width", "320", "--height", "240")
+    for arguments in ((*plan, "--out", tmp_path / "far", "--scheduler", address), (*plan, "--out", tmp_path / "near")):
+        done = subprocess.run(
+            [sys.executable, str(ROOT / "main.py"), *map(str, arguments)], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+    far, near = ({p.relative_to(tmp_path / at): p.read_bytes() for p in (tmp_path / at).rglob("*.*")} for at in ("far", "near"))
+    assert len(near) == 3 * 20 + 2 + 2
+    assert far == near
+
+
+def test_what_a_cluster_has_not_made_is_made_when_the_command_is_given_again(address: str, tmp_path: Path) -> None:
+    plan = SynthPlan(tmp_path / "set", 40, 3, (160, 120))
+
+    def breaks_off(make: Callable[[int], Episode], numbers: Sequence[int]) -> Iterator[Episode]:
+        yield next(iter(over_cluster(address, make, numbers)))
+        raise ClusterError("the scheduler has gone")
+
+    with pytest.raises(ClusterError):
+        write_set(plan, elsewhere=breaks_off)
+    asked: list[int] = []
+
+    def the_rest(make: Callable[[int], Episode], numbers: Sequence[int]) -> Iterator[Episode]:
+        asked.extend(numbers)
+        return over_cluster(address, make, numbers)
+
+    assert write_set(plan, elsewhere=the_rest) == 40
+    assert len(asked) == 2
+    assert len(list((plan.out / "images").iterdir())) == len((plan.out / "truth.jsonl").read_text().splitlines()) == 40
+    write_set(plan, elsewhere=the_rest)
+    assert len(asked) == 2
 
 
 def test_results_come_as_they_are_ready_and_what_has_not_begun_is_cancelled(address: str) -> None:
