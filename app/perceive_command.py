@@ -17,7 +17,7 @@ from app.line_output import LineOutput
 from app.outputs import check_apart, check_no_input, is_same
 from app.overlay_picture import draw_overlay
 from app.scene_json import scene_to_json, unread_to_json
-from app.sources import SourcePicture, expand, frame_of, is_video, own_stems, pictures
+from app.sources import SourcePicture, expand, frame_of, inner_folders, is_video, own_stems, pictures
 from core.config import choose_model, load_config
 from core.control.policy import table_policy
 from core.errors import UserError
@@ -54,7 +54,7 @@ def run_perceive(
     targets = _Targets(_read_targets(targets_path))
     files = expand(paths)
     if not files:
-        raise UserError(f"{', '.join(map(str, paths))}: no pictures or videos there")
+        raise UserError(f"{', '.join(map(str, paths))}: no pictures or videos there{_where_else(paths)}")
     if outputs.jsonl is not None:
         read = (path for path in (*files, targets_path, config_path) if path is not None)
         check_no_input(outputs.jsonl, read, "--jsonl")
@@ -91,6 +91,16 @@ def run_perceive(
                     tally.problem(f"{error.filename or picture.stem}: cannot be written ({error.strerror or error})")
             bar.advance(task)
     tally.close([stem for stem in targets if stem not in targets.used])
+
+
+def _where_else(paths: list[Path]) -> str:
+    """Pictures are not looked for in folders of folders; but who gave one is told where there are some."""
+    inner = inner_folders(paths)
+    if not inner:
+        return ""
+    if len(inner) == 1:
+        return f"; {inner[0]} has some: name that"
+    return f"; {inner[0]} and others in it ({len(inner)} folders) have some: name those"
 
 
 @dataclass(slots=True)

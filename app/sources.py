@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -49,6 +50,15 @@ def expand(paths: Sequence[Path]) -> list[Path]:
             raise UserError(f"{path}: cannot be read ({error.strerror})") from None
         files.append(path)
     return files
+
+
+def inner_folders(paths: Sequence[Path]) -> list[Path]:
+    """Folders right inside those of `paths` that have pictures or videos, in order; what cannot be read has none."""
+    found = []
+    for folder in filter(Path.is_dir, paths):
+        with contextlib.suppress(OSError, UserError):
+            found += [inner for inner in sorted(folder.iterdir()) if inner.is_dir() and expand([inner])]
+    return found
 
 
 def _is_file(path: Path) -> bool:

@@ -237,6 +237,21 @@ def test_what_cannot_be_written_is_told_and_the_rest_goes_on(picture: Path, tmp_
     assert (tmp_path / "m" / "other_robot.png").is_file()
 
 
+def test_a_folder_of_folders_says_in_which_there_are_pictures(picture: Path, tmp_path: Path) -> None:
+    for name in ("monday", "tuesday", "notes"):
+        (tmp_path / "set" / name).mkdir(parents=True)
+    where = tmp_path / "set"
+    for name, words in (
+        ("monday", f"{where / 'monday'} has some: name that"),
+        ("tuesday", "and others in it (2 folders) have some"),
+    ):
+        (where / name / "a.png").write_bytes(picture.read_bytes())
+        done = run("perceive", where)
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"error: {where}: no pictures or videos there; ")
+        assert words in done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
