@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
 
-from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, Qt
+from PySide6.QtCore import QAbstractListModel, QModelIndex, QObject, QPersistentModelIndex, Qt
 
 from app import palette
 from app.language import mark, tr
@@ -60,8 +60,8 @@ class LoggedEvent:
 class EventModel(QAbstractListModel):
     """All events, and those that the filter lets through, both newest first."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
         self._all: deque[LoggedEvent] = deque()
         self._kind: EventKind | None = None
         self.shown: list[LoggedEvent] = []

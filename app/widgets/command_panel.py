@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QLabel, QTableView, QVBoxLayout, QWidget
 
@@ -59,7 +59,7 @@ class CommandPanel(QWidget):
         self._heading = QLabel(_heading(None))
         self._heading.setObjectName("card_note")
         self._heading.setFixedHeight(16)
-        self._model = ClampModel(self._log)
+        self._model = ClampModel(self._log, self)
         self._view = self._make_view()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -121,8 +121,8 @@ class CommandPanel(QWidget):
 class ClampModel(QAbstractTableModel):
     """The log as a Qt model; ``renew`` announces what has changed since the last time."""
 
-    def __init__(self, log: ClampLog) -> None:
-        super().__init__()
+    def __init__(self, log: ClampLog, parent: QObject | None = None) -> None:
+        super().__init__(parent)
         self._log = log
         self._shown: list[LogEntry] = []
 

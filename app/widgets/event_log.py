@@ -40,7 +40,7 @@ class EventLog(QWidget):
         self._now = now
         self._waiting: deque[LoggedEvent] = deque(maxlen=MOST_ROWS)
         self._newest: LoggedEvent | None = None
-        self._model = EventModel()
+        self._model = EventModel(self)
         self._view = _EventList(self._model)
         self._view.customContextMenuRequested.connect(self._open_menu)
         self._filter = QuietCombo(tr("Kind of events shown"))
