@@ -194,7 +194,7 @@ def run_accuracy(
     from core.learning.model_writing import check_can_change, write_figures
     from core.perception.pipeline import Pipeline, open_pipeline
     from core.study.accuracy import TrueMasks, score_set, summarise, summarise_looks
-    from core.study.calibration import describe_confidence
+    from core.study.calibration import describe_confidence, describe_gates
 
     config = _config(model, preset, config_path)
     if store:
@@ -214,7 +214,9 @@ def run_accuracy(
     if interrupted and not scores:
         raise KeyboardInterrupt
     left_out.tell(len(scores))
-    figures = summarise(scores) | describe_confidence(scores) | ({"left_out": len(left_out)} if left_out else {})
+    figures = summarise(scores) | describe_confidence(scores) | {"stricter_gates": describe_gates(scores)}
+    if left_out:
+        figures["left_out"] = len(left_out)
     if interrupted:
         figures |= {"interrupted": True, "frames_of_set": len(samples)}
     looks = {stem: str(row["family"]) for stem, row in truth.items() if row.get("family") is not None}

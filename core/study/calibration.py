@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,8 @@ from sklearn.metrics import roc_auc_score
 
 from core.errors import UserError
 from core.perception.evidence import Calibration, Evidence
-from core.study.accuracy import FrameScore
+from core.study.accuracy import FrameScore, summarise
+from core.types import Reason
 
 WRONG_THETA_DEG, WRONG_HEAD_PX = 5.0, 15.0
 """An answer is wrong when theta or head is off by more than this, or when there is no robot at all."""
@@ -109,3 +110,29 @@ def describe_confidence(scores: Sequence[FrameScore]) -> dict[str, Any]:
             f"{b.low:.2f}-{b.high:.2f}": {"n": b.count, "promised": b.mean_confidence, "right": b.right_share} for b in bins
         },
     }
+
+
+_GATES = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98)
+_PER_GATE = ("answered_share", "state_agreement", "state_kappa", "theta_pearson", "confident_and_wrong_share")
+
+
+def describe_gates(scores: Sequence[FrameScore]) -> dict[str, dict[str, float | None]]:
+    """What is answered, and how well, where ``perception.quality.min_confidence`` is stricter: figures of ``summarise`` by limit.
+
+    ``theta_mean_deg`` is the mean absolute error. Limits below which there is no answer are left out.
+    """
+    lowest = min((score.confidence for score in scores if score.answered and score.expected), default=1.0)
+    gates = {}
+    for limit in _GATES:
+        if limit > lowest:
+            sums = summarise([score if score.confidence >= limit else _refused(score) for score in scores])
+            theta = sums["theta_error_deg"]
+            gates[f"{limit:.2f}"] = {key: sums[key] for key in _PER_GATE} | {"theta_mean_deg": theta["mean"] if theta else None}
+    return gates
+
+
+def _refused(score: FrameScore) -> FrameScore:
+    if not score.answered:
+        return score
+    refused = replace(score, answered=False, reason=Reason.LOW_CONFIDENCE, confidence=0.0)
+    return replace(refused, head_error_px=None, theta_error_deg=None, theta_deg=None, state=None)

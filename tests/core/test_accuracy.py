@@ -7,7 +7,7 @@ import pytest
 
 from core.learning.dataset import DatasetError
 from core.study.accuracy import FrameScore, dice, kappa, score_frame, summarise, summarise_looks
-from core.study.calibration import describe_confidence
+from core.study.calibration import describe_confidence, describe_gates
 from core.types import Masks, Pose, PoseState, Reason, Refusal, RobotPath, Scene
 from tests.core.drawing import art
 
@@ -123,6 +123,26 @@ def test_of_what_nobody_has_measured_only_the_masks_count() -> None:
     assert (sums["frames"], sums["expected"], sums["poseless_frames"], sums["empty_frames"]) == (3, 1, 0, 0)
     assert sums["robot_dice"] == pytest.approx(drawn.robot_dice)
     assert describe_confidence([score(), drawn])["reliability"]["0.90-0.95"]["n"] == 1
+
+
+def test_stricter_gates_refuse_what_promises_less() -> None:
+    empty = REFUSED | {"expected": False, "robot_dice": None, "true_state": None, "true_theta_deg": None}
+    scores = [
+        score(confidence=0.96),
+        score(confidence=0.8, theta_error_deg=-3.0, theta_deg=20.0, true_theta_deg=23.0),
+        score(confidence=0.75, theta_error_deg=20.0, theta_deg=40.0, true_theta_deg=20.0, state="B"),
+        score(confidence=0.0, **REFUSED, reason=Reason.NO_ROBOT),
+        score(**(empty | {"answered": True, "state": "A", "confidence": 0.6})),
+    ]
+    gates = describe_gates(scores)
+    assert list(gates) == ["0.80", "0.90", "0.95", "0.98"]  # below all answers a gate changes nothing
+    assert gates["0.80"] == {
+        "answered_share": 2 / 4, "state_agreement": 1.0, "state_kappa": None, "theta_pearson": None,
+        "confident_and_wrong_share": 0.0, "theta_mean_deg": 2.0,
+    }  # fmt: skip
+    assert (gates["0.95"]["answered_share"], gates["0.95"]["theta_mean_deg"]) == (1 / 4, 1.0)
+    assert (gates["0.98"]["answered_share"], gates["0.98"]["state_agreement"], gates["0.98"]["theta_mean_deg"]) == (0.0, None, None)
+    assert describe_gates([score(**empty)]) == {}
 
 
 def test_sums_by_hand() -> None:
