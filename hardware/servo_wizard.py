@@ -123,7 +123,7 @@ def identify_servo(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], ser
             if finding is not None and finding.function is Function.ADVANCE and amplitude_mm < most_mm:
                 # It is clear who this is; how far it goes is clear only after a longer way.
                 say(f"servo {servo_id}: {most_mm:g} mm both ways")
-                farther = classify(_wiggled(bench, probe, most_mm))
+                farther = _farther(bench, probe, most_mm)
                 if farther is not None and (farther.function, farther.sign) == (finding.function, finding.sign):
                     finding = farther
             if finding is not None:
@@ -131,6 +131,15 @@ def identify_servo(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], ser
                 return finding
     say(f"servo {servo_id}: nothing clear was seen")
     return None
+
+
+def _farther(bench: Bench, probe: Probe, amplitude_mm: float) -> Finding | None:
+    """What is seen over a longer way; None, and the servo where it stood, when the head leaves the picture there."""
+    try:
+        return classify(_wiggled(bench, probe, amplitude_mm))
+    except HeadNotSeen:
+        probe.move_to(0.0)
+        return None
 
 
 def _wiggled(bench: Bench, probe: Probe, amplitude_mm: float) -> Wiggle:

@@ -83,6 +83,12 @@ def excused(watch: BusWatch, now_s: float) -> BusWatch:
     return replace(watch, seen_s=now_s)
 
 
+def armed_anew(watch: BusWatch) -> BusWatch:
+    """The watch after all servos were checked and armed: what arming has mended is over, though no report has said so yet."""
+    mended = replace(watch.newest, watchdog_tripped=False, torque_problem="")
+    return replace(checked(watch), newest=mended)
+
+
 def checked(watch: BusWatch) -> BusWatch:
     """The watch after all servos were found, checked and, if restarted, zeroed."""
     return replace(watch, rebooted=False, disarmed_run=0)

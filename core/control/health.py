@@ -6,7 +6,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from core.control.bus_watch import BusReport, BusWatch, bus_faults, checked, excused, see_bus
+from core.control.bus_watch import BusReport, BusWatch, armed_anew, bus_faults, checked, excused, see_bus
 from core.control.deadman import Deadman, DeadmanReport, is_held, see_deadman
 from core.control.faults import AREA, Area, Cause, Fault
 from core.control.frame_watch import (
@@ -143,7 +143,7 @@ def take(health: Health, report: Report, *, armed: bool, now_s: float, servos: S
         case ModelReport():
             return replace(health, model=report)
         case ServosChecked(problems):
-            bus = health.bus if problems else checked(health.bus)
+            bus = health.bus if problems else armed_anew(health.bus)
             return replace(health, servo_problems=problems, bus=bus)
         case ServosOff():
             return replace(health, servo_problems=None, bus=checked(health.bus))

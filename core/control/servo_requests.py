@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 from collections.abc import Callable, Sequence
@@ -126,6 +127,8 @@ class ServoRequests:
         except Interrupted:
             robot.stop()
             raise
+        with self._lock:
+            self._offs_done = max(self._offs_done, asked[1])  # what was asked for before is over, whatever became of it
         self._post(ServosChecked())
 
     def _switch_off(self, asked: int) -> None:
@@ -134,7 +137,8 @@ class ServoRequests:
         if self._robot.failure is not None:
             self._robot.connect()
         else:
-            self._robot.disarm()
+            with contextlib.suppress(DeviceError):  # a hold that fails is no reason to leave the torque on
+                self._robot.disarm()
         self._robot.torque_off()
         with self._lock:
             self._offs_done = asked

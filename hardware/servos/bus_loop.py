@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import math
 import os
@@ -49,6 +48,7 @@ class BusLoop:
         self._settle = 0
         self._ended = self._quiet = self._lost = False
         self._reopen_at_s = 0.0
+        self._not_open = ""
         self._stop_s = -math.inf
         self._debt = TorqueDebt(bus, self._guard)
         self._does: dict[str, Callable[[Request], None]] = {
@@ -195,24 +195,28 @@ class BusLoop:
         if self._debt.owed or self._servos.torque_off_on_stop:
             self._debt.owe()
         self._readings = ()
-        self._lost = True
+        self._lost, self._not_open = True, ""
         self._reopen_at_s = time.monotonic() + _REOPEN_S
 
     def _reopen(self, now_s: float) -> None:
         self._reopen_at_s = now_s + _REOPEN_S
         if os.path.exists(self._servos.port or ""):
-            with contextlib.suppress(ServoError):
+            try:
                 self._open()
+            except ServoError as error:
+                self._not_open = str(error)
+                self._debt.pay_unopened()
 
     def _open(self) -> None:
         if not self._bus.is_open:
             self._bus.open()
             self._corrupt = self._bus.counts.corrupt
             self._lost = False
+            self._not_open = ""
 
     def _arm(self) -> None:
         if not self._bus.is_open:
-            raise NotReady("not armed: the servo port is not open")
+            raise NotReady(f"not armed: {self._not_open or 'the servo port is not open'}")
         if not self._guard.armed:
             self._look_before_arming()
         self._guard.check_arming()

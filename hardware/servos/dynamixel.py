@@ -248,6 +248,22 @@ class ServoBus:
         if doubtful:
             raise TorqueStillOn(f"torque of {', '.join(doubtful)} is not proven to be off: cut the servos' power")
 
+    def let_go(self) -> None:
+        """``torque_off`` on a closed bus that cannot be opened because not all seven answer: whoever hears it obeys.
+
+        Raises
+        ------
+        PortError, PortTaken
+            The port cannot be opened.
+        TorqueStillOn
+            When a servo still has torque, or does not tell.
+        """
+        self._line.open()
+        try:
+            self.torque_off()
+        finally:
+            self._line.close()
+
     def reboot(self, servo_id: int) -> None:
         """Restart one servo, which clears its hardware error. Afterwards the bus is disarmed, and the joint must be zeroed.
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 from hardware.servos.bus_guard import BusGuard
 from hardware.servos.dynamixel import ServoBus
-from hardware.servos.errors import PortLost, ServoError
+from hardware.servos.errors import PortError, PortLost, ServoError
 from hardware.servos.line import LATE_S
 
 _NOT_PROVEN = "the torque is not proven to be off: cut the servos' power"
@@ -40,12 +42,21 @@ class TorqueDebt:
             if self.owed and self._bus.is_open and left:
                 time.sleep(LATE_S)  # whoever was silent is not asked before
         if self.owed and not self._bus.is_open:
-            self._tell(_NOT_PROVEN)
+            self._tell(self.problem or _NOT_PROVEN)
+
+    def pay_unopened(self) -> None:
+        """On a port that is there, of a bus that cannot be opened: one missing servo is no reason for six to go on pulling."""
+        if self.owed:
+            with contextlib.suppress(PortError, PortLost):  # nobody has heard it
+                self._try(self._bus.let_go)
 
     def _pay_once(self) -> None:
+        self._try(self._bus.torque_off)
+
+    def _try(self, switch_off: Callable[[], None]) -> None:
         try:
-            self._bus.torque_off()
-        except PortLost:
+            switch_off()
+        except (PortError, PortLost):
             raise
         except ServoError as error:
             self._tell(str(error))

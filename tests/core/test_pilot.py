@@ -21,6 +21,7 @@ from core.control.health import ModelReport
 from core.control.modes import Act, Hindrance, Mode
 from core.control.pilot import PERIOD_S, Pilot
 from core.control.policies import make_policy
+from core.devices import DeviceError
 from core.safety_config import SafetyConfig
 from core.types import Advice, Points, Reason, Refusal, Route, Scene, Speed
 from tests.core.pilot_bench import ADVICE, WELL, Bench, Policy, scene_at
@@ -502,6 +503,38 @@ def test_a_torque_off_that_is_done_is_not_done_again_at_the_end(bench: Bench) ->
     assert bench.robot.calls.count("torque off") == 1
 
 
+def test_servos_that_were_switched_on_after_a_torque_off_in_vain_keep_their_torque_at_the_end(bench: Bench) -> None:
+    """The wires went slack when the window was closed, though the operator had switched the servos on and driven since."""
+    bench.seconds(0.2)
+    plain = bench.robot.torque_off
+
+    def in_vain() -> None:
+        plain()
+        raise DeviceError("torque of up is not proven to be off: cut the servos' power")
+
+    bench.robot.torque_off = in_vain  # type: ignore[method-assign]
+    bench.pilot.torque_off()
+    bench.done().turn()
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.on()
+    assert bench.pilot.view.servos_on
+    bench.pilot.close()
+    assert bench.robot.calls.count("torque off") == 1
+
+
+def test_a_hold_that_fails_does_not_keep_the_torque_on(bench: Bench) -> None:
+    """The servos were to hold first; where that failed the bus process never heard of the torque-off, and owed none."""
+    bench.seconds(0.2)
+
+    def lost() -> None:
+        raise DeviceError("servo port is lost")
+
+    bench.robot.disarm = lost  # type: ignore[method-assign]
+    bench.pilot.torque_off()
+    bench.done()
+    assert "torque off" in bench.robot.calls
+
+
 def test_a_torque_off_needs_no_bus_process_that_lives(bench: Bench) -> None:
     bench.seconds(0.2)
     bench.robot.failure = "the servo bus process ended"
@@ -532,6 +565,24 @@ def test_torque_that_is_not_proven_to_be_off_is_told_though_the_servos_follow_no
     bench.robot.bus = replace(WELL, armed=False, torque_problem="torque of up is not proven to be off: cut the servos' power")
     bench.turn(2)
     assert Cause.TORQUE_ON in bench.alerts()
+
+
+@pytest.mark.parametrize(
+    "before", [{"watchdog_tripped": True}, {"torque_problem": "torque of up is not proven to be off: cut the servos' power"}]
+)
+def test_what_arming_has_mended_is_no_fault_of_the_servos_that_were_switched_on(bench: Bench, before: dict[str, object]) -> None:
+    """Arming is answered a moment before the first report since: in that turn the last one from before disarmed them again."""
+    bench.seconds(0.2)
+    bench.robot.bus = replace(WELL, armed=False, **before)  # type: ignore[arg-type]
+    bench.turn(2)
+    bench.robot.bus = None
+    bench.pilot.switch_on()
+    bench.done().turn()
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.latched is None
+    bench.robot.bus = replace(WELL, **before)  # type: ignore[arg-type]
+    bench.turn()
+    assert bench.pilot.view.latched is not None, "what is said of them afterwards counts"
 
 
 def test_an_unexpected_error_of_a_request_is_told(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:

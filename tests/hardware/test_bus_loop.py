@@ -13,7 +13,7 @@ from core.servo_config import ServosConfig
 from hardware.servos import bus_loop, servo_robot
 from hardware.servos.bus_loop import BusLoop
 from hardware.servos.bus_messages import BusStatus
-from hardware.servos.errors import NotReady, ServoError, TorqueStillOn
+from hardware.servos.errors import NoAnswer, NotReady, ServoError, TorqueStillOn
 from hardware.servos.guard_end import Request
 from hardware.servos.line import LineCounts
 from hardware.servos.servo_robot import ServoRobot
@@ -29,6 +29,17 @@ class PaperBus:
         self.counts = LineCounts()
         self.told: list[str] = []
         self.torque_stays = False
+        self.missing = ""
+
+    def open(self) -> None:
+        if self.missing:
+            raise NoAnswer(self.missing)
+        self.told.append("open")
+        self.is_open = True
+
+    def let_go(self) -> None:
+        self.told.append("let go")
+        raise TorqueStillOn("torque of up is not proven to be off: cut the servos' power")
 
     def disarm(self) -> None:
         self.told.append("hold")
@@ -255,6 +266,58 @@ def test_a_port_that_is_lost_forgets_no_torque_off(paper: Paper) -> None:
     paper.loop._lose_port()
     paper.turn()
     assert paper.bus.told == ["torque off"]
+
+
+def _six_of_seven(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The port is back, and one servo's cable has come off: the bus cannot be opened."""
+    monkeypatch.setattr(bus_loop.os.path, "exists", lambda _: True)
+    paper.bus.is_open = False
+    paper.bus.missing = "servo up (id 3): no answer"
+
+
+def test_six_servos_of_seven_let_go_when_the_port_comes_back_without_the_seventh(
+    paper: Paper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bus that cannot be opened never tried the torque-off that it owed, and the six went on pulling."""
+    paper.loop._debt.owe()
+    paper.loop._lose_port()
+    _six_of_seven(paper, monkeypatch)
+    paper.loop._reopen(paper.now_s)
+    assert paper.bus.told == ["let go"]
+    paper.loop._publish(paper.now_s)
+    assert paper.end.told.torque_problem == "torque of up is not proven to be off: cut the servos' power"
+    paper.bus.missing = ""
+    paper.loop._reopen(paper.now_s)
+    paper.turn()
+    assert paper.bus.told == ["let go", "open", "torque off"]
+    paper.loop._publish(paper.now_s)
+    assert (paper.end.told.torque_offs, paper.end.told.torque_problem) == (1, "")
+
+
+def test_they_let_go_when_the_process_ends_too(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    paper.loop._debt.owe()
+    paper.loop._lose_port()
+    _six_of_seven(paper, monkeypatch)
+    paper.loop.end()
+    paper.loop.run()
+    assert paper.bus.told == ["let go", "close"]
+    assert "torque of up is not proven to be off" in paper.end.words[0]
+
+
+def test_nobody_lets_go_of_wires_when_no_torque_off_is_owed(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    paper.loop._lose_port()
+    _six_of_seven(paper, monkeypatch)
+    paper.loop._reopen(paper.now_s)
+    assert paper.bus.told == []
+
+
+def test_arming_says_why_the_port_that_came_back_is_not_open(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cable was in, and all that the operator was told was to plug it in."""
+    paper.loop._lose_port()
+    _six_of_seven(paper, monkeypatch)
+    paper.loop._reopen(paper.now_s)
+    paper.hear(request="arm")
+    assert str(paper.end.answers[0][1]) == "not armed: servo up (id 3): no answer"
 
 
 @pytest.mark.parametrize("how", ["end", "signal", "alone"])

@@ -633,6 +633,17 @@ def test_torque_off_without_proof_is_an_error(twin: SoftServoBus, armed: ServoBu
     assert twin.servo(3).table["torque"] == 0
 
 
+def test_who_hears_it_lets_go_though_the_seven_are_not_complete(twin: SoftServoBus, armed: ServoBus) -> None:
+    armed.close()
+    twin.faults.mute(3)
+    with pytest.raises(NoAnswer, match=r"up \(id 3\)"):
+        armed.open()
+    with pytest.raises(TorqueStillOn, match="torque of up is not proven"):
+        armed.let_go()
+    assert [twin.servo(joint.id).table["torque"] for joint in CONFIG.joints if joint.name != "up"] == [0] * 6
+    assert not armed.is_open
+
+
 def test_close_holds_and_keeps_the_wires_tight(twin: SoftServoBus, armed: ServoBus) -> None:
     armed.write([0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0])
     _until(armed, 4, lambda reading: isinstance(reading, ServoState) and reading.velocity_mm_s > 5.0)

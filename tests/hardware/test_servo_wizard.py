@@ -67,6 +67,26 @@ def test_how_far_the_feed_goes_is_measured_over_its_longest_way(straight: tuple[
     assert twin.turned_mm == pytest.approx(start, abs=0.02)
 
 
+def test_a_feed_that_leaves_the_picture_on_its_longest_way_is_a_feed_all_the_same() -> None:
+    """It was clear who it is: the longer way only tells how far it goes. All seven had to be identified again."""
+    twin, bench = lock_bench(_config())
+    feed = twin.wiring.joints[JOINT_NAMES.index("advance")]
+    start = dict(twin.turned_mm)
+
+    class EyesThatLoseIt:
+        def look(self, alive: Callable[[], None]) -> Look:
+            if any(abs(at_mm) > 2.0 for _, at_mm in twin.moved):
+                raise HeadNotSeen("the robot's head is not seen")
+            return bench.eyes.look(alive)
+
+    finding = servo_wizard.identify_servo(
+        Bench(EyesThatLoseIt(), bench.hands, bench.stop), ServosConfig(), IDS, feed.id, lambda _: None
+    )
+    assert finding is not None
+    assert (finding.function, finding.sign) == (Function.ADVANCE, feed.sign)
+    assert twin.turned_mm == pytest.approx(start, abs=0.05)
+
+
 @pytest.mark.slow
 def test_wires_are_left_where_they_just_become_taut(straight: tuple[LockTwin, Bench]) -> None:
     twin, bench = straight
