@@ -35,7 +35,7 @@ class WorkThread(QObject):
         super().__init__(parent)
         self.setObjectName(name)
         self._worker = _Worker(name, Letters(self), behind=behind)
-        self.destroyed.connect(self._worker.end_after_its_jobs)
+        self.destroyed.connect(self._worker.end)
 
     @property
     def pending(self) -> int:
@@ -52,9 +52,7 @@ class WorkThread(QObject):
 
     def stop(self, *, finish: bool) -> None:
         """Ask the thread to end, with `finish` after all jobs; returns at once."""
-        if not finish:
-            self._worker.forget()
-        if not self._worker.end_after_its_jobs():
+        if not self._worker.end(finish=finish):
             self.ended.emit()
 
     def wait(self, within_ms: float | None = None) -> bool:
@@ -101,10 +99,12 @@ class _Worker:
         with self._changed:
             self._jobs.clear()
 
-    def end_after_its_jobs(self) -> bool:
+    def end(self, *, finish: bool = True) -> bool:
         """Whether there is a thread that will say so."""
         with self._changed:
             self._stopping = True
+            if not finish:
+                self._jobs.clear()
             self._changed.notify()
             return self._thread is not None
 
