@@ -41,7 +41,11 @@ class BusReport:
 
 @dataclass(frozen=True, slots=True)
 class BusWatch:
-    """What is remembered of the bus. What a report leaves out keeps its last reading. ``disarmed_run`` counts reports in a row."""
+    """What is remembered of the bus. What a report leaves out keeps its last reading. ``disarmed_run`` counts reports in a row.
+
+    ``gaps_since_s`` is when the cycles began in which not all servos have answered, without one between in which they have, and
+    ``gaps`` whose answers were missed since.
+    """
 
     seen_s: float | None = None
     newest: BusReport = BusReport()
@@ -52,6 +56,8 @@ class BusWatch:
     strained: str = ""
     rebooted: bool = False
     disarmed_run: int = 0
+    gaps_since_s: float | None = None
+    gaps: frozenset[str] = frozenset()
 
 
 def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConfig, safety: SafetyConfig) -> BusWatch:
@@ -67,6 +73,11 @@ def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConf
     if report.currents_ma:
         currents = see_currents(currents, report.currents_ma, now_s, servos)
         strain = strained(currents, servos)
+    gaps_since_s, gaps = watch.gaps_since_s, watch.gaps
+    if report.misses:
+        missing = {name for name, misses in zip(JOINT_NAMES, report.misses, strict=False) if misses > 0}
+        gaps_since_s = (now_s if gaps_since_s is None else gaps_since_s) if missing else None
+        gaps = gaps | missing if missing else frozenset()
     newest = replace(
         report,
         hardware_errors=report.hardware_errors or old.hardware_errors,
@@ -75,7 +86,7 @@ def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConf
     )
     disarmed_run = 0 if report.armed else watch.disarmed_run + 1
     rebooted = watch.rebooted or report.rebooted
-    return BusWatch(now_s, newest, errors, since_s, astray, currents, strain, rebooted, disarmed_run)
+    return BusWatch(now_s, newest, errors, since_s, astray, currents, strain, rebooted, disarmed_run, gaps_since_s, gaps)
 
 
 def excused(watch: BusWatch, now_s: float) -> BusWatch:
@@ -119,6 +130,10 @@ def bus_faults(watch: BusWatch, now_s: float, servos: ServosConfig, safety: Safe
         faults.append(Fault(Cause.BUS_NOISE, f"{bad} in {safety.bus_errors_window_s:g} s (at most {safety.bus_errors})"))
     if silent := [n for n, misses in zip(JOINT_NAMES, newest.misses, strict=False) if misses >= safety.missed_answers]:
         faults.append(Fault(Cause.SERVO_SILENT, ", ".join(silent)))
+    elif watch.gaps_since_s is not None and now_s - watch.gaps_since_s > safety.bus_disarm_s:
+        # Each by itself answers often enough. But positions of all at once, which the motion goes by, are never there.
+        names = ", ".join(name for name in JOINT_NAMES if name in watch.gaps)
+        faults.append(Fault(Cause.SERVO_SILENT, f"in turns, {names}: not all in one cycle for {safety.bus_disarm_s:g} s"))
     if alerted := [f"{n} {bits:#04x}" for n, bits in zip(JOINT_NAMES, newest.hardware_errors, strict=False) if bits != 0]:
         faults.append(Fault(Cause.SERVO_ALERT, ", ".join(alerted)))
     if watch.astray_since_s is not None and now_s - watch.astray_since_s >= safety.tracking_time_s:

@@ -253,7 +253,6 @@ class BusLoop:
 
     def _torque_off(self) -> None:
         """Owed from now on, whatever becomes of the first tries: who asked for it is told, and it is tried with each turn."""
-        """Owed from now on, whatever becomes of the first tries: who asked for it is told, and it is tried with each turn."""
         self._guard.disarm()
         self._settle = 0
         self._debt.owe()

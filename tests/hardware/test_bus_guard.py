@@ -6,6 +6,7 @@ import math
 import mmap
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -249,6 +250,40 @@ def test_where_nothing_is_written_nothing_is_told_as_sent(bench: Bench) -> None:
     bench.cycle()
     bench.cycle()
     assert bench.guard.sent.order == bench.order
+
+
+def _silent(servo_id: int | None, state: ServoState) -> ServoReading:
+    return MissingServo(state.name, state.id, state.time_s, 1, "silent") if state.id == servo_id else state
+
+
+def test_servos_that_are_silent_in_turns_disarm() -> None:
+    """No one misses three answers in a row, and yet there are never positions of all: the motion stood still, and nothing said why."""
+    bench = Bench()
+    bench.arm()
+    begun_s = bench.now_s
+    for turn in range(100):
+        bench.alter = partial(_silent, (1, 5)[turn % 2])
+        bench.cycle()
+        if not bench.guard.armed:
+            break
+    assert not bench.guard.armed
+    assert bench.now_s - begun_s == pytest.approx(SAFETY.bus_disarm_s, abs=2.1 * CYCLE_S)
+    assert bench.guard.latched is not None
+    assert bench.guard.latched.cause is Cause.SERVO_SILENT
+    assert bench.guard.latched.detail == "in turns, right, advance: not all in one cycle for 0.5 s"
+    bench.alter = lambda state: state
+    bench.cycle()
+    bench.guard.acknowledge()
+    bench.guard.check_arming()
+
+
+def test_one_whole_cycle_now_and_then_is_enough() -> None:
+    bench = Bench()
+    bench.arm()
+    for turn in range(100):
+        bench.alter = partial(_silent, (1, 5, None)[turn % 3])
+        bench.cycle()
+    assert bench.guard.armed
 
 
 def test_an_order_from_before_the_arming_does_not_count() -> None:
