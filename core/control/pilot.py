@@ -286,13 +286,14 @@ class Pilot:
 
     def _hear(self, inputs: Inputs, sent: SentMotion | None, kept_back: Rejection | None, now_s: float) -> None:
         """Add to the events what servos, controls and the way say now."""
-        events = inputs.events
+        events, has_let_go = inputs.events, self._requests.take_let_go()
         if (failure := self._robot.failure) is not None:
             events.append(Fault(Cause.BUS_DEAD, failure))
         elif (report := self._robot.report()) is not None:
             events.append(report)
-            if report.torque_off:
-                self._teller.tell([(Note.TORQUE_OFF, "")], now_s)
+            has_let_go = has_let_go or report.torque_off
+        if has_let_go:
+            self._teller.tell([(Note.TORQUE_OFF, "")], now_s)
         if self._requests.busy:
             self._busy_s = now_s
             events.append(ServosBusy())

@@ -36,7 +36,7 @@ class ServoRequests:
         self._lock = threading.Lock()
         self._stops = 0
         self._offs = self._offs_done = 0
-        self._blocked = False
+        self._blocked = self._let_go = False
         self._waiting: list[str] = []
 
     @property
@@ -44,6 +44,12 @@ class ServoRequests:
         """What is being done; "" for nothing."""
         with self._lock:
             return self._waiting[0] if self._waiting else ""
+
+    def take_let_go(self) -> bool:
+        """Whether the torque went off since the last call, of all servos of a robot that is not connected and reports nothing."""
+        with self._lock:
+            let_go, self._let_go = self._let_go, False
+        return let_go
 
     def stopped(self) -> None:
         """STOP: what is running or waiting must not switch anything on, and nothing does before an acknowledgement."""
@@ -132,16 +138,17 @@ class ServoRequests:
         self._post(ServosChecked())
 
     def _switch_off(self, asked: int) -> None:
-        """Also where the bus process is gone: nobody but a new one lets the wires go."""
+        """Also where the bus process is gone, and where not all servos are there to connect: no reason to let the others pull."""
         self._post(ServosOff())
-        if self._robot.failure is not None:
-            self._robot.connect()
-        else:
-            with contextlib.suppress(DeviceError):  # a hold that fails is no reason to leave the torque on
+        with contextlib.suppress(DeviceError):  # nor is a hold that fails
+            if self._robot.failure is not None:
+                self._robot.connect()
+            else:
                 self._robot.disarm()
         self._robot.torque_off()
         with self._lock:
             self._offs_done = asked
+            self._let_go = self._let_go or self._robot.failure is not None  # no report tells it
 
     def _check(self, asked: tuple[int, int]) -> None:
         """Raise Interrupted when something came since that speaks against switching on."""

@@ -256,7 +256,10 @@ class BusLoop:
         self._guard.disarm()
         self._settle = 0
         self._debt.owe()
-        self._debt.pay(_TRIES_ON_REQUEST)
+        if self._bus.is_open:
+            self._debt.pay(_TRIES_ON_REQUEST)
+        else:
+            self._debt.pay_unopened()
         if self._debt.owed:
             raise TorqueStillOn(self._debt.problem)
 

@@ -24,7 +24,7 @@ from hardware.servos.errors import BusProcessLost, NotReady, ServoError
 from hardware.servos.status_block import ServoReading, ServoState
 from hardware.servos.units import wire_force_mn
 
-_OPEN_S, _ARM_S, _REQUEST_S = 20.0, 10.0, 5.0
+_OPEN_S, _ARM_S, _REQUEST_S, _LET_GO_S = 20.0, 10.0, 5.0, 10.0
 
 
 class ServoRobot:
@@ -160,11 +160,23 @@ class ServoRobot:
     def torque_off(self) -> None:
         """Disarm and switch all torque off, which releases the tension of the wires.
 
+        Where the bus process is gone a new one does it, and ends. Servos obey also where a missing one keeps the robot from being
+        connected.
+
         Raises
         ------
         TorqueStillOn
         """
-        self._connected().request("torque off", _REQUEST_S)
+        if (failure := self.failure) is None:
+            self._connected().request("torque off", _REQUEST_S)
+            return
+        self._not_connected = failure  # and stays so: this process is not the one that drives
+        self._disconnect()
+        link = BusLink(self._servos, self._safety)
+        try:
+            link.request("torque off", _LET_GO_S)
+        finally:
+            link.close()
 
     def beat(self, permitted: Source | None) -> None:
         """A sign of life of the application, with what its supervisor says: whose orders may be followed (None: nobody's)."""

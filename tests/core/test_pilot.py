@@ -543,6 +543,26 @@ def test_a_torque_off_needs_no_bus_process_that_lives(bench: Bench) -> None:
     assert bench.robot.calls[-2:] == ["connect", "torque off"]
 
 
+def test_a_torque_off_needs_not_all_servos_to_connect(bench: Bench) -> None:
+    """The bus process was gone and a servo was missing: connecting failed, and six servos went on pulling."""
+    bench.seconds(0.2)
+    bench.robot.failure = "the servo bus process ended"
+
+    def connect() -> None:
+        bench.robot.calls.append("connect")
+        raise DeviceError("servo up (id 3) does not answer")
+
+    bench.robot.connect = connect  # type: ignore[method-assign]
+    bench.alerts()
+    bench.pilot.torque_off()
+    bench.done()
+    bench.turn()
+    assert bench.robot.calls[-2:] == ["connect", "torque off"]
+    assert Note.TORQUE_OFF in bench.alerts()
+    bench.turn()
+    assert Note.TORQUE_OFF not in bench.alerts()
+
+
 def test_what_became_of_a_torque_off_is_told(bench: Bench) -> None:
     bench.on()
     bench.alerts()

@@ -252,17 +252,17 @@ def test_where_nothing_is_written_nothing_is_told_as_sent(bench: Bench) -> None:
     assert bench.guard.sent.order == bench.order
 
 
-def _silent(servo_id: int | None, state: ServoState) -> ServoReading:
+def _silent_one(servo_id: int | None, state: ServoState) -> ServoReading:
     return MissingServo(state.name, state.id, state.time_s, 1, "silent") if state.id == servo_id else state
 
 
 def test_servos_that_are_silent_in_turns_disarm() -> None:
-    """No one misses three answers in a row, and yet there are never positions of all: the motion stood still, and nothing said why."""
+    """None misses three answers in a row, and yet there are never positions of all: all stood still, and nothing said why."""
     bench = Bench()
     bench.arm()
     begun_s = bench.now_s
     for turn in range(100):
-        bench.alter = partial(_silent, (1, 5)[turn % 2])
+        bench.alter = partial(_silent_one, (1, 5)[turn % 2])
         bench.cycle()
         if not bench.guard.armed:
             break
@@ -281,7 +281,7 @@ def test_one_whole_cycle_now_and_then_is_enough() -> None:
     bench = Bench()
     bench.arm()
     for turn in range(100):
-        bench.alter = partial(_silent, (1, 5, None)[turn % 3])
+        bench.alter = partial(_silent_one, (1, 5, None)[turn % 3])
         bench.cycle()
     assert bench.guard.armed
 

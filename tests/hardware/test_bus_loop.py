@@ -256,7 +256,7 @@ def test_a_torque_off_that_was_asked_for_while_the_port_was_gone_is_owed(paper: 
     assert isinstance(error, TorqueStillOn)
     paper.bus.is_open = True
     paper.turn()
-    assert paper.bus.told == ["torque off"]
+    assert paper.bus.told == ["let go", "torque off"]
 
 
 def test_a_port_that_is_lost_forgets_no_torque_off(paper: Paper) -> None:

@@ -28,7 +28,7 @@ from core.types import Command
 from hardware.rig import RigKind, open_rig
 from hardware.servos.bus_link import BusLink
 from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order
-from hardware.servos.errors import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken
+from hardware.servos.errors import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servo_bus import SoftServoBus
 from tests.hardware.kill_campaign import BOUND_S, BOUND_STEPS, KINDS, strike
@@ -330,6 +330,31 @@ def test_a_torque_off_that_is_owed_is_paid_when_the_application_closes(
         robot.close()
     assert any(servos.servo(joint.id).table["torque"] for joint in CONFIG.joints) is not comes_back
     assert ("the torque is not proven to be off" in caplog.text) is not comes_back
+
+
+def test_without_a_bus_process_and_without_a_servo_the_others_still_let_go(servos: SoftServoBus, armed: ServoRobot) -> None:
+    """Nobody can connect seven servos of which one is missing, and six went on pulling."""
+    link = armed._link
+    assert link is not None
+    os.kill(link.pid, signal.SIGKILL)
+    end_s = time.monotonic() + PATIENCE_S
+    while armed.failure is None and time.monotonic() < end_s:
+        time.sleep(0.01)
+    servos.faults.mute(3)
+    with pytest.raises(NoAnswer, match="servo up"):
+        armed.connect()
+    with pytest.raises(TorqueStillOn, match="torque of up is not proven to be off"):
+        armed.torque_off()
+    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints if joint.id != 3] == [0] * 6
+    servos.faults.clear()
+    armed.torque_off()
+    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    assert armed.failure is not None  # nobody drives with it before it was connected again
+    armed.connect()
+    assert armed.failure is None
+    armed.close()
+    with pytest.raises(BusProcessLost, match="connect it first"):
+        armed.torque_off()
 
 
 def test_a_bus_process_that_tells_nothing_any_more_sends_nothing(servos: SoftServoBus, armed: ServoRobot) -> None:
