@@ -220,7 +220,11 @@ class BusLoop:
         if not self._guard.armed:
             self._look_before_arming()
         self._guard.check_arming()
-        self._bus.arm()
+        try:
+            self._bus.arm()
+        except TorqueStillOn:  # some pull, some do not, and nobody drives: it is tried until they have all let go
+            self._debt.owe()
+            raise
         self._settle = 0
         self._debt.forgive()
         self._guard.set_armed(time.monotonic())

@@ -147,8 +147,9 @@ class ServoBus:
         NotReady
             A joint has no zero, has lost it by a restart, or a servo reports a hardware error.
         WrongServo, NoAnswer, Refused
-            Before the torque is touched: a servo is missing or another one. Later, the torque of all servos is off again, or the
-            message says of which one it may be on.
+            Before the torque is touched: a servo is missing or another one. Later, the torque of all servos is off again.
+        TorqueStillOn
+            It could not be switched on everywhere, nor proven to be off again.
         """
         self._armed = False
         self._check_ready()
@@ -175,7 +176,7 @@ class ServoBus:
             except PortLost:
                 raise
             except ServoError as still_on:
-                raise type(error)(f"{error}; {still_on}") from error
+                raise TorqueStillOn(f"{error}; {still_on}") from error
             raise
         self._armed = True
 

@@ -116,6 +116,16 @@ class Paper:
         self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
         self.loop._talk()
 
+    def reads(self, advance_mm: float = 0.0) -> None:
+        """From now on all servos tell that they stand at zero, but for one."""
+        places = zip(ServosConfig().joints, (0.0, 0.0, 0.0, 0.0, advance_mm, 0.0, 0.0), strict=True)
+        states = tuple(
+            ServoState(joint.name, joint.id, self.now_s, 0, 0, at_mm, 0.0, 0.0, 8.0, 12.0, 30.0, HardwareError(0), False, False)
+            for joint, at_mm in places
+        )
+        self.bus.read = lambda: states  # type: ignore[method-assign]
+        self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
+
     @property
     def stopped(self) -> bool:
         return self.loop._guard.stopped
@@ -248,6 +258,27 @@ def test_a_torque_off_that_was_asked_for_in_vain_is_told_and_stays_owed(paper: P
     assert (paper.end.told.torque_offs, paper.end.told.torque_problem) == (1, "")
 
 
+def test_an_arming_that_fails_half_way_and_cannot_be_undone_owes_the_torque_off(paper: Paper) -> None:
+    """It was told, and then nobody tried again: some servos pulled on."""
+
+    def arm() -> None:
+        raise TorqueStillOn("servo 5 did not take it; torque of right is not proven to be off: cut the servos' power")
+
+    paper.bus.arm = arm  # type: ignore[method-assign]
+    paper.reads()
+    paper.bus.torque_stays = True
+    paper.hear(request="arm")
+    assert "servo 5 did not take it" in str(paper.end.answers[0][1])
+    paper.turn()
+    paper.loop._publish(paper.now_s)
+    assert "torque of right is not proven to be off" in paper.end.told.torque_problem
+    paper.bus.torque_stays = False
+    paper.turn()
+    paper.loop._publish(paper.now_s)
+    assert paper.bus.told[-1] == "torque off"
+    assert (paper.end.told.torque_offs, paper.end.told.torque_problem) == (1, "")
+
+
 def test_a_torque_off_that_was_asked_for_while_the_port_was_gone_is_owed(paper: Paper) -> None:
     paper.loop._lose_port()
     paper.bus.is_open = False
@@ -356,20 +387,10 @@ def test_a_stop_that_nobody_has_heard_is_heard_before_the_process_ends(monkeypat
 
 def test_arming_looks_where_the_joints_are_now(paper: Paper) -> None:
     """A quiet bus was not read for long: meanwhile somebody has turned a joint by hand."""
-
-    def reads(advance_mm: float) -> None:
-        places = zip(ServosConfig().joints, (0.0, 0.0, 0.0, 0.0, advance_mm, 0.0, 0.0), strict=True)
-        states = tuple(
-            ServoState(joint.name, joint.id, paper.now_s, 0, 0, at_mm, 0.0, 0.0, 8.0, 12.0, 30.0, HardwareError(0), False, False)
-            for joint, at_mm in places
-        )
-        paper.bus.read = lambda: states  # type: ignore[method-assign]
-
-    paper.end.heartbeat = lambda: None  # type: ignore[attr-defined]
     for before_mm, now_mm, told in ((0.0, -7.0, []), (-7.0, 0.0, ["arm"])):
-        reads(before_mm)
+        paper.reads(before_mm)
         paper.loop._talk()
-        reads(now_mm)
+        paper.reads(now_mm)
         paper.hear(request="arm")
         assert paper.bus.told == told
     refused, armed = (error for _, error in paper.end.answers)

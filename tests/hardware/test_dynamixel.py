@@ -548,7 +548,7 @@ def test_arming_that_fails_says_of_which_servo_the_torque_may_be_on(
         write(line, servo_id, address, data)
 
     monkeypatch.setattr(ServoLine, "write", fail_at_the_fifth)
-    with pytest.raises(Refused, match=r"servo 5 did not take it; torque of right is not proven to be off: cut the servos' power"):
+    with pytest.raises(TorqueStillOn, match=r"servo 5 did not take it; torque of right is not proven to be off: cut the servos'"):
         bus.arm()
     assert not bus.is_armed
 
