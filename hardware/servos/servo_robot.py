@@ -266,11 +266,11 @@ class ServoRobot:
             if status is None or status.cycle == cycle or self.failure is not None:
                 return None
             self._reported = status.cycle, bad_packets, restarts
-            if status.phase is BusPhase.CLOSED:
-                return BusReport(port_open=False, torque_problem=status.torque_problem)
-            if not status.servos:
+            if status.phase is not BusPhase.CLOSED and not status.servos:
                 return None
             torque_off, self._told_offs = status.torque_offs > self._told_offs, status.torque_offs
+            if status.phase is BusPhase.CLOSED:
+                return BusReport(port_open=False, torque_off=torque_off, torque_problem=status.torque_problem)
             self._reported = status.cycle, status.bad_packets, status.restarts
         errors, rebooted = status.bad_packets - bad_packets, status.restarts > restarts
         report = report_of(status.servos, armed=status.armed, errors=errors, rebooted=rebooted)

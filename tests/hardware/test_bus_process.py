@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -330,6 +331,21 @@ def test_a_torque_off_that_is_owed_is_paid_when_the_application_closes(
         robot.close()
     assert any(servos.servo(joint.id).table["torque"] for joint in CONFIG.joints) is not comes_back
     assert ("the torque is not proven to be off" in caplog.text) is not comes_back
+
+
+def test_torque_that_went_off_on_a_port_that_cannot_be_opened_is_told_at_once(robot: ServoRobot) -> None:
+    """All seven had let go, but one of them was another one than before: told only when somebody had changed it back."""
+    link, status = robot._link, _seen(robot, lambda status: bool(status.servos))
+    assert link is not None
+    closed = replace(status, phase=BusPhase.CLOSED, servos=(), cycle=status.cycle + 1000, torque_offs=1)
+    link.status = lambda: closed  # type: ignore[method-assign]
+    report = robot.report()
+    assert report is not None
+    assert (report.port_open, report.torque_off) == (False, True)
+    closed = replace(closed, cycle=closed.cycle + 1)
+    report = robot.report()
+    assert report is not None
+    assert (report.port_open, report.torque_off) == (False, False)
 
 
 def test_without_a_bus_process_and_without_a_servo_the_others_still_let_go(servos: SoftServoBus, armed: ServoRobot) -> None:
