@@ -35,6 +35,7 @@ TESTS = {
     "joint_limits": ("test_gate.py",),
     "supervisor": ("test_supervisor.py", "test_health.py"),
     "health": ("test_supervisor.py", "test_health.py"),
+    "bus_watch": ("test_bus_watch.py", "test_supervisor.py", "test_health.py"),
     "deadman": ("test_deadman.py", "test_supervisor.py"),
 }
 """Module -> the tests that should find its mutants."""
