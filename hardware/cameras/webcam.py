@@ -24,9 +24,9 @@ from hardware.usb import DEV, SYS, VideoDevice, video_devices
 _log = logging.getLogger(__name__)
 
 _SELECT_TIMEOUT = "OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT"
+"""Seconds that OpenCV waits for a frame; its own 10 would keep a lost camera from being found again."""
 _AT_ONCE_S = 0.5
 """A camera that is gone says so sooner; one that is still starting makes us wait for the time limit."""
-"""Seconds that OpenCV waits for a frame; its own 10 would keep a lost camera from being found again."""
 _MANUAL, _AUTOMATIC = 1.0, 3.0
 """Exposure modes of V4L2."""
 _EXPOSURE_STEPS_PER_MS = 10.0
