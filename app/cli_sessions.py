@@ -8,7 +8,16 @@ from typing import Annotated
 
 import typer
 
-from app.cli_options import ConfigOption, JsonOption, PresetOption, ProgressOption, RigOption, SessionArgument, tell_asked_progress
+from app.cli_options import (
+    ConfigOption,
+    JsonOption,
+    PresetOption,
+    ProgressOption,
+    RigOption,
+    SchedulerOption,
+    SessionArgument,
+    tell_asked_progress,
+)
 
 
 def record(
@@ -26,19 +35,35 @@ def record(
 
 
 def replay(
-    session: SessionArgument,
+    sessions: Annotated[
+        list[Path], typer.Argument(metavar="SESSION", help="folders of recorded sessions, or folders with sessions in them")
+    ],
     model: Annotated[str | None, typer.Option(help="model name or folder; default: the recorded configuration's")] = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
     jsonl: Annotated[Path | None, typer.Option(help="the new results, one JSON object per frame, as perceive writes them")] = None,
     diff: Annotated[bool, typer.Option("--diff", help="also the frames that changed most")] = False,
-    out: Annotated[Path | None, typer.Option(help="folder for replay.json, frames.jsonl and the figure as SVG and PDF")] = None,
-    json: JsonOption = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="folder for replay.json, frames.jsonl and the figure as SVG and PDF; of several sessions a folder each"),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="processes, which share the sessions")] = 1,
+    scheduler: SchedulerOption = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="one JSON object on standard output, nothing else there; of several sessions a line each")
+    ] = False,
 ) -> None:
-    """Perceive a recorded session again and compare; without --config or --preset in the recorded configuration."""
-    from app.replay_command import ReplayOptions, run_replay
+    """Perceive recorded sessions again and compare; without --config or --preset in the recorded configuration."""
+    from app.replay_campaign import run_replays, sessions_in
+    from app.replay_command import run_replay
+    from app.replay_session import ReplayOptions
 
-    run_replay(ReplayOptions(session, model, preset, config, jsonl, out, diff, json))
+    found = sessions_in(sessions)
+    options = ReplayOptions(found[0], model, preset, config, jsonl, diff)
+    if found == sessions and len(found) == 1 and scheduler is None:
+        run_replay(options, out, as_json=json)
+    else:
+        run_replays(found, options, out, workers=workers, scheduler=scheduler, as_json=json)
 
 
 def play(

@@ -243,7 +243,7 @@ def _how_answered(
 
 def _recorded(folder: Path, config: Config, model: str | None) -> tuple[Config, list[str]] | None:
     """The configuration that a session was recorded with, with another `model` if given, and notes on it; None: no session."""
-    from app.replay_command import ReplayOptions, model_note, model_of, replay_config
+    from app.replay_session import ReplayOptions, model_note, model_of, replay_config
     from core.session.manifest import MANIFEST, SessionError, read_manifest
 
     if not (folder / MANIFEST).is_file():

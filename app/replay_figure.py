@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from app.figure_style import BLUE, GREY, INK, PALE, styled
 from app.palette import ON_PICTURE, STATE_COLOUR
-from core.study.replay import STATES, Change, Seen
+from core.study.replay import Change, Seen
+from core.study.replay_tally import STATES
 from core.types import PoseState
 
 VERMILLION = ON_PICTURE.VERMILLION  # on white paper, always

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -10,7 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from app.wording import signed_degrees
-from core.study.replay import STATES, Change, Seen, changed_most, runs
+from core.study.replay import Change, Seen, changed_most, runs
+from core.study.replay_tally import STATES
 
 _MOST_RUNS = 20
 _DASH = "\N{EN DASH}"
@@ -24,6 +26,34 @@ def print_replay(result: dict[str, Any], changes: Sequence[Change], *, with_diff
     if with_diff:
         console.print(_frames(changed_most(changes, count), count))
         _print_runs(console, changes)
+
+
+def print_replays(results: Sequence[dict[str, Any]], total: dict[str, Any], worst: Sequence[tuple[str, Change]] | None) -> None:
+    """Of many sessions, and of all of them in sum, on standard output. `worst`: frames that changed most, by session."""
+    console = Console(markup=False, emoji=False)
+    console.print(_sessions(results))
+    console.print(_sums(total))
+    console.print(_states(total["states"]["matrix"]))
+    if worst is not None:
+        console.print(_frames([change for _, change in worst], len(worst), [name for name, _ in worst]))
+
+
+def _sessions(results: Sequence[dict[str, Any]]) -> Table:
+    table = Table(title=f"{len(results)} session{'s' if len(results) > 1 else ''} perceived again")
+    table.add_column("session", overflow="fold")
+    for heading in ("frames", "|theta change| median (°)", "p95", "state changed", "pose lost", "gained"):
+        table.add_column(heading, justify="right")
+    for result in results:
+        theta, refusals = result["theta_change_deg"], result["refusals"]
+        table.add_row(
+            Path(result["session"]).name,
+            str(result["frames"]),
+            *(_DASH if theta[key] is None else f"{theta[key]:.2f}" for key in ("median", "p95")),
+            str(result["states"]["changed"]),
+            str(sum(refusals["gained"].values())),
+            str(sum(refusals["lost"].values())),
+        )
+    return table
 
 
 def _sums(result: dict[str, Any]) -> Table:
@@ -66,9 +96,11 @@ def _states(matrix: list[list[int]]) -> Table:
     return table
 
 
-def _frames(worst: Sequence[Change], count: int) -> Table:
+def _frames(worst: Sequence[Change], count: int, sessions: Sequence[str] | None = None) -> Table:
     title = f"The {len(worst)} frames that changed most" if len(worst) == count else f"The {len(worst)} frames that changed"
     table = Table(title=title if worst else "No frame changed")
+    if sessions is not None:
+        table.add_column("session", overflow="fold")
     for heading, is_number in (
         ("row", True),
         ("time (s)", True),
@@ -80,9 +112,10 @@ def _frames(worst: Sequence[Change], count: int) -> Table:
         ("reason", False),
     ):
         table.add_column(heading, justify="right" if is_number else "left")
-    for change in worst:
+    for place, change in enumerate(worst):
         told_by = change.before if change.before.reason is not None else change.after
         table.add_row(
+            *([] if sessions is None else [sessions[place]]),
             str(change.row),
             f"{change.time_s:.3f}",
             _theta(change.before),

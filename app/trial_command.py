@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
-import os
 import re
-import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,6 +17,7 @@ from rich.console import Console
 from app.cluster import over_cluster
 from app.learning_commands import progress_bar
 from app.trial_store import Job, KeptTrials, TrialError
+from app.worker_pool import over_processes
 from core.config import choose_model, load_config
 from core.control.policies import POLICY_NAMES
 from core.policy_config import PolicyName
@@ -141,7 +136,7 @@ def _results(campaign: Campaign, jobs: list[Job]) -> Iterator[Row]:
     if campaign.scheduler is not None:
         return over_cluster(campaign.scheduler, partial(run_one, campaign.plan), jobs)
     if campaign.workers > 1:
-        return _over_processes(campaign, jobs)
+        return over_processes(campaign.workers, partial(run_one, campaign.plan), jobs)
     return (run_one(campaign.plan, job) for job in jobs)
 
 
@@ -168,52 +163,6 @@ def run_one(plan: TrialPlan, job: Job) -> Row:
         pipelines[key] = open_pipeline(plan.config.perception) if masks is None else Pipeline(masks, plan.config.perception), masks
     pipeline, masks = pipelines[key]
     return Trial(plan, job[1], job[0], pipeline, masks).run()
-
-
-def _over_processes(campaign: Campaign, jobs: list[Job]) -> Iterator[Row]:
-    # Spawned, not forked: physics, OpenCV and OpenVINO own threads that a fork would cut off.
-    context = multiprocessing.get_context("spawn")
-    with _one_thread_each(), ProcessPoolExecutor(campaign.workers, mp_context=context, initializer=_start_worker) as pool:
-        futures = [pool.submit(run_one, campaign.plan, job) for job in jobs]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        except BrokenProcessPool:
-            raise TrialError("a worker ended (out of memory?); run the same command with fewer --workers") from None
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in multiprocessing.active_children():
-                worker.terminate()  # nothing runs any more unless it was interrupted: its trial starts again next time
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Numeric libraries read their number of threads once, at import: it must be in the environment that a worker inherits."""
-    before = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["OMP_NUM_THREADS"]
-        else:
-            os.environ["OMP_NUM_THREADS"] = before
-
-
-def _start_worker() -> None:
-    """Ctrl-C is the parent's business; and a worker whose parent was killed would wait for work for ever."""
-    import cv2
-
-    cv2.setNumThreads(1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        parent = multiprocessing.parent_process()
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def _tell(campaign: Campaign, rows: list[Row], as_json: bool) -> None:

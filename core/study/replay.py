@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from core.session.events import Event, EventKind
 from core.session.recorded import RecordedRow
 from core.types import Point, PoseState, Reason, Scene
 
-STATES = (*(state.value for state in PoseState), "-")
-"""Rows and columns of the table of states; "-": no pose."""
 _NO_POSE_DEG = 180.0
 
 
@@ -128,61 +122,6 @@ def event_target(event: Event) -> Point | None:
         place = [float(value) for value in written.groups()]
     is_point = isinstance(place, list) and len(place) == 2 and all(type(value) in (int, float) for value in place)
     return (float(place[0]), float(place[1])) if is_point and place is not None else None
-
-
-def summarise(changes: Sequence[Change]) -> dict[str, Any]:
-    """All frames in sum, as plain JSON values; None where there is nothing to count.
-
-    Returns
-    -------
-    dict
-        ``frames``; ``theta_change_deg`` and ``head_shift_px`` (n, mean, median, p95, max of the absolute change, source pixels);
-        ``states`` with ``labels``, ``matrix`` (rows before, columns after, "-" is no pose) and ``changed``; ``refusals`` gained and
-        lost by reason; ``confidence`` and ``latency_ms`` before and after.
-    """
-    table = [[0] * len(STATES) for _ in STATES]
-    for change in changes:
-        table[STATES.index(change.before.state or "-")][STATES.index(change.after.state or "-")] += 1
-    gained = Counter(c.after.reason.value for c in changes if c.before.state is not None and c.after.reason is not None)
-    lost = Counter(c.before.reason.value for c in changes if c.after.state is not None and c.before.reason is not None)
-    return {
-        "frames": len(changes),
-        "theta_change_deg": _spread(abs(c.theta_deg) for c in changes if c.theta_deg is not None),
-        "head_shift_px": _spread(c.head_px for c in changes if c.head_px is not None),
-        "states": {
-            "labels": list(STATES),
-            "matrix": table,
-            "changed": sum(map(sum, table)) - sum(table[k][k] for k in range(len(STATES))),
-        },
-        "refusals": {
-            "gained": dict(gained.most_common()),
-            "lost": dict(lost.most_common()),
-            "other_reason": sum(c.kind == "other reason" for c in changes),
-        },
-        "confidence": {name: _median(s.confidence for s in _side(changes, name) if s.state is not None) for name in _SIDES},
-        "latency_ms": {name: _spread(s.total_ms for s in _side(changes, name) if s.total_ms is not None) for name in _SIDES},
-    }
-
-
-_SIDES = ("before", "after")
-
-
-def _side(changes: Sequence[Change], name: str) -> list[Seen]:
-    return [change.before if name == "before" else change.after for change in changes]
-
-
-def _spread(values: Iterable[float]) -> dict[str, Any]:
-    found = np.fromiter(values, np.float64)
-    if not found.size:
-        return {"n": 0, "mean": None, "median": None, "p95": None, "max": None}
-    median, p95 = np.percentile(found, (50, 95))
-    numbers = {"mean": found.mean(), "median": median, "p95": p95, "max": found.max()}
-    return {"n": int(found.size)} | {name: round(float(value), 4) for name, value in numbers.items()}
-
-
-def _median(values: Iterable[float]) -> float | None:
-    found = np.fromiter(values, np.float64)
-    return round(float(np.median(found)), 4) if found.size else None
 
 
 def changed_most(changes: Sequence[Change], count: int) -> list[Change]:

@@ -1,4 +1,4 @@
-"""``--scheduler`` of ``trial`` and ``synth`` on a real Dask scheduler and worker, on this machine."""
+"""``--scheduler`` of ``trial``, ``synth`` and ``replay`` on a real Dask scheduler and worker, on this machine."""
 
 from __future__ import annotations
 
@@ -14,10 +14,13 @@ import pytest
 
 from app import cluster
 from app.cluster import ClusterError, code_of_worker, over_cluster
+from app.replay_campaign import replay_one
+from app.replay_session import ReplayOptions, replay_session
 from app.trial_command import run_one
 from core.config import Config
 from hardware.twin.synth import Episode, SynthPlan, write_set
 from hardware.twin.trial import TrialPlan
+from tests.app.golden_session import GOLDEN
 
 ROOT = Path(__file__).resolve().parents[2]
 DASK = [sys.executable, "-m", "dask"]
@@ -98,6 +101,23 @@ def test_frames_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Pa
     far, near = ({p.relative_to(tmp_path / at): p.read_bytes() for p in (tmp_path / at).rglob("*.*")} for at in ("far", "near"))
     assert len(near) == 3 * 20 + 2 + 2
     assert far == near
+
+
+def test_sessions_are_perceived_again_on_a_cluster(address: str, tmp_path: Path) -> None:
+    """Where a path leads to them; one that a worker does not see is told, and the others go on."""
+    arguments = ("replay", GOLDEN, "--scheduler", address, "--json", "--out", tmp_path / "out")
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "main.py"), *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    told, total = (json.loads(line) for line in done.stdout.splitlines())
+    alone = replay_session(ReplayOptions(GOLDEN, threads=1)).result
+    assert told["states"] == total["states"] == alone["states"]
+    assert told["theta_change_deg"] == alone["theta_change_deg"]
+    assert json.loads((tmp_path / "out" / GOLDEN.name / "replay.json").read_text()) == told
+    away = tmp_path / "away"
+    (outcome,) = over_cluster(address, partial(replay_one, ReplayOptions(away)), [away])
+    assert (outcome.done, outcome.problem) == (None, f"{away}: no such session")
 
 
 def test_what_a_cluster_has_not_made_is_made_when_the_command_is_given_again(address: str, tmp_path: Path) -> None:

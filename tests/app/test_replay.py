@@ -17,14 +17,16 @@ from statistics import median
 
 import pytest
 
-from app.replay_command import ReplayOptions, change_to_json, model_note, replay_config, run_replay
+from app.replay_command import run_replay
 from app.replay_figure import draw_replay
+from app.replay_session import ReplayOptions, change_to_json, model_note, replay_config
 from app.replayed import Replayed
 from core.config import Config
 from core.errors import UserError
 from core.names import name_of
 from core.session.manifest import read_manifest
-from core.study.replay import Change, Seen, summarise
+from core.study.replay import Change, Seen
+from core.study.replay_tally import Tally
 from core.types import PoseState, Reason
 from tests.app.golden_session import COUNT, GOLDEN, TRUTH
 from tests.core.session_data import record, tick_of
@@ -132,7 +134,6 @@ def test_another_configuration_shows_what_it_changes(capsys: pytest.CaptureFixtu
         (options, "not a session"),
         (lambda folder: options(GOLDEN, model="no_such_model"), "no_such_model"),
         (lambda folder: options(GOLDEN, preset="moon"), "unknown preset 'moon'"),
-        (lambda folder: options(GOLDEN, out=folder / "file" / "out"), "choose another"),
         (lambda folder: options(GOLDEN, jsonl=folder / "file" / "x.jsonl"), "choose another"),
     ],
 )
@@ -143,12 +144,20 @@ def test_bad_input_is_one_line(tmp_path: Path, make: Callable[[Path], ReplayOpti
     assert "\n" not in str(caught.value)
 
 
+def test_an_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="choose another folder"):
+        run_replay(options(GOLDEN), tmp_path / "file" / "out")
+    with pytest.raises(UserError, match="is a recorded session, which --out would damage"):
+        run_replay(options(GOLDEN), GOLDEN)
+
+
 def test_lost_pictures_are_counted_and_the_rest_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(3)])
     lines = (session / "frames.jsonl").read_text().splitlines()
     (session / "frames.jsonl").write_text("\n".join([lines[0], '{"row": 1, "nonsense', lines[2]]) + "\n")
     out = tmp_path / "out"
-    run_replay(options(session, as_json=True, out=out))
+    run_replay(options(session), out, as_json=True)
     told = json.loads(capsys.readouterr().out)
     assert told["frames"] == 2
     frames = [json.loads(line) for line in (out / "frames.jsonl").read_text().splitlines()]
@@ -185,7 +194,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
 def test_a_session_whose_name_is_no_utf8_is_replayed(tmp_path: Path) -> None:
     session = tmp_path / os.fsdecode(b"caf\xe9")
     record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(2)]).rename(session)
-    run_replay(options(session, out=tmp_path / "new"))
+    run_replay(options(session), tmp_path / "new")
     assert "caf\\xe9" in json.loads((tmp_path / "new" / "replay.json").read_text())["session"]
 
 
@@ -193,7 +202,7 @@ def test_one_frame_can_be_drawn_and_written() -> None:
     change = Change(0, 7, 0.0, Seen(1.0, (2.0, 3.0), PoseState.A, 0.9), Seen(reason=Reason.BLACK))
     told = change_to_json(change)
     assert (told["change"], told["before"]["head_xy"], told["after"]["reason"]) == ("pose lost", [2.0, 3.0], "image black")
-    assert len(draw_replay([change], summarise([change])["states"]["matrix"], "x").axes) == 5
+    assert len(draw_replay([change], Tally.of([change]).to_json()["states"]["matrix"], "x").axes) == 5
 
 
 def test_another_second_look_is_another_model() -> None:

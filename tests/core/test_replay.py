@@ -7,7 +7,8 @@ import pytest
 from core.session.events import Event, EventKind
 from core.session.recorded import row_from_json
 from core.session.rows import row_of
-from core.study.replay import Change, RecordedTargets, Run, Seen, changed_most, runs, seen, summarise
+from core.study.replay import Change, RecordedTargets, Run, Seen, changed_most, runs, seen
+from core.study.replay_tally import Tally
 from core.types import PoseState, Reason
 from tests.core.session_data import full_scene, tick_of
 
@@ -61,7 +62,7 @@ def test_the_sums() -> None:
         change(3, refused(Reason.NO_ROBOT), posed(5.0, D)),
         change(4, refused(Reason.NO_ROBOT), refused(Reason.BLACK)),
     ]
-    sums = summarise(changes)
+    sums = Tally.of(changes).to_json()
     assert sums["frames"] == 5
     theta = sums["theta_change_deg"]
     assert (theta["n"], theta["mean"], theta["median"], theta["max"]) == (2, 2.0, 2.0, 3.0)
@@ -81,7 +82,7 @@ def test_the_sums() -> None:
 
 
 def test_without_frames_nothing_is_made_up() -> None:
-    sums = summarise([])
+    sums = Tally.of([]).to_json()
     assert sums["theta_change_deg"] == {"n": 0, "mean": None, "median": None, "p95": None, "max": None}
     assert sums["confidence"] == {"before": None, "after": None}
 
