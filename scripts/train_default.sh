@@ -49,6 +49,10 @@ OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames39" --count 12000 --se
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames40" --count 1920 --seed 1190000 --family opaque_channel --workers 2
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames41" --count 1600 --seed 1191000 --family subtraction --workers 2
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames42" --count 480 --seed 1193230 --family bench --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames43" --count 12800 --seed 1199000 --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames44" --count 1280 --seed 1200500 --family opaque_channel --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames45" --count 1280 --seed 1201000 --family subtraction --workers 2
+OMP_NUM_THREADS=1 $python main.py synth --out "$out/frames46" --count 320 --seed 1193400 --family bench --workers 2
 # Two threads that spin for each other lose half their time as soon as anything else runs, and two that sleep at once a quarter of it:
 # so they spin for a moment. And memory that is given back after each step has to be cleared for the next one.
 export OMP_WAIT_POLICY=passive GOMP_SPINCOUNT=20000 GLIBC_TUNABLES=glibc.malloc.hugetlb=1
@@ -133,7 +137,11 @@ $python main.py train "${sets[@]}" --look-share 0.5 --second-look --init "$out/n
 # And once more, on others that nobody has seen.
 sets=(--data "$out/frames39" --data "$out/frames40" --data "$out/frames41" --data "$out/frames42")
 $python main.py train "${sets[@]}" --look-share 0.5 --second-look --init "$out/near20" --focus 0.4 --end-weight 4 --robot-weight 0.75 \
-    --batch 24 --rate 4e-3 --steps 6500 --seed 44 --out "$out/default"
+    --batch 24 --rate 4e-3 --steps 6500 --seed 44 --out "$out/near21"
+# And once more, on others that nobody has seen.
+sets=(--data "$out/frames43" --data "$out/frames44" --data "$out/frames45" --data "$out/frames46")
+$python main.py train "${sets[@]}" --look-share 0.5 --second-look --init "$out/near21" --focus 0.4 --end-weight 4 --robot-weight 0.85 \
+    --batch 32 --rate 4e-3 --steps 5200 --seed 47 --out "$out/default"
 
 OMP_NUM_THREADS=1 $python main.py synth --out "$out/calibration" --count 960 --seed 950000 --workers 2
 # The twin's own look is in none of the random families, and has to be known, too.
