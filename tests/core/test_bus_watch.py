@@ -72,7 +72,7 @@ def test_one_that_is_silent_three_times_in_a_row_is_named_alone() -> None:
 
 def test_a_report_without_currents_forgets_no_strain() -> None:
     strained = BusReport(currents_ma=(40.0, 40.0, 40.0, 40.0, -601.0, 40.0, 40.0))
-    watch, now_s = _watched([*[strained] * 60, BusReport()])
+    watch, now_s = _watched([*[strained] * 60, *[BusReport()] * 6])
     assert [fault.cause for fault in _faults(watch, now_s)] == [Cause.STRAINED]
 
 
