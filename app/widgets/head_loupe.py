@@ -98,6 +98,10 @@ class HeadLoupe(QWidget):
         place = self._to_widget.inverted()[0].map(event.position())
         self.clicked.emit(place.x() - 0.5, place.y() - 0.5)
 
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """One place is meant, and the first half has told it."""
+        event.accept()
+
     def paintEvent(self, event: QPaintEvent) -> None:
         if self._image is None:
             return

@@ -270,6 +270,8 @@ class _PictureBox(pg.ViewBox):  # type: ignore[misc]
 
     def mouseClickEvent(self, event: pg.GraphicsScene.mouseEvents.MouseClickEvent) -> None:
         event.accept()
+        if event.double():
+            return  # its first half may have closed what lay over the picture, and never meant a place
         if event.button() == Qt.MouseButton.LeftButton:
             self.left_clicked.emit(self.mapSceneToView(event.scenePos()))
         elif event.button() == Qt.MouseButton.RightButton:

@@ -191,6 +191,22 @@ def test_click_gives_source_pixels(view: LiveView, qtbot: QtBot) -> None:
     assert signal.args == pytest.approx([800.0, 300.0], abs=1.5)
 
 
+def test_a_double_click_means_one_place_and_none_where_it_began_elsewhere(view: LiveView, qtbot: QtBot) -> None:
+    """Who double-clicks an alert or an offer away clicks the second time on the picture that lay behind it."""
+    _show(view, blank_frame(1280, 960), replace(make_scene(), source_size=(1280, 960), scale=0.5))
+    at, viewport = on_screen(view, 800.0, 300.0).toPoint(), view._view.viewport()
+    places: list[tuple[float, float]] = []
+    view.clicked.connect(lambda x, y: places.append((x, y)))
+    qtbot.mouseClick(viewport, Qt.MouseButton.LeftButton, pos=at)
+    qtbot.mouseDClick(viewport, Qt.MouseButton.LeftButton, pos=at)
+    qtbot.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=at)
+    assert len(places) == 1
+    loupe = view._loupe
+    qtbot.mouseClick(loupe, Qt.MouseButton.LeftButton)
+    qtbot.mouseDClick(loupe, Qt.MouseButton.LeftButton)
+    assert len(places) == 2
+
+
 def test_click_beside_the_picture_is_no_target(view: LiveView, qtbot: QtBot) -> None:
     _show(view, blank_frame(640, 240), make_scene())
     with qtbot.assertNotEmitted(view.clicked, wait=50):

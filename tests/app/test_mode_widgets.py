@@ -529,6 +529,16 @@ def test_a_click_dismisses_one_and_the_next_in_line_takes_its_place(qtbot: QtBot
     assert strip.isHidden()
 
 
+def test_a_double_click_dismisses_one_alert_and_not_the_next_that_nobody_has_read(qtbot: QtBot, strip: AlertStrip) -> None:
+    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.TRACKING)])
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    qtbot.mouseDClick(strip._rows[0], LEFT)
+    qtbot.mouseRelease(strip._rows[0], LEFT)
+    assert strip.texts == [words(Cause.WARM)]
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    assert strip.texts == []
+
+
 def test_a_click_on_an_alert_sets_no_destination_behind_it(qtbot: QtBot, clock: Clock) -> None:
     class Picture(QWidget):
         pressed = 0
