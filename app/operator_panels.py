@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, QTimer
@@ -15,6 +16,7 @@ from app.language import tr, tr_text
 from app.pace import Pace
 from app.panel_layout import card_note, column, holder, row
 from app.scene_panels import ScenePanels
+from app.servo_cells import known_joints
 from app.widgets.alert_strip import AlertStrip
 from app.widgets.card import Card
 from app.widgets.command_panel import CommandPanel
@@ -73,6 +75,7 @@ class OperatorPanels(ScenePanels):
         self._needle_pace = Pace(_NEEDLE_EVERY_S)
         self._blanked = ""
         self._beside: tuple[Tick, float] | None = None
+        self._standing = ""
         left = holder(column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0), (self.mode_bar, 0)))
         self.help = operator_help(self._lay_out(self._header(), left, self._right_side()))
 
@@ -122,6 +125,9 @@ class OperatorPanels(ScenePanels):
         self.mode_bar.show_view(view, has_rig=has_rig)
         if view is not None:
             self.alerts.show_view(view)
+        why_not = tr("This rig has no robot") if has_rig else self._standing
+        self.jog.set_enabled(view is not None, "" if view is not None else why_not)
+        self.jog.show_known(known_joints(bus, time.monotonic()))
         self.servos.show_status(bus, self._servo_config)
         self.commands.show_view(view, bus)
 
@@ -197,6 +203,7 @@ class OperatorPanels(ScenePanels):
 
     def _stand_still(self, title: str, why: str) -> None:
         self.blank(title, why)
+        self._standing = title
         self.jog.set_enabled(False, title)
 
     def forget(self) -> None:

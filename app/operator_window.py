@@ -386,8 +386,6 @@ class OperatorWindow(WindowFrame):
             return
         self._pace.tick_shown()
         self._is_stale = False
-        if self._tick is None:
-            self._panels.jog.set_enabled(tick.status is not None, "" if tick.status is not None else tr("This rig has no robot"))
         self._tick = self._last_tick = tick
         self._panels.notice.clear()
         self._panels.show_tick(tick, self._heartbeat.max_block_ms)

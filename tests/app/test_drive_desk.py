@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.engine_thread import Phase
+from app.jog_keys import Motion
 from app.operator_window import OperatorWindow
 from core.config import Config
 from core.control.alerts import ALERTS, Alert
@@ -118,6 +119,26 @@ def test_what_a_rig_that_is_closed_still_says_is_nothing_of_the_next_ones(
         assert heard == ["the last word", "the next rig"]
     finally:
         may_close.set()
+
+
+def test_the_keys_on_the_screen_work_wherever_those_of_the_keyboard_do(
+    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot
+) -> None:
+    """Without a picture, too: who has a robot in a vessel must be able to bring it back by hand."""
+    engine = FakeEngine(bench)
+    engine.silent = True
+    window = make_window(lambda _config: engine)
+    window.start()
+    cap = window.panels.jog._caps[Motion.RETRACT]
+    assert not cap.isEnabled()
+    until(qtbot, lambda: window.phase is Phase.RUNNING and cap.isEnabled())
+    assert window.panels.jog.toolTip() == ""
+    engine.silent = False
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert cap.isEnabled()
+    engine.fail_with = DeviceError("gone")
+    until(qtbot, lambda: window.phase is Phase.FAULT and not cap.isEnabled())
+    assert window.panels.jog.toolTip() == "Fault"
 
 
 def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:

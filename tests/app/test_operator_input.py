@@ -318,7 +318,7 @@ def test_nothing_is_held_any_more_after_the_end(
     engine.fail_with = error
     until(qtbot, lambda: running._phase in (Phase.ENDED, Phase.FAULT))
     assert running.desk.jog.held == frozenset()
-    assert running.panels.jog.readout.startswith("bend 0.00")
+    assert running.panels.jog.readout.startswith("bend –")
 
 
 def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:

@@ -420,7 +420,21 @@ def test_readout_shows_how_far_the_robot_is_in(qtbot: QtBot) -> None:
     panel.show_status(RobotStatus(0.0, 84.2, 0.0, (-1.0, 1.0, 0, 0), (0, 0, 0, 0)))
     assert panel.readout == "bend -0.50, pitch 0.00, in 84 mm"
     panel.show_status(None)
-    assert panel.readout.endswith("in – mm")
+    assert panel.readout == "bend –, pitch –, in – mm", "a straight head would be something that is known"
+
+
+def test_readout_shows_nothing_of_joints_of_which_nobody_knows_where_they_are(qtbot: QtBot) -> None:
+    panel = JogPanel(2.0)
+    qtbot.addWidget(panel)
+    panel.show_known((False,) * 7)
+    panel.show_status(RobotStatus(0.0, 0.0, 0.0, (0.0,) * 4, (0.0,) * 4))
+    assert panel.readout == "bend –, pitch –, in – mm"
+    unknown = panel._readout.grab().toImage()
+    panel.show_known((True, True, False, True, True, True, True))
+    assert panel.readout == "bend 0.00, pitch –, in 0 mm"
+    assert panel._readout.grab().toImage() != unknown, "a bar without a mark is no straight head"
+    panel.show_known((True,) * 4 + (False, True, True))
+    assert panel.readout == "bend 0.00, pitch 0.00, in – mm"
 
 
 def test_notice_shows_title_detail_and_a_way_out(qtbot: QtBot) -> None:
