@@ -13,6 +13,7 @@ from app import palette
 from app.engine_thread import Phase
 from app.event_model import EventKind
 from app.language import tr, tr_text
+from app.next_step import Undriven
 from app.pace import Pace
 from app.panel_layout import card_note, column, holder, row
 from app.scene_panels import ScenePanels
@@ -115,18 +116,18 @@ class OperatorPanels(ScenePanels):
         self.gauge.show_pose(scene.pose)
         self.bars.show_pose(scene.pose)
 
-    def show_drive(self, view: DriveView | None, bus: BusStatus | None, *, has_rig: bool = True) -> None:
-        """Show who drives, and what the servos say; None: there is nothing to drive, or no rig is open."""
+    def show_drive(self, view: DriveView | None, bus: BusStatus | None, why_not: Undriven = Undriven.NO_ROBOT) -> None:
+        """Show who drives, and what the servos say; None: there is nothing to drive, and `why_not`."""
         before, self._blanked = self._blanked, view.blanked if view is not None else ""
         if self._blanked and not before:  # at once, and not with the next picture: it may be long in coming
             self.live.drop_ghost()
             self.advice.show_advice(None, None, self._blanked)
-        self.mode.show_view(view, has_rig=has_rig)
-        self.mode_bar.show_view(view, has_rig=has_rig)
+        self.mode.show_view(view, why_not)
+        self.mode_bar.show_view(view, why_not)
         if view is not None:
             self.alerts.show_view(view)
-        why_not = tr("This rig has no robot") if has_rig else self._standing
-        self.jog.set_enabled(view is not None, "" if view is not None else why_not)
+        why_still = tr("This rig has no robot") if why_not is Undriven.NO_ROBOT else self._standing
+        self.jog.set_enabled(view is not None, "" if view is not None else why_still)
         self.jog.show_known(known_joints(bus, time.monotonic()))
         self.servos.show_status(bus, self._servo_config)
         self.commands.show_view(view, bus)

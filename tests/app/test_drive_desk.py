@@ -173,10 +173,20 @@ def is_lent(window: OperatorWindow, _engine: FakeEngine) -> None:
     window.lend("the wizard has camera and servos")
 
 
-@pytest.mark.parametrize("end", [fails, is_opened_anew, is_another_one, is_lent])
+WAITING, CLOSED = ("waiting for the rig", "Waiting for the rig."), ("no rig is open", "No rig is open. F5 opens it again.")
+
+
+@pytest.mark.parametrize(
+    ("end", "says"), [(fails, CLOSED), (is_opened_anew, WAITING), (is_another_one, WAITING), (is_lent, CLOSED)]
+)
 def test_nothing_says_who_drives_once_the_rig_is_over(
-    end: Callable[[OperatorWindow, FakeEngine], None], make_window: MakeWindow, bench: FakeBench, qtbot: QtBot
+    end: Callable[[OperatorWindow, FakeEngine], None],
+    says: tuple[str, str],
+    make_window: MakeWindow,
+    bench: FakeBench,
+    qtbot: QtBot,
 ) -> None:
+    """Where it stopped for good, nobody waits for anything: it is opened again by whoever asks for it."""
     engine, may_open = FakeEngine(bench), threading.Event()
     engine.bus_status = lambda: bus(time_s=time.monotonic())  # type: ignore[assignment,return-value]
     rigs = iter([engine])
@@ -195,9 +205,8 @@ def test_nothing_says_who_drives_once_the_rig_is_over(
     until(qtbot, lambda: "20.0 ms" in panels.servos.bus_text)
     try:
         end(window, engine)
-        until(qtbot, lambda: panels.mode.who == "waiting for the rig")
+        until(qtbot, lambda: (panels.mode.who, panels.mode_bar.text) == says)
         assert panels.mode.mode is Mode.ADVISORY
-        assert panels.mode_bar.text == "Waiting for the rig."
         assert not any(part.isEnabled() for part in (panels.mode_bar.main, panels.mode_bar.second, panels.mode_bar.deadman))
         assert not panels.mode_bar.deadman.is_lit
         assert panels.servos.bus_text.startswith("no servo bus")
