@@ -452,6 +452,27 @@ def test_notice_shows_title_detail_and_a_way_out(qtbot: QtBot) -> None:
     assert not notice.isVisible()
 
 
+@pytest.mark.parametrize("size", [(480, 320), (590, 345), (1000, 700)])
+@pytest.mark.parametrize("restartable", [False, True])
+def test_a_notice_has_room_for_all_that_it_says(qtbot: QtBot, size: tuple[int, int], restartable: bool) -> None:
+    room = QWidget()
+    qtbot.addWidget(room)
+    room.resize(*size)
+    room.show()
+    notice = Notice(room)
+    path = "/dev/serial/by-id/usb-FTDI_USB__-__Serial_Converter_FT8J0MXY-if00-port0"
+    why = f"no permission for {path}: {'add yourself to the group dialout, log out and in again; ' * 4}then start the rig again"
+
+    notice.show_notice(NoticeKind.FAULT, "The rig stopped", why, restartable=restartable)
+    assert room.rect().contains(notice.geometry())
+    assert notice.toolTip() == notice.text
+    shown = notice.grab().toImage()
+    notice.show_notice(NoticeKind.FAULT, "The rig stopped", why.removesuffix("again") + "twice", restartable=restartable)
+    assert notice.grab().toImage() != shown, "its last word is seen"
+    notice.show_notice(NoticeKind.FAULT, "The rig stopped", "camera lost", restartable=restartable)
+    assert notice.height() == (178 if restartable else 132)
+
+
 def test_every_widget_has_an_accessible_name_and_a_tool_tip(qtbot: QtBot) -> None:
     widgets = (StateBadge(LIMITS), ThetaGauge(10), DistanceBars(6), AdviceLine(), TrendPlot(LIMITS), PerformancePanel())
     for widget in (*widgets, ModeBadge()):
