@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication, QMenu, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app import palette
+from app import palette, theme
 from app.cells import Tone, number
 from app.clamp_log import MAX_ENTRIES, ClampLog
 from app.servo_cells import Column, bus_line, error_words, known_joints, pair_balances, servo_rows
@@ -76,6 +77,17 @@ def bus(*others: ServoReading, **changes: object) -> BusStatus:
 
 def cells(status: BusStatus | None, place: int) -> dict[Column, tuple[str, Tone]]:
     return {column: (cell.text, cell.tone) for column, cell in zip(Column, servo_rows(status, SERVOS, SAFETY)[place], strict=True)}
+
+
+def test_no_heading_of_the_table_is_cut_in_the_smallest_window(qtbot: QtBot) -> None:
+    table = ServoTable()
+    qtbot.addWidget(table)
+    table.resize(470, 240)
+    table.show()
+    header, metrics = table._table.horizontalHeader(), QFontMetrics(theme.font(11))
+    for place in range(table.model.columnCount()):
+        heading = str(table.model.headerData(place, Qt.Orientation.Horizontal)).strip()
+        assert metrics.horizontalAdvance(heading) + 6 <= header.sectionSize(place), heading
 
 
 def test_where_a_joint_is_is_known_of_a_zeroed_one_that_answers() -> None:
