@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from app import palette, theme
+from app.application import is_asked_to_end
 from app.language import tr, tr_text
 from app.stop_key import StopKeys
 from app.widgets.card import Card
@@ -161,7 +162,9 @@ class RigWizard(QDialog):
             super().keyPressEvent(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        if self.isVisible():
+        if self.isVisible() and is_asked_to_end():
+            self.reject()
+        elif self.isVisible():
             self.ask_to_leave()
         event.setAccepted(not self.isVisible())
 

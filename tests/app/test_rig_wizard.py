@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.application import close_all, is_asked_to_end
 from app.rig_command import calibration_lines
 from app.rig_wizard import RigWizard
 from app.widgets import wizard_servos
@@ -518,6 +520,15 @@ def test_what_was_found_is_not_thrown_away_without_a_question(
     opened.question._yes.click()
     assert not opened.isVisible()
     until(qtbot, lambda: opened.desk.bench is None)
+
+
+def test_a_program_that_is_asked_to_end_is_not_kept_by_a_question(opened: RigWizard, qtbot: QtBot, qapp: QApplication) -> None:
+    """Ctrl-C, or a computer that is shut down: whoever waits for an answer is killed, and leaves the servos as they are."""
+    _find_a_scale(opened)
+    close_all(qapp)
+    assert not opened.isVisible()
+    until(qtbot, lambda: opened.desk.bench is None)
+    assert not is_asked_to_end()
 
 
 @LEAVING
