@@ -26,6 +26,7 @@ from app.stop_key import StopKeys
 from app.widgets.card import Card
 from app.widgets.enter_key import takes_enter
 from app.widgets.question_strip import QuestionStrip
+from app.widgets.still_wheel import StillWheel
 from app.widgets.stop_button import StopButton
 from app.widgets.wizard_camera import CameraPage
 from app.widgets.wizard_motion import SteeringPage, ZeroPage
@@ -98,6 +99,7 @@ class RigWizard(QDialog):
         self.question = QuestionStrip()
         self.question.closed.connect(self._on_answered)
         self._lay_out()
+        StillWheel(self)
         self.stop_button.asked.connect(desk.stop)
         self._stop_keys = StopKeys(self, lambda: desk.is_busy, desk.stop)  # servos are open while a job runs only
         desk.said.connect(self._say)
