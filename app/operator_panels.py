@@ -192,6 +192,7 @@ class OperatorPanels(ScenePanels):
         told = tr_text(problem) if problem is not None else ""
         self.blank(tr("No new picture"), told or tr("Check the camera; F5 starts the rig again"))
         self.performance.clear()
+        self.trends.show_silence(age_s)
         self.jog.show_status(None)
         title = tr("No new picture for {seconds:.0f} s", seconds=age_s)
         detail = told or tr("The camera or the program is behind")
