@@ -65,6 +65,7 @@ class OperatorPanels(ScenePanels):
         self.toast = Toast(self.live)
         self.offers = OfferStrip(self.live)
         self.offers.lifted.connect(self.toast.lift)
+        self.live.set_covers(self.alerts, self.offers)
         self.trends = TrendPlot(config.perception.pose)
         self.performance = PerformancePanel()
         self.jog = JogPanel(config.servos.max_pull_mm)
