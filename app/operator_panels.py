@@ -197,12 +197,17 @@ class OperatorPanels(ScenePanels):
         self.jog.show_status(None)
         title = tr("No new picture for {seconds:.0f} s", seconds=age_s)
         detail = told or tr("The camera or the program is behind")
-        self.notice.show_notice(NoticeKind.WARNING, title, detail, restartable=problem is not None)
+        self._warn(title, detail, restartable=problem is not None)
 
     def show_no_picture(self, problem: str) -> None:
         """None has come since the rig was opened, and why."""
         self.blank(tr("No picture"), tr_text(problem))
-        self.notice.show_notice(NoticeKind.WARNING, tr("No picture from the camera"), tr_text(problem), restartable=True)
+        self._warn(tr("No picture from the camera"), tr_text(problem), restartable=True)
+
+    def _warn(self, title: str, detail: str, *, restartable: bool) -> None:
+        """Below the alerts: they are read first, and each can be dismissed."""
+        self.notice.show_notice(NoticeKind.WARNING, title, detail, restartable=restartable)
+        self.alerts.raise_()
 
     def _stand_still(self, title: str, why: str) -> None:
         self.blank(title, why)

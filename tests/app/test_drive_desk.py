@@ -79,6 +79,20 @@ def test_alerts_are_shown_logged_and_heard(
     assert any("does not follow" in line for line in running.panels.events.lines)
 
 
+def test_alerts_stay_above_the_notice_that_no_picture_comes(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running.resize(1100, 660)
+    causes = (Cause.TRACKING, Cause.WARM, Cause.DISK_LOW)
+    engine.pilot.alerts = [Alert(cause, ALERTS[cause], "", 0, None) for cause in causes]
+    until(qtbot, lambda: len(running.panels.alerts.texts) == 3)
+    engine.silent = True
+    panels = running.panels
+    until(qtbot, panels.notice.isVisible)
+    panels.notice.setGeometry(panels.live.rect())
+    until(qtbot, lambda: panels.notice.isVisible() and panels.badge.title == "No new picture")
+    for row in panels.alerts._rows:
+        assert panels.live.childAt(row.mapTo(panels.live, row.rect().center())) is row
+
+
 def test_the_speed_by_hand_reaches_the_pilot_and_that_of_the_next_rig(
     make_window: MakeWindow, engines: list[FakeEngine], qtbot: QtBot
 ) -> None:
