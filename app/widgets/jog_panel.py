@@ -40,7 +40,7 @@ class JogPanel(QWidget):
         self._caps: dict[Motion, _Cap] = {}
         self._rig: tuple[HandConfig, ServosConfig] | None = None
         self._status: RobotStatus | None = None
-        self._known = _ALL
+        self._known: tuple[bool, ...] = _ALL
         self._enabled = (True, "")
         grid = QGridLayout()
         grid.setSpacing(4)
