@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from app.window_frame import WindowFrame
 
+_ENDS = "is_asked_to_end"
 _SWITCH_S = 0.001
 """How long a thread may keep the interpreter while another waits: at Python's 5 ms the window stood still for 198 to 221 ms, so for
 125 to 158 (alternating runs on a busy machine)."""
@@ -62,6 +63,21 @@ def check_display() -> None:
         )
 
 
+def close_all(application: QApplication) -> None:
+    """Close all windows because the program is asked to end: where only results would be lost, nobody may be there to answer."""
+    application.setProperty(_ENDS, True)
+    application.closeAllWindows()
+    application.setProperty(_ENDS, False)
+
+
+def is_asked_to_end() -> bool:
+    """Whether a window is closed because the whole program is to end, by Ctrl-C or a termination request."""
+    from PySide6.QtCore import QCoreApplication
+
+    application = QCoreApplication.instance()
+    return application is not None and bool(application.property(_ENDS))
+
+
 def quit_on_signal(application: QApplication) -> QTimer:
     """Ctrl-C and a termination request close the window properly. Python sees signals only between Qt events, hence the timer."""
     import signal
@@ -70,7 +86,7 @@ def quit_on_signal(application: QApplication) -> QTimer:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         # Not at once: a signal may come while a widget is painting, and its window must not go from under it.
-        signal.signal(number, lambda *_: QTimer.singleShot(0, application.closeAllWindows))
+        signal.signal(number, lambda *_: QTimer.singleShot(0, lambda: close_all(application)))
     timer = QTimer(application)
     timer.timeout.connect(lambda: None)
     timer.start(200)

@@ -297,6 +297,7 @@ TEMPLATES = (
     "of the last seconds only {a} of {b} frames were saved: {why}",
     "{why}; make room and save them again",
     "disk full ({left} MB left in {folder})",
+    "disk nearly full: {left} MB left",
     "{folder}: {a} GB free of {b} GB",
     "{a} as pinned",
     "{a} can be loaded",

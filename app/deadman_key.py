@@ -6,7 +6,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QWidget
 
-from app.held_input import HeldInput
+from app.held_input import HeldInput, place_of
 
 REPEAT_MS = 25
 """Silence of 80 ms counts as let go, so it is said three times in that time."""
@@ -24,6 +24,7 @@ class DeadmanKey(HeldInput):
     def __init__(self, window: QWidget) -> None:
         super().__init__(window, REPEAT_MS)
         self._holders: set[str] = set()
+        self._places: set[tuple[str, int]] = set()
 
     @property
     def is_held(self) -> bool:
@@ -45,17 +46,21 @@ class DeadmanKey(HeldInput):
 
     def release_all(self) -> None:
         """Nobody holds it."""
+        self._places.clear()
         for holder in tuple(self._holders):
             self.hold(holder, False)
 
     def _on_press(self, watched: QObject, event: QKeyEvent) -> bool:
         is_ours = isinstance(watched, QWidget) and watched.window() is self._window
         if event.key() == _KEY and is_ours and not event.isAutoRepeat():
+            self._places.add(place_of(event))
             self.hold("key", True)
         return False
 
     def _on_release(self, event: QKeyEvent) -> bool:
-        if event.key() == _KEY and not event.isAutoRepeat():
+        """The first Shift that comes up counts, and whatever a Shift that went down has become meanwhile."""
+        if not event.isAutoRepeat() and (event.key() == _KEY or place_of(event) in self._places):
+            self._places.clear()
             self.hold("key", False)
         return False
 

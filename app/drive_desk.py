@@ -14,7 +14,7 @@ from app.engine_thread import EngineThread
 from app.event_model import EventKind
 from app.jog_keys import JogKeys, Motion
 from app.language import tr, tr_text
-from app.next_step import Step
+from app.next_step import Step, Undriven
 from app.recorder import Recorder
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
@@ -37,7 +37,7 @@ _ACT_OF = {
 class DrivePanels(Protocol):
     """What the desk shows things on."""
 
-    def show_drive(self, view: DriveView | None, bus: BusStatus | None, *, has_rig: bool = True) -> None: ...
+    def show_drive(self, view: DriveView | None, bus: BusStatus | None, why_not: Undriven = Undriven.NO_ROBOT) -> None: ...
     def show_alerts(self, alerts: tuple[Alert, ...]) -> None: ...
     def log(self, kind: EventKind, text: str) -> None: ...
 
@@ -61,8 +61,8 @@ class DriveDesk(QObject):
         self.sounds = AlertSounds(self)
         self._shown: DriveView | None = None
         self._speed = 1.0
-        self.has_rig = False
-        """Whether a rig runs, or has run to its end: else nobody knows whether there is something to drive."""
+        self.why_not = Undriven.NOT_YET
+        """What is shown while there is no pilot."""
         self._timer = QTimer(self)
         self._timer.setInterval(_LOOK_EVERY_MS)
         self._timer.timeout.connect(self.look)
@@ -217,8 +217,9 @@ class DriveDesk(QObject):
         pilot = self._thread.pilot
         if pilot is None:
             # A pilot that has just gone belonged to a rig that is over, even where nobody has told so yet.
-            has_rig, self._shown = self.has_rig and self._shown is None, None
-            self._panels.show_drive(None, None, has_rig=has_rig)
+            has_just_gone, self._shown = self._shown is not None, None
+            is_told = not has_just_gone or self.why_not is not Undriven.NO_ROBOT
+            self._panels.show_drive(None, None, self.why_not if is_told else Undriven.NOT_YET)
             return
         pilot.window_alive()
         pilot.hand_speed(self._speed)

@@ -6,12 +6,15 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Slot
 from PySide6.QtGui import QGuiApplication, QKeyEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
+_WINDOW_LOST = (QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked)
+"""Blocked by a dialog, a window gets no release any more, even where the desktop leaves it the focus."""
+
 
 class HeldInput(QObject):
     """Listens to the keys of the whole application, from its making to ``detach``.
 
     Subclasses say what a press and a release mean, how all is let go, and what is said every `period_ms` while ``_timer`` runs. All
-    is let go when `window` or the application loses the focus, so that nothing goes on unattended.
+    is let go when `window` or the application loses the focus, or a dialog blocks it, so that nothing goes on unattended.
     """
 
     def __init__(self, window: QWidget, period_ms: int) -> None:
@@ -44,7 +47,7 @@ class HeldInput(QObject):
             return self._on_press(watched, event)
         if kind == QEvent.Type.KeyRelease and isinstance(event, QKeyEvent):
             return self._on_release(event)
-        if kind == QEvent.Type.WindowDeactivate and watched is self._window:
+        if kind in _WINDOW_LOST and watched is self._window:
             self.release_all()
         return False
 
@@ -62,3 +65,13 @@ class HeldInput(QObject):
     def _on_application_state(self, state: Qt.ApplicationState) -> None:
         if state != Qt.ApplicationState.ApplicationActive:
             self.release_all()
+
+
+def place_of(event: QKeyEvent) -> tuple[str, int]:
+    """Which key of the keyboard it is.
+
+    What a key means may change while it is down: with NumLock the keypad's Up, pressed beside Shift, is let go as an 8, and where
+    Shift and Alt together change the layout, Shift itself is let go as another key.
+    """
+    scan_code = event.nativeScanCode()
+    return ("place", scan_code) if scan_code else ("key", event.key())

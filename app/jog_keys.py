@@ -7,9 +7,9 @@ from enum import Enum
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QAbstractItemView, QAbstractSpinBox, QLineEdit, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QAbstractSpinBox, QLineEdit, QMenuBar, QWidget
 
-from app.held_input import HeldInput
+from app.held_input import HeldInput, place_of
 from app.language import mark
 from app.stop_key import is_stop
 from app.widgets.scroll_keys import SCROLL_KEYS
@@ -111,22 +111,25 @@ class JogKeys(HeldInput):
                 self.stop_pressed.emit()
                 self.release_all()
             return True
+        if event.isAutoRepeat() and place_of(event) in self._held:
+            return True  # a field or menu that gets the focus meanwhile is not typed into by it
         if watched.window() is not self._window or event.modifiers() & _OTHER_MODIFIERS:
             return False
         motion = _MOTION_OF_KEY.get(key)
         # A field keeps its letters and arrows, and what it does not use must not reach the robot by way of its parent.
         focus = self._window.focusWidget()
-        if motion is None or isinstance(focus, QAbstractSpinBox | QLineEdit):
+        # A tap on Alt gives the keys to the menu bar, where the arrows go from menu to menu.
+        if motion is None or isinstance(focus, QAbstractSpinBox | QLineEdit | QMenuBar):
             return False
         if isinstance(focus, QAbstractItemView) and key in SCROLL_KEYS:
             return False
         if not event.isAutoRepeat():
-            self.press(_place(event), motion)
+            self.press(place_of(event), motion)
         return True
 
     def _on_release(self, event: QKeyEvent) -> bool:
         """A release counts wherever it goes to, or motion would go on after a menu opened over the window."""
-        place = _place(event)
+        place = place_of(event)
         if event.isAutoRepeat():
             return place in self._held
         if place in self._held:
@@ -140,15 +143,6 @@ class JogKeys(HeldInput):
     def _announce(self) -> None:
         self.held_changed.emit(self.held)
         self.changed.emit(self.jog if self._held else AT_REST)
-
-
-def _place(event: QKeyEvent) -> tuple[str, int]:
-    """Which key of the keyboard it is.
-
-    What a key means may change while it is down: with NumLock the keypad's Up, pressed beside Shift, is let go as an 8.
-    """
-    scan_code = event.nativeScanCode()
-    return ("place", scan_code) if scan_code else ("key", event.key())
 
 
 def _sign(held: frozenset[Motion], plus: Motion, minus: Motion) -> int:

@@ -73,12 +73,31 @@ class NextStep:
 
 NO_ROBOT = NextStep(Step.SERVOS_ON, False, mark("This rig has no robot"), mark("pictures and advice only"))
 NOT_YET = NextStep(Step.SERVOS_ON, False, mark("Waiting for the rig"), "")
+CLOSED = NextStep(Step.SERVOS_ON, False, mark("No rig is open"), mark("F5 opens it again"))
 
 
-def who_drives(view: DriveView | None, *, has_rig: bool = True) -> str:
-    """In few words, for the badge; without a rig nobody knows yet whether there will be something to drive."""
+class Undriven(Enum):
+    """Why there is no view of driving: what the badge says, and the step."""
+
+    NO_ROBOT = (mark("pictures only"), NO_ROBOT)
+    NOT_YET = (mark("waiting for the rig"), NOT_YET)
+    """It is being opened: nobody knows yet whether there will be something to drive."""
+    CLOSED = (mark("no rig is open"), CLOSED)
+    """It stopped, and nobody opens it by himself."""
+
+    @property
+    def who(self) -> str:
+        return self.value[0]
+
+    @property
+    def step(self) -> NextStep:
+        return self.value[1]
+
+
+def who_drives(view: DriveView | None, why_not: Undriven = Undriven.NO_ROBOT) -> str:
+    """In few words, for the badge; `why_not` says it where there is no view."""
     if view is None:
-        return tr("pictures only") if has_rig else tr("waiting for the rig")
+        return tr(why_not.who)
     if view.mode is Mode.HOLD:
         return tr("interrupted")
     if view.mode is Mode.STOPPED:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, QTimer
@@ -12,9 +13,11 @@ from app import palette
 from app.engine_thread import Phase
 from app.event_model import EventKind
 from app.language import tr, tr_text
+from app.next_step import Undriven
 from app.pace import Pace
 from app.panel_layout import card_note, column, holder, row
 from app.scene_panels import ScenePanels
+from app.servo_cells import known_joints
 from app.widgets.alert_strip import AlertStrip
 from app.widgets.card import Card
 from app.widgets.command_panel import CommandPanel
@@ -62,6 +65,7 @@ class OperatorPanels(ScenePanels):
         self.toast = Toast(self.live)
         self.offers = OfferStrip(self.live)
         self.offers.lifted.connect(self.toast.lift)
+        self.live.set_covers(self.alerts, self.offers)
         self.trends = TrendPlot(config.perception.pose)
         self.performance = PerformancePanel()
         self.jog = JogPanel(config.servos.max_pull_mm)
@@ -73,6 +77,7 @@ class OperatorPanels(ScenePanels):
         self._needle_pace = Pace(_NEEDLE_EVERY_S)
         self._blanked = ""
         self._beside: tuple[Tick, float] | None = None
+        self._standing = ""
         left = holder(column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0), (self.mode_bar, 0)))
         self.help = operator_help(self._lay_out(self._header(), left, self._right_side()))
 
@@ -112,16 +117,19 @@ class OperatorPanels(ScenePanels):
         self.gauge.show_pose(scene.pose)
         self.bars.show_pose(scene.pose)
 
-    def show_drive(self, view: DriveView | None, bus: BusStatus | None, *, has_rig: bool = True) -> None:
-        """Show who drives, and what the servos say; None: there is nothing to drive, or no rig is open."""
+    def show_drive(self, view: DriveView | None, bus: BusStatus | None, why_not: Undriven = Undriven.NO_ROBOT) -> None:
+        """Show who drives, and what the servos say; None: there is nothing to drive, and `why_not`."""
         before, self._blanked = self._blanked, view.blanked if view is not None else ""
         if self._blanked and not before:  # at once, and not with the next picture: it may be long in coming
             self.live.drop_ghost()
             self.advice.show_advice(None, None, self._blanked)
-        self.mode.show_view(view, has_rig=has_rig)
-        self.mode_bar.show_view(view, has_rig=has_rig)
+        self.mode.show_view(view, why_not)
+        self.mode_bar.show_view(view, why_not)
         if view is not None:
             self.alerts.show_view(view)
+        why_still = tr("This rig has no robot") if why_not is Undriven.NO_ROBOT else self._standing
+        self.jog.set_enabled(view is not None, "" if view is not None else why_still)
+        self.jog.show_known(known_joints(bus, time.monotonic()))
         self.servos.show_status(bus, self._servo_config)
         self.commands.show_view(view, bus)
 
@@ -185,18 +193,25 @@ class OperatorPanels(ScenePanels):
         told = tr_text(problem) if problem is not None else ""
         self.blank(tr("No new picture"), told or tr("Check the camera; F5 starts the rig again"))
         self.performance.clear()
+        self.trends.show_silence(age_s)
         self.jog.show_status(None)
         title = tr("No new picture for {seconds:.0f} s", seconds=age_s)
         detail = told or tr("The camera or the program is behind")
-        self.notice.show_notice(NoticeKind.WARNING, title, detail, restartable=problem is not None)
+        self._warn(title, detail, restartable=problem is not None)
 
     def show_no_picture(self, problem: str) -> None:
         """None has come since the rig was opened, and why."""
         self.blank(tr("No picture"), tr_text(problem))
-        self.notice.show_notice(NoticeKind.WARNING, tr("No picture from the camera"), tr_text(problem), restartable=True)
+        self._warn(tr("No picture from the camera"), tr_text(problem), restartable=True)
+
+    def _warn(self, title: str, detail: str, *, restartable: bool) -> None:
+        """Below the alerts: they are read first, and each can be dismissed."""
+        self.notice.show_notice(NoticeKind.WARNING, title, detail, restartable=restartable)
+        self.alerts.raise_()
 
     def _stand_still(self, title: str, why: str) -> None:
         self.blank(title, why)
+        self._standing = title
         self.jog.set_enabled(False, title)
 
     def forget(self) -> None:

@@ -15,7 +15,7 @@ from app.drive_desk import DriveDesk
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
 from app.event_model import EventKind
 from app.language import tr
-from app.next_step import Step
+from app.next_step import Step, Undriven
 from app.operator_menus import add_operator_menus
 from app.operator_panels import OperatorPanels
 from app.recorder import Recorder
@@ -363,7 +363,9 @@ class OperatorWindow(WindowFrame):
         panels.forget()
         panels.alerts.clear()
         # A recording that is over has been seen to have no robot, and F5 plays no other one.
-        self._desk.has_rig = phase is Phase.RUNNING or (phase is Phase.ENDED and self._kind is RigKind.PLAYBACK)
+        is_seen = phase is Phase.RUNNING or (phase is Phase.ENDED and self._kind is RigKind.PLAYBACK)
+        is_over = phase in (Phase.ENDED, Phase.FAULT)
+        self._desk.why_not = Undriven.NO_ROBOT if is_seen else Undriven.CLOSED if is_over else Undriven.NOT_YET
         self.phase_changed.emit(phase)
         if phase is Phase.STARTING:
             self._last_tick = None
@@ -386,8 +388,6 @@ class OperatorWindow(WindowFrame):
             return
         self._pace.tick_shown()
         self._is_stale = False
-        if self._tick is None:
-            self._panels.jog.set_enabled(tick.status is not None, "" if tick.status is not None else tr("This rig has no robot"))
         self._tick = self._last_tick = tick
         self._panels.notice.clear()
         self._panels.show_tick(tick, self._heartbeat.max_block_ms)

@@ -135,7 +135,12 @@ class RigDesk(QObject):
 
     @Slot()
     def _renew_cameras(self) -> None:
+        """Those that are plugged in; none is looked for while none may be chosen, since a look may hold the window up for so long
+        that the robot is disarmed."""
         self._cameras.clear()
+        if why := self.hindrance():
+            self._cameras.addAction(tr("The rig stays as it is: {why}", why=why)).setEnabled(False)
+            return
         for camera in search().cameras:
             self._cameras.addAction(tr_text(camera.title).replace("&", "&&"), partial(self.choose_camera, camera))
 

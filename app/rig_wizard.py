@@ -20,11 +20,13 @@ from PySide6.QtWidgets import (
 )
 
 from app import palette, theme
+from app.application import is_asked_to_end
 from app.language import tr, tr_text
 from app.stop_key import StopKeys
 from app.widgets.card import Card
 from app.widgets.enter_key import takes_enter
 from app.widgets.question_strip import QuestionStrip
+from app.widgets.still_wheel import StillWheel
 from app.widgets.stop_button import StopButton
 from app.widgets.wizard_camera import CameraPage
 from app.widgets.wizard_motion import SteeringPage, ZeroPage
@@ -97,6 +99,7 @@ class RigWizard(QDialog):
         self.question = QuestionStrip()
         self.question.closed.connect(self._on_answered)
         self._lay_out()
+        StillWheel(self)
         self.stop_button.asked.connect(desk.stop)
         self._stop_keys = StopKeys(self, lambda: desk.is_busy, desk.stop)  # servos are open while a job runs only
         desk.said.connect(self._say)
@@ -161,7 +164,9 @@ class RigWizard(QDialog):
             super().keyPressEvent(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        if self.isVisible():
+        if self.isVisible() and is_asked_to_end():
+            self.reject()
+        elif self.isVisible():
             self.ask_to_leave()
         event.setAccepted(not self.isVisible())
 

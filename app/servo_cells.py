@@ -16,6 +16,8 @@ from hardware.servos.units import wire_force_mn
 if TYPE_CHECKING:
     from hardware.servos.bus_messages import BusStatus
 
+SILENT_AFTER_S = 1.0
+"""What the bus said longer ago is not true any more."""
 _CYCLE_P99_LIMIT_MS = 30.0
 _LONG_TRAVEL_MM = 50.0
 _TRACK_STEPS = 200.0
@@ -69,6 +71,18 @@ def servo_rows(status: BusStatus | None, servos: ServosConfig, safety: SafetyCon
         else:
             rows.append(_unknown(joint, reading))
     return tuple(rows)
+
+
+def known_joints(status: BusStatus | None, now_s: float) -> tuple[bool, ...]:
+    """Of which joints it is known where they are: those that are zeroed, and whose servo has answered lately.
+
+    Without a bus it is known of all: such a robot tells it itself. `now_s` is monotonic, as ``BusStatus.time_s`` is.
+    """
+    if status is None:
+        return (True,) * 7
+    if not status.servos or now_s - status.time_s > SILENT_AFTER_S:
+        return (False,) * 7
+    return tuple(zeroed and isinstance(reading, ServoState) for reading, zeroed in zip(status.servos, status.zeroed, strict=True))
 
 
 def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, servos: ServosConfig, safety: SafetyConfig) -> Row:

@@ -26,6 +26,7 @@ from app.language import tr, tr_text
 from app.settings_model import SettingsDraft, search
 from app.widgets.enter_key import takes_enter
 from app.widgets.profile_row import ProfileRow
+from app.widgets.question_strip import QuestionStrip
 from app.widgets.setting_page import SettingPage
 from core.config import Config
 from core.config_schema import Effect, Section, schema, settings_by_key
@@ -44,7 +45,8 @@ class SettingsDialog(QDialog):
     """Edits a draft and says what is to become of it; it writes profiles, and leaves the settings file to its owner.
 
     ``drafted`` carries the configuration whenever it changes and is allowed, for the preview, ``save_asked`` whether the rig is to
-    be started again. ``finished`` comes at the end.
+    be started again. ``finished`` comes at the end. Whoever leaves with changes by Esc, which is meant for the field
+    as often, is asked; Cancel and the window's cross ask nobody.
 
     Parameters
     ----------
@@ -75,6 +77,8 @@ class SettingsDialog(QDialog):
         self.page = SettingPage(draft)
         self.profile_row = ProfileRow()
         self.status, self.notice = QLabel(), QLabel()
+        self.question = QuestionStrip()
+        """Of leaving, in place of the state of the settings."""
         self.reset_all, self.cancel = QPushButton(tr("Reset all")), QPushButton(tr("Cancel"))
         self.save, self.save_and_restart = QPushButton(tr("Save")), QPushButton(tr("Save, and start the rig again"))
         self._items: dict[str, QTreeWidgetItem] = {}
@@ -302,18 +306,38 @@ class SettingsDialog(QDialog):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if takes_enter(self, event):
             return
-        if event.key() == Qt.Key.Key_Escape and self.profile_row.is_asking:
-            self.profile_row.question.cancel()
-            self.profile_row.end_asking()
-            return
-        if event.key() == Qt.Key.Key_Escape and self.search.text():
-            self.search.clear()
-            return
-        super().keyPressEvent(event)
+        if event.key() != Qt.Key.Key_Escape:
+            super().keyPressEvent(event)
+        elif not event.isAutoRepeat():
+            self._on_escape()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        self.reject()
+        self.reject()  # asks nobody: what refuses to be closed would keep the program from ending, too
         super().closeEvent(event)
+
+    def ask_to_leave(self) -> None:
+        """Close the dialog; with something changed and not saved only after a question."""
+        if not self.draft.is_dirty:
+            self.reject()
+        elif not self.question.text:
+            self._show_question(True)
+            self.question.ask(tr("Leave without saving the changes?"), tr("Leave"), self.reject)
+
+    def _on_escape(self) -> None:
+        """Back by one step: a question, the search, the dialog."""
+        if self.question.text:
+            self.question.cancel()
+        elif self.profile_row.is_asking:
+            self.profile_row.question.cancel()
+            self.profile_row.end_asking()
+        elif self.search.text():
+            self.search.clear()
+        else:
+            self.ask_to_leave()
+
+    def _show_question(self, on: bool) -> None:
+        self.question.setVisible(on)
+        self.status.setVisible(not on)
 
     # ---- places
 
@@ -328,6 +352,7 @@ class SettingsDialog(QDialog):
         self.profile_row.save_asked.connect(self._ask_save_profile)
         self.profile_row.delete_asked.connect(self._delete_profile)
         self.status.linkActivated.connect(self.go_to)
+        self.question.closed.connect(lambda: self._show_question(False))
         self.reset_all.clicked.connect(lambda _on=False: self._ask_reset_all())
         self.cancel.clicked.connect(lambda _on=False: self.reject())
         self.save.clicked.connect(lambda _on=False: self.save_asked.emit(False))
@@ -377,6 +402,8 @@ class SettingsDialog(QDialog):
         bottom = QHBoxLayout()
         bottom.setSpacing(8)
         bottom.addWidget(self.status, 1)
+        bottom.addWidget(self.question, 1)
+        self.question.hide()
         for button in (self.reset_all, self.cancel, self.save, self.save_and_restart):
             bottom.addWidget(button)
         for button in self.findChildren(QPushButton):

@@ -67,6 +67,7 @@ class AlertRow(QWidget):
         super().__init__(parent)
         self.entry: ShownAlert | None = None
         self._hidden = 0
+        self._is_pressed = False
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def show_entry(self, entry: ShownAlert | None, hidden: int) -> None:
@@ -81,10 +82,16 @@ class AlertRow(QWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Taken here, so that no destination is set behind it."""
+        self._is_pressed = True
+        event.accept()
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Its second half is not for the alert that has taken the place of the dismissed one: nobody has read that yet."""
         event.accept()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        if self.entry is not None and self.rect().contains(event.position().toPoint()):
+        was_pressed, self._is_pressed = self._is_pressed, False
+        if was_pressed and self.entry is not None and self.rect().contains(event.position().toPoint()):
             self.dismissed.emit(self.entry.alert.key)
 
     def needed_width(self, entry: ShownAlert, *, full: bool) -> int:

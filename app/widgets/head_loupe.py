@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
@@ -47,13 +49,18 @@ class HeadLoupe(QWidget):
         self.setAccessibleName(tr("Magnified head"))
         self.hide()
 
-    def show_head(self, image: Image, scene: Scene, head_in_view: QPointF, to_view: QTransform) -> None:
-        """Magnify the surroundings of the head; `head_in_view` is where it is on the parent widget, `to_view` leads there."""
+    def show_head(
+        self, image: Image, scene: Scene, head_in_view: QPointF, to_view: QTransform, covers: Sequence[QRectF] = ()
+    ) -> None:
+        """Magnify the surroundings of the head.
+
+        `head_in_view` is where it is on the parent widget, `to_view` leads there; `covers` are what lies over the loupe.
+        """
         middle = _middle(scene)
         if middle is None:
             self.hide()
             return
-        self._place(head_in_view, to_view)
+        self._place(head_in_view, to_view, covers)
         span = _SPAN_PX / scene.scale
         zoom = self.width() / span
         left, top = middle[0] + 0.5 - span / 2, middle[1] + 0.5 - self.height() / zoom / 2
@@ -76,12 +83,12 @@ class HeadLoupe(QWidget):
         self._image = QImage(self._pixels.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32)
         self._image.setOffset(QPointF(x0, y0).toPoint())
 
-    def _place(self, head: QPointF, to_view: QTransform) -> None:
+    def _place(self, head: QPointF, to_view: QTransform, covers: Sequence[QRectF]) -> None:
         room = self._parent.rect()
         width = int(_SHARE_OF_VIEW * min(room.width(), room.height() / _ASPECT))
         corners = [self._rect(k, (width, int(width * _ASPECT))) for k in range(len(_CORNERS))]
         places, weights = self._marks.places()
-        corner = self._corner.choose(corners, head, on_screen(places, to_view), weights)
+        corner = self._corner.choose(corners, head, on_screen(places, to_view), weights, covers)
         self.setGeometry(corners[corner].toRect())
 
     def _rect(self, corner: int, size: tuple[int, int]) -> QRectF:
@@ -97,6 +104,10 @@ class HeadLoupe(QWidget):
             return
         place = self._to_widget.inverted()[0].map(event.position())
         self.clicked.emit(place.x() - 0.5, place.y() - 0.5)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """One place is meant, and the first half has told it."""
+        event.accept()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         if self._image is None:

@@ -20,6 +20,7 @@ from core.types import RobotStatus
 _FEEDS = (Motion.ADVANCE, Motion.RETRACT, Motion.DELIVER, Motion.WITHDRAW)
 _FED = mark("{motion}: hold to move, release to stop; {speed:.3g} mm/s")
 _PULLED = mark("{motion}: hold to move, release to stop; the tendons are pulled {speed:.3g} mm/s")
+_ALL = (True,) * 7
 _LEFT, _RIGHT, _UP, _DOWN = (QPointF(-1, 0), QPointF(1, 0), QPointF(0, -1), QPointF(0, 1))
 
 
@@ -38,6 +39,9 @@ class JogPanel(QWidget):
         self.max_pull_mm = max_pull_mm
         self._caps: dict[Motion, _Cap] = {}
         self._rig: tuple[HandConfig, ServosConfig] | None = None
+        self._status: RobotStatus | None = None
+        self._known: tuple[bool, ...] = _ALL
+        self._enabled = (True, "")
         grid = QGridLayout()
         grid.setSpacing(4)
         for motion, row, column, arrow, key, text in (
@@ -103,13 +107,24 @@ class JogPanel(QWidget):
             cap.light(motion in held)
 
     def show_status(self, status: RobotStatus | None) -> None:
-        """How the head is bent, as the tendons are pulled, and how far in the robot is."""
+        """How the head is bent, as the tendons are pulled, and how far in the robot is; None: nobody knows."""
+        self._status = status
         if status is None:
-            self._readout.show_values(0.0, 0.0, None)
+            self._readout.show_values(None, None, None)
             return
         right, left, up, down = status.tendon_pull_mm
         full_mm = 2.0 * self.max_pull_mm
-        self._readout.show_values((right - left) / full_mm, (up - down) / full_mm, status.insertion_mm)
+        bend, pitch, insertion_mm = (right - left) / full_mm, (up - down) / full_mm, status.insertion_mm
+        known = self._known
+        self._readout.show_values(
+            bend if known[0] and known[1] else None, pitch if known[2] and known[3] else None, insertion_mm if known[4] else None
+        )
+
+    def show_known(self, joints: tuple[bool, ...]) -> None:
+        """Of which of the seven joints it is known where they are."""
+        if joints != self._known:
+            self._known = joints
+            self.show_status(self._status)
 
     def _speed_choice(self) -> QComboBox:
         """Full speed, or a share of it for fine work."""
@@ -126,6 +141,9 @@ class JogPanel(QWidget):
 
     def set_enabled(self, enabled: bool, why: str = "") -> None:
         """Grey the caps out when there is nothing to move."""
+        if (enabled, why) == self._enabled:
+            return
+        self._enabled = enabled, why
         for cap in self._caps.values():
             cap.setEnabled(enabled)
         self._readout.setEnabled(enabled)

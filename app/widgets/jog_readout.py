@@ -12,14 +12,19 @@ from app.tool_tips import tip
 from core.control.hand import HandSpeeds
 
 _LINE_PX, _BETWEEN_PX, _SMALLEST_PX = 17, 6, 10
+_UNKNOWN = "\N{EN DASH}"
 
 
 class JogReadout(QWidget):
-    """Bend and pitch as bars from the middle, how far the robot is in, and below them how fast a held key changes that."""
+    """Bend and pitch as bars from the middle, how far the robot is in, and below them how fast a held key changes that.
+
+    What is not known is a dash, and a bar without a mark: it must not pass for a straight head.
+    """
 
     def __init__(self) -> None:
         super().__init__()
-        self._bend = self._pitch = 0.0
+        self._bend: float | None = None
+        self._pitch: float | None = None
         self._insertion_mm: float | None = None
         self._speeds = ""
         self.setFixedHeight(2 * _LINE_PX)
@@ -30,7 +35,10 @@ class JogReadout(QWidget):
     @property
     def text(self) -> str:
         return tr(
-            "bend {bend:.2f}, pitch {pitch:.2f}, in {inserted} mm", bend=self._bend, pitch=self._pitch, inserted=self._inserted
+            "bend {bend}, pitch {pitch}, in {inserted} mm",
+            bend=_number(self._bend),
+            pitch=_number(self._pitch),
+            inserted=self._inserted,
         )
 
     @property
@@ -39,10 +47,11 @@ class JogReadout(QWidget):
 
     @property
     def _inserted(self) -> str:
-        return "\N{EN DASH}" if self._insertion_mm is None else f"{self._insertion_mm:.0f}"
+        return _UNKNOWN if self._insertion_mm is None else f"{self._insertion_mm:.0f}"
 
-    def show_values(self, bend: float, pitch: float, insertion_mm: float | None) -> None:
-        values = (round(bend, 2), round(pitch, 2), None if insertion_mm is None else round(insertion_mm))
+    def show_values(self, bend: float | None, pitch: float | None, insertion_mm: float | None) -> None:
+        """Shares of full pull, -1..1, and millimetres; None: not known."""
+        values = (_rounded(bend, 2), _rounded(pitch, 2), _rounded(insertion_mm, 0))
         if values != (self._bend, self._pitch, self._insertion_mm):
             self._bend, self._pitch, self._insertion_mm = values
             self._say()
@@ -84,11 +93,21 @@ class JogReadout(QWidget):
         painter.end()
 
 
-def _paint_bar(painter: QPainter, track: QRectF, share: float) -> None:
-    """From the middle of `track` to the left or right; `share` is -1..1."""
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)
+
+
+def _number(share: float | None) -> str:
+    return _UNKNOWN if share is None else f"{share:.2f}"
+
+
+def _paint_bar(painter: QPainter, track: QRectF, share: float | None) -> None:
+    """From the middle of `track` to the left or right; `share` is -1..1, or None."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(palette.RAISED))
     painter.drawRoundedRect(track, 3, 3)
+    if share is None:
+        return
     center = track.center().x()
     end = center + max(-1.0, min(1.0, share)) * track.width() / 2
     painter.setBrush(QColor(palette.SKY))

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, Qt, QTimer, Signal
+from PySide6.QtCore import QPointF, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QImage, QPainter, QResizeEvent, QTransform
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
@@ -75,6 +75,11 @@ class LiveView(QWidget):
         self._loupe = HeadLoupe(self, self._marks)
         self._loupe.clicked.connect(self._on_place)
         self._loupe_pace = Pace(_LOUPE_EVERY_S)
+        self._covers: tuple[QWidget, ...] = ()
+
+    def set_covers(self, *widgets: QWidget) -> None:
+        """What lies over the picture at times: the loupe goes out of its way."""
+        self._covers = widgets
 
     @property
     def scene(self) -> Scene | None:
@@ -212,7 +217,8 @@ class LiveView(QWidget):
             return
         x, y = scene.to_source(scene.path.head)
         at = self._box.mapViewToScene(QPointF(x + 0.5, y + 0.5))
-        self._loupe.show_head(image, scene, QPointF(self._view.mapFromScene(at)), self._to_view())
+        covers = [QRectF(cover.geometry()) for cover in self._covers if cover.isVisible()]
+        self._loupe.show_head(image, scene, QPointF(self._view.mapFromScene(at)), self._to_view(), covers)
 
     def _on_left_click(self, point: QPointF) -> None:
         self._on_place(point.x() - 0.5, point.y() - 0.5)
@@ -270,6 +276,8 @@ class _PictureBox(pg.ViewBox):  # type: ignore[misc]
 
     def mouseClickEvent(self, event: pg.GraphicsScene.mouseEvents.MouseClickEvent) -> None:
         event.accept()
+        if event.double():
+            return  # its first half may have closed what lay over the picture, and never meant a place
         if event.button() == Qt.MouseButton.LeftButton:
             self.left_clicked.emit(self.mapSceneToView(event.scenePos()))
         elif event.button() == Qt.MouseButton.RightButton:

@@ -16,6 +16,7 @@ _NEAR_PX, _CLEAR_PX = 20, 60
 _SETTLE_S = 1.0
 _MUCH, _SHARE = 30.0, 0.5
 _VESSEL, _ROBOT, _ROUTE, _TARGET = 1.0, 2.0, 3.0, 200.0
+_COVERED = 150.0
 
 
 class LoupeCorner:
@@ -26,7 +27,14 @@ class LoupeCorner:
         self._corner: int | None = None
         self._better_since_s: float | None = None
 
-    def choose(self, corners: Sequence[QRectF], head: QPointF, places: Points, weights: NDArray[np.float64]) -> int:
+    def choose(
+        self,
+        corners: Sequence[QRectF],
+        head: QPointF,
+        places: Points,
+        weights: NDArray[np.float64],
+        covers: Sequence[QRectF] = (),
+    ) -> int:
         """Which of `corners`.
 
         Parameters
@@ -35,8 +43,12 @@ class LoupeCorner:
         head : where the robot's head is.
         places : (N, 2) what there is to see, also beyond the view.
         weights : (N,) how much each place matters.
+        covers : what lies over the loupe.
         """
-        hidden = [float(weights[_within(corner, places)].sum()) for corner in corners]
+        hidden = [
+            float(weights[_within(corner, places)].sum()) + _COVERED * any(corner.intersects(cover) for cover in covers)
+            for corner in corners
+        ]
         free = [k for k, corner in enumerate(corners) if not _grown(corner, _CLEAR_PX).contains(head)]
         best = min(free or range(len(corners)), key=lambda k: hidden[k])
         now = self._corner

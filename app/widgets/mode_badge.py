@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
 from app.language import mark, tr
-from app.next_step import who_drives
+from app.next_step import Undriven, who_drives
 from app.widgets.signs import Sign, octagon, paint_sign
 from core.control.drive_view import DriveView
 from core.control.modes import Mode
@@ -51,7 +51,7 @@ class ModeBadge(QWidget):
         self._who = ""
         self.setFixedSize(_SIZE)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.show_view(None, has_rig=False)
+        self.show_view(None, Undriven.NOT_YET)
 
     @property
     def mode(self) -> Mode:
@@ -65,9 +65,9 @@ class ModeBadge(QWidget):
     def sizeHint(self) -> QSize:
         return _SIZE
 
-    def show_view(self, view: DriveView | None, *, has_rig: bool = True) -> None:
-        """The newest view; None: this rig has no robot, or no rig is open."""
-        mode, who = view.mode if view is not None else Mode.ADVISORY, who_drives(view, has_rig=has_rig)
+    def show_view(self, view: DriveView | None, why_not: Undriven = Undriven.NO_ROBOT) -> None:
+        """The newest view; None: there is nothing to drive, and `why_not`."""
+        mode, who = view.mode if view is not None else Mode.ADVISORY, who_drives(view, why_not)
         if (mode, who) == (self._mode, self._who):
             return
         self._mode, self._who = mode, who

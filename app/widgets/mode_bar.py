@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app import palette, theme
 from app.language import tr
-from app.next_step import NO_ROBOT, NOT_YET, NextStep, Step, next_step, sentence
+from app.next_step import NOT_YET, NextStep, Step, Undriven, next_step, sentence
 from app.widgets.deadman_field import DeadmanField
 from app.widgets.mode_badge import MODE_LOOK
 from app.widgets.step_button import StepButton
@@ -85,12 +85,12 @@ class ModeBar(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(_NARROW, HEIGHT)
 
-    def show_view(self, view: DriveView | None, *, has_rig: bool = True) -> None:
-        """The newest view; None: this rig has no robot, or no rig is open."""
+    def show_view(self, view: DriveView | None, why_not: Undriven = Undriven.NO_ROBOT) -> None:
+        """The newest view; None: there is nothing to drive, and `why_not`."""
         usable, mode = view is not None, view.mode if view is not None else None
         if usable is not self.deadman.isEnabled():
             self._set_usable(usable)
-        step = next_step(view) if view is not None else NO_ROBOT if has_rig else NOT_YET
+        step = next_step(view) if view is not None else why_not.step
         matters = mode in ARMED_MODES
         self.deadman.show_deadman(view.deadman if view is not None else None, matters=matters)
         if (step, mode) == (self._shown, self._mode) or (view is not None and self._too_soon(step, view)):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from enum import Enum
+from math import ceil
 
 from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
 from app import palette, theme
@@ -20,8 +21,16 @@ class NoticeKind(Enum):
     FAULT = "FAULT"
 
 
+_WIDEST_PX, _EDGE_PX, _TITLE_PX, _DETAIL_PX, _FOOT_PX, _BUTTON_PX = 560, 20, 54, 62, 16, 46
+_SIZES_PX = (14, 13, 12, 11)
+_WRAPPED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
+
+
 class Notice(QWidget):
-    """A card in the middle of its parent. PROGRESS has a moving bar; a fault or an ended recording has a button to start again."""
+    """A card in the middle of its parent. PROGRESS has a moving bar; a fault or an ended recording has a button to start again.
+
+    It is as high as its text needs: what to do stands at the end of it.
+    """
 
     restart = Signal()
 
@@ -36,6 +45,7 @@ class Notice(QWidget):
         self._timer.setInterval(50)
         self._timer.timeout.connect(self._move_bar)
         self._button = QPushButton(tr("Start again  (F5)"))
+        self._button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click must not take the keys from the robot
         self._button.clicked.connect(self.restart)
         column = QVBoxLayout(self)
         column.setContentsMargins(24, 24, 24, 20)
@@ -55,6 +65,7 @@ class Notice(QWidget):
         self._kind, self._title, self._detail = kind, tr_text(title), tr_text(detail)
         self._button.setVisible(restartable)
         self.setAccessibleName(self.text)
+        self.setToolTip(self.text)
         if kind is NoticeKind.PROGRESS:
             self._timer.start()
         else:
@@ -75,9 +86,20 @@ class Notice(QWidget):
 
     def _place(self) -> None:
         room = self._parent.rect()
-        width = min(560, room.width() - 40)
-        height = 178 if self._button.isVisibleTo(self) else 132
+        width = min(_WIDEST_PX, room.width() - 2 * _EDGE_PX)
+        self.resize(width, self.height())
+        needed = max(_DETAIL_PX, self._detail_height(_SIZES_PX[0]))
+        height = self._around + min(needed, max(_DETAIL_PX, room.height() - _EDGE_PX - self._around))
         self.setGeometry((room.width() - width) // 2, (room.height() - height) // 2, width, height)
+
+    @property
+    def _around(self) -> int:
+        """What is not the detail's, of the height."""
+        return _TITLE_PX + _FOOT_PX + (_BUTTON_PX if self._button.isVisibleTo(self) else 0)
+
+    def _detail_height(self, size_px: int) -> int:
+        room = QRectF(0, 0, self.width() - 2 - 2 * _EDGE_PX, 0)
+        return ceil(QFontMetricsF(theme.font(size_px)).boundingRect(room, _WRAPPED, self._detail).height())
 
     @Slot()
     def _move_bar(self) -> None:
@@ -95,9 +117,10 @@ class Notice(QWidget):
         painter.setFont(theme.fitted(theme.bold(22), self._title, int(frame.width() - 40)))
         painter.drawText(QRectF(20, 16, frame.width() - 40, 32), Qt.AlignmentFlag.AlignCenter, self._title)
         painter.setPen(QColor(palette.TEXT_DIM))
-        painter.setFont(theme.font(theme.Size.BODY))
-        flags = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap
-        painter.drawText(QRectF(20, 54, frame.width() - 40, 62), int(flags), self._detail)
+        room = QRectF(_EDGE_PX, _TITLE_PX, frame.width() - 2 * _EDGE_PX, self.height() - self._around)
+        size_px = next((size for size in _SIZES_PX if self._detail_height(size) <= room.height()), _SIZES_PX[-1])
+        painter.setFont(theme.font(size_px))
+        painter.drawText(room, _WRAPPED, self._detail)
         if self._kind is NoticeKind.PROGRESS:
             self._paint_bar(painter, QRectF(60, frame.bottom() - 26, frame.width() - 120, 6))
         painter.end()

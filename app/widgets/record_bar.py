@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app import palette, theme
-from app.language import tr
+from app.language import tr, tr_text
 from core.session.record_status import RecordStatus
 
 _SIZE = QSize(196, 34)
@@ -36,14 +36,20 @@ class RecordBar(QWidget):
         """Show how it is going; repaints only when something that is shown has changed."""
         self._status = status
         lines = _lines_of(status)
-        if lines != self._lines:
-            self._lines = lines
-            self._describe()
+        has_changed, self._lines = lines != self._lines, lines
+        self._describe()
+        if has_changed:
             self.update()
 
     def _describe(self) -> None:
-        self.setAccessibleName(tr("Recording") if self._status.recording else tr("Record"))
-        self.setAccessibleDescription(self.text)
+        """Name, description and tool tip, which tells more than the lines do, and changes without them."""
+        if self._tip() != self.toolTip():
+            self.setToolTip(self._tip())
+        if self.text != self.accessibleDescription():
+            self.setAccessibleName(tr("Recording") if self._status.recording else tr("Record"))
+            self.setAccessibleDescription(self.text)
+
+    def _tip(self) -> str:
         free = (
             tr("{value:.1f} GB free on the disk", value=self._status.disk_free / 1000000000.0)
             if self._status.disk_free is not None
@@ -51,11 +57,15 @@ class RecordBar(QWidget):
         )
         where = str(self._status.folder) if self._status.folder is not None else ""
         tip = [tr("F9 begins or ends a session"), tr("F10 saves the last seconds without having recorded"), where, free]
-        self.setToolTip("\n".join(line for line in (*tip, self._status.warning, self._status.problem) if line))
+        return "\n".join(line for line in (*tip, tr_text(self._status.warning), tr_text(self._status.problem)) if line)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self.clicked.emit()
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """One click was meant: the second would end at once what the first has begun, or begin another session."""
+        event.accept()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)

@@ -14,7 +14,7 @@ from app.servo_cells import Column
 _COLUMNS = tuple(Column)
 _LEFT = {Column.JOINT, Column.ERROR}
 _WIDTHS = {
-    Column.JOINT: (70, 0.10), Column.POSITION: (82, 0.26), Column.GOAL: (48, 0.06), Column.CURRENT: (42, 0.05),
+    Column.JOINT: (70, 0.10), Column.POSITION: (78, 0.25), Column.GOAL: (52, 0.07), Column.CURRENT: (42, 0.05),
     Column.TEMPERATURE: (34, 0.05), Column.VOLTAGE: (40, 0.05), Column.TORQUE: (42, 0.04), Column.ZERO: (32, 0.04),
     Column.ERROR: (56, 0.35),
 }  # fmt: skip

@@ -23,7 +23,7 @@ from app import theme
 from app.cells import TONE_ROLE, Cell, Tone
 from app.language import tr, tr_text
 from app.pace import Pace
-from app.servo_cells import bus_line, pair_balances, servo_rows
+from app.servo_cells import SILENT_AFTER_S, bus_line, pair_balances, servo_rows
 from app.widgets.question_strip import BUTTON_STYLE, QuestionStrip
 from app.widgets.servo_model import ServoModel, ServoView
 from app.widgets.tendon_balance import TendonBalance
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from hardware.servos.bus_messages import BusStatus
 
 _SHOW_EVERY_S = 0.2
-_SILENT_AFTER_S = 1.0
 _LINE_ROLE = {**TONE_ROLE, Tone.PLAIN: "TEXT_DIM"}
 
 
@@ -110,7 +109,7 @@ class ServoTable(QWidget):
         """The newest status of the bus, None when there is none; a status that is older than a second is shown as silence."""
         self._servos = servos
         silence_s = self._clock() - status.time_s if status is not None else 0.0
-        is_silent = silence_s > _SILENT_AFTER_S
+        is_silent = silence_s > SILENT_AFTER_S
         kind = (status is None, is_silent, status.phase if status is not None else None)
         if self._pace.due() or kind != self._kind:
             self._kind = kind

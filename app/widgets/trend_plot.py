@@ -115,15 +115,22 @@ class TrendPlot(QWidget):
         if self._pace.due():
             self._draw()
 
+    def show_silence(self, age_s: float) -> None:
+        """Nothing has come for so long: the curves go on to the left, and where now is they have no value."""
+        if self._pace.due():
+            self._draw(age_s)
+
     def clear(self) -> None:
         self._times_s[:] = -np.inf
         self._values[:] = np.nan
         self._states[:] = 0
         self._draw()
 
-    def _draw(self) -> None:
-        first = int(np.searchsorted(self._times_s, self._times_s[-1] - SPAN_S)) if np.isfinite(self._times_s[-1]) else _CAPACITY
-        ago_s = self._times_s[first:] - self._times_s[-1]
+    def _draw(self, age_s: float = 0.0) -> None:
+        """As seen `age_s` after the newest value."""
+        now_s = self._times_s[-1] + age_s
+        first = int(np.searchsorted(self._times_s, now_s - SPAN_S)) if np.isfinite(now_s) else _CAPACITY
+        ago_s = self._times_s[first:] - now_s
         values = self._values[:, first:]
         for curve, series in zip(self._curves, values, strict=True):
             curve.setData(ago_s, series, connect="finite")

@@ -152,7 +152,10 @@ class ScalePage(WizardPage):
         self.desk.changed.emit()
 
     def _print(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, tr("Save the board"), "lumenpilot_board.pdf", tr("PDF (*.pdf);;PNG (*.png)"))
+        no_other_program = QFileDialog.Option.DontUseNativeDialog  # which would hear Space, and know nothing of STOP
+        name, _ = QFileDialog.getSaveFileName(
+            self, tr("Save the board"), "lumenpilot_board.pdf", tr("PDF (*.pdf);;PNG (*.png)"), options=no_other_program
+        )
         if name:
             self.save_board(Path(name))
 

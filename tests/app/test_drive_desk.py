@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.engine_thread import Phase
+from app.jog_keys import Motion
 from app.operator_window import OperatorWindow
 from core.config import Config
 from core.control.alerts import ALERTS, Alert
@@ -78,6 +79,20 @@ def test_alerts_are_shown_logged_and_heard(
     assert any("does not follow" in line for line in running.panels.events.lines)
 
 
+def test_alerts_stay_above_the_notice_that_no_picture_comes(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running.resize(1100, 660)
+    causes = (Cause.TRACKING, Cause.WARM, Cause.DISK_LOW)
+    engine.pilot.alerts = [Alert(cause, ALERTS[cause], "", 0, None) for cause in causes]
+    until(qtbot, lambda: len(running.panels.alerts.texts) == 3)
+    engine.silent = True
+    panels = running.panels
+    until(qtbot, panels.notice.isVisible)
+    panels.notice.setGeometry(panels.live.rect())
+    until(qtbot, lambda: panels.notice.isVisible() and panels.badge.title == "No new picture")
+    for row in panels.alerts._rows:
+        assert panels.live.childAt(row.mapTo(panels.live, row.rect().center())) is row
+
+
 def test_the_speed_by_hand_reaches_the_pilot_and_that_of_the_next_rig(
     make_window: MakeWindow, engines: list[FakeEngine], qtbot: QtBot
 ) -> None:
@@ -120,6 +135,26 @@ def test_what_a_rig_that_is_closed_still_says_is_nothing_of_the_next_ones(
         may_close.set()
 
 
+def test_the_keys_on_the_screen_work_wherever_those_of_the_keyboard_do(
+    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot
+) -> None:
+    """Without a picture, too: who has a robot in a vessel must be able to bring it back by hand."""
+    engine = FakeEngine(bench)
+    engine.silent = True
+    window = make_window(lambda _config: engine)
+    window.start()
+    cap = window.panels.jog._caps[Motion.RETRACT]
+    assert not cap.isEnabled()
+    until(qtbot, lambda: window.phase is Phase.RUNNING and cap.isEnabled())
+    assert window.panels.jog.toolTip() == ""
+    engine.silent = False
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert cap.isEnabled()
+    engine.fail_with = DeviceError("gone")
+    until(qtbot, lambda: window.phase is Phase.FAULT and not cap.isEnabled())
+    assert window.panels.jog.toolTip() == "Fault"
+
+
 def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
     engine = FakeEngine(bench)
     engine.pilot = None  # type: ignore[assignment]
@@ -152,10 +187,20 @@ def is_lent(window: OperatorWindow, _engine: FakeEngine) -> None:
     window.lend("the wizard has camera and servos")
 
 
-@pytest.mark.parametrize("end", [fails, is_opened_anew, is_another_one, is_lent])
+WAITING, CLOSED = ("waiting for the rig", "Waiting for the rig."), ("no rig is open", "No rig is open. F5 opens it again.")
+
+
+@pytest.mark.parametrize(
+    ("end", "says"), [(fails, CLOSED), (is_opened_anew, WAITING), (is_another_one, WAITING), (is_lent, CLOSED)]
+)
 def test_nothing_says_who_drives_once_the_rig_is_over(
-    end: Callable[[OperatorWindow, FakeEngine], None], make_window: MakeWindow, bench: FakeBench, qtbot: QtBot
+    end: Callable[[OperatorWindow, FakeEngine], None],
+    says: tuple[str, str],
+    make_window: MakeWindow,
+    bench: FakeBench,
+    qtbot: QtBot,
 ) -> None:
+    """Where it stopped for good, nobody waits for anything: it is opened again by whoever asks for it."""
     engine, may_open = FakeEngine(bench), threading.Event()
     engine.bus_status = lambda: bus(time_s=time.monotonic())  # type: ignore[assignment,return-value]
     rigs = iter([engine])
@@ -174,9 +219,8 @@ def test_nothing_says_who_drives_once_the_rig_is_over(
     until(qtbot, lambda: "20.0 ms" in panels.servos.bus_text)
     try:
         end(window, engine)
-        until(qtbot, lambda: panels.mode.who == "waiting for the rig")
+        until(qtbot, lambda: (panels.mode.who, panels.mode_bar.text) == says)
         assert panels.mode.mode is Mode.ADVISORY
-        assert panels.mode_bar.text == "Waiting for the rig."
         assert not any(part.isEnabled() for part in (panels.mode_bar.main, panels.mode_bar.second, panels.mode_bar.deadman))
         assert not panels.mode_bar.deadman.is_lit
         assert panels.servos.bus_text.startswith("no servo bus")

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QSpinBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.deadman_key import REPEAT_MS
+from app.deadman_key import REPEAT_MS, DeadmanKey
 from app.jog_keys import KEYS, PERIOD_MS, JogKeys, Motion
 from app.widgets.setting_field import NumberEdit
 from core.control.hand import AT_REST, Jog
@@ -128,15 +128,27 @@ def test_auto_repeat_is_ignored(bench: Bench) -> None:
     assert bench.jogs == [Jog(advance=1.0)]
 
 
+def test_a_held_key_types_nothing_into_a_field_that_is_clicked_meanwhile(bench: Bench) -> None:
+    bench.press(Key.Key_W)
+    bench.text.setFocus()
+    QApplication.sendEvent(bench.text, QKeyEvent(QEvent.Type.KeyPress, Key.Key_W, NONE, "w", True))
+    assert bench.text.text() == ""
+    bench.release(Key.Key_W, to=bench.text)
+    QApplication.sendEvent(bench.text, QKeyEvent(QEvent.Type.KeyPress, Key.Key_W, NONE, "w"))
+    assert bench.text.text() == "w"
+
+
 def test_a_key_that_was_down_before_does_not_count(bench: Bench) -> None:
     bench.press(Key.Key_W, repeat=True)
     assert bench.jog.held == frozenset()
 
 
-def test_losing_the_focus_lets_go(bench: Bench) -> None:
+@pytest.mark.parametrize("lost", [QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked])
+def test_losing_the_focus_or_a_dialog_in_front_lets_go(bench: Bench, lost: QEvent.Type) -> None:
+    """Behind a modal dialog no release is heard, also where the desktop has not given the focus to it."""
     bench.press(Key.Key_W)
     bench.press(Key.Key_Right)
-    QApplication.sendEvent(bench.window, QEvent(QEvent.Type.WindowDeactivate))
+    QApplication.sendEvent(bench.window, QEvent(lost))
     assert bench.jog.held == frozenset()
     assert bench.jogs[-1] == AT_REST
 
@@ -161,6 +173,34 @@ def test_a_key_that_means_something_else_when_it_is_let_go_lets_go(bench: Bench)
     up = QKeyEvent(QEvent.Type.KeyRelease, Key.Key_8, keypad, scan_code, 0, 0)
     QApplication.sendEvent(bench.window, up)
     assert bench.jogs[-1] == AT_REST
+
+
+def shift(kind: QEvent.Type, key: Qt.Key, scan_code: int) -> QKeyEvent:
+    return QKeyEvent(kind, key, Qt.KeyboardModifier.AltModifier, scan_code, 0, 0)
+
+
+@pytest.mark.parametrize("becomes", [Key.Key_unknown, Key.Key_Mode_switch, Key.Key_Meta, Key.Key_Shift])
+def test_a_shift_that_is_another_key_when_it_is_let_go_holds_no_deadman(bench: Bench, becomes: Qt.Key) -> None:
+    """Where Alt and Shift together change the layout, a Shift that comes up beside Alt is no Shift any more."""
+    deadman, said = DeadmanKey(bench.window), list[bool]()
+    deadman.reported.connect(said.append)
+    QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyPress, Key.Key_Shift, 50))
+    QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyRelease, Key.Key_Alt, 64))
+    assert deadman.is_held
+    assert said == [True]
+    QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyRelease, becomes, 50))
+    assert not deadman.is_held
+    assert said == [True, False]
+    deadman.detach()
+
+
+def test_of_two_shifts_the_first_that_comes_up_lets_go_of_the_deadman(bench: Bench) -> None:
+    deadman = DeadmanKey(bench.window)
+    for scan_code in (50, 62):
+        QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyPress, Key.Key_Shift, scan_code))
+    QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyRelease, Key.Key_Shift, 62))
+    assert not deadman.is_held
+    deadman.detach()
 
 
 def test_space_stops_once_and_lets_go_even_in_a_text_field(bench: Bench) -> None:

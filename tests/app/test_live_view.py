@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QColor, QImage
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from app import palette
 from app.widgets.head_loupe import _middle
 from app.widgets.live_view import LiveView
+from app.widgets.loupe_corner import LoupeCorner
 from app.widgets.overlays import Layer
 from core.types import Advice, Frame, Masks, RobotPath, Route, Scene, Skeletons, Speed
 from tests.app.fakes import FakeBench, make_pose, make_scene
+from tests.app.hand_clock import Clock
 
 GREY = 90
 
@@ -25,6 +27,11 @@ def _show(view: LiveView, frame: Frame, scene: Scene, advice: Advice | None = No
     """What is drawn over a first picture comes in the event loop's next turn."""
     view.show_frame(frame, scene, advice)
     QApplication.processEvents()
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
 
 
 @pytest.fixture
@@ -191,6 +198,22 @@ def test_click_gives_source_pixels(view: LiveView, qtbot: QtBot) -> None:
     assert signal.args == pytest.approx([800.0, 300.0], abs=1.5)
 
 
+def test_a_double_click_means_one_place_and_none_where_it_began_elsewhere(view: LiveView, qtbot: QtBot) -> None:
+    """Who double-clicks an alert or an offer away clicks the second time on the picture that lay behind it."""
+    _show(view, blank_frame(1280, 960), replace(make_scene(), source_size=(1280, 960), scale=0.5))
+    at, viewport = on_screen(view, 800.0, 300.0).toPoint(), view._view.viewport()
+    places: list[tuple[float, float]] = []
+    view.clicked.connect(lambda x, y: places.append((x, y)))
+    qtbot.mouseClick(viewport, Qt.MouseButton.LeftButton, pos=at)
+    qtbot.mouseDClick(viewport, Qt.MouseButton.LeftButton, pos=at)
+    qtbot.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=at)
+    assert len(places) == 1
+    loupe = view._loupe
+    qtbot.mouseClick(loupe, Qt.MouseButton.LeftButton)
+    qtbot.mouseDClick(loupe, Qt.MouseButton.LeftButton)
+    assert len(places) == 2
+
+
 def test_click_beside_the_picture_is_no_target(view: LiveView, qtbot: QtBot) -> None:
     _show(view, blank_frame(640, 240), make_scene())
     with qtbot.assertNotEmitted(view.clicked, wait=50):
@@ -219,3 +242,20 @@ def test_labels_stay_on_their_side_when_the_offset_is_about_zero(view: LiveView)
     assert view._marks._head_side == 1.0, "too near to zero to change sides"
     _show(view, blank_frame(), make_scene(make_pose(head=-5.0)))
     assert view._marks._head_side == -1.0
+
+
+def test_the_loupe_does_not_stay_below_an_alert(view: LiveView, bench: FakeBench, clock: Clock) -> None:
+    cover = QWidget(view)
+    cover.setGeometry(10, 10, 620, 60)
+    view.set_covers(cover)
+    view._loupe._corner = LoupeCorner(clock)
+    cover.hide()
+    image, scene = bench.scene_at(0, 0.0)
+    _show(view, Frame(0, 0.0, image), scene)
+    for shown in (False, True):
+        cover.setVisible(shown)
+        for _ in range(3):
+            clock.now_s += 1.1
+            view._show_loupe()
+        assert view._loupe.isVisible()
+        assert not (shown and view._loupe.geometry().intersects(cover.geometry()))

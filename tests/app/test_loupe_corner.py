@@ -82,3 +82,14 @@ def test_a_destination_counts_more_than_a_vessel() -> None:
     assert places.tolist() == [[10.0, 20.0]]
     assert weights[0] > 100
     assert len(seen_places(None, None)[0]) == 0
+
+
+def test_it_goes_out_of_the_way_of_what_lies_over_it(corner: LoupeCorner, clock: Clock) -> None:
+    alerts = [QRectF(12, 12, 360, 60)]
+    nothing, ones = crowd(), np.ones(0)
+    assert corner.choose(CORNERS, MIDDLE, nothing, ones) == 0
+    assert corner.choose(CORNERS, MIDDLE, nothing, ones, alerts) == 0
+    clock.now_s += 1.1
+    assert corner.choose(CORNERS, MIDDLE, nothing, ones, alerts) == 2
+    clock.now_s += 5.0
+    assert corner.choose(CORNERS, MIDDLE, nothing, ones) == 2, "they are gone, and it need not come back"

@@ -13,7 +13,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.next_step import STOP_KEY, Step, next_step, who_drives
+from app.next_step import STOP_KEY, Step, Undriven, next_step, who_drives
 from app.widgets.alert_row import LOOK
 from app.widgets.alert_strip import BRIEF_S, LINGER_S, AlertStrip
 from app.widgets.event_log import MOST_ROWS, EventKind, EventLog
@@ -103,9 +103,13 @@ def test_without_a_rig_nobody_knows_whether_there_is_something_to_drive(qtbot: Q
     assert badge.who == "pictures only"
     for shown in (badge, bar):
         shown.show_view(DRIVING)
-        shown.show_view(None, has_rig=False)
+        shown.show_view(None, Undriven.NOT_YET)
     assert (badge.mode, badge.who) == (Mode.ADVISORY, "waiting for the rig")
     assert bar.text == "Waiting for the rig."
+    assert not bar.main.isEnabled()
+    for shown in (badge, bar):
+        shown.show_view(None, Undriven.CLOSED)
+    assert (badge.who, bar.text) == ("no rig is open", "No rig is open. F5 opens it again.")
     assert not bar.main.isEnabled()
 
 
@@ -527,6 +531,16 @@ def test_a_click_dismisses_one_and_the_next_in_line_takes_its_place(qtbot: QtBot
     assert strip.texts == [words(key) for key in (Cause.HOT, Cause.DISK_LOW, Cause.WARM)]
     strip.clear()
     assert strip.isHidden()
+
+
+def test_a_double_click_dismisses_one_alert_and_not_the_next_that_nobody_has_read(qtbot: QtBot, strip: AlertStrip) -> None:
+    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.TRACKING)])
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    qtbot.mouseDClick(strip._rows[0], LEFT)
+    qtbot.mouseRelease(strip._rows[0], LEFT)
+    assert strip.texts == [words(Cause.WARM)]
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    assert strip.texts == []
 
 
 def test_a_click_on_an_alert_sets_no_destination_behind_it(qtbot: QtBot, clock: Clock) -> None:

@@ -46,6 +46,26 @@ def test_losing_the_focus_stops_the_robot(running: OperatorWindow, engine: FakeE
     assert engine.jogs[-1] == AT_REST
 
 
+def test_the_arrows_are_the_menu_bars_after_a_tap_on_alt(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    bar, live = running.menuBar(), running.panels.live
+    running.activateWindow()
+    live.setFocus()
+    qtbot.keyClick(live, Key.Key_Alt)
+    assert running.focusWidget() is bar
+    engine.jogs.clear()
+    for key in (Key.Key_Right, Key.Key_W):
+        qtbot.keyClick(bar, key)
+    assert engine.jogs == [], "who looks for a menu moves nothing"
+    assert bar.activeAction() is bar.actions()[1]
+    qtbot.keyClick(bar, Key.Key_Space)
+    assert engine.pilot.acts == [Act.STOP]
+    qtbot.keyClick(bar, Key.Key_Escape)
+    assert running.focusWidget() is live
+    qtbot.keyPress(live, Key.Key_Right)
+    assert engine.jogs[-1] == Jog(bend=1.0)
+    qtbot.keyRelease(live, Key.Key_Right)
+
+
 def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     chip = running.panels.overlay_bar._chips[Layer.MASKS]
     chip.setFocus()
@@ -298,7 +318,7 @@ def test_nothing_is_held_any_more_after_the_end(
     engine.fail_with = error
     until(qtbot, lambda: running._phase in (Phase.ENDED, Phase.FAULT))
     assert running.desk.jog.held == frozenset()
-    assert running.panels.jog.readout.startswith("bend 0.00")
+    assert running.panels.jog.readout.startswith("bend –")
 
 
 def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:

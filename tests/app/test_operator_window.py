@@ -224,6 +224,7 @@ def test_with_no_new_picture_no_number_of_an_older_one_stands(running: OperatorW
     engine.silent = True
     until(qtbot, lambda: running.panels.badge.title == "No new picture")
     assert "27.5" not in running.panels.performance.text
+    until(qtbot, lambda: running.panels.trends.curves[0].xData[-1] <= -0.5)
 
 
 def test_a_camera_that_never_gives_a_picture_says_why(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:

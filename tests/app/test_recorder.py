@@ -11,12 +11,14 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from app.operator_window import OperatorWindow
+from app.widgets.record_bar import RecordBar
 from core.config import Config
 from core.control.alerts import ALERTS, Alert
 from core.control.faults import Cause
 from core.control.modes import Act
 from core.session.events import EventKind
 from core.session.reader import SessionReader
+from core.session.record_status import RecordStatus
 from core.study.replay import event_target
 from core.types import Tick
 from tests.app.conftest import MakeWindow
@@ -159,3 +161,26 @@ def test_no_picture_of_the_old_rig_is_kept_as_one_of_the_new(
     assert stopped == [True], "a STOP in between is kept for the new rig"
     until(qtbot, lambda: len(engines) == 2 and bool(kept))
     assert engines[1].pilot.acts == [Act.STOP]
+
+
+def test_a_double_click_is_one_click(qtbot: QtBot) -> None:
+    bar, asked = RecordBar(), list[bool]()
+    qtbot.addWidget(bar)
+    bar.show()
+    bar.clicked.connect(lambda: asked.append(True))
+    qtbot.mouseClick(bar, Qt.MouseButton.LeftButton)
+    qtbot.mouseDClick(bar, Qt.MouseButton.LeftButton)
+    assert asked == [True], "the second would end what the first has begun"
+    qtbot.mouseClick(bar, Qt.MouseButton.LeftButton)
+    assert asked == [True, True]
+
+
+def test_the_tool_tip_of_the_bar_is_as_new_as_what_it_tells(qtbot: QtBot) -> None:
+    """Between two sessions the bar's own words stay the same, and the disk fills up."""
+    bar = RecordBar()
+    qtbot.addWidget(bar)
+    bar.show_status(RecordStatus(disk_free=40_000_000_000))
+    assert "40.0 GB free" in bar.toolTip()
+    bar.show_status(RecordStatus(disk_free=1_200_000_000, warning="disk nearly full: 1200 MB left"))
+    assert "1.2 GB free" in bar.toolTip()
+    assert "disk nearly full: 1200 MB left" in bar.toolTip()

@@ -25,7 +25,7 @@ from core.rig_file import make_rig, read_rig, rig_path, with_rig, write_rig
 from core.session.manifest import read_manifest
 from hardware.calibration_bench import CalibrationBench
 from hardware.gamepad import GamepadState
-from hardware.rig_search import FoundCamera
+from hardware.rig_search import Found, FoundCamera
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until
 from tests.app.test_rig_wizard import StillCamera
 
@@ -92,6 +92,33 @@ def test_rigs_are_listed_and_broken_ones_cannot_be_chosen(window: OperatorWindow
     assert desk.entries == ["bench 1", "broken"]
     assert [action.isEnabled() for action in desk._rigs] == [True, False]
     assert "no TOML" in desk._rigs[1].toolTip()
+
+
+def test_no_camera_is_looked_for_while_the_robot_is_armed(
+    window: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The look asks the cameras' drivers, in the window's thread: a window that hangs disarms."""
+    looks: list[bool] = []
+
+    def look() -> Found:
+        looks.append(True)
+        return Found((FoundCamera("twin", "Bench twin"),), ())
+
+    monkeypatch.setattr("app.rig_desk.search", look)
+    desk = _desk(window)
+    pilot = window.pilot
+    assert pilot is not None
+    pilot.view = DriveView(0.0, mode=Mode.AUTONOMOUS)  # type: ignore[misc]
+    until(qtbot, lambda: desk.hindrance() != "")
+    desk._cameras.aboutToShow.emit()
+    assert looks == []
+    (line,) = desk._cameras.actions()
+    assert line.text() == "The rig stays as it is: the robot is armed: disarm it first"
+    assert not line.isEnabled()
+    pilot.view = DriveView(0.0)  # type: ignore[misc]
+    until(qtbot, lambda: desk.hindrance() == "")
+    desk._cameras.aboutToShow.emit()
+    assert [action.text() for action in desk._cameras.actions()] == ["Bench twin"]
 
 
 def test_a_chosen_rig_is_opened_in_this_window_and_shows_millimetres(

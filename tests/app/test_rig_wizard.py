@@ -9,10 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QFileDialog, QSpinBox, QWidget
 from pytestqt.qtbot import QtBot
 
+from app.application import close_all, is_asked_to_end
 from app.rig_command import calibration_lines
 from app.rig_wizard import RigWizard
 from app.widgets import wizard_servos
@@ -224,6 +227,21 @@ def test_the_board_is_written_for_the_printer(opened: RigWizard, tmp_path: Path)
     assert "100 %" in opened.message
     opened.scale_page.save_board(tmp_path / "board.jpg")
     assert "written as .pdf or .png" in opened.message
+
+
+def test_no_dialog_of_the_desktop_keeps_stop_from_the_wizard(opened: RigWizard) -> None:
+    """It would be another program's: Space in it would reach nobody here."""
+    dialogs: list[bool] = []
+
+    def look() -> None:
+        dialog = QApplication.activeModalWidget()
+        assert isinstance(dialog, QFileDialog)
+        dialogs.append(dialog.testOption(QFileDialog.Option.DontUseNativeDialog))
+        dialog.reject()
+
+    QTimer.singleShot(0, look)
+    opened.scale_page._print()
+    assert dialogs == [True]
 
 
 # ---- servos
@@ -520,10 +538,42 @@ def test_what_was_found_is_not_thrown_away_without_a_question(
     until(qtbot, lambda: opened.desk.bench is None)
 
 
+def test_a_program_that_is_asked_to_end_is_not_kept_by_a_question(opened: RigWizard, qtbot: QtBot, qapp: QApplication) -> None:
+    """Ctrl-C, or a computer that is shut down: whoever waits for an answer is killed, and leaves the servos as they are."""
+    _find_a_scale(opened)
+    close_all(qapp)
+    assert not opened.isVisible()
+    until(qtbot, lambda: opened.desk.bench is None)
+    assert not is_asked_to_end()
+
+
 @LEAVING
 def test_where_nothing_was_found_nobody_is_asked(opened: RigWizard, qtbot: QtBot, leave: Callable[[RigWizard], None]) -> None:
     leave(opened)
     assert not opened.isVisible()
+
+
+def turn_the_wheel(over: QWidget) -> QWheelEvent:
+    at = QPointF(over.rect().center())
+    down, none = QPoint(0, -120), Qt.MouseButton.NoButton
+    everywhere = QPointF(over.mapToGlobal(at.toPoint()))
+    event = QWheelEvent(at, everywhere, QPoint(), down, none, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False)
+    QApplication.sendEvent(over, event)
+    return event
+
+
+def test_the_wheel_changes_no_servo_no_direction_and_no_number(opened: RigWizard) -> None:
+    """Turned over the table of joints it would pull a wire the wrong way ever after."""
+    lists, numbers = opened.findChildren(QComboBox), opened.findChildren(QSpinBox) + opened.findChildren(QDoubleSpinBox)
+    assert len(lists) > 14
+    assert len(numbers) > 3
+    for control in (*lists, *numbers):
+        control.setEnabled(True)
+        before = control.currentIndex() if isinstance(control, QComboBox) else control.value()
+        event = turn_the_wheel(control)
+        assert before == (control.currentIndex() if isinstance(control, QComboBox) else control.value()), control.accessibleName()
+        assert not event.isAccepted()
+    assert not opened.identify_page.is_done
 
 
 def test_escape_leaves_the_field_first(opened: RigWizard, qtbot: QtBot) -> None:

@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication, QMenu, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app import palette
+from app import palette, theme
 from app.cells import Tone, number
 from app.clamp_log import MAX_ENTRIES, ClampLog
-from app.servo_cells import Column, bus_line, error_words, pair_balances, servo_rows
+from app.servo_cells import Column, bus_line, error_words, known_joints, pair_balances, servo_rows
 from app.widgets.clearance_bar import ClearanceBar
 from app.widgets.command_panel import CommandPanel
 from app.widgets.live_view import LiveView
@@ -76,6 +77,27 @@ def bus(*others: ServoReading, **changes: object) -> BusStatus:
 
 def cells(status: BusStatus | None, place: int) -> dict[Column, tuple[str, Tone]]:
     return {column: (cell.text, cell.tone) for column, cell in zip(Column, servo_rows(status, SERVOS, SAFETY)[place], strict=True)}
+
+
+def test_no_heading_of_the_table_is_cut_in_the_smallest_window(qtbot: QtBot) -> None:
+    table = ServoTable()
+    qtbot.addWidget(table)
+    table.resize(470, 240)
+    table.show()
+    header, metrics = table._table.horizontalHeader(), QFontMetrics(theme.font(11))
+    for place in range(table.model.columnCount()):
+        heading = str(table.model.headerData(place, Qt.Orientation.Horizontal)).strip()
+        assert metrics.horizontalAdvance(heading) + 6 <= header.sectionSize(place), heading
+
+
+def test_where_a_joint_is_is_known_of_a_zeroed_one_that_answers() -> None:
+    assert known_joints(None, 100.0) == (True,) * 7, "a robot without a bus tells it itself"
+    assert known_joints(bus(), 100.5) == (True,) * 7
+    assert known_joints(bus(), 102.0) == (False,) * 7, "the bus is silent"
+    assert known_joints(bus(servos=(), zeroed=(False,) * 7), 100.0) == (False,) * 7
+    silent = MissingServo(SERVOS.joints[2].name, SERVOS.joints[2].id, 100.0, 5, "no answer")
+    some = bus(silent, zeroed=(True, False, True, True, True, True, False))
+    assert known_joints(some, 100.0) == (True, False, False, True, True, True, False)
 
 
 # ---- what the table says

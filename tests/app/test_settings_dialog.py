@@ -108,6 +108,32 @@ def test_typing_is_checked_at_once_and_marked(dialog: SettingsDialog) -> None:
     assert seen[-1] == load_config()
 
 
+def test_escape_asks_before_changes_are_lost(dialog: SettingsDialog) -> None:
+    type_into(dialog, D_ALLOW, "9")
+    QTest.keyClick(dialog.page.fields[D_ALLOW].editor, Key.Key_Escape)
+    assert dialog.isVisible()
+    assert dialog.question.text == "Leave without saving the changes?"
+    assert not dialog.status.isVisible()
+    QTest.keyClick(dialog.question._no, Key.Key_Escape)
+    assert dialog.question.text == ""
+    assert dialog.status.isVisible()
+    assert dialog.draft.is_dirty, "nothing was lost"
+    QTest.keyClick(dialog, Key.Key_Escape)
+    dialog.question._yes.click()
+    assert not dialog.isVisible()
+    assert dialog.result() == SettingsDialog.DialogCode.Rejected
+
+
+def test_without_changes_nobody_is_asked_and_cancel_and_the_cross_ask_nobody(dialog: SettingsDialog) -> None:
+    QTest.keyClick(dialog, Key.Key_Escape)
+    assert not dialog.isVisible()
+    for leave in (dialog.cancel.click, dialog.close):
+        dialog.show()
+        type_into(dialog, D_ALLOW, "9")
+        leave()
+        assert not dialog.isVisible()
+
+
 def test_the_tree_tells_where_something_differs_or_is_wrong(dialog: SettingsDialog) -> None:
     type_into(dialog, D_ALLOW, "9")
     assert dialog._items["perception.pose"].text(1).endswith("1")

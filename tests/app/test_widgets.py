@@ -167,6 +167,26 @@ def test_frames_without_a_pose_are_gaps(qtbot: QtBot) -> None:
     np.testing.assert_array_equal(theta, [0.0, 1.0, np.nan, 3.0, 4.0])
 
 
+def test_trends_go_on_to_the_left_while_nothing_comes(qtbot: QtBot) -> None:
+    """Where now is there is no value: the newest one is not taken for it."""
+    plot = TrendPlot(LIMITS)
+    qtbot.addWidget(plot)
+    for k in range(50):
+        plot._pace.reset()
+        plot.add(make_scene(make_pose(theta=5.0), index=k, captured_s=100.0 + 0.1 * k))
+    newest_s = plot.curves[0].xData[-1]
+    assert newest_s == 0.0
+    plot._pace.reset()
+    plot.show_silence(12.0)
+    assert plot.curves[0].xData[-1] == pytest.approx(-12.0)
+    plot._pace.reset()
+    plot.show_silence(SPAN_S + 1.0)
+    assert len(plot.curves[0].xData) == 0
+    plot._pace.reset()
+    plot.add(make_scene(make_pose(theta=5.0), index=50, captured_s=120.0))
+    assert plot.curves[0].xData[-1] == 0.0
+
+
 def test_trends_hold_thirty_seconds_and_restart_when_the_clock_jumps_back(qtbot: QtBot) -> None:
     plot = TrendPlot(LIMITS)
     qtbot.addWidget(plot)
@@ -420,7 +440,21 @@ def test_readout_shows_how_far_the_robot_is_in(qtbot: QtBot) -> None:
     panel.show_status(RobotStatus(0.0, 84.2, 0.0, (-1.0, 1.0, 0, 0), (0, 0, 0, 0)))
     assert panel.readout == "bend -0.50, pitch 0.00, in 84 mm"
     panel.show_status(None)
-    assert panel.readout.endswith("in – mm")
+    assert panel.readout == "bend –, pitch –, in – mm", "a straight head would be something that is known"
+
+
+def test_readout_shows_nothing_of_joints_of_which_nobody_knows_where_they_are(qtbot: QtBot) -> None:
+    panel = JogPanel(2.0)
+    qtbot.addWidget(panel)
+    panel.show_known((False,) * 7)
+    panel.show_status(RobotStatus(0.0, 0.0, 0.0, (0.0,) * 4, (0.0,) * 4))
+    assert panel.readout == "bend –, pitch –, in – mm"
+    unknown = panel._readout.grab().toImage()
+    panel.show_known((True, True, False, True, True, True, True))
+    assert panel.readout == "bend 0.00, pitch –, in 0 mm"
+    assert panel._readout.grab().toImage() != unknown, "a bar without a mark is no straight head"
+    panel.show_known((True,) * 4 + (False, True, True))
+    assert panel.readout == "bend 0.00, pitch 0.00, in – mm"
 
 
 def test_notice_shows_title_detail_and_a_way_out(qtbot: QtBot) -> None:
@@ -436,6 +470,27 @@ def test_notice_shows_title_detail_and_a_way_out(qtbot: QtBot) -> None:
     assert room.rect().contains(notice.geometry())
     notice.clear()
     assert not notice.isVisible()
+
+
+@pytest.mark.parametrize("size", [(480, 320), (590, 345), (1000, 700)])
+@pytest.mark.parametrize("restartable", [False, True])
+def test_a_notice_has_room_for_all_that_it_says(qtbot: QtBot, size: tuple[int, int], restartable: bool) -> None:
+    room = QWidget()
+    qtbot.addWidget(room)
+    room.resize(*size)
+    room.show()
+    notice = Notice(room)
+    path = "/dev/serial/by-id/usb-FTDI_USB__-__Serial_Converter_FT8J0MXY-if00-port0"
+    why = f"no permission for {path}: {'add yourself to the group dialout, log out and in again; ' * 4}then start the rig again"
+
+    notice.show_notice(NoticeKind.FAULT, "The rig stopped", why, restartable=restartable)
+    assert room.rect().contains(notice.geometry())
+    assert notice.toolTip() == notice.text
+    shown = notice.grab().toImage()
+    notice.show_notice(NoticeKind.FAULT, "The rig stopped", why.removesuffix("again") + "twice", restartable=restartable)
+    assert notice.grab().toImage() != shown, "its last word is seen"
+    notice.show_notice(NoticeKind.FAULT, "The rig stopped", "camera lost", restartable=restartable)
+    assert notice.height() == (178 if restartable else 132)
 
 
 def test_every_widget_has_an_accessible_name_and_a_tool_tip(qtbot: QtBot) -> None:
