@@ -189,6 +189,7 @@ class Pipeline:
                 past.lookalikes.forget()  # the camera was moved, perhaps
             if refusal is not None:
                 scene = replace(scene, pose=None, refusal=refusal)
+        past.routes.settle(is_believed=scene.pose is not None)
         if self._glance is not None:
             past.glances.remember(scene)
         return watch.finish(replace(scene, pose=self._states.update(scene.pose, scene.captured_s)))

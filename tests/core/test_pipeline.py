@@ -434,6 +434,27 @@ def test_in_a_stream_a_way_that_was_seen_holds_over_a_gap(pipeline: Pipeline, ne
     assert pipeline(frame(1.0 + 4 * FRAME_S), target).route is None, "it was seen for one frame only"
 
 
+@pytest.mark.parametrize("wrong", ["a jump", "not believed"])
+def test_in_a_stream_a_frame_that_is_refused_does_not_undo_the_way_that_was_seen(
+    pipeline: Pipeline, network: DrawnNetwork, wrong: str
+) -> None:
+    """What makes a head jump for a frame, a reflection, cuts the vessel or joins two of them in the same moment."""
+    target, whole = (560.0, 246.0), network.vessel
+    for step in range(20):
+        first = pipeline(frame(step * FRAME_S), target)
+    assert first.route is not None
+    network.draw_up_to(450 if wrong == "a jump" else 320)
+    if wrong == "not believed":
+        network.vessel = cv2.GaussianBlur(whole, (0, 0), 7.0)
+    refused = pipeline(frame(20 * FRAME_S), target)
+    assert reason(refused) is (Reason.HEAD_JUMP if wrong == "a jump" else Reason.NO_VESSEL)
+    network.draw_up_to(300)
+    network.vessel = _cut_at(whole, 440, 465)
+    later = pipeline(frame(21 * FRAME_S), target)
+    assert later.route is not None
+    assert later.route.length_px == pytest.approx(first.route.length_px, abs=6.0)
+
+
 def test_no_way_is_remembered_once_the_destination_was_taken_back(pipeline: Pipeline, network: DrawnNetwork) -> None:
     target, whole = (560.0, 246.0), network.vessel
     assert pipeline(frame(), target).route is not None
