@@ -69,11 +69,12 @@ _EDGE_PX = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Before:
-    """The path of the last frame, or, after a gap, the one that still tells which end is the head; and which pixels (h, w) of this
-    frame are known to be no robot."""
+    """The path of the last frame, or, after a gap, the one that still tells which end is the head; whether that head came to where
+    it is from within the picture; and which pixels (h, w) of this frame are known to be no robot."""
 
     path: RobotPath | None = None
     ends: RobotPath | None = None
+    came_from_within: bool = False
     none: Mask | None = None
 
 
@@ -90,7 +91,12 @@ class _Past:
 
     def recall(self, captured_s: float) -> _Before:
         memory, config = self.memory, self._config
-        return _Before(recall(memory, captured_s, config), recall_ends(memory, captured_s, config), self.lookalikes.none)
+        return _Before(
+            recall(memory, captured_s, config),
+            recall_ends(memory, captured_s, config),
+            memory is not None and memory.came_from_within,
+            self.lookalikes.none,
+        )
 
     def forget(self) -> None:
         self.memory, self.unlike = None, False
@@ -296,7 +302,16 @@ class Pipeline:
         assert skeletons is not None
         assert graph is not None
         with watch.stage("path"):
-            path = robot_path.find(skeletons, found, config, before.path, graph, _port(config.path, image), before.ends)
+            path = robot_path.find(
+                skeletons,
+                found,
+                config,
+                before.path,
+                graph,
+                _port(config.path, image),
+                before.ends,
+                came_from_within=before.came_from_within,
+            )
         if isinstance(path, Refusal):
             return replace(scene, refusal=path)
         with watch.stage("pose"):

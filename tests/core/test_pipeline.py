@@ -272,6 +272,29 @@ def test_a_head_that_has_left_the_picture_is_refused_within_half_a_second_until_
     assert all(answered[-3:])
 
 
+@pytest.mark.parametrize("lost_s", [0.0, 1.0])  # frames without an answer while the head is out of the picture
+def test_a_robot_that_comes_out_of_a_sheath_and_leaves_the_picture_is_not_turned_about(
+    pipeline: Pipeline, network: DrawnNetwork, lost_s: float
+) -> None:
+    """Its tail lies where the sheath ends, in the middle of a vessel; its head was seen to go to the image border."""
+    robot = VESSEL[VESSEL[:, 0] >= 70.0] + [0.0, 3.0]
+    heads = [*range(560, 680, 8), *[680] * 60, *range(660, 560, -8)]
+    lost = range(30, 30 + round(20 * lost_s))
+    answered = []
+    for step, head_x in enumerate(heads):
+        network.draw(*([robot[robot[:, 0] <= head_x]] if step not in lost else []))
+        scene = pipeline(frame(0.05 * step))
+        answered.append(scene.pose is not None)
+        if scene.pose is not None:
+            assert scene.path is not None
+            assert scene.path.head[0] == pytest.approx(min(head_x, SIZE[0] - 1), abs=3.0), "the tail was never taken for it"
+    arrived = next(index for index, head_x in enumerate(heads) if head_x > SIZE[0])
+    assert all(answered[: arrived + 4])
+    assert not any(answered[arrived + 10 : 30])
+    assert not any(answered[65:75])
+    assert all(answered[-3:])
+
+
 def _draw_tapered(network: DrawnNetwork, left_x: float, right_x: float, *, thick: str) -> None:
     """A robot both of whose ends lie in the picture, thicker at one of them: by itself that one is taken for the tail."""
     line = VESSEL[(VESSEL[:, 0] >= left_x) & (VESSEL[:, 0] <= right_x)]
