@@ -27,6 +27,7 @@ from core.study.replay import Change, RecordedTargets, changed_most, seen, summa
 from core.types import Frame, Scene
 
 if TYPE_CHECKING:
+    from core.control.engine import Perceive
     from core.perception.pipeline import Pipeline
 
 MOST_SHOWN = 20
@@ -136,11 +137,12 @@ def model_note(manifest: Manifest | None, config: Config, after: dict[str, Any])
 
 
 def replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None = None) -> _Replayed:
-    """All frames once more, as a stream with the recorded targets; Ctrl-C keeps what is done."""
+    """All frames once more with the recorded targets, as a stream where they were one; Ctrl-C keeps what is done."""
     done = _Replayed()
     targets = RecordedTargets(reader.events)
     first_s: float | None = None
-    _warm_up(reader, pipeline)
+    perceive = pipeline if _was_stream(reader.manifest) else pipeline.perceive_single
+    _warm_up(reader, pipeline, perceive)
     with Interrupt() as interrupt, progress_bar() as bar:
         task = bar.add_task("frames", total=len(reader))
         for place in range(len(reader)):
@@ -160,7 +162,7 @@ def replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None =
                 done.no_picture += 1
                 record = unread_to_json(name, "the picture is lost")
             else:
-                scene: Scene = pipeline(Frame(row.index, row.captured_s, frame.image), target)
+                scene: Scene = perceive(Frame(row.index, row.captured_s, frame.image), target)
                 done.changes.append(Change(row.row, row.index, row.captured_s - first_s, seen(row.scene), seen(scene)))
                 record = scene_to_json(name, scene)
             if lines is not None:
@@ -169,12 +171,18 @@ def replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None =
     return done
 
 
-def _warm_up(reader: SessionReader, pipeline: Pipeline) -> None:
+def _was_stream(manifest: Manifest | None) -> bool:
+    """Whether the frames follow each other; the pictures of a folder have nothing to do with each other, and were perceived so."""
+    rig = manifest.config.get("rig") if manifest is not None else None
+    return not (isinstance(rig, dict) and rig.get("camera") == "image_folder")
+
+
+def _warm_up(reader: SessionReader, pipeline: Pipeline, perceive: Perceive) -> None:
     """The first picture waits for the network's first run, which would spoil the latency."""
     pipeline.warm_up()
     frame = reader.frame(0) if len(reader) else None
     if frame is not None:
-        pipeline(frame)
+        perceive(frame)
     pipeline.reset()
 
 
