@@ -192,7 +192,7 @@ class Pipeline:
                 past.lookalikes.learn(scene.path, frame.captured_s)
                 refusal = check_in_view(past.memory, self._config)
             else:
-                past.lookalikes.forget()  # the camera was moved, perhaps
+                past.lookalikes.doubt()  # the camera was moved, perhaps; or it is one bad frame
             if refusal is not None:
                 scene = replace(scene, pose=None, refusal=refusal)
         past.routes.settle(is_believed=scene.pose is not None)

@@ -655,3 +655,18 @@ def test_in_a_stream_text_beneath_the_vessel_does_not_become_the_robots_end(netw
             refused[lookalike_px] += scene.pose is None or scene.path is None or abs(scene.path.head[0] - x) > 5.0
     assert refused[0.0] > 10
     assert refused[CONFIG.tracking.lookalike_px] == 0
+
+
+def test_in_a_stream_one_bad_frame_does_not_make_text_the_robots_end(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    """A reflection cuts the robot short, when it has come so near to the text that nobody could tell it any more."""
+    text = VESSEL[(VESSEL[:, 0] >= 420) & (VESSEL[:, 0] <= 450)]
+    for k, x in enumerate([*range(270, 416, 5), *[415] * 30]):
+        is_cut = k == 28
+        network.draw(VESSEL[VESSEL[:, 0] <= (x - 100 if is_cut else x)], text)
+        scene = pipeline(frame(k * FRAME_S))
+        if is_cut:
+            assert reason(scene) is Reason.HEAD_JUMP
+        elif x > 340:
+            assert scene.pose is not None
+            assert scene.path is not None
+            assert scene.path.head[0] == pytest.approx(x, abs=5.0)
