@@ -151,6 +151,14 @@ class Pipeline:
             swings=stream.swings,
         )
 
+    def follow_on(self, before: Pipeline) -> None:
+        """Go on with the stream that `before` perceives, under other thresholds; may be asked while it does.
+
+        Which end of the robot is the head does not hang on them, and one picture alone may not tell it. All else begins anew.
+        """
+        if before._config.working_size_px == self._config.working_size_px:
+            self._past.memory, self._shape = before._past.memory, before._shape
+
     def warm_up(self) -> None:
         """Compile the networks for a stream of 4:3 pictures. Else the first pictures wait for it, up to a second each."""
         side, window = self._config.working_size_px, self._config.tracking.window_px

@@ -620,6 +620,23 @@ def test_other_thresholds_act_with_the_same_networks_and_no_memory(pipeline: Pip
     assert other.engine == pipeline.engine
 
 
+@pytest.mark.parametrize("change", ["none", "picture size", "working size"])
+def test_a_stream_goes_on_under_other_thresholds_with_the_same_head(pipeline: Pipeline, network: DrawnNetwork, change: str) -> None:
+    """What lies in other pixels is not known any more."""
+    _draw_tapered(network, 180.0, 420.0, thick="left")
+    assert pipeline(frame(0.0)).pose is not None
+    other = CONFIG.model_copy(update={"pose": CONFIG.pose.model_copy(update={"d_allow_px": 9.0})})
+    if change == "working size":
+        other = other.model_copy(update={"working_size_px": 704})
+    after = pipeline.with_config(other)
+    after.follow_on(pipeline)
+    _draw_tapered(network, 190.0, 424.0, thick="right")
+    scene = after(frame(FRAME_S, size=(1280, 960) if change == "picture size" else SIZE))
+    assert scene.path is not None
+    head_x = scene.to_source(scene.path.head)[0] * SIZE[0] / scene.source_size[0]
+    assert head_x == pytest.approx(424.0 if change == "none" else 190.0, abs=3.0)
+
+
 @pytest.mark.parametrize("size", [SIZE, (1280, 960)])
 @pytest.mark.parametrize(("port_x", "head_x"), [(150.0, 450.0), (450.0, 150.0)])
 def test_the_end_at_the_insertion_port_is_the_tail(
