@@ -1,4 +1,4 @@
-"""One recorded session perceived again, as a stream with the recorded targets, by itself or in a worker."""
+"""One recorded session perceived again, with the recorded targets, by itself or in a worker."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from core.study.replay_tally import Tally
 from core.types import Frame, Scene
 
 if TYPE_CHECKING:
+    from core.control.engine import Perceive
     from core.perception.pipeline import Pipeline
 
 MOST_SHOWN = 20
@@ -87,7 +88,7 @@ def replay_session(options: ReplayOptions, watch: Watch = unwatched) -> SessionR
         notes += model_note(reader.manifest, config, after)
         reader.wait()
         with LineOutput(options.jsonl) if options.jsonl is not None else nullcontext() as lines:
-            done = _replay(reader, pipeline, lines, watch)
+            done = replay_frames(reader, pipeline, lines, watch)
         problems = list(reader.problems)
     if done.interrupted and not done.changes:
         raise KeyboardInterrupt
@@ -160,12 +161,15 @@ def model_note(manifest: Manifest | None, config: Config, after: dict[str, Any])
     return []
 
 
-def _replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None, watch: Watch) -> _Replayed:
-    """All frames once more; whoever ends it keeps what is done."""
+def replay_frames(
+    reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None = None, watch: Watch = unwatched
+) -> _Replayed:
+    """All frames once more with the recorded targets, as a stream where they were one; whoever ends it keeps what is done."""
     done = _Replayed()
     targets = RecordedTargets(reader.events)
     first_s: float | None = None
-    _warm_up(reader, pipeline)
+    perceive = pipeline if _was_stream(reader.manifest) else pipeline.perceive_single
+    _warm_up(reader, pipeline, perceive)
     with watch(len(reader)) as may_go_on:
         for place in range(len(reader)):
             if not may_go_on():
@@ -183,7 +187,7 @@ def _replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None,
                 done.no_picture += 1
                 record = unread_to_json(name, "the picture is lost")
             else:
-                scene: Scene = pipeline(Frame(row.index, row.captured_s, frame.image), target)
+                scene: Scene = perceive(Frame(row.index, row.captured_s, frame.image), target)
                 done.changes.append(Change(row.row, row.index, row.captured_s - first_s, seen(row.scene), seen(scene)))
                 record = scene_to_json(name, scene)
             if lines is not None:
@@ -192,12 +196,18 @@ def _replay(reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None,
     return done
 
 
-def _warm_up(reader: SessionReader, pipeline: Pipeline) -> None:
+def _was_stream(manifest: Manifest | None) -> bool:
+    """Whether the frames follow each other; the pictures of a folder have nothing to do with each other, and were perceived so."""
+    rig = manifest.config.get("rig") if manifest is not None else None
+    return not (isinstance(rig, dict) and rig.get("camera") == "image_folder")
+
+
+def _warm_up(reader: SessionReader, pipeline: Pipeline, perceive: Perceive) -> None:
     """The first picture waits for the network's first run, which would spoil the latency."""
     pipeline.warm_up()
     frame = reader.frame(0) if len(reader) else None
     if frame is not None:
-        pipeline(frame)
+        perceive(frame)
     pipeline.reset()
 
 

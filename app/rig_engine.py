@@ -41,10 +41,12 @@ class RigEngine(Engine):
         self._network, self._knows_past = network, knows_past
 
     def set_perception(self, config: PerceptionConfig) -> bool:
-        """Perceive under other thresholds from the next frame on; from any thread. False without a network."""
+        """Perceive under other thresholds from the next frame on, with the same head; from any thread. False without a network."""
         if self._network is None:
             return False
-        changed = self._network.with_config(config)
+        changed, running = self._network.with_config(config), self._perceive
+        if isinstance(running, Pipeline):
+            changed.follow_on(running)
         self._perceive = changed if self._knows_past else changed.perceive_single
         return True
 

@@ -58,7 +58,7 @@ class FrameReports:
         return self._landmarks.drift_px(frame.image, frame.captured_s, scene.scale)
 
     def _route(self, scene: Scene, has_target: bool) -> RouteState:
-        if not has_target or scene.route is None:
+        if not has_target or scene.route is None or scene.pose is None:  # where a refused head lies, the way says nothing
             return RouteState.NONE
         way = look_ahead(scene, self._config.look_ahead_px, self._config)
         behind = way is not None and way.behind

@@ -15,8 +15,8 @@ from core.types import Mask, Masks, Point, Points, RobotPath, VesselGraph
 END_PART_PX = 20.0
 """How much of each end is compared for thickness."""
 STILL_HEAD_PX = 15.0
-"""An end this near to the last frame's head is that head, also where it has just reached the image border, if the robot's other
-end lies at an end of the vessel."""
+"""An end this near to the last frame's head is that head, also where it has just reached the image border, if it was seen to come
+there from within the picture, or the robot's other end lies at an end of the vessel."""
 ALONG_PX, ALONG_STEP_PX, ALONG_SHARE = 30.0, 10.0, 0.5
 """A robot lies along an earlier path if so much of the shorter of both is no farther from it than a lumen is wide."""
 NEAR_PX = 20
@@ -29,7 +29,11 @@ NEARER_BY = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """What tells tail from head, besides the path itself. ``earlier`` is the path from before a gap in a stream, or None."""
+    """What tells tail from head, besides the path itself.
+
+    ``earlier`` is the path from before a gap in a stream, or None. ``came_from_within``: the head of ``previous`` or ``earlier``
+    was seen well within the picture before it was where it is.
+    """
 
     masks: Masks
     previous: RobotPath | None
@@ -37,6 +41,7 @@ class Surroundings:
     port: Point | None
     config: PathConfig
     earlier: RobotPath | None = None
+    came_from_within: bool = False
 
 
 def is_entry(place: Points, around: Surroundings) -> bool:
@@ -85,7 +90,7 @@ def tail_first(points: Points, around: Surroundings) -> Points:
 def _entry(points: Points, around: Surroundings) -> float:
     before = around.previous or around.earlier
     arrived = before is not None and float(np.hypot(*(points[0] - before.points[-1]))) <= STILL_HEAD_PX
-    if arrived and is_at_vessel_end(points[-1], around):
+    if arrived and (around.came_from_within or is_at_vessel_end(points[-1], around)):
         return 0.0
     if not is_entry(points[0], around):
         return 0.0

@@ -49,6 +49,14 @@ class Lookalikes:
         """Another stream, or another place of the camera."""
         self._begin((0, 0))
 
+    def doubt(self) -> None:
+        """The robot's end has jumped: what has stayed beside it until now shall be seen to stay anew.
+
+        What is known already is none for as long as the picture there is as it was, and not one of a camera that was moved.
+        """
+        self._end = None
+        self._seen_s[~self._known] = -math.inf
+
     def _begin(self, shape: tuple[int, ...]) -> None:
         self._last_s = -math.inf
         self.none: Mask | None = None

@@ -69,11 +69,12 @@ _EDGE_PX = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Before:
-    """The path of the last frame, or, after a gap, the one that still tells which end is the head; and which pixels (h, w) of this
-    frame are known to be no robot."""
+    """The path of the last frame, or, after a gap, the one that still tells which end is the head; whether that head came to where
+    it is from within the picture; and which pixels (h, w) of this frame are known to be no robot."""
 
     path: RobotPath | None = None
     ends: RobotPath | None = None
+    came_from_within: bool = False
     none: Mask | None = None
 
 
@@ -90,7 +91,12 @@ class _Past:
 
     def recall(self, captured_s: float) -> _Before:
         memory, config = self.memory, self._config
-        return _Before(recall(memory, captured_s, config), recall_ends(memory, captured_s, config), self.lookalikes.none)
+        return _Before(
+            recall(memory, captured_s, config),
+            recall_ends(memory, captured_s, config),
+            memory is not None and memory.came_from_within,
+            self.lookalikes.none,
+        )
 
     def forget(self) -> None:
         self.memory, self.unlike = None, False
@@ -145,6 +151,14 @@ class Pipeline:
             swings=stream.swings,
         )
 
+    def follow_on(self, before: Pipeline) -> None:
+        """Go on with the stream that `before` perceives, under other thresholds; may be asked while it does.
+
+        Which end of the robot is the head does not hang on them, and one picture alone may not tell it. All else begins anew.
+        """
+        if before._config.working_size_px == self._config.working_size_px:
+            self._past.memory, self._shape = before._past.memory, before._shape
+
     def warm_up(self) -> None:
         """Compile the networks for a stream of 4:3 pictures. Else the first pictures wait for it, up to a second each."""
         side, window = self._config.working_size_px, self._config.tracking.window_px
@@ -186,9 +200,10 @@ class Pipeline:
                 past.lookalikes.learn(scene.path, frame.captured_s)
                 refusal = check_in_view(past.memory, self._config)
             else:
-                past.lookalikes.forget()  # the camera was moved, perhaps
+                past.lookalikes.doubt()  # the camera was moved, perhaps; or it is one bad frame
             if refusal is not None:
                 scene = replace(scene, pose=None, refusal=refusal)
+        past.routes.settle(is_believed=scene.pose is not None)
         if self._glance is not None:
             past.glances.remember(scene)
         return watch.finish(replace(scene, pose=self._states.update(scene.pose, scene.captured_s)))
@@ -295,7 +310,16 @@ class Pipeline:
         assert skeletons is not None
         assert graph is not None
         with watch.stage("path"):
-            path = robot_path.find(skeletons, found, config, before.path, graph, _port(config.path, image), before.ends)
+            path = robot_path.find(
+                skeletons,
+                found,
+                config,
+                before.path,
+                graph,
+                _port(config.path, image),
+                before.ends,
+                came_from_within=before.came_from_within,
+            )
         if isinstance(path, Refusal):
             return replace(scene, refusal=path)
         with watch.stage("pose"):

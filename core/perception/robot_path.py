@@ -43,6 +43,8 @@ def find(
     vessel: VesselGraph | None = None,
     port: Point | None = None,
     earlier: RobotPath | None = None,
+    *,
+    came_from_within: bool = False,
 ) -> RobotPath | Refusal:
     """The robot's path, tail -> head, or why there is none.
 
@@ -59,6 +61,7 @@ def find(
     vessel : the vessel graph; its ends tell tail from head where the image border does not.
     port : where the robot is inserted, if known.
     earlier : in a stream, the path from before a gap; it says nothing but which end is the head.
+    came_from_within : the head of one of these was seen well within the picture: at the image border it is no entry.
 
     Returns
     -------
@@ -75,7 +78,7 @@ def find(
     pieces = find_pieces(graph, masks.vessel)
     if not pieces:
         return Refusal(Reason.TOO_SHORT, f"{total_px:.0f} px long (at least {config.path.min_length_px:.0f} px)")
-    around = Surroundings(masks, previous, vessel, port, config.path, earlier)
+    around = Surroundings(masks, previous, vessel, port, config.path, earlier, came_from_within)
     pieces = without_reflections(graph, pieces, around, config)
     refusal = check_pieces(graph, pieces, config)
     if refusal is not None:

@@ -27,6 +27,8 @@ class _Seen:
 class RouteMemory:
     """The last route that was found, for as long as the destination stays the same.
 
+    Of a frame that was not believed nothing stays (``settle``): its route began at a head that was somewhere else.
+
     The phantom stands still, but a fitting or a reflection can cut the mask of the vessel in two, in one frame and not in the next,
     or join two vessels. The route of before then still holds if it has lasted for ``memory_s``, the head is beside it, and the
     vessel is still where it leads, but for a short gap. Another way, longer or shorter, is taken once it has lasted as long.
@@ -40,6 +42,13 @@ class RouteMemory:
         """Another stream, or no destination any more."""
         self._known: _Seen | None = None
         self._other: _Seen | None = None
+        self._settled: tuple[_Seen | None, _Seen | None] = (None, None)
+
+    def settle(self, *, is_believed: bool) -> None:
+        """The end of a frame, whether or not ``follow`` was asked in it: keep what it found, or what was known before it."""
+        if not is_believed:
+            self._known, self._other = self._settled
+        self._settled = self._known, self._other
 
     def follow(self, found: Route | str, head: Point, target: Point, vessel: Mask, captured_s: float) -> Route | str:
         """The route that was found, or what is left of the one remembered, or why there is none.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.config import PerceptionConfig, TrackingConfig
-from core.perception.entry import may_go_on_outside
-from core.types import Mask, Reason, Refusal, RobotPath
+from core.perception.entry import STILL_HEAD_PX, may_go_on_outside
+from core.types import Mask, Points, Reason, Refusal, RobotPath
 
 SLACK_PX = 12.0
 """A still head may be found this far off from frame to frame: noise of the mask's tip."""
@@ -19,6 +19,8 @@ HEAD_AT_BORDER_S = 0.3
 HEAD_BACK_S = 0.08
 """The end of a mask that runs out of the picture comes and goes with the noise: a head that was there is back once it has been
 clear of the border for so long, and not in a single frame."""
+WITHIN_PX = 40.0
+"""An end so far from the image border is not one that the border has just not been seen to reach."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,13 +28,15 @@ class Memory:
     """The last path that was believed, and when its frame was captured.
 
     ``border_s``: since when the robot's mask has met the image border at its head, but for moments; None where it does not.
-    ``clear_s``: the first frame of such a moment, while it lasts.
+    ``clear_s``: the first frame of such a moment, while it lasts. ``came_from_within``: the same head was seen well within the
+    picture before; one that never was may be an entry at which the robot was not seen to meet the border.
     """
 
     path: RobotPath
     captured_s: float
     border_s: float | None = None
     clear_s: float | None = None
+    came_from_within: bool = False
 
 
 def recall(memory: Memory | None, captured_s: float, config: TrackingConfig) -> RobotPath | None:
@@ -72,12 +76,28 @@ def remember(path: RobotPath, mask: Mask, memory: Memory | None, captured_s: flo
     """A path that was believed, found in the robot's mask (h, w), beside what is remembered of the frames before."""
     is_known = memory is not None and recall(memory, captured_s, config.tracking) is not None
     border_s, clear_s = (memory.border_s, memory.clear_s) if memory is not None and is_known else (None, None)
+    came = _is_within(path.points[-1], mask.shape) or _came_before(path, memory, captured_s, config.tracking)
     if may_go_on_outside(path.points[-1], mask, config.path):
-        return Memory(path, captured_s, captured_s if border_s is None else border_s)
+        return Memory(path, captured_s, captured_s if border_s is None else border_s, came_from_within=came)
     clear_s = captured_s if clear_s is None else clear_s
     if border_s is None or captured_s - clear_s >= HEAD_BACK_S:
-        return Memory(path, captured_s)
-    return Memory(path, captured_s, border_s, clear_s)
+        return Memory(path, captured_s, came_from_within=came)
+    return Memory(path, captured_s, border_s, clear_s, came)
+
+
+def _is_within(place: Points, shape: tuple[int, ...]) -> bool:
+    """Whether a place (2,) is well within a picture of `shape` (h, w)."""
+    x, y = float(place[0]), float(place[1])
+    return min(x, y, shape[1] - 1 - x, shape[0] - 1 - y) >= WITHIN_PX
+
+
+def _came_before(path: RobotPath, memory: Memory | None, captured_s: float, config: TrackingConfig) -> bool:
+    """Whether the head of a path is the remembered one, which came from within the picture."""
+    if recall(memory, captured_s, config) is None:  # one that lies elsewhere after a gap was judged by itself
+        before = recall_ends(memory, captured_s, config)
+        if before is None or float(np.hypot(*(path.points[-1] - before.points[-1]))) > STILL_HEAD_PX:
+            return False
+    return memory is not None and memory.came_from_within
 
 
 def check_in_view(memory: Memory, config: PerceptionConfig) -> Refusal | None:

@@ -19,15 +19,16 @@ import pytest
 
 from app.replay_command import run_replay
 from app.replay_figure import draw_replay
-from app.replay_session import ReplayOptions, change_to_json, model_note, replay_config
+from app.replay_session import ReplayOptions, change_to_json, model_note, replay_config, replay_frames
 from app.replayed import Replayed
-from core.config import Config
+from core.config import Config, RigConfig
 from core.errors import UserError
 from core.names import name_of
-from core.session.manifest import read_manifest
+from core.session.manifest import MANIFEST, read_manifest
+from core.session.reader import SessionReader
 from core.study.replay import Change, Seen
 from core.study.replay_tally import Tally
-from core.types import PoseState, Reason
+from core.types import Frame, Point, PoseState, Reason, Refusal, Scene
 from tests.app.golden_session import COUNT, GOLDEN, TRUTH
 from tests.core.session_data import record, tick_of
 
@@ -163,6 +164,44 @@ def test_lost_pictures_are_counted_and_the_rest_goes_on(tmp_path: Path, capsys: 
     frames = [json.loads(line) for line in (out / "frames.jsonl").read_text().splitlines()]
     assert [frame["row"] for frame in frames] == [0, 2], "as in the session, so that other tables of it can be joined"
     assert any("line 2" in problem for problem in told["problems"])
+
+
+class _Asked:
+    """A pipeline that counts how it was asked."""
+
+    def __init__(self) -> None:
+        self.as_stream = self.alone = 0
+
+    def __call__(self, frame: Frame, target: Point | None = None) -> Scene:
+        self.as_stream += 1
+        return Scene(frame.index, frame.captured_s, (1, 1), 1.0, refusal=Refusal(Reason.NO_ROBOT))
+
+    def perceive_single(self, frame: Frame, target: Point | None = None) -> Scene:
+        scene = self(frame, target)
+        self.as_stream, self.alone = self.as_stream - 1, self.alone + 1
+        return scene
+
+    def warm_up(self) -> None: ...
+
+    def reset(self) -> None: ...
+
+
+@pytest.mark.parametrize(("camera", "is_stream"), [("webcam", True), ("image_folder", False)])
+def test_pictures_that_had_nothing_to_do_with_each_other_are_perceived_so_again(
+    tmp_path: Path, camera: str, is_stream: bool
+) -> None:
+    """As a stream, a picture's robot would be judged by that of the picture before: its head, its state, whether it jumped."""
+    session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(3)])
+    path = session / MANIFEST
+    manifest = json.loads(path.read_text())
+    manifest["config"] = Config(rig=RigConfig(camera=camera, source="pictures")).model_dump(mode="json")  # type: ignore[arg-type]
+    path.write_text(json.dumps(manifest))
+    pipeline = _Asked()
+    with SessionReader(session) as reader:
+        reader.wait()
+        assert len(replay_frames(reader, pipeline).changes) == 3  # type: ignore[arg-type]
+    warm_up = 1
+    assert (pipeline.as_stream, pipeline.alone) == ((3 + warm_up, 0) if is_stream else (0, 3 + warm_up))
 
 
 def test_a_session_without_pictures_is_refused_by_name(tmp_path: Path) -> None:

@@ -11,19 +11,21 @@ import pytest
 from app import rig_engine
 from app.rig_engine import EngineMaker, RigEngine
 from core.calibration_config import CalibrationConfig, ScaleConfig
-from core.config import Config, PerceptionConfig
+from core.config import Config, PerceptionConfig, PoseConfig
 from core.control.engine import Perceive
 from core.control.faults import Cause, Fault
 from core.control.health import ModelReport
 from core.control.modes import Act, Mode
 from core.control.policies import Policy, make_policy
 from core.devices import DeviceError
+from core.perception.pipeline import Pipeline
 from core.policy_config import PolicyName
 from core.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.types import Frame, Point, Reason, Refusal, Scene
 from hardware.rig import Rig, RigKind
 from tests.core.pilot_bench import Robot
 from tests.core.test_control import _Camera
+from tests.core.test_pipeline import DrawnNetwork, _draw_tapered, frame
 
 
 class _Maker(EngineMaker):
@@ -106,6 +108,32 @@ def test_the_policy_and_the_watch_over_stalls_use_the_rigs_own_scale(monkeypatch
     told.append(engine.pilot._config.policy.pursuit.pixels_per_mm)
     engine.close()
     assert told == [pytest.approx(2.5)] * 2
+
+
+class _Grey(_Camera):
+    """Pictures that are neither black nor white."""
+
+    def read(self, timeout_s: float) -> Frame | None:
+        given = super().read(timeout_s)
+        return frame(given.captured_s) if given is not None else None
+
+
+@pytest.mark.parametrize(("knows_past", "head_x"), [(True, 424.0), (False, 190.0)])
+def test_other_thresholds_do_not_turn_the_robot_about(knows_past: bool, head_x: float) -> None:
+    """The second picture by itself shows the robot the other way round; pictures without a past have no head to go on with."""
+    network = DrawnNetwork()
+    pipeline = Pipeline(network, PerceptionConfig())
+    rig = Rig("drawn", RigKind.LIVE, _Grey([0, 1]), None)
+    engine = RigEngine(rig, pipeline if knows_past else pipeline.perceive_single, Config(), ModelReport(True))
+    engine.use_network(pipeline, knows_past=knows_past)
+    _draw_tapered(network, 180.0, 420.0, thick="left")
+    first = engine.step(0.0)
+    assert engine.set_perception(PerceptionConfig(pose=PoseConfig(d_allow_px=9.0)))
+    _draw_tapered(network, 190.0, 424.0, thick="right")
+    second = engine.step(0.0)
+    engine.close()
+    found = [tick.scene.path.head[0] for tick in (first, second) if tick is not None and tick.scene.path is not None]
+    assert found == [pytest.approx(420.0, abs=3.0), pytest.approx(head_x, abs=3.0)]
 
 
 def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, monkeypatch: pytest.MonkeyPatch) -> None:

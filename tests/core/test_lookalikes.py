@@ -164,6 +164,27 @@ def test_a_camera_that_was_moved_hides_no_tip(stream: Stream) -> None:
     assert np.array_equal(left, moved)
 
 
+@pytest.mark.parametrize("is_doubted", [True, False])
+def test_an_end_that_jumped_teaches_nothing(stream: Stream, is_doubted: bool) -> None:
+    """A camera that was moved along the robot, over a board of one colour: nobody else sees it."""
+    stream.board[:] = 150.0
+    mask, moved = _stretch((0, 200), (255, 300)), _stretch((0, 236), (291, 336))
+    for _ in range(10):
+        stream.see(mask, 200, image=stream.image((0, 300)))
+    for step in range(30):
+        left = stream.see(moved, 236 if step > 15 else None, image=stream.image((0, 336)))
+        if step <= 15 and is_doubted:
+            stream.lookalikes.doubt()
+    assert np.array_equal(left, moved) is is_doubted
+
+
+def test_what_is_known_to_be_none_is_so_after_an_end_that_jumped(stream: Stream) -> None:
+    stream.advance(100, 160, TEXT)
+    stream.see(_stretch((0, 60), TEXT), None)
+    stream.lookalikes.doubt()
+    assert np.array_equal(stream.see(_stretch((0, 161), TEXT), 161), _stretch((0, 161)))
+
+
 def test_a_part_that_was_robot_is_robot_for_as_long_as_it_is_seen(stream: Stream) -> None:
     """The robot rests, and glare cuts its tip off for half a minute. Then the glare's edge creeps along the body."""
     stream.advance(240, 300)

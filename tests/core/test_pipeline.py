@@ -272,6 +272,29 @@ def test_a_head_that_has_left_the_picture_is_refused_within_half_a_second_until_
     assert all(answered[-3:])
 
 
+@pytest.mark.parametrize("lost_s", [0.0, 1.0])  # frames without an answer while the head is out of the picture
+def test_a_robot_that_comes_out_of_a_sheath_and_leaves_the_picture_is_not_turned_about(
+    pipeline: Pipeline, network: DrawnNetwork, lost_s: float
+) -> None:
+    """Its tail lies where the sheath ends, in the middle of a vessel; its head was seen to go to the image border."""
+    robot = VESSEL[VESSEL[:, 0] >= 70.0] + [0.0, 3.0]
+    heads = [*range(560, 680, 8), *[680] * 60, *range(660, 560, -8)]
+    lost = range(30, 30 + round(20 * lost_s))
+    answered = []
+    for step, head_x in enumerate(heads):
+        network.draw(*([robot[robot[:, 0] <= head_x]] if step not in lost else []))
+        scene = pipeline(frame(0.05 * step))
+        answered.append(scene.pose is not None)
+        if scene.pose is not None:
+            assert scene.path is not None
+            assert scene.path.head[0] == pytest.approx(min(head_x, SIZE[0] - 1), abs=3.0), "the tail was never taken for it"
+    arrived = next(index for index, head_x in enumerate(heads) if head_x > SIZE[0])
+    assert all(answered[: arrived + 4])
+    assert not any(answered[arrived + 10 : 30])
+    assert not any(answered[65:75])
+    assert all(answered[-3:])
+
+
 def _draw_tapered(network: DrawnNetwork, left_x: float, right_x: float, *, thick: str) -> None:
     """A robot both of whose ends lie in the picture, thicker at one of them: by itself that one is taken for the tail."""
     line = VESSEL[(VESSEL[:, 0] >= left_x) & (VESSEL[:, 0] <= right_x)]
@@ -434,6 +457,27 @@ def test_in_a_stream_a_way_that_was_seen_holds_over_a_gap(pipeline: Pipeline, ne
     assert pipeline(frame(1.0 + 4 * FRAME_S), target).route is None, "it was seen for one frame only"
 
 
+@pytest.mark.parametrize("wrong", ["a jump", "not believed"])
+def test_in_a_stream_a_frame_that_is_refused_does_not_undo_the_way_that_was_seen(
+    pipeline: Pipeline, network: DrawnNetwork, wrong: str
+) -> None:
+    """What makes a head jump for a frame, a reflection, cuts the vessel or joins two of them in the same moment."""
+    target, whole = (560.0, 246.0), network.vessel
+    for step in range(20):
+        first = pipeline(frame(step * FRAME_S), target)
+    assert first.route is not None
+    network.draw_up_to(450 if wrong == "a jump" else 320)
+    if wrong == "not believed":
+        network.vessel = cv2.GaussianBlur(whole, (0, 0), 7.0)
+    refused = pipeline(frame(20 * FRAME_S), target)
+    assert reason(refused) is (Reason.HEAD_JUMP if wrong == "a jump" else Reason.NO_VESSEL)
+    network.draw_up_to(300)
+    network.vessel = _cut_at(whole, 440, 465)
+    later = pipeline(frame(21 * FRAME_S), target)
+    assert later.route is not None
+    assert later.route.length_px == pytest.approx(first.route.length_px, abs=6.0)
+
+
 def test_no_way_is_remembered_once_the_destination_was_taken_back(pipeline: Pipeline, network: DrawnNetwork) -> None:
     target, whole = (560.0, 246.0), network.vessel
     assert pipeline(frame(), target).route is not None
@@ -576,6 +620,23 @@ def test_other_thresholds_act_with_the_same_networks_and_no_memory(pipeline: Pip
     assert other.engine == pipeline.engine
 
 
+@pytest.mark.parametrize("change", ["none", "picture size", "working size"])
+def test_a_stream_goes_on_under_other_thresholds_with_the_same_head(pipeline: Pipeline, network: DrawnNetwork, change: str) -> None:
+    """What lies in other pixels is not known any more."""
+    _draw_tapered(network, 180.0, 420.0, thick="left")
+    assert pipeline(frame(0.0)).pose is not None
+    other = CONFIG.model_copy(update={"pose": CONFIG.pose.model_copy(update={"d_allow_px": 9.0})})
+    if change == "working size":
+        other = other.model_copy(update={"working_size_px": 704})
+    after = pipeline.with_config(other)
+    after.follow_on(pipeline)
+    _draw_tapered(network, 190.0, 424.0, thick="right")
+    scene = after(frame(FRAME_S, size=(1280, 960) if change == "picture size" else SIZE))
+    assert scene.path is not None
+    head_x = scene.to_source(scene.path.head)[0] * SIZE[0] / scene.source_size[0]
+    assert head_x == pytest.approx(424.0 if change == "none" else 190.0, abs=3.0)
+
+
 @pytest.mark.parametrize("size", [SIZE, (1280, 960)])
 @pytest.mark.parametrize(("port_x", "head_x"), [(150.0, 450.0), (450.0, 150.0)])
 def test_the_end_at_the_insertion_port_is_the_tail(
@@ -611,3 +672,18 @@ def test_in_a_stream_text_beneath_the_vessel_does_not_become_the_robots_end(netw
             refused[lookalike_px] += scene.pose is None or scene.path is None or abs(scene.path.head[0] - x) > 5.0
     assert refused[0.0] > 10
     assert refused[CONFIG.tracking.lookalike_px] == 0
+
+
+def test_in_a_stream_one_bad_frame_does_not_make_text_the_robots_end(pipeline: Pipeline, network: DrawnNetwork) -> None:
+    """A reflection cuts the robot short, when it has come so near to the text that nobody could tell it any more."""
+    text = VESSEL[(VESSEL[:, 0] >= 420) & (VESSEL[:, 0] <= 450)]
+    for k, x in enumerate([*range(270, 416, 5), *[415] * 30]):
+        is_cut = k == 28
+        network.draw(VESSEL[VESSEL[:, 0] <= (x - 100 if is_cut else x)], text)
+        scene = pipeline(frame(k * FRAME_S))
+        if is_cut:
+            assert reason(scene) is Reason.HEAD_JUMP
+        elif x > 340:
+            assert scene.pose is not None
+            assert scene.path is not None
+            assert scene.path.head[0] == pytest.approx(x, abs=5.0)

@@ -429,6 +429,19 @@ def test_another_destination_is_looked_at_anew() -> None:
     assert routes == [RouteState.READY, RouteState.BEHIND, RouteState.READY]
 
 
+def test_a_frame_that_is_refused_says_nothing_of_where_the_destination_lies() -> None:
+    """With a way, but without an answer: as the first look at it, or for as long as another one would need to count."""
+    reports = FrameReports(PursuitConfig(behind_s=0.3))
+    image = np.zeros((480, 640, 3), np.uint8)
+    told = []
+    for index, is_refused in enumerate([True, False, *[True] * 5, False, False]):
+        scene = scene_at(STRAIGHT, (100, 100), (380, 100), 180, 0.1 * index)
+        if is_refused:
+            scene = replace(scene, pose=None, refusal=Refusal(Reason.LOW_CONFIDENCE))
+        told.append(reports.report(Frame(index, 0.1 * index, image), scene, None, has_target=True).route)
+    assert told == [RouteState.NONE, RouteState.BEHIND, *[RouteState.NONE] * 5, RouteState.BEHIND, RouteState.BEHIND]
+
+
 def test_braking_begins_before_the_target_counts_as_reached() -> None:
     with pytest.raises(ValueError, match="brake_px must be above arrive_px"):
         PursuitConfig(brake_px=8.0, arrive_px=8.0)

@@ -271,6 +271,20 @@ def test_a_head_that_has_met_the_border_for_longer_than_a_moment_may_be_out_of_v
     assert check_in_view(Memory(path(outside), 9.0, 5.0), PerceptionConfig(quality=QualityConfig(enabled=False))) is None
 
 
+def test_only_a_head_that_was_seen_well_within_the_picture_came_from_there() -> None:
+    within, beside, border = (np.array([[300.0, 240.0], [tip, 240.0]]) for tip in (580.0, 630.0, 639.0))
+    mask = probability(depth(border, 4.0)) >= 0.5
+    memory: Memory | None = None
+    told = []
+    seen = ((0.0, beside), (0.1, border), (0.2, within), (0.3, beside), (0.4, border), (2.0, border), (4.0, within[::-1]))
+    for at_s, line in seen:
+        memory = remember(path(line), mask, memory, at_s, CONFIG)
+        told.append(memory.came_from_within)
+    assert told == [False, False, True, True, True, True, True], "also over a gap, where it is the same one"
+    assert not remember(path(beside[::-1] + [327.0, 0.0]), mask, memory, 6.0, CONFIG).came_from_within, "another one may be none"
+    assert not remember(path(border), mask, memory, 20.0, CONFIG).came_from_within
+
+
 @pytest.mark.parametrize("frame_s", [1 / 30, 0.05, 0.2])
 def test_a_mask_that_flickers_at_the_border_shows_no_head(frame_s: float) -> None:
     """Its end is cut off in single frames: the head is where it was, out of view or at the border, and does not come and go."""

@@ -109,6 +109,24 @@ def test_at_its_end_the_destination_is_reached(memory: RouteMemory) -> None:
     assert left.points == pytest.approx(np.array([TARGET]))
 
 
+def test_what_a_frame_found_that_was_not_believed_is_not_kept(memory: RouteMemory) -> None:
+    memory.settle(is_believed=True)
+    elsewhere = Route(np.linspace((120.0, 190.0), TARGET, 50), 280.0, TARGET)
+    assert memory.follow(elsewhere, (120.0, 190.0), TARGET, _vessel(), 0.1) is elsewhere, "it is shown"
+    memory.settle(is_believed=False)
+    memory.settle(is_believed=False)  # a frame in which nobody asked for a way
+    left = memory.follow(WHY, (120.0, 100.0), TARGET, _vessel((200, 235)), 0.2)
+    assert isinstance(left, Route)
+    assert left.length_px == pytest.approx(260.0, abs=2.0)
+
+
+def test_a_way_that_was_forgotten_does_not_come_back_with_a_frame_that_was_not_believed(memory: RouteMemory) -> None:
+    memory.settle(is_believed=True)
+    assert memory.follow(WHY, (120.0, 100.0), (300.0, 100.0), _vessel(), 0.1) == WHY, "another destination"
+    memory.settle(is_believed=False)
+    assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel((200, 212)), 0.2) == WHY
+
+
 def test_forgotten_is_forgotten(memory: RouteMemory) -> None:
     memory.forget()
     assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel(), 0.0) == WHY
