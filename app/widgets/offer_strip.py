@@ -206,7 +206,7 @@ class OfferStrip(QFrame):
 
 
 class _AnswerButton(QPushButton):
-    """The second half of a double click is no answer: by then it may lie under the pointer for another offer, that nobody has read."""
+    """The second half of a double click is no answer: by then the button may be another offer's, which nobody has read."""
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         event.accept()
