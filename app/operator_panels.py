@@ -79,7 +79,7 @@ class OperatorPanels(ScenePanels):
         self._beside: tuple[Tick, float] | None = None
         self._standing = ""
         left = holder(column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0), (self.mode_bar, 0)))
-        self.help = operator_help(self._lay_out(self._header(), left, self._right_side()))
+        self.help = operator_help(self._lay_out(self._header(), left, self._right_side()), self.mode_bar)
 
     def show_kind(self, kind: RigKind, *, has_servos: bool) -> None:
         """Another rig is being opened: what the banner says, and whether there are phantoms to choose."""
