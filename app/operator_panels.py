@@ -17,7 +17,7 @@ from app.next_step import Undriven
 from app.pace import Pace
 from app.panel_layout import card_note, column, holder, row
 from app.scene_panels import ScenePanels
-from app.servo_cells import known_joints
+from app.servo_cells import known_joints, status_by_servos
 from app.widgets.alert_strip import AlertStrip
 from app.widgets.card import Card
 from app.widgets.command_panel import CommandPanel
@@ -78,8 +78,9 @@ class OperatorPanels(ScenePanels):
         self._blanked = ""
         self._beside: tuple[Tick, float] | None = None
         self._standing = ""
+        self._has_picture = False
         left = holder(column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0), (self.mode_bar, 0)))
-        self.help = operator_help(self._lay_out(self._header(), left, self._right_side()))
+        self.help = operator_help(self._lay_out(self._header(), left, self._right_side()), self.mode_bar)
 
     def show_kind(self, kind: RigKind, *, has_servos: bool) -> None:
         """Another rig is being opened: what the banner says, and whether there are phantoms to choose."""
@@ -130,6 +131,8 @@ class OperatorPanels(ScenePanels):
         why_still = tr("This rig has no robot") if why_not is Undriven.NO_ROBOT else self._standing
         self.jog.set_enabled(view is not None, "" if view is not None else why_still)
         self.jog.show_known(known_joints(bus, time.monotonic()))
+        if not self._has_picture:  # who has a robot in a vessel brings it back by hand, and must see how far
+            self.jog.show_status(status_by_servos(bus))
         self.servos.show_status(bus, self._servo_config)
         self.commands.show_view(view, bus)
 
@@ -156,6 +159,7 @@ class OperatorPanels(ScenePanels):
         if self._beside is None:
             return
         (tick, max_block_ms), self._beside = self._beside, None
+        self._has_picture = True
         scene = tick.scene
         renew_text = self._renews_text(scene)
         self.badge.show_scene(scene, renew_text=renew_text)
@@ -169,6 +173,7 @@ class OperatorPanels(ScenePanels):
     def blank(self, title: str, why: str) -> None:
         """Show nothing that was understood of an older picture, and say why."""
         self._beside = None
+        self._has_picture = False
         self.live.blank_overlays()
         self._blank_dials(title, why)
 
@@ -194,7 +199,6 @@ class OperatorPanels(ScenePanels):
         self.blank(tr("No new picture"), told or tr("Check the camera; F5 starts the rig again"))
         self.performance.clear()
         self.trends.show_silence(age_s)
-        self.jog.show_status(None)
         title = tr("No new picture for {seconds:.0f} s", seconds=age_s)
         detail = told or tr("The camera or the program is behind")
         self._warn(title, detail, restartable=problem is not None)

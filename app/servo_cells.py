@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from app.cells import NONE, SIGN, Cell, Row, Tone, Track, number
 from app.language import mark, tr, tr_text
 from core.safety_config import SafetyConfig
-from core.servo_config import JointConfig, JointName, ServosConfig
+from core.servo_config import JOINT_NAMES, JointConfig, JointName, ServosConfig
+from core.types import RobotStatus
 from hardware.servos.status_block import HardwareError, MissingServo, ServoReading, ServoState
 from hardware.servos.units import wire_force_mn
 
@@ -83,6 +84,18 @@ def known_joints(status: BusStatus | None, now_s: float) -> tuple[bool, ...]:
     if not status.servos or now_s - status.time_s > SILENT_AFTER_S:
         return (False,) * 7
     return tuple(zeroed and isinstance(reading, ServoState) for reading, zeroed in zip(status.servos, status.zeroed, strict=True))
+
+
+def status_by_servos(status: BusStatus | None) -> RobotStatus | None:
+    """Where the robot is by its servos alone, for while no picture brings its status along; None when not all of them answer.
+
+    What it says of a joint that is not zeroed is nothing that is known: see ``known_joints``.
+    """
+    states = [reading for reading in status.servos if isinstance(reading, ServoState)] if status is not None else []
+    if status is None or len(states) != len(JOINT_NAMES):
+        return None
+    right, left, up, down, advance, first, second = (state.position_mm or 0.0 for state in states)
+    return RobotStatus(status.time_s, advance, (first + second) / 2.0, (right, left, up, down), (0.0,) * 4)
 
 
 def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, servos: ServosConfig, safety: SafetyConfig) -> Row:

@@ -336,8 +336,10 @@ class SettingsDialog(QDialog):
             self.ask_to_leave()
 
     def _show_question(self, on: bool) -> None:
+        """In place of the state and of Cancel: the question has one of its own, which goes on with the dialog."""
         self.question.setVisible(on)
-        self.status.setVisible(not on)
+        for part in (self.status, self.reset_all, self.cancel):
+            part.setVisible(not on)
 
     # ---- places
 

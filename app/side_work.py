@@ -65,7 +65,7 @@ class SideWork(QObject):
             sessions_folder(window.config.record.folder), offers, Declined(state / "not_to_recover.json"), self
         )
         self.preflight = PreflightDesk(lambda: window.config, lambda: window.desk.view, self)
-        self.checks = PreflightList(self.preflight, window)
+        self.checks = PreflightList(self.preflight, window, window.panels.mode_bar.stop)
         self.models = ModelMenu(window, offers, self._model, self._against_another_model, self._cost_of_another_model, self.train)
         self.training: TrainingDialog | None = None
         self._saved: Path | None = None

@@ -32,6 +32,6 @@ def operator_keys(window: QMainWindow) -> Sequence[KeyTable]:
     return (*map(shown, (_HELD, _DRIVING)), *menu_tables(window), shown(_ELSE))
 
 
-def operator_help(parent: QWidget) -> KeyPage:
-    """The page of the operator window, over `parent`."""
-    return KeyPage(parent, operator_keys)
+def operator_help(parent: QWidget, above: QWidget) -> KeyPage:
+    """The page of the operator window, over `parent`; it ends above what the robot is stopped with."""
+    return KeyPage(parent, operator_keys, above)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QObject, QRectF, Qt
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetrics, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QMainWindow, QWidget
 
@@ -17,6 +17,7 @@ TablesOf = Callable[[QMainWindow], Sequence[KeyTable]]
 _MOST_WIDTH, _MOST_COLUMNS, _EDGE, _GUTTER = 1280, 4, 28, 22
 _TITLE, _HEAD, _ROW, _BETWEEN = 58.0, 29.0, 26.0, 10.0
 _LEAST_ROW = 16.0
+_CLEAR_PX = 4
 _KEYS_SHARE = 0.46
 
 
@@ -33,16 +34,20 @@ class KeyPage(QWidget):
     ----------
     parent : what it covers, a part of the window whose keys these are.
     tables_of : the tables in their order, of that window.
+    above : what the page ends above, a part of the parent that must stay in sight and in reach.
     """
 
-    def __init__(self, parent: QWidget, tables_of: TablesOf) -> None:
+    def __init__(self, parent: QWidget, tables_of: TablesOf, above: QWidget | None = None) -> None:
         super().__init__(parent)
         self._parent = parent
         self._tables_of = tables_of
+        self._above = above
         self._tables: tuple[KeyTable, ...] = ()
         self.hide()
         self.setAccessibleName(tr("Keys"))
         parent.installEventFilter(self)
+        if above is not None:
+            above.installEventFilter(self)
 
     @property
     def tables(self) -> tuple[KeyTable, ...]:
@@ -56,14 +61,20 @@ class KeyPage(QWidget):
             self._tables = tuple(self._tables_of(window))
             rows = (row for _, table in self._tables for row in table)
             self.setAccessibleDescription("; ".join(f"{key}: {text}" for key, text in rows))
-        self.setGeometry(self._parent.rect())
+        self.setGeometry(self._room())
         self.setVisible(not self.isVisible())
         self.raise_()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize:
-            self.setGeometry(self._parent.rect())
+        if event.type() in (QEvent.Type.Resize, QEvent.Type.Move):
+            self.setGeometry(self._room())
         return False
+
+    def _room(self) -> QRect:
+        room = self._parent.rect()
+        if self._above is not None:
+            room.setBottom(self._above.mapTo(self._parent, QPoint(0, 0)).y() - _CLEAR_PX)
+        return room
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.hide()

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from app import palette
@@ -166,7 +167,7 @@ class OfferStrip(QFrame):
         cross.setFixedWidth(30)
 
     def _add_button(self, name: str, meaning: str, is_main: bool) -> QPushButton:
-        button = QPushButton(name)
+        button = _AnswerButton(name)
         button.setStyleSheet(f"QPushButton {{ {_MAIN if is_main else _PLAIN} }} {_FOCUS}")
         button.setToolTip(meaning)
         button.setAccessibleDescription(meaning)
@@ -202,3 +203,10 @@ class OfferStrip(QFrame):
         height = max(48, layout.totalHeightForWidth(width) if layout.hasHeightForWidth() else self.sizeHint().height())
         self.setGeometry((room.width() - width) // 2, room.height() - height - _MARGIN_PX, width, height)
         self.lifted.emit(height + _MARGIN_PX)
+
+
+class _AnswerButton(QPushButton):
+    """The second half of a double click is no answer: by then the button may be another offer's, which nobody has read."""
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        event.accept()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
@@ -14,6 +14,8 @@ from app.widgets.signs import Sign, paint_sign
 from hardware.driving_checks import Level
 
 _SIZE = QSize(780, 560)
+_LEAST_PX, _ABOVE_PX, _TITLE_PX = 300, 8, 40
+"""The last one is what the desktop's title bar takes, about."""
 _RENEW_MS = 1000
 _TICK = QPolygonF([QPointF(4.0, 12.0), QPointF(9.0, 17.0), QPointF(18.0, 6.0)])
 _LOOK: dict[Level, tuple[Sign | None, str, str]] = {
@@ -49,13 +51,17 @@ class _Badge(QWidget):
 
 
 class PreflightList(QDialog):
-    """Shows what the desk knows. ``arm_asked`` is the operator's wish; nothing here decides."""
+    """Shows what the desk knows. ``arm_asked`` is the operator's wish; nothing here decides.
+
+    It opens above `kept_clear` (STOP) in its parent's window: it comes by itself, too, when arming is refused.
+    """
 
     arm_asked = Signal()
 
-    def __init__(self, desk: PreflightDesk, parent: QWidget | None = None) -> None:
+    def __init__(self, desk: PreflightDesk, parent: QWidget | None = None, kept_clear: QWidget | None = None) -> None:
         super().__init__(parent)
         self._desk = desk
+        self._kept_clear = kept_clear
         self._shown: tuple[Finding, ...] = ()
         self.setWindowTitle(tr("Before driving"))
         self.setModal(False)
@@ -119,9 +125,20 @@ class PreflightList(QDialog):
         """Show it, in front."""
         self.renew()
         self._timer.start()
+        if not self.isVisible():
+            self._stand_clear()
         self.show()
         self.raise_()
         self.activateWindow()
+
+    def _stand_clear(self) -> None:
+        window, clear = self.parentWidget(), self._kept_clear
+        if window is None or clear is None:
+            return
+        frame, bottom = window.frameGeometry(), clear.mapToGlobal(QPoint(0, 0)).y() - _ABOVE_PX
+        height = max(_LEAST_PX, min(_SIZE.height(), bottom - frame.top() - _TITLE_PX))
+        self.resize(_SIZE.width(), height)
+        self.move(frame.center().x() - _SIZE.width() // 2, min(frame.center().y() - height // 2, bottom - height - _TITLE_PX))
 
     def renew(self) -> None:
         """Show what is known now."""

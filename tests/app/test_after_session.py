@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QSize
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
@@ -140,6 +140,23 @@ def test_the_window_offers_it_when_a_recording_ends_and_takes_it_back_when_the_n
     running.recorder.toggle()
     until(qtbot, lambda: strip.text == "")
     side.close()
+
+
+def test_a_double_click_answers_one_offer_and_not_the_next_that_nobody_has_read(strip: OfferStrip, qtbot: QtBot) -> None:
+    from app.widgets.offer_strip import Answer, Offer  # what is offered
+
+    done: list[str] = []
+    for key in "ab":
+        strip.offer(Offer(key, f"Session {key}", answers=(Answer("Never ask again", lambda key=key: done.append(key)),)))
+    left = Qt.MouseButton.LeftButton
+    qtbot.mouseClick(strip.answers["Never ask again"], left)
+    assert strip.text == "Session b"
+    button = strip.answers["Never ask again"]
+    qtbot.mouseDClick(button, left)
+    qtbot.mouseRelease(button, left)
+    assert done == ["a"]
+    qtbot.mouseClick(button, left)
+    assert done == ["a", "b"]
 
 
 def test_the_strip_shows_one_offer_at_a_time_and_fits_a_small_picture(strip: OfferStrip, qtbot: QtBot, tmp_path: Path) -> None:

@@ -155,6 +155,25 @@ def test_the_keys_on_the_screen_work_wherever_those_of_the_keyboard_do(
     assert window.panels.jog.toolTip() == "Fault"
 
 
+def test_who_brings_the_robot_back_without_a_picture_sees_how_far_it_is_in(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    """By its servos, where they answer and are zeroed; else nobody knows."""
+    jog = running.panels.jog
+    until(qtbot, lambda: jog.readout.endswith("in 84 mm"))
+    engine.silent = True
+    until(qtbot, lambda: running.panels.badge.title == "No new picture")
+    until(qtbot, lambda: jog.readout == "bend –, pitch –, in – mm")
+    engine.bus_status = lambda: bus(time_s=time.monotonic())  # type: ignore[assignment,return-value]
+    until(qtbot, lambda: jog.readout == "bend 0.00, pitch 0.00, in 20 mm")
+    zeroed = (True, True, True, True, False, True, True)
+    engine.bus_status = lambda: bus(time_s=time.monotonic(), zeroed=zeroed)  # type: ignore[assignment,return-value]
+    until(qtbot, lambda: jog.readout == "bend 0.00, pitch 0.00, in – mm")
+    engine.bus_status = lambda: None  # type: ignore[assignment,return-value]
+    engine.silent = False
+    until(qtbot, lambda: jog.readout.endswith("in 84 mm"))
+
+
 def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
     engine = FakeEngine(bench)
     engine.pilot = None  # type: ignore[assignment]

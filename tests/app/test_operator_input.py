@@ -424,6 +424,24 @@ def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[
     assert running.panels.live.width() >= 0.5 * size[0]
 
 
+@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900)])
+def test_the_page_of_keys_leaves_stop_in_sight_and_in_reach(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, size: tuple[int, int]
+) -> None:
+    """F1 lies beside the keys that drive: the first click on STOP is a STOP also while the page is open."""
+    panels, stop = running.panels, running.panels.mode_bar.stop
+    qtbot.keyClick(running, Key.Key_F1)
+    running.resize(*size)
+    qtbot.wait(30)
+    assert panels.help.isVisible()
+    bar = panels.mode_bar
+    assert running.childAt(stop.mapTo(running, stop.rect().center())) is stop
+    assert panels.help.geometry().bottom() < bar.mapTo(panels.help.parentWidget(), bar.rect().topLeft()).y()
+    qtbot.mouseClick(running.windowHandle(), Qt.MouseButton.LeftButton, pos=stop.mapTo(running, stop.rect().center()))
+    assert engine.pilot.acts == [Act.STOP]
+    assert panels.help.isVisible()
+
+
 def test_a_screen_of_720_lines_is_enough(running: OperatorWindow, qtbot: QtBot) -> None:
     """In a low window the trends have a page of their own; the legend names only what is drawn."""
     assert running.minimumSizeHint().height() <= 660

@@ -114,9 +114,11 @@ def test_escape_asks_before_changes_are_lost(dialog: SettingsDialog) -> None:
     assert dialog.isVisible()
     assert dialog.question.text == "Leave without saving the changes?"
     assert not dialog.status.isVisible()
+    assert not dialog.cancel.isVisible(), "there is one Cancel, and it goes on"
     QTest.keyClick(dialog.question._no, Key.Key_Escape)
     assert dialog.question.text == ""
     assert dialog.status.isVisible()
+    assert dialog.cancel.isVisible()
     assert dialog.draft.is_dirty, "nothing was lost"
     QTest.keyClick(dialog, Key.Key_Escape)
     dialog.question._yes.click()
