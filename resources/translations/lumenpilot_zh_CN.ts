@@ -1897,6 +1897,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>disk nearly full: {left} MB left</source>
+        <translation>磁盘空间即将不足：剩余 {left} MB</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>{folder}: {a} GB free of {b} GB</source>
         <translation>{folder}：{b} GB 中剩余 {a} GB</translation>
     </message>
@@ -2717,6 +2722,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
+        <source>No rig is open</source>
+        <translation>没有打开的装置</translation>
+    </message>
+    <message>
+        <location filename="../../app/next_step.py"/>
+        <source>F5 opens it again</source>
+        <translation>按 F5 重新打开</translation>
+    </message>
+    <message>
+        <location filename="../../app/next_step.py"/>
         <source>hold {deadman} and press {again} to go on, or {back} to take back</source>
         <translation>按住 {deadman} 再按 {again} 继续，或按 {back} 收回控制</translation>
     </message>
@@ -2779,6 +2794,21 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/next_step.py"/>
         <source>The program may not be handed over to any more; you go on steering by hand</source>
         <translation>不再允许移交给程序；您继续手动操纵</translation>
+    </message>
+    <message>
+        <location filename="../../app/next_step.py"/>
+        <source>pictures only</source>
+        <translation>仅图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/next_step.py"/>
+        <source>waiting for the rig</source>
+        <translation>正在等待台架</translation>
+    </message>
+    <message>
+        <location filename="../../app/next_step.py"/>
+        <source>no rig is open</source>
+        <translation>没有打开的装置</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
@@ -2854,16 +2884,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/next_step.py"/>
         <source> (+{count} more)</source>
         <translation> （另有 {count} 项）</translation>
-    </message>
-    <message>
-        <location filename="../../app/next_step.py"/>
-        <source>pictures only</source>
-        <translation>仅图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/next_step.py"/>
-        <source>waiting for the rig</source>
-        <translation>正在等待台架</translation>
     </message>
     <message>
         <location filename="../../app/next_step.py"/>
@@ -4532,6 +4552,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/settings_dialog.py"/>
+        <source>Leave without saving the changes?</source>
+        <translation>不保存更改就离开吗？</translation>
+    </message>
+    <message>
+        <location filename="../../app/settings_dialog.py"/>
         <source>{count} differ from the default</source>
         <translation>{count} 项与默认值不同</translation>
     </message>
@@ -6080,8 +6105,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/jog_readout.py"/>
-        <source>bend {bend:.2f}, pitch {pitch:.2f}, in {inserted} mm</source>
-        <translation>弯曲 {bend:.2f}，俯仰 {pitch:.2f}，进深 {inserted} mm</translation>
+        <source>bend {bend}, pitch {pitch}, in {inserted} mm</source>
+        <translation>弯曲 {bend}，俯仰 {pitch}，进深 {inserted} mm</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_readout.py"/>
@@ -6670,11 +6695,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/record_bar.py"/>
-        <source>Recording</source>
-        <translation>录制</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
         <source>{count} dropped</source>
         <translation>丢弃 {count} 帧</translation>
     </message>
@@ -6682,6 +6702,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/record_bar.py"/>
         <source>stopped: disk full</source>
         <translation>已停：磁盘已满</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/record_bar.py"/>
+        <source>Recording</source>
+        <translation>录制</translation>
     </message>
     <message>
         <location filename="../../app/widgets/recorded_plate.py"/>
