@@ -44,6 +44,11 @@ KEYS: dict[Motion, tuple[Qt.Key, ...]] = {
     Motion.STRAIGHTEN: (Qt.Key.Key_X,),
 }
 _MOTION_OF_KEY = {key: motion for motion, keys in KEYS.items() for key in keys}
+_BY_PLACE = {
+    24: Qt.Key.Key_Q, 25: Qt.Key.Key_W, 26: Qt.Key.Key_E, 38: Qt.Key.Key_A, 39: Qt.Key.Key_S, 40: Qt.Key.Key_D, 53: Qt.Key.Key_X,
+}  # fmt: skip
+"""Where these letters lie, in the numbers of X11 and Wayland, for a layout that has the letters of another alphabet there."""
+_FIRST_LETTER, _FIRST_OTHER_KEY = 0x80, 0x0100_0000
 _OTHER_MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 
 
@@ -105,7 +110,7 @@ class JogKeys(HeldInput):
     def _on_press(self, watched: QObject, event: QKeyEvent) -> bool:
         if not isinstance(watched, QWidget):
             return False
-        key = Qt.Key(event.key())
+        key = _key_of(event)
         if is_stop(watched, event, self._can_move()):  # wherever it goes to: menus, lists and dialogs too
             if not event.isAutoRepeat():
                 self.stop_pressed.emit()
@@ -143,6 +148,12 @@ class JogKeys(HeldInput):
     def _announce(self) -> None:
         self.held_changed.emit(self.held)
         self.changed.emit(self.jog if self._held else AT_REST)
+
+
+def _key_of(event: QKeyEvent) -> Qt.Key:
+    """By its letter; where that is none of the Latin ones, by the place of the keyboard where theirs would be."""
+    key = Qt.Key(event.key())
+    return _BY_PLACE.get(event.nativeScanCode(), key) if _FIRST_LETTER <= key < _FIRST_OTHER_KEY else key
 
 
 def _sign(held: frozenset[Motion], plus: Motion, minus: Motion) -> int:

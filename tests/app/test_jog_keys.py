@@ -175,6 +175,23 @@ def test_a_key_that_means_something_else_when_it_is_let_go_lets_go(bench: Bench)
     assert bench.jogs[-1] == AT_REST
 
 
+def test_on_a_keyboard_of_another_alphabet_the_letters_are_found_by_their_place(bench: Bench) -> None:
+    """Cyrillic, Greek, Hebrew: only the arrows steered, and nothing pitched."""
+    cyrillic = {
+        24: ("\N{CYRILLIC CAPITAL LETTER SHORT I}", Motion.PITCH_DOWN),
+        38: ("\N{CYRILLIC CAPITAL LETTER EF}", Motion.STEER_LEFT),
+    }
+    for scan_code, (letter, motion) in cyrillic.items():
+        for kind, held in ((QEvent.Type.KeyPress, {motion}), (QEvent.Type.KeyRelease, set())):
+            QApplication.sendEvent(bench.window, QKeyEvent(kind, ord(letter), NONE, scan_code, 0, 0, letter))
+            assert bench.jog.held == held
+    # French: A lies where others have Q, and is the A that the legend shows
+    QApplication.sendEvent(bench.window, QKeyEvent(QEvent.Type.KeyPress, Key.Key_A, NONE, 24, 0, 0, "a"))
+    assert bench.jog.held == {Motion.STEER_LEFT}
+    QApplication.sendEvent(bench.window, QKeyEvent(QEvent.Type.KeyRelease, Key.Key_A, NONE, 24, 0, 0, "a"))
+    assert bench.jog.held == set()
+
+
 def shift(kind: QEvent.Type, key: Qt.Key, scan_code: int) -> QKeyEvent:
     return QKeyEvent(kind, key, Qt.KeyboardModifier.AltModifier, scan_code, 0, 0)
 
