@@ -36,6 +36,7 @@ class KnownSession(QObject):
         self._course = course_of(reader.timeline())
         self._events: tuple[Event, ...] = ()
         self._has_events = False
+        self._is_written = False
         self._losses: list[str] | None = None
         self._replayed: Replayed | None = None
         self._problem_count = -1
@@ -65,7 +66,7 @@ class KnownSession(QObject):
     @Slot(object, bool)
     def take_events(self, events: tuple[Event, ...], is_written: bool) -> None:
         """The session's events, and whether it is still being recorded."""
-        self._events, self._has_events = events, True
+        self._events, self._has_events, self._is_written = events, True, is_written
         if is_written:
             self.said.emit(tr("This session is still being recorded: what came later is not shown"), False)
         self.changed.emit()
@@ -119,7 +120,7 @@ class KnownSession(QObject):
         manifest = self._reader.manifest
         if manifest is not None and manifest.counts.dropped:
             problems.append(tr("{count} frames could not be recorded: the recorder was behind", count=manifest.counts.dropped))
-        if manifest is not None and not manifest.closed:
+        if manifest is not None and not manifest.closed and self._has_events and not self._is_written:
             problems.append(tr("the session did not end properly; session recover makes a repaired copy"))
         if len(problems) != self._problem_count:
             self._problem_count = len(problems)

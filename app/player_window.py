@@ -117,6 +117,7 @@ class PlayerWindow(WindowFrame):
         self._decode.failed.connect(lambda line: panels.show_nothing(tr("Playing ended"), line, NoticeKind.FAULT))
         self._keeper.said.connect(self.say)
         self._keeper.events_read.connect(self._known.take_events)
+        self._keeper.events_read.connect(lambda _events, is_written: panels.plate.show_written(is_written))
         self._keeper.noted.connect(self._known.take_note)
         self._keeper.note_refused.connect(self._write_again)
         self._keeper.replayed_read.connect(self._on_replayed)

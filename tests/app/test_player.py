@@ -29,7 +29,7 @@ from core.config import Config
 from core.control.modes import Mode
 from core.session.events import Event, EventKind, event_of_target
 from core.session.files import LineFile
-from core.session.manifest import SessionError
+from core.session.manifest import SessionError, read_manifest, write_manifest
 from core.session.reader import SessionReader
 from core.session.writer import SessionWriter
 from core.types import Frame, PoseState, Reason, Refusal, RobotStatus, Tick
@@ -411,8 +411,17 @@ def test_rows_that_went_from_a_closed_session_are_told(open_player: Open, tmp_pa
     until(qtbot, lambda: f"the last 5 of {COUNT} rows are lost" in window.panels.problems.toPlainText())
 
 
+def test_a_session_that_was_cut_says_so(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    write_manifest(folder, read_manifest(folder).model_copy(update={"closed": False}))
+    window = open_player(folder)
+    until(qtbot, lambda: "did not end properly" in window.panels.problems.toPlainText())
+    assert window.panels.plate.text.endswith(", cut off")
+
+
 def test_a_note_into_a_session_that_is_being_recorded_is_refused(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
     folder = make_session(tmp_path)
+    write_manifest(folder, read_manifest(folder).model_copy(update={"closed": False}))
     (folder / "frames.jsonl").rename(folder / "old")
     lock = LineFile(folder / "frames.jsonl")
     try:
@@ -421,6 +430,8 @@ def test_a_note_into_a_session_that_is_being_recorded_is_refused(open_player: Op
         window = open_player(folder)
         until(qtbot, lambda: "still being recorded" in window.panels.toast.text())
         until(qtbot, lambda: window.place == 0)
+        assert "did not end properly" not in window.panels.problems.toPlainText()
+        assert window.panels.plate.text.endswith(", being recorded")
         press(window, Key.Key_M)
         QTest.keyClicks(window.panels.note, "x")
         press(window, Key.Key_Return)
