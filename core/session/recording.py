@@ -15,7 +15,7 @@ from core.record_config import RecordConfig
 from core.session.events import Event, EventKind, events_between
 from core.session.files import SessionFiles
 from core.session.manifest import About
-from core.session.record_status import StatusBoard
+from core.session.record_status import STOPPED, StatusBoard
 from core.session.ring import EncodedFrame, Ring
 from core.session.ring_saver import RingSaver
 from core.session.rows import row_of
@@ -234,7 +234,7 @@ class Recording:
         was_on = self.is_on
         self.end(problem, dropped)
         self.drop_encoder()
-        self._board.fail(f"recording stopped: {problem}" if was_on else problem, is_disk_full=is_disk_full)
+        self._board.fail(f"{STOPPED}{problem}" if was_on else problem, is_disk_full=is_disk_full)
 
     def change_rig(self, about: About, dropped: int) -> None:
         """A session never mixes two rigs, and neither does the ring."""
