@@ -41,6 +41,7 @@ class KnownSession(QObject):
         self._replayed: Replayed | None = None
         self._problem_count = -1
         self._is_empty = False
+        self._is_whole = False
         self._timer = QTimer(self)
         self._timer.setInterval(_LOOK_MS)
         self._timer.timeout.connect(self._look)
@@ -49,6 +50,11 @@ class KnownSession(QObject):
     def course(self) -> Course:
         """The rows known so far."""
         return self._course
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all rows are known."""
+        return self._is_whole
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -102,6 +108,7 @@ class KnownSession(QObject):
         if known != shown and (is_all or known > _GROWN * shown):
             self._course = self._compared(course_of(self._reader.timeline()))
             self.changed.emit()
+        self._is_whole = is_all
         if is_all and not len(self._course) and not self._is_empty:
             self._is_empty = True
             loose = tr("there are pictures, but no rows: repair it with: session recover")

@@ -338,6 +338,9 @@ class PlayerWindow(WindowFrame):
         if not len(self._course):
             self.say(tr("No clip: there are no frames"), is_fault=True)
             return
+        if self._selection is None and not self._known.is_whole:
+            self.say(tr("No clip yet: the session is still being read, and would be cut short"), is_fault=True)
+            return
         first_s, last_s = self._selection or (0.0, self._course.duration_s)
         self._keeper.write_clip((self._course.place_at(first_s), self._course.place_at(last_s)), (first_s, last_s))
 

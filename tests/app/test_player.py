@@ -96,7 +96,7 @@ def open_player(qtbot: QtBot, tmp_path: Path) -> Iterator[Open]:
 def player(open_player: Open, session: Path, qtbot: QtBot) -> PlayerWindow:
     """On the first frame, with all rows and events known."""
     window = open_player(session)
-    until(qtbot, lambda: window.place == 0 and window.rows == COUNT and len(window.events) > 3)
+    until(qtbot, lambda: window.place == 0 and window.rows == COUNT and len(window.events) > 3 and window._known.is_whole)
     return window
 
 
@@ -455,6 +455,21 @@ def test_the_selection_becomes_a_video_with_the_banner_in_it(player: PlayerWindo
     assert path.name.endswith("_1000-1400ms.mp4")
     with av.open(str(path)) as container:
         assert sum(1 for _ in container.decode(video=0)) == 5
+
+
+def test_a_clip_of_the_whole_session_waits_until_all_of_it_is_known(
+    open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(SessionReader, "wait", lambda _reader, timeout_s=None: False)
+        player = open_player(session)
+        until(qtbot, lambda: player.place == 0)
+        player.export_clip()
+        assert "still being read" in player.panels.toast.text()
+        assert not player._keeper.has_clip
+    until(qtbot, lambda: player._known.is_whole)
+    player.export_clip()
+    until(qtbot, lambda: f"{COUNT} pictures" in player.panels.toast.text())
 
 
 def test_a_clip_is_cancelled_without_a_trace(player: PlayerWindow, tmp_path: Path, qtbot: QtBot) -> None:
