@@ -133,6 +133,7 @@ class Recorder(QObject):
         """End the session; False when the disk has not answered in time."""
         self._timer.stop()
         self._thread.on_tick = None
+        self._about = None  # what has ended now is not to live again
         return self._writer.close(_CLOSE_WITHIN_S) if self._writer is not None else True
 
     def _put(self, tick: Tick) -> None:
