@@ -39,7 +39,7 @@ class KnownSession(QObject):
         self._is_written = False
         self._losses: list[str] | None = None
         self._replayed: Replayed | None = None
-        self._problem_count = -1
+        self._problems: list[str] | None = None
         self._is_empty = False
         self._is_whole = False
         self._timer = QTimer(self)
@@ -129,6 +129,6 @@ class KnownSession(QObject):
             problems.append(tr("{count} frames could not be recorded: the recorder was behind", count=manifest.counts.dropped))
         if manifest is not None and not manifest.closed and self._has_events and not self._is_written:
             problems.append(tr("the session did not end properly; session recover makes a repaired copy"))
-        if len(problems) != self._problem_count:
-            self._problem_count = len(problems)
+        if problems != self._problems:
+            self._problems = problems
             self.problems_found.emit(problems)

@@ -276,6 +276,17 @@ def test_the_timeline_tells_what_is_under_the_pointer(player: PlayerWindow) -> N
     assert angle.endswith("°")
 
 
+def test_the_timeline_claims_nothing_for_a_time_without_frames(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    times_s = [FIRST_S + k * STEP_S for k in range(11)] + [FIRST_S + 6.0 + k * STEP_S for k in range(11)]
+    window = open_player(record(tmp_path, (tick_of(k, time_s, full=True) for k, time_s in enumerate(times_s))))
+    until(qtbot, lambda: window.rows == len(times_s) and len(window.events) > 0)
+    line = window.panels.timeline
+    width = line.width() - 60
+    assert line.text_at(50 + 0.5 / 7.0 * width).startswith("0:00.500  state D")
+    assert line.text_at(50 + 3.5 / 7.0 * width) == "0:03.500  no frames"
+    assert line.text_at(50 + 6.5 / 7.0 * width).startswith("0:06.500  state D")
+
+
 def test_values_that_no_dial_shows_can_be_read(player: PlayerWindow, qtbot: QtBot) -> None:
     told = player.panels.values.toPlainText()
     assert "frame 0 of the camera, captured at 1000.000 s, 640 \N{MULTIPLICATION SIGN} 480 px" in told
@@ -409,6 +420,17 @@ def test_rows_that_went_from_a_closed_session_are_told(open_player: Open, tmp_pa
     (folder / "frames.jsonl").write_bytes(b"".join(lines[:-5]))
     window = open_player(folder)
     until(qtbot, lambda: f"the last 5 of {COUNT} rows are lost" in window.panels.problems.toPlainText())
+
+
+def test_rows_that_turn_out_to_be_missing_while_it_is_read_are_all_counted(
+    open_player: Open, session: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = [2]
+    monkeypatch.setattr(SessionReader, "missing_rows", property(lambda _reader: found[0]))
+    window = open_player(session)
+    until(qtbot, lambda: "2 rows are missing" in window.panels.problems.toPlainText())
+    found[0] = 5
+    until(qtbot, lambda: "5 rows are missing" in window.panels.problems.toPlainText())
 
 
 def test_a_session_that_was_cut_says_so(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
