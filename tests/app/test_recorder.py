@@ -144,6 +144,16 @@ def test_after_a_fault_of_the_program_in_the_recorder_the_next_key_records_again
     assert running._recorder.status.problem == ""
 
 
+def test_a_recorder_that_was_closed_does_not_live_again(running: OperatorWindow, tmp_path: Path) -> None:
+    writer = running.recorder._writer
+    assert writer is not None
+    assert running.recorder.close()
+    running.recorder.toggle()
+    assert running.recorder._writer is writer
+    assert not writer.is_alive
+    assert sessions(tmp_path / "sessions") == []
+
+
 def restart(window: OperatorWindow) -> None:
     window.restart()
 
