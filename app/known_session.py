@@ -36,10 +36,12 @@ class KnownSession(QObject):
         self._course = course_of(reader.timeline())
         self._events: tuple[Event, ...] = ()
         self._has_events = False
+        self._is_written = False
         self._losses: list[str] | None = None
         self._replayed: Replayed | None = None
-        self._problem_count = -1
+        self._problems: list[str] | None = None
         self._is_empty = False
+        self._is_whole = False
         self._timer = QTimer(self)
         self._timer.setInterval(_LOOK_MS)
         self._timer.timeout.connect(self._look)
@@ -48,6 +50,11 @@ class KnownSession(QObject):
     def course(self) -> Course:
         """The rows known so far."""
         return self._course
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all rows are known."""
+        return self._is_whole
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -65,7 +72,7 @@ class KnownSession(QObject):
     @Slot(object, bool)
     def take_events(self, events: tuple[Event, ...], is_written: bool) -> None:
         """The session's events, and whether it is still being recorded."""
-        self._events, self._has_events = events, True
+        self._events, self._has_events, self._is_written = events, True, is_written
         if is_written:
             self.said.emit(tr("This session is still being recorded: what came later is not shown"), False)
         self.changed.emit()
@@ -101,6 +108,7 @@ class KnownSession(QObject):
         if known != shown and (is_all or known > _GROWN * shown):
             self._course = self._compared(course_of(self._reader.timeline()))
             self.changed.emit()
+        self._is_whole = is_all
         if is_all and not len(self._course) and not self._is_empty:
             self._is_empty = True
             loose = tr("there are pictures, but no rows: repair it with: session recover")
@@ -119,8 +127,8 @@ class KnownSession(QObject):
         manifest = self._reader.manifest
         if manifest is not None and manifest.counts.dropped:
             problems.append(tr("{count} frames could not be recorded: the recorder was behind", count=manifest.counts.dropped))
-        if manifest is not None and not manifest.closed:
+        if manifest is not None and not manifest.closed and self._has_events and not self._is_written:
             problems.append(tr("the session did not end properly; session recover makes a repaired copy"))
-        if len(problems) != self._problem_count:
-            self._problem_count = len(problems)
+        if problems != self._problems:
+            self._problems = problems
             self.problems_found.emit(problems)

@@ -117,6 +117,7 @@ class PlayerWindow(WindowFrame):
         self._decode.failed.connect(lambda line: panels.show_nothing(tr("Playing ended"), line, NoticeKind.FAULT))
         self._keeper.said.connect(self.say)
         self._keeper.events_read.connect(self._known.take_events)
+        self._keeper.events_read.connect(lambda _events, is_written: panels.plate.show_written(is_written))
         self._keeper.noted.connect(self._known.take_note)
         self._keeper.note_refused.connect(self._write_again)
         self._keeper.replayed_read.connect(self._on_replayed)
@@ -336,6 +337,9 @@ class PlayerWindow(WindowFrame):
         """The selection as a video with overlays, into the pictures' folder; playing goes on."""
         if not len(self._course):
             self.say(tr("No clip: there are no frames"), is_fault=True)
+            return
+        if self._selection is None and not self._known.is_whole:
+            self.say(tr("No clip yet: the session is still being read, and would be cut short"), is_fault=True)
             return
         first_s, last_s = self._selection or (0.0, self._course.duration_s)
         self._keeper.write_clip((self._course.place_at(first_s), self._course.place_at(last_s)), (first_s, last_s))

@@ -41,13 +41,29 @@ class _Progress:
     failed: str = ""
     """Why it ended too early, or without the camera."""
     camera_dropped: int = 0
+    camera_lost: int = 0
+    """Frames that never came from the camera."""
     without_picture_s: float = 0.0
     picture_s: float = 0.0
     """When the last one was understood."""
+    lost_until: int | None = None
+    """What the camera had lost until then, since it was opened."""
 
     @property
     def seconds(self) -> float:
         return 0.0 if self.started_s is None else time.monotonic() - self.started_s
+
+    def see_gap(self) -> None:
+        """Count the time since the last picture if it was long."""
+        if (away_s := time.monotonic() - self.picture_s) > _GAP_S:
+            self.without_picture_s += away_s
+        self.picture_s = time.monotonic()
+
+    def see_lost(self, lost: int) -> None:
+        """Count what was lost since the last picture; a camera that was opened again counts from 0."""
+        if self.lost_until is not None:
+            self.camera_lost += max(0, lost - self.lost_until)
+        self.lost_until = lost
 
 
 def run_record(
@@ -92,6 +108,7 @@ def run_record(
         "frames": status.frames,
         "dropped": status.dropped,
         "camera_dropped": done.camera_dropped,
+        "camera_lost": done.camera_lost,
         "without_picture_s": round(done.without_picture_s, 3),
         "bytes": _size(status.folder),
     }
@@ -107,6 +124,8 @@ def _record(engine: RigEngine, writer: SessionWriter, seconds: float) -> _Progre
     away_s = time.monotonic() - done.picture_s
     if not done.failed and done.started_s is not None and (engine.problem or away_s > _PICTURE_WITHIN_S):
         done.ended = done.failed = engine.problem or f"no picture from the camera for {away_s:.0f} s; check its cable"
+    if done.started_s is not None:
+        done.see_gap()
     writer.stop(done.ended)
     return done
 
@@ -141,9 +160,8 @@ def _record_into(engine: RigEngine, writer: SessionWriter, seconds: float, done:
             if done.started_s is None:
                 done.started_s = done.picture_s = time.monotonic()
                 dropped_before = tick.dropped_frames
-            if (away_s := time.monotonic() - done.picture_s) > _GAP_S:
-                done.without_picture_s += away_s
-            done.picture_s = time.monotonic()
+            done.see_gap()
+            done.see_lost(tick.frame.lost)
             done.camera_dropped = tick.dropped_frames - dropped_before
             _put(engine, writer, tick)
             status = writer.status()
@@ -186,6 +204,7 @@ def _tell(result: dict[str, Any], config: Config, as_json: bool) -> None:
         sys.stderr.write(f"for {result['without_picture_s']:.1f} s of it the camera sent no picture\n")
     sys.stderr.write(
         f"{result['ended']}: {result['seconds']:.1f} s, {result['frames']} frames, {result['dropped']} dropped by the recorder, "
-        f"{result['camera_dropped']} by camera and perception, {result['bytes'] / 1e6:.1f} MB "
+        f"{result['camera_dropped']} skipped for newer ones, {result['camera_lost']} lost by the camera, "
+        f"{result['bytes'] / 1e6:.1f} MB "
         f"({result['bytes'] / 1e6 / minutes:.1f} MB a minute, {config.record.codec})\n"
     )

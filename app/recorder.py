@@ -12,9 +12,9 @@ from core.config import Config
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.faults import Cause
-from core.session.events import EventKind, event_of_alert, event_of_target
-from core.session.manifest import about_rig
-from core.session.record_status import RecordStatus, faults_between
+from core.session.events import Event, EventKind, event_of_alert, event_of_target
+from core.session.manifest import About, about_rig
+from core.session.record_status import STOPPED, RecordStatus, faults_between
 from core.session.writer import SessionWriter
 from core.types import Point, Tick
 from hardware.rig import RigKind
@@ -40,6 +40,8 @@ class Recorder(QObject):
         super().__init__(parent)
         self._kind, self._thread = kind, thread
         self._writer: SessionWriter | None = None
+        self._about: About | None = None
+        self._target: Event | None = None
         self._config = config
         self._shown = RecordStatus()
         self._timer = QTimer(self)
@@ -55,23 +57,35 @@ class Recorder(QObject):
     def open_rig(self, config: Config, kind: RigKind) -> None:
         """Another rig is being opened: what is being recorded ends, for a session never mixes two rigs."""
         self._kind = kind
-        about = about_rig(config, self._kind.value, config.rig.name)
+        self._about = about_rig(config, self._kind.value, config.rig.name)
         if self._writer is None:
-            self._writer = SessionWriter(config.record, about)
+            self._config = config
+            self._writer = SessionWriter(config.record, self._about)
             self._timer.start()
         else:
-            self._writer.set_about(about)
+            self._living(self._writer).set_about(self._about)
+
+    def _living(self, writer: SessionWriter) -> SessionWriter:
+        """The writer, or another one in the place of one that a fault of the program has ended: a day's recording goes on."""
+        if writer.is_alive or self._about is None:
+            return writer
+        writer.close(0.0)
+        self._writer = living = SessionWriter(self._config.record, self._about)
+        if self._target is not None:
+            living.add_event(self._target)
+        return living
 
     @Slot()
     def toggle(self) -> None:
         """Begin a session with the next picture, or end it; one that has not begun yet is taken back."""
         if self._writer is None:
             return
-        status = self._writer.status()
+        writer = self._living(self._writer)
+        status = writer.status()
         if status.recording or status.armed:
-            self._writer.stop()
+            writer.stop()
         else:
-            self._writer.start()
+            writer.start()
 
     def stop(self, why: str) -> None:
         """End the session that is being recorded, if any; `why` goes into it. From any thread."""
@@ -83,10 +97,11 @@ class Recorder(QObject):
         """Make a session of the last seconds, without having recorded."""
         if self._writer is None:
             return
-        if self._writer.status().ring_s <= 0.0:
+        writer = self._living(self._writer)
+        if writer.status().ring_s <= 0.0:
             self.said.emit(tr("Nothing to save yet: record.ring_s is 0, or the rig has just been opened"), True)
             return
-        self._writer.save_last()
+        writer.save_last()
 
     def note(self, text: str) -> None:
         """Keep a note with the session."""
@@ -95,8 +110,9 @@ class Recorder(QObject):
 
     def target(self, target: Point | None) -> None:
         """Keep the operator's destination, source pixels."""
+        self._target = event_of_target(target, time.monotonic())
         if self._writer is not None:
-            self._writer.add_event(event_of_target(target, time.monotonic()))
+            self._writer.add_event(self._target)
 
     def drive(self, view: DriveView) -> None:
         """Keep that mode or faults have changed, also when there are no pictures."""
@@ -117,6 +133,7 @@ class Recorder(QObject):
         """End the session; False when the disk has not answered in time."""
         self._timer.stop()
         self._thread.on_tick = None
+        self._about = None  # what has ended now is not to live again
         return self._writer.close(_CLOSE_WITHIN_S) if self._writer is not None else True
 
     def _put(self, tick: Tick) -> None:
@@ -136,9 +153,10 @@ class Recorder(QObject):
         if (pilot := self._thread.pilot) is not None:
             for fault in faults_between(before, now):
                 pilot.report(fault)
-        if now.problem and now.problems != before.problems:
-            self.said.emit(tr("Recording stopped: {problem}", problem=tr_text(now.problem)), True)
-        if now.notices != before.notices:
-            self.said.emit(tr_text(now.notice), True)
         if now.saved is not None and now.saved != before.saved:
             self.said.emit(tr("Session saved: {saved}", saved=now.saved), False)
+        if now.notices != before.notices:
+            self.said.emit(tr_text(now.notice), True)
+        if now.problem and now.problems != before.problems:  # last: what was saved until then must not cover it
+            problem = now.problem.removeprefix(STOPPED)
+            self.said.emit(tr("Recording stopped: {problem}", problem=tr_text(problem)), True)

@@ -14,6 +14,7 @@ from rich.table import Table
 from app.learning_commands import progress_bar
 from core.control.modes import Mode
 from core.session.completeness import losses, rows_cut_off
+from core.session.events import frames_lost
 from core.session.export import export_csv, export_mp4
 from core.session.files import is_being_written
 from core.session.manifest import SessionError
@@ -75,6 +76,7 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "rows": len(reader),
         "missing_rows": reader.missing_rows + rows_cut_off(reader),
         "dropped": counts.dropped if counts and manifest and manifest.closed else None,
+        "camera_lost": frames_lost(events),
         "states": {state.value: int((line.state == place).sum()) for place, state in enumerate(PoseState)},
         "without_pose": int((line.state < 0).sum()),
         "theta_median_deg": round(float(np.nanmedian(np.abs(line.theta_deg))), 3) if np.isfinite(line.theta_deg).any() else None,

@@ -20,11 +20,18 @@ class RecordedPlate(QWidget):
     def __init__(self, manifest: Manifest | None, name: str) -> None:
         super().__init__()
         self._kind = manifest.kind if manifest is not None else "UNKNOWN"
-        self._note = _note(manifest, name)
+        self._manifest, self._name = manifest, name
+        self._note = ""
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.show_written(False)
+
+    def show_written(self, is_written: bool) -> None:
+        """Whether it is still being recorded: what has not ended yet was not cut off."""
+        self._note = _note(self._manifest, self._name, is_written=is_written)
         self.setAccessibleName(self.text)
         self.setToolTip(self.text)
+        self.update()
 
     @property
     def text(self) -> str:
@@ -56,10 +63,10 @@ class RecordedPlate(QWidget):
         painter.end()
 
 
-def _note(manifest: Manifest | None, name: str) -> str:
+def _note(manifest: Manifest | None, name: str, *, is_written: bool) -> str:
     if manifest is None:
         return tr("{name}: its manifest is damaged", name=name)
     started = manifest.started_utc.astimezone()
-    how = "" if manifest.closed else tr(", cut off")
+    how = "" if manifest.closed else tr(", being recorded") if is_written else tr(", cut off")
     how += tr(", recovered") if manifest.recovered is not None else ""
     return tr("{started:%Y-%m-%d %H:%M:%S}, rig {name}{how}", started=started, name=manifest.rig or tr("unknown"), how=how)

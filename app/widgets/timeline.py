@@ -389,6 +389,9 @@ class TimelineView(QWidget):
         time_s = self._time(x)
         place = course.place_at(time_s)
         parts = [clock_text(time_s), tr("no pose")]
+        if place + 1 in course.gaps and time_s - course.times_s[place] > _HOLD_S:
+            # what was true before a gap is not said of the time in it
+            return "  ".join((parts[0], tr("no frames")))
         if course.states[place] >= 0:
             parts[1:] = [
                 tr("state {state}", state=tuple(PoseState)[course.states[place]].value),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
@@ -89,6 +89,12 @@ def event_of_target(point: Point | None, time_s: float) -> Event:
     if point is None:
         return Event(time_s, EventKind.TARGET, "cleared")
     return Event(time_s, EventKind.TARGET, f"{point[0]:.0f}, {point[1]:.0f}", {"xy": [round(point[0], 2), round(point[1], 2)]})
+
+
+def frames_lost(events: Iterable[Event]) -> int:
+    """How many frames never came from the camera, by what the recorder has told of it."""
+    counts = (event.data.get("count") for event in events if event.kind is EventKind.LOST)
+    return sum(count for count in counts if type(count) is int and count > 0)
 
 
 _LONGEST_KIND = 40

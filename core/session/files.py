@@ -11,6 +11,7 @@ import shutil
 import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from io import FileIO
 from pathlib import Path
 
 from core.record_config import RecordConfig
@@ -114,19 +115,30 @@ def add_event(session: Path, event: Event) -> Event:
     if is_being_written(session):
         raise SessionError(f"{session}: is being recorded; stop the recording first")
     try:
-        with path.open("a+b") as file:
+        with path.open("a+b", buffering=0) as file:
             fcntl.flock(file.fileno(), fcntl.LOCK_EX)
             end = file.seek(0, os.SEEK_END)
             if end:
                 # a last line that was cut must not swallow the new one
                 file.seek(end - 1)
                 line = line if file.read(1) == b"\n" else "\n" + line
-            file.write(line.encode())
-            file.flush()
-            os.fsync(file.fileno())
+            _append(file, line.encode(), end)
     except OSError as error:
         raise SessionError(f"{path}: cannot be written ({error.strerror}); the note was not kept") from None
     return event
+
+
+def _append(file: FileIO, data: bytes, end: int) -> None:
+    """All of it, forced to the disk, or nothing: the file ends at `end` as before. Raises OSError."""
+    try:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[file.write(rest) or 0 :]
+        os.fsync(file.fileno())
+    except OSError:
+        with contextlib.suppress(OSError):
+            os.ftruncate(file.fileno(), end)
+        raise
 
 
 def check_parent(folder: Path) -> None:

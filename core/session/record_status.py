@@ -11,6 +11,8 @@ from typing import Any
 from core.control.faults import Cause, Fault
 from core.record_config import RecordConfig
 
+STOPPED = "recording stopped: "
+"""Before a problem that has ended a session."""
 _MB = 1e6
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from core.record_config import RecordConfig
 from core.session.events import Event, EventKind, events_between
 from core.session.files import SessionFiles
 from core.session.manifest import About
-from core.session.record_status import StatusBoard
+from core.session.record_status import STOPPED, StatusBoard
 from core.session.ring import EncodedFrame, Ring
 from core.session.ring_saver import RingSaver
 from core.session.rows import row_of
@@ -38,9 +38,10 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class _Lost:
-    """How many frames of the camera are known to be lost, and when that was told (or first looked at)."""
+    """How many frames of the camera are known to be lost, how many of them were told, and when (or when it was first looked at)."""
 
     total: int
+    told: int
     told_s: float
 
 
@@ -152,11 +153,22 @@ class Recording:
         """Frames that never came from the camera; at most once a second, too. A camera that was opened again counts from 0."""
         known = self._lost
         if known is None or frame.lost < known.total:
-            self._lost = _Lost(frame.lost, frame.captured_s)
-        elif frame.lost > known.total and frame.captured_s - known.told_s >= _TELL_EVERY_S:
-            count = frame.lost - known.total
-            self._lost = _Lost(frame.lost, frame.captured_s)
-            self.take_event(Event(frame.captured_s, EventKind.LOST, f"{count} frames", {"count": count, "total": frame.lost}))
+            for event in self._untold(frame.captured_s):
+                self.take_event(event)
+            self._lost = _Lost(frame.lost, frame.lost, frame.captured_s)
+            return
+        self._lost = replace(known, total=frame.lost)
+        if frame.captured_s - known.told_s >= _TELL_EVERY_S:
+            for event in self._untold(frame.captured_s):
+                self.take_event(event)
+
+    def _untold(self, time_s: float) -> Iterator[Event]:
+        """What the camera has lost and nobody was told yet; it counts as told then."""
+        known = self._lost
+        if known is not None and known.total > known.told:
+            count = known.total - known.told
+            self._lost = _Lost(known.total, known.total, time_s)
+            yield Event(time_s, EventKind.LOST, f"{count} frames", {"count": count, "total": known.total})
 
     def begin(self) -> None:
         """A session begins with the next frame; nothing happens when one is being recorded."""
@@ -171,8 +183,7 @@ class Recording:
         self.dropped_before = self._files.dropped_before = picture.dropped
         self._dropped_told, self._dropped_told_s = 0, -math.inf
         self.began_s = self._clock()
-        if self._ring is None:
-            self._lost = None  # nobody has counted between two sessions
+        self._leave_losses_before(picture.tick.frame)
         self._board.show(armed=False, recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
         drive = picture.drive or self._drive
         if drive is not None:
@@ -187,6 +198,15 @@ class Recording:
         for event in early:
             self._files.write_event(event)
 
+    def _leave_losses_before(self, first: Frame) -> None:
+        """What was lost before the first frame of a session is not the session's: the ring is told, which reaches further back."""
+        if self._ring is None:
+            self._lost = None  # nobody has counted between two sessions
+        elif self._lost is not None:
+            self._lost = replace(self._lost, total=max(first.lost, self._lost.total))
+            for event in self._untold(first.captured_s):
+                self._ring.add_event(event)
+
     def end(self, ended: str, dropped: int) -> None:
         """End the session if there is one; `dropped` frames were dropped until now, ever."""
         self._is_armed, self._early = False, []
@@ -195,8 +215,12 @@ class Recording:
             self._board.show(armed=False)
             return
         count, elapsed_s = dropped - self.dropped_before, max(0.0, self._clock() - self.began_s)
-        if count > self._dropped_told:
-            with contextlib.suppress(OSError):  # the disk may be why it ends; the manifest has the count, too
+        with contextlib.suppress(OSError):  # the disk may be why it ends; manifest and rows have the counts, too
+            for event in self._untold(self._last_s):
+                if self._ring is not None:
+                    self._ring.add_event(event)
+                files.write_event(event)
+            if count > self._dropped_told:
                 files.write_event(_dropped_event(self._last_s, count - self._dropped_told, count))
         problem = files.close(ended, count)
         self._board.show(recording=False, elapsed_s=elapsed_s, dropped=count, bytes=files.counts.bytes)
@@ -210,7 +234,7 @@ class Recording:
         was_on = self.is_on
         self.end(problem, dropped)
         self.drop_encoder()
-        self._board.fail(f"recording stopped: {problem}" if was_on else problem, is_disk_full=is_disk_full)
+        self._board.fail(f"{STOPPED}{problem}" if was_on else problem, is_disk_full=is_disk_full)
 
     def change_rig(self, about: About, dropped: int) -> None:
         """A session never mixes two rigs, and neither does the ring."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import threading
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from core.record_config import RecordConfig
-from core.session.events import Event
+from core.session.events import Event, EventKind
 from core.session.files import SessionFiles
 from core.session.manifest import About, SessionError
 from core.session.record_status import StatusBoard, look_at_disk
@@ -49,7 +51,7 @@ class RingSaver:
             first_s = frames[0].captured_s
             files = SessionFiles(self._parent, about, self._config, first_s=first_s, now_s=now_s, origin="last seconds")
             files.dropped_before = frames[0].dropped
-            for event in events:
+            for event in (*_beginning(frames[0], events), *events):
                 files.write_event(event)
             for frame in frames:
                 self._check_room()
@@ -84,3 +86,14 @@ class RingSaver:
             self._board.notice(f"the last seconds were not saved: {problem}")
         else:
             self._board.notice(f"of the last seconds only {written} of {frames} frames were saved: {problem}")
+
+
+def _beginning(first: EncodedFrame, events: Sequence[Event]) -> Iterator[Event]:
+    """Where driving stood at the first frame, as every session must tell by itself; nothing where the ring knows how it began."""
+    drive = json.loads(first.row)["drive"]
+    mode = next((event for event in events if event.kind is EventKind.MODE), None)
+    if drive is None or (mode is not None and "from" not in mode.data):
+        return
+    yield Event(first.captured_s, EventKind.MODE, drive["mode"])
+    for cause, detail in drive["active"]:
+        yield Event(first.captured_s, EventKind.FAULT, cause, {"detail": detail})

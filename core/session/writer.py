@@ -127,6 +127,11 @@ class SessionWriter:
         return True
 
     @property
+    def is_alive(self) -> bool:
+        """False once it is closed, or has ended because of a fault of the program: the status tells which."""
+        return self._thread.is_alive()
+
+    @property
     def pictures_waiting(self) -> int:
         """Handed over and not yet taken up."""
         return self._pictures_waiting

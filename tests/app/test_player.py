@@ -29,7 +29,7 @@ from core.config import Config
 from core.control.modes import Mode
 from core.session.events import Event, EventKind, event_of_target
 from core.session.files import LineFile
-from core.session.manifest import SessionError
+from core.session.manifest import SessionError, read_manifest, write_manifest
 from core.session.reader import SessionReader
 from core.session.writer import SessionWriter
 from core.types import Frame, PoseState, Reason, Refusal, RobotStatus, Tick
@@ -96,7 +96,7 @@ def open_player(qtbot: QtBot, tmp_path: Path) -> Iterator[Open]:
 def player(open_player: Open, session: Path, qtbot: QtBot) -> PlayerWindow:
     """On the first frame, with all rows and events known."""
     window = open_player(session)
-    until(qtbot, lambda: window.place == 0 and window.rows == COUNT and len(window.events) > 3)
+    until(qtbot, lambda: window.place == 0 and window.rows == COUNT and len(window.events) > 3 and window._known.is_whole)
     return window
 
 
@@ -276,6 +276,17 @@ def test_the_timeline_tells_what_is_under_the_pointer(player: PlayerWindow) -> N
     assert angle.endswith("°")
 
 
+def test_the_timeline_claims_nothing_for_a_time_without_frames(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    times_s = [FIRST_S + k * STEP_S for k in range(11)] + [FIRST_S + 6.0 + k * STEP_S for k in range(11)]
+    window = open_player(record(tmp_path, (tick_of(k, time_s, full=True) for k, time_s in enumerate(times_s))))
+    until(qtbot, lambda: window.rows == len(times_s) and len(window.events) > 0)
+    line = window.panels.timeline
+    width = line.width() - 60
+    assert line.text_at(50 + 0.5 / 7.0 * width).startswith("0:00.500  state D")
+    assert line.text_at(50 + 3.5 / 7.0 * width) == "0:03.500  no frames"
+    assert line.text_at(50 + 6.5 / 7.0 * width).startswith("0:06.500  state D")
+
+
 def test_values_that_no_dial_shows_can_be_read(player: PlayerWindow, qtbot: QtBot) -> None:
     told = player.panels.values.toPlainText()
     assert "frame 0 of the camera, captured at 1000.000 s, 640 \N{MULTIPLICATION SIGN} 480 px" in told
@@ -411,8 +422,28 @@ def test_rows_that_went_from_a_closed_session_are_told(open_player: Open, tmp_pa
     until(qtbot, lambda: f"the last 5 of {COUNT} rows are lost" in window.panels.problems.toPlainText())
 
 
+def test_rows_that_turn_out_to_be_missing_while_it_is_read_are_all_counted(
+    open_player: Open, session: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = [2]
+    monkeypatch.setattr(SessionReader, "missing_rows", property(lambda _reader: found[0]))
+    window = open_player(session)
+    until(qtbot, lambda: "2 rows are missing" in window.panels.problems.toPlainText())
+    found[0] = 5
+    until(qtbot, lambda: "5 rows are missing" in window.panels.problems.toPlainText())
+
+
+def test_a_session_that_was_cut_says_so(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    write_manifest(folder, read_manifest(folder).model_copy(update={"closed": False}))
+    window = open_player(folder)
+    until(qtbot, lambda: "did not end properly" in window.panels.problems.toPlainText())
+    assert window.panels.plate.text.endswith(", cut off")
+
+
 def test_a_note_into_a_session_that_is_being_recorded_is_refused(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
     folder = make_session(tmp_path)
+    write_manifest(folder, read_manifest(folder).model_copy(update={"closed": False}))
     (folder / "frames.jsonl").rename(folder / "old")
     lock = LineFile(folder / "frames.jsonl")
     try:
@@ -421,6 +452,8 @@ def test_a_note_into_a_session_that_is_being_recorded_is_refused(open_player: Op
         window = open_player(folder)
         until(qtbot, lambda: "still being recorded" in window.panels.toast.text())
         until(qtbot, lambda: window.place == 0)
+        assert "did not end properly" not in window.panels.problems.toPlainText()
+        assert window.panels.plate.text.endswith(", being recorded")
         press(window, Key.Key_M)
         QTest.keyClicks(window.panels.note, "x")
         press(window, Key.Key_Return)
@@ -444,6 +477,21 @@ def test_the_selection_becomes_a_video_with_the_banner_in_it(player: PlayerWindo
     assert path.name.endswith("_1000-1400ms.mp4")
     with av.open(str(path)) as container:
         assert sum(1 for _ in container.decode(video=0)) == 5
+
+
+def test_a_clip_of_the_whole_session_waits_until_all_of_it_is_known(
+    open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(SessionReader, "wait", lambda _reader, timeout_s=None: False)
+        player = open_player(session)
+        until(qtbot, lambda: player.place == 0)
+        player.export_clip()
+        assert "still being read" in player.panels.toast.text()
+        assert not player._keeper.has_clip
+    until(qtbot, lambda: player._known.is_whole)
+    player.export_clip()
+    until(qtbot, lambda: f"{COUNT} pictures" in player.panels.toast.text())
 
 
 def test_a_clip_is_cancelled_without_a_trace(player: PlayerWindow, tmp_path: Path, qtbot: QtBot) -> None:

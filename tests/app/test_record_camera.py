@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from app import record_command
 from app.record_command import run_record
+from app.session_command import describe
 from core.devices import DeviceError
 from core.session.manifest import read_manifest
 from core.session.reader import SessionReader
@@ -89,6 +91,44 @@ def test_one_that_comes_back_is_waited_for_and_its_absence_is_told(
         assert first is not None
         assert last is not None
         assert last.captured_s - first.captured_s > 0.8
+
+
+class SilentEngine(FlakyEngine):
+    """Whose camera gives nothing from some picture on, and does not say why."""
+
+    def step(self, timeout_s: float) -> Tick | None:
+        tick = super().step(timeout_s)
+        self.problem = None
+        return tick
+
+
+def test_a_silence_that_lasts_to_the_end_is_told_as_well(
+    recorded: Callable[[FlakyEngine, float], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorded(SilentEngine((0.3, 99.0)), 1.0)
+    said = json.loads(capsys.readouterr().out)
+    assert said["without_picture_s"] >= 0.5
+
+
+class LosingEngine(FlakyEngine):
+    """Whose camera loses two frames before each that comes, as it does on a cable that is too slow."""
+
+    def step(self, timeout_s: float) -> Tick | None:
+        tick = super().step(timeout_s)
+        if tick is not None:
+            tick = replace(tick, frame=replace(tick.frame, lost=2 * self._index))
+        return tick
+
+
+def test_what_the_camera_lost_is_told_and_can_be_asked_for_afterwards(
+    recorded: Callable[[FlakyEngine, float], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    session = recorded(LosingEngine((99.0, 99.0)), 0.3)
+    said = json.loads(capsys.readouterr().out)
+    assert said["camera_lost"] == 2 * (said["frames"] - 1) > 0
+    with SessionReader(session) as reader:
+        assert reader.wait(10.0)
+        assert describe(reader)["camera_lost"] == said["camera_lost"]
 
 
 def test_a_device_that_fails_ends_the_session_with_the_reason(

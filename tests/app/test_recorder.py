@@ -16,6 +16,7 @@ from core.config import Config
 from core.control.alerts import ALERTS, Alert
 from core.control.faults import Cause
 from core.control.modes import Act
+from core.session import recording
 from core.session.events import EventKind
 from core.session.reader import SessionReader
 from core.session.record_status import RecordStatus
@@ -125,6 +126,34 @@ def test_a_folder_that_cannot_be_written_stops_the_recording_visibly(
     assert "Recording stopped" in running.panels.toast.text()
     assert engine.pilot.faults[-1].cause is Cause.RECORDING_STOPPED
     assert running.shown_tick is not None, "the rig goes on"
+
+
+def test_after_a_fault_of_the_program_in_the_recorder_the_next_key_records_again(
+    running: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_values: object, **_options: object) -> None:
+        raise RuntimeError("nobody has thought of this")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(recording, "row_of", fail)
+        qtbot.keyClick(running, Key.Key_F9)
+        until(qtbot, lambda: "stopped" in running.panels.record_bar.text)
+        said = running.panels.toast.text()
+        assert said == "Recording stopped: unexpected RuntimeError: nobody has thought of this", "not that all is saved"
+        assert any("Session saved" in line for line in running.panels.events.lines), "what was recorded until then"
+    qtbot.keyClick(running, Key.Key_F9)
+    until(qtbot, lambda: running._recorder.status.frames >= 3)
+    assert running._recorder.status.problem == ""
+
+
+def test_a_recorder_that_was_closed_does_not_live_again(running: OperatorWindow, tmp_path: Path) -> None:
+    writer = running.recorder._writer
+    assert writer is not None
+    assert running.recorder.close()
+    running.recorder.toggle()
+    assert running.recorder._writer is writer
+    assert not writer.is_alive
+    assert sessions(tmp_path / "sessions") == []
 
 
 def restart(window: OperatorWindow) -> None:

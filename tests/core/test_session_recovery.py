@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import random
+import resource
 import shutil
 import subprocess
 import sys
@@ -619,6 +620,43 @@ def test_a_note_is_added_to_a_session_that_has_ended(session: Path) -> None:
     path.mkdir()
     with pytest.raises(SessionError, match="not kept"):
         add_event(session, Event(1001.5, EventKind.NOTE, "kink here"))
+
+
+@pytest.fixture
+def short_of_room(session: Path) -> Iterator[None]:
+    """The disk takes twenty bytes more of the events."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, ((session / EVENTS).stat().st_size + 20, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.usefixtures("short_of_room")
+def test_a_note_that_finds_no_room_leaves_nothing_of_itself(session: Path) -> None:
+    before = (session / EVENTS).read_bytes()
+    with pytest.raises(SessionError, match="the note was not kept"):
+        add_event(session, Event(1001.0, EventKind.NOTE, "the tip touched the wall here"))
+    assert (session / EVENTS).read_bytes() == before
+
+
+def test_a_note_that_cannot_be_forced_to_the_disk_is_not_there_twice_when_it_is_written_again(
+    session: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    note = Event(1001.0, EventKind.NOTE, "the tip touched the wall here")
+
+    def fail(_handle: int) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", fail)
+        with pytest.raises(SessionError, match="the note was not kept"):
+            add_event(session, note)
+    add_event(session, note)
+    with SessionReader(session) as reader:
+        assert [event.text for event in reader.events].count(note.text) == 1
+        assert reader.problems == ()
 
 
 def test_lines_of_gives_places_by_which_a_line_can_be_read_again(tmp_path: Path) -> None:

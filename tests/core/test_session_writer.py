@@ -506,6 +506,41 @@ def test_the_last_seconds_are_saved_without_having_recorded(tmp_path: Path) -> N
         assert manifest.started_monotonic_s == reader.timeline().time_s[0]
 
 
+def test_the_last_seconds_tell_where_driving_stood_when_they_began(tmp_path: Path) -> None:
+    armed = drive_of(1000.0)
+    with writer_in(tmp_path, replace_config(ring_s=2.0)) as writer:
+        for tick in ticks(150):
+            writer.put(tick, replace(armed, time_s=tick.frame.captured_s))
+        writer.drive(replace(armed, time_s=1004.5, mode=Mode.ADVISORY, active=(Fault(Cause.WARM),)))
+        writer.save_last()
+        wait_for(lambda: writer.status().saved is not None)
+    session = writer.status().saved
+    assert session is not None
+    first_s = read_manifest(session).started_monotonic_s
+    with SessionReader(session) as reader:
+        told = [(event.time_s, event.kind, event.text) for event in reader.events if event.kind is not EventKind.VIDEO]
+    assert told == [
+        (first_s, EventKind.MODE, "ARMED"),
+        (first_s, EventKind.FAULT, str(Cause.HEAD_JUMP)),
+        (first_s, EventKind.FAULT, str(Cause.WARM)),
+        (1004.5, EventKind.MODE, "ADVISORY"),
+        (1004.5, EventKind.DISARM, str(Cause.HEAD_JUMP)),
+        (1004.5, EventKind.CLEARED, str(Cause.HEAD_JUMP)),
+    ]
+
+
+def test_what_the_ring_has_from_the_very_beginning_is_not_told_twice(tmp_path: Path) -> None:
+    with writer_in(tmp_path, replace_config(ring_s=20.0)) as writer:
+        for tick in ticks(5):
+            writer.put(tick, DriveView(1000.001, Mode.ADVISORY))
+        writer.save_last()
+        wait_for(lambda: writer.status().saved is not None)
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        assert [event.text for event in reader.events if event.kind is EventKind.MODE] == ["ADVISORY"]
+
+
 def test_last_seconds_that_were_saved_in_part_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the folder, too: the message in the window is gone the next day."""
     writes = SessionFiles.write_frame
