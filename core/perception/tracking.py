@@ -74,9 +74,9 @@ def check_jump(path: RobotPath, memory: Memory | None, captured_s: float, config
 
 def remember(path: RobotPath, mask: Mask, memory: Memory | None, captured_s: float, config: PerceptionConfig) -> Memory:
     """A path that was believed, found in the robot's mask (h, w), beside what is remembered of the frames before."""
-    is_known = memory is not None and recall(memory, captured_s, config.tracking) is not None
-    border_s, clear_s = (memory.border_s, memory.clear_s) if memory is not None and is_known else (None, None)
-    came = _is_within(path.points[-1], mask.shape) or _came_before(path, memory, captured_s, config.tracking)
+    goes_on = _goes_on(path, memory, captured_s, config.tracking)
+    border_s, clear_s = (memory.border_s, memory.clear_s) if memory is not None and goes_on else (None, None)
+    came = _is_within(path.points[-1], mask.shape) or (memory is not None and goes_on and memory.came_from_within)
     if may_go_on_outside(path.points[-1], mask, config.path):
         return Memory(path, captured_s, captured_s if border_s is None else border_s, came_from_within=came)
     clear_s = captured_s if clear_s is None else clear_s
@@ -91,13 +91,12 @@ def _is_within(place: Points, shape: tuple[int, ...]) -> bool:
     return min(x, y, shape[1] - 1 - x, shape[0] - 1 - y) >= WITHIN_PX
 
 
-def _came_before(path: RobotPath, memory: Memory | None, captured_s: float, config: TrackingConfig) -> bool:
-    """Whether the head of a path is the remembered one, which came from within the picture."""
-    if recall(memory, captured_s, config) is None:  # one that lies elsewhere after a gap was judged by itself
-        before = recall_ends(memory, captured_s, config)
-        if before is None or float(np.hypot(*(path.points[-1] - before.points[-1]))) > STILL_HEAD_PX:
-            return False
-    return memory is not None and memory.came_from_within
+def _goes_on(path: RobotPath, memory: Memory | None, captured_s: float, config: TrackingConfig) -> bool:
+    """Whether what is remembered of the head is true of this path's: it was seen a moment ago, or lies there still after a gap."""
+    if recall(memory, captured_s, config) is not None:
+        return True
+    before = recall_ends(memory, captured_s, config)
+    return before is not None and float(np.hypot(*(path.points[-1] - before.points[-1]))) <= STILL_HEAD_PX
 
 
 def check_in_view(memory: Memory, config: PerceptionConfig) -> Refusal | None:

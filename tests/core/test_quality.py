@@ -266,8 +266,9 @@ def test_a_head_that_has_met_the_border_for_longer_than_a_moment_may_be_out_of_v
         assert refusal is None or refusal.reason is Reason.AMBIGUOUS_PATH
         told.append(refusal is None)
     assert told == [True, True, True, True, True, False, False, True, True, True, True, True, True, False]
-    # After a pause it has arrived anew.
-    assert remember(path(outside), mask, memory, 9.0, CONFIG).border_s == 9.0
+    # A gap in which nothing was found brings it back no more than a frame does; after a long one it has arrived anew.
+    assert check_in_view(remember(path(outside), mask, memory, 9.0, CONFIG), CONFIG) is not None
+    assert remember(path(outside), mask, memory, 12.0, CONFIG).border_s == 12.0
     assert check_in_view(Memory(path(outside), 9.0, 5.0), PerceptionConfig(quality=QualityConfig(enabled=False))) is None
 
 
