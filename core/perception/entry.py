@@ -117,13 +117,15 @@ def _as_before(points: Points, around: Surroundings) -> float:
 
 
 def _as_earlier(points: Points, around: Surroundings) -> float:
-    """How far the path goes on along the one of before a gap, in its direction; negative: against it. 0 where it lies elsewhere.
+    """How far the path goes on along the one of before a gap."""
+    return goes_along_px(points, around.earlier.points) if around.earlier is not None else 0.0
+
+
+def goes_along_px(points: Points, before: Points) -> float:
+    """How far a path goes on along an earlier one, in its direction; negative: against it. 0 where it lies elsewhere.
 
     A robot slides along itself and cannot turn about in a vessel, however far it has moved meanwhile.
     """
-    if around.earlier is None:
-        return 0.0
-    before = around.earlier.points
     along = polyline.arc_length(before)
     places = [polyline.nearest(before, (x, y), along) for x, y in polyline.resample(points, ALONG_STEP_PX).tolist()]
     beside = [position for distance, position, _ in places if distance <= ALONG_PX]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.config import PerceptionConfig, TrackingConfig
-from core.perception.entry import STILL_HEAD_PX, may_go_on_outside
+from core.perception.entry import ALONG_STEP_PX, STILL_HEAD_PX, goes_along_px, may_go_on_outside
 from core.types import Mask, Points, Reason, Refusal, RobotPath
 
 SLACK_PX = 12.0
@@ -76,7 +76,7 @@ def remember(path: RobotPath, mask: Mask, memory: Memory | None, captured_s: flo
     """A path that was believed, found in the robot's mask (h, w), beside what is remembered of the frames before."""
     goes_on = _goes_on(path, memory, captured_s, config.tracking)
     border_s, clear_s = (memory.border_s, memory.clear_s) if memory is not None and goes_on else (None, None)
-    came = _is_within(path.points[-1], mask.shape) or (memory is not None and goes_on and memory.came_from_within)
+    came = _is_within(path.points[-1], mask.shape) or _came_before(path, memory, captured_s, config.tracking)
     if may_go_on_outside(path.points[-1], mask, config.path):
         return Memory(path, captured_s, captured_s if border_s is None else border_s, came_from_within=came)
     clear_s = captured_s if clear_s is None else clear_s
@@ -89,6 +89,15 @@ def _is_within(place: Points, shape: tuple[int, ...]) -> bool:
     """Whether a place (2,) is well within a picture of `shape` (h, w)."""
     x, y = float(place[0]), float(place[1])
     return min(x, y, shape[1] - 1 - x, shape[0] - 1 - y) >= WITHIN_PX
+
+
+def _came_before(path: RobotPath, memory: Memory | None, captured_s: float, config: TrackingConfig) -> bool:
+    """Whether the head of a path is the remembered one, wherever it has gone in a gap, and this one came from within."""
+    if memory is None or not memory.came_from_within:
+        return False
+    before = recall_ends(memory, captured_s, config)
+    along = before is not None and goes_along_px(path.points, before.points) > ALONG_STEP_PX
+    return along or _goes_on(path, memory, captured_s, config)
 
 
 def _goes_on(path: RobotPath, memory: Memory | None, captured_s: float, config: TrackingConfig) -> bool:

@@ -282,6 +282,8 @@ def test_only_a_head_that_was_seen_well_within_the_picture_came_from_there() -> 
         memory = remember(path(line), mask, memory, at_s, CONFIG)
         told.append(memory.came_from_within)
     assert told == [False, False, True, True, True, True, True], "also over a gap, where it is the same one"
+    went_on = remember(path(beside), mask, remember(path(within), mask, None, 0.0, CONFIG), 3.0, CONFIG)
+    assert went_on.came_from_within, "in a gap it has gone on along itself"
     assert not remember(path(beside[::-1] + [327.0, 0.0]), mask, memory, 6.0, CONFIG).came_from_within, "another one may be none"
     assert not remember(path(border), mask, memory, 20.0, CONFIG).came_from_within
 
