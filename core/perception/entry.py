@@ -49,6 +49,15 @@ def is_entry(place: Points, around: Surroundings) -> bool:
     return _is_at_border(place, around.masks.robot, around.config) or _at_port(place, around)
 
 
+def was_the_head(points: Points, around: Surroundings) -> bool:
+    """Whether what is taken for the tail of an ordered path was the head before a gap, and well within the picture by then.
+
+    The path lies as it lay then: nothing has turned it about, but the other end reached the image border while nobody saw it.
+    """
+    turned = around.came_from_within and _as_earlier(points, around) < -ALONG_STEP_PX
+    return turned and not _at_port(points[0], around)
+
+
 def may_go_on_outside(place: Points, mask: Mask, config: PathConfig) -> bool:
     """Whether the robot's mask meets the image border at a place (2,), so that nobody can tell whether the robot ends there."""
     return _is_at_border(place, mask, config) and _meets_border(place, mask)
@@ -117,13 +126,15 @@ def _as_before(points: Points, around: Surroundings) -> float:
 
 
 def _as_earlier(points: Points, around: Surroundings) -> float:
-    """How far the path goes on along the one of before a gap, in its direction; negative: against it. 0 where it lies elsewhere.
+    """How far the path goes on along the one of before a gap."""
+    return goes_along_px(points, around.earlier.points) if around.earlier is not None else 0.0
+
+
+def goes_along_px(points: Points, before: Points) -> float:
+    """How far a path goes on along an earlier one, in its direction; negative: against it. 0 where it lies elsewhere.
 
     A robot slides along itself and cannot turn about in a vessel, however far it has moved meanwhile.
     """
-    if around.earlier is None:
-        return 0.0
-    before = around.earlier.points
     along = polyline.arc_length(before)
     places = [polyline.nearest(before, (x, y), along) for x, y in polyline.resample(points, ALONG_STEP_PX).tolist()]
     beside = [position for distance, position, _ in places if distance <= ALONG_PX]

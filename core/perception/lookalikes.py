@@ -49,14 +49,6 @@ class Lookalikes:
         """Another stream, or another place of the camera."""
         self._begin((0, 0))
 
-    def doubt(self) -> None:
-        """The robot's end has jumped: what has stayed beside it until now shall be seen to stay anew.
-
-        What is known already is none for as long as the picture there is as it was, and not one of a camera that was moved.
-        """
-        self._end = None
-        self._seen_s[~self._known] = -math.inf
-
     def _begin(self, shape: tuple[int, ...]) -> None:
         self._last_s = -math.inf
         self.none: Mask | None = None
@@ -70,6 +62,14 @@ class Lookalikes:
         self._robots_s: NDArray[np.float64] = np.full(shape, -np.inf)
         self._ends: NDArray[np.float32] = np.zeros((*shape, 2), np.float32)  # the robot's, when the pixel was first seen
         self._picture: NDArray[np.float32] = np.zeros((*shape, 3), np.float32)
+
+    def doubt(self) -> None:
+        """The robot's end has jumped: what has stayed beside it until now shall be seen to stay anew.
+
+        What is known already is none for as long as the picture there is as it was, and not one of a camera that was moved.
+        """
+        self._end = None
+        self._seen_s[~self._known] = -math.inf
 
     def without(self, robot: Mask, image: Image, captured_s: float, window: Window | None = None) -> Mask:
         """The robot's mask (h, w) of the next frame without what is none; the same object where nothing is.

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.config import PathConfig, PerceptionConfig
 from core.perception import path_shape, polyline, trails
-from core.perception.entry import Surroundings, is_entry, tail_first
+from core.perception.entry import Surroundings, is_entry, tail_first, was_the_head
 from core.perception.pieces import check_pieces, find_pieces, without_reflections
 from core.perception.pixel_graph import Chain, PixelGraph, trace
 from core.perception.trails import Trail
@@ -97,6 +97,8 @@ def find(
     if must_show_head and all(is_entry(place, around) for place in best.trail.points[[0, -1]]):
         return Refusal(Reason.AMBIGUOUS_PATH, "both of its ends lie at the image border, so its head may be out of view")
     points = tail_first(best.trail.points, around)
+    if config.quality.enabled and was_the_head(points, around):
+        return Refusal(Reason.AMBIGUOUS_PATH, "it reaches the image border at its head, which may be out of view")
     line, radius_px = path_shape.refine(points, masks, radius_px, config.path.smoothing_px, config.cleaning.extend_ends)
     return RobotPath(
         points=line,

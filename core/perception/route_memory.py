@@ -13,6 +13,7 @@ from core.perception.lumen import foot
 from core.types import Mask, Point, Points, Route
 
 _STEP_PX = 1.0
+_ALIKE_STEP_PX = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +80,12 @@ class RouteMemory:
         return seen.last_s - seen.since_s >= self._config.memory_s
 
     def _are_alike(self, one: Route, other: Route) -> bool:
-        return abs(one.length_px - other.length_px) <= self._config.route_gap_px
+        """Whether the other route is as long, and nowhere far from the one: round a loop both ways may be as long."""
+        if abs(one.length_px - other.length_px) > self._config.route_gap_px:
+            return False
+        along = polyline.arc_length(one.points)
+        places = polyline.resample(other.points, _ALIKE_STEP_PX).tolist()
+        return all(polyline.nearest(one.points, (x, y), along)[0] <= self._config.route_reach_px for x, y in places)
 
     def _seen_again(self, seen: _Seen, left: Route, found: Route, captured_s: float) -> _Seen:
         """A route found after `seen`, of which `left` is left: if they are alike, it has been found for as long."""

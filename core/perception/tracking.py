@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.config import PerceptionConfig, TrackingConfig
-from core.perception.entry import STILL_HEAD_PX, may_go_on_outside
+from core.perception.entry import ALONG_STEP_PX, STILL_HEAD_PX, goes_along_px, may_go_on_outside
 from core.types import Mask, Points, Reason, Refusal, RobotPath
 
 SLACK_PX = 12.0
@@ -74,8 +74,8 @@ def check_jump(path: RobotPath, memory: Memory | None, captured_s: float, config
 
 def remember(path: RobotPath, mask: Mask, memory: Memory | None, captured_s: float, config: PerceptionConfig) -> Memory:
     """A path that was believed, found in the robot's mask (h, w), beside what is remembered of the frames before."""
-    is_known = memory is not None and recall(memory, captured_s, config.tracking) is not None
-    border_s, clear_s = (memory.border_s, memory.clear_s) if memory is not None and is_known else (None, None)
+    goes_on = _goes_on(path, memory, captured_s, config.tracking)
+    border_s, clear_s = (memory.border_s, memory.clear_s) if memory is not None and goes_on else (None, None)
     came = _is_within(path.points[-1], mask.shape) or _came_before(path, memory, captured_s, config.tracking)
     if may_go_on_outside(path.points[-1], mask, config.path):
         return Memory(path, captured_s, captured_s if border_s is None else border_s, came_from_within=came)
@@ -92,12 +92,20 @@ def _is_within(place: Points, shape: tuple[int, ...]) -> bool:
 
 
 def _came_before(path: RobotPath, memory: Memory | None, captured_s: float, config: TrackingConfig) -> bool:
-    """Whether the head of a path is the remembered one, which came from within the picture."""
-    if recall(memory, captured_s, config) is None:  # one that lies elsewhere after a gap was judged by itself
-        before = recall_ends(memory, captured_s, config)
-        if before is None or float(np.hypot(*(path.points[-1] - before.points[-1]))) > STILL_HEAD_PX:
-            return False
-    return memory is not None and memory.came_from_within
+    """Whether the head of a path is the remembered one, wherever it has gone in a gap, and this one came from within."""
+    if memory is None or not memory.came_from_within:
+        return False
+    before = recall_ends(memory, captured_s, config)
+    along = before is not None and goes_along_px(path.points, before.points) > ALONG_STEP_PX
+    return along or _goes_on(path, memory, captured_s, config)
+
+
+def _goes_on(path: RobotPath, memory: Memory | None, captured_s: float, config: TrackingConfig) -> bool:
+    """Whether what is remembered of the head is true of this path's: it was seen a moment ago, or lies there still after a gap."""
+    if recall(memory, captured_s, config) is not None:
+        return True
+    before = recall_ends(memory, captured_s, config)
+    return before is not None and float(np.hypot(*(path.points[-1] - before.points[-1]))) <= STILL_HEAD_PX
 
 
 def check_in_view(memory: Memory, config: PerceptionConfig) -> Refusal | None:

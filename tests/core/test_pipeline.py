@@ -290,9 +290,23 @@ def test_a_robot_that_comes_out_of_a_sheath_and_leaves_the_picture_is_not_turned
             assert scene.path.head[0] == pytest.approx(min(head_x, SIZE[0] - 1), abs=3.0), "the tail was never taken for it"
     arrived = next(index for index, head_x in enumerate(heads) if head_x > SIZE[0])
     assert all(answered[: arrived + 4])
-    assert not any(answered[arrived + 10 : 30])
-    assert not any(answered[65:75])
+    assert not any(answered[arrived + 10 : 75]), "nor after a gap"
     assert all(answered[-3:])
+
+
+def test_a_head_that_left_the_picture_while_nobody_saw_it_is_not_answered_at_the_other_end(
+    pipeline: Pipeline, network: DrawnNetwork
+) -> None:
+    robot = VESSEL[VESSEL[:, 0] >= 70.0] + [0.0, 3.0]
+    for step, head_x in enumerate([*[560] * 4, *[None] * 20, *[680] * 20, *range(620, 560, -8)]):
+        network.draw(*([robot[robot[:, 0] <= head_x]] if head_x is not None else []))
+        scene = pipeline(frame(0.05 * step))
+        if head_x == 680:
+            assert reason(scene) is Reason.AMBIGUOUS_PATH
+        elif head_x is not None:
+            assert reason(scene) is None
+            assert scene.path is not None
+            assert scene.path.head[0] == pytest.approx(head_x, abs=3.0)
 
 
 def _draw_tapered(network: DrawnNetwork, left_x: float, right_x: float, *, thick: str) -> None:

@@ -266,8 +266,9 @@ def test_a_head_that_has_met_the_border_for_longer_than_a_moment_may_be_out_of_v
         assert refusal is None or refusal.reason is Reason.AMBIGUOUS_PATH
         told.append(refusal is None)
     assert told == [True, True, True, True, True, False, False, True, True, True, True, True, True, False]
-    # After a pause it has arrived anew.
-    assert remember(path(outside), mask, memory, 9.0, CONFIG).border_s == 9.0
+    # A gap in which nothing was found brings it back no more than a frame does; after a long one it has arrived anew.
+    assert check_in_view(remember(path(outside), mask, memory, 9.0, CONFIG), CONFIG) is not None
+    assert remember(path(outside), mask, memory, 12.0, CONFIG).border_s == 12.0
     assert check_in_view(Memory(path(outside), 9.0, 5.0), PerceptionConfig(quality=QualityConfig(enabled=False))) is None
 
 
@@ -281,6 +282,8 @@ def test_only_a_head_that_was_seen_well_within_the_picture_came_from_there() -> 
         memory = remember(path(line), mask, memory, at_s, CONFIG)
         told.append(memory.came_from_within)
     assert told == [False, False, True, True, True, True, True], "also over a gap, where it is the same one"
+    went_on = remember(path(beside), mask, remember(path(within), mask, None, 0.0, CONFIG), 3.0, CONFIG)
+    assert went_on.came_from_within, "in a gap it has gone on along itself"
     assert not remember(path(beside[::-1] + [327.0, 0.0]), mask, memory, 6.0, CONFIG).came_from_within, "another one may be none"
     assert not remember(path(border), mask, memory, 20.0, CONFIG).came_from_within
 

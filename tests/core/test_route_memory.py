@@ -152,6 +152,28 @@ def test_nor_is_it_when_the_way_was_not_found_for_long(memory: RouteMemory, othe
     assert memory.follow(other, head, TARGET, cut, 5.6) is not other, "it has been seen to be none meanwhile"
 
 
+_ARC = np.linspace(0.0, np.pi, 100)
+ABOVE, BELOW = (
+    Route(np.column_stack([250.0 - 130.0 * np.cos(_ARC), 100.0 + side * 60.0 * np.sin(_ARC)]), length_px, TARGET)
+    for side, length_px in ((-1.0, 311.0), (1.0, 309.0))
+)
+"""Round a loop both ways are as long: which one is the shorter hangs on a pixel."""
+
+
+def test_round_a_loop_the_way_does_not_change_from_frame_to_frame() -> None:
+    memory, head = RouteMemory(CONFIG), (120.0, 100.0)
+    vessel = np.ones((200, 400), np.bool_)
+    for step in range(18):
+        assert memory.follow(ABOVE, head, TARGET, vessel, step / 30) is ABOVE
+    for step in range(18, 60):
+        told = memory.follow((ABOVE, BELOW)[step % 2], head, TARGET, vessel, step / 30)
+        assert isinstance(told, Route)
+        assert told.points[50][1] == pytest.approx(40.0, abs=1.0), "above"
+    for step in range(60, 80):
+        told = memory.follow(BELOW, head, TARGET, vessel, step / 30)
+    assert told is BELOW, "what lasts is true"
+
+
 def test_other_ways_that_contradict_each_other_are_not_taken(memory: RouteMemory) -> None:
     head, cut = (120.0, 100.0), _vessel((200, 212))
     for step in range(40):
