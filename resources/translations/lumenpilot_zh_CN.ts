@@ -3397,6 +3397,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/player_window.py"/>
+        <source>No clip yet: the session is still being read, and would be cut short</source>
+        <translation>尚不能导出片段：会话仍在读取中，否则片段会被截短</translation>
+    </message>
+    <message>
+        <location filename="../../app/player_window.py"/>
         <source>No snapshot: there is no picture</source>
         <translation>没有截图：没有图像</translation>
     </message>
@@ -3652,13 +3657,13 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/recorder.py"/>
-        <source>Recording stopped: {problem}</source>
-        <translation>录制停止：{problem}</translation>
+        <source>Session saved: {saved}</source>
+        <translation>会话已保存：{saved}</translation>
     </message>
     <message>
         <location filename="../../app/recorder.py"/>
-        <source>Session saved: {saved}</source>
-        <translation>会话已保存：{saved}</translation>
+        <source>Recording stopped: {problem}</source>
+        <translation>录制停止：{problem}</translation>
     </message>
     <message>
         <location filename="../../app/recovery_desk.py"/>
@@ -6725,11 +6730,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/widgets/recorded_plate.py"/>
-        <source>, cut off</source>
-        <translation>，被截断</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/recorded_plate.py"/>
         <source>, recovered</source>
         <translation>，已恢复</translation>
     </message>
@@ -6737,6 +6737,16 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/recorded_plate.py"/>
         <source>recorded {kind}</source>
         <translation>录制 {kind}</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/recorded_plate.py"/>
+        <source>, being recorded</source>
+        <translation>，正在录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/recorded_plate.py"/>
+        <source>, cut off</source>
+        <translation>，被截断</translation>
     </message>
     <message>
         <location filename="../../app/widgets/recorded_plate.py"/>
