@@ -93,4 +93,7 @@ def test_a_survivor_without_an_explanation_is_a_failure(mutation: ModuleType, ca
 
 def test_an_unknown_module_is_one_line(mutation: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
     assert mutation.main(["pedal"]) == 2
-    assert capsys.readouterr().err == "unknown: pedal; known are gate, gate_checks, joint_limits, supervisor, health, deadman\n"
+    assert (
+        capsys.readouterr().err
+        == "unknown: pedal; known are gate, gate_checks, joint_limits, supervisor, health, bus_watch, deadman\n"
+    )

@@ -43,8 +43,8 @@ class BusReport:
 class BusWatch:
     """What is remembered of the bus. What a report leaves out keeps its last reading. ``disarmed_run`` counts reports in a row.
 
-    ``gaps_since_s`` is when the cycles began in which not all servos have answered, without one between in which they have, and
-    ``gaps`` whose answers were missed since.
+    ``gap_run`` counts the cycles in which not all servos have answered, without one between in which they have (time says nothing:
+    the process may have stood still), and ``gaps`` says whose answers were missed in them.
     """
 
     seen_s: float | None = None
@@ -56,7 +56,7 @@ class BusWatch:
     strained: str = ""
     rebooted: bool = False
     disarmed_run: int = 0
-    gaps_since_s: float | None = None
+    gap_run: int = 0
     gaps: frozenset[str] = frozenset()
 
 
@@ -73,11 +73,10 @@ def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConf
     if report.currents_ma:
         currents = see_currents(currents, report.currents_ma, now_s, servos)
         strain = strained(currents, servos)
-    gaps_since_s, gaps = watch.gaps_since_s, watch.gaps
+    gap_run, gaps = watch.gap_run, watch.gaps
     if report.misses:
         missing = {name for name, misses in zip(JOINT_NAMES, report.misses, strict=False) if misses > 0}
-        gaps_since_s = (now_s if gaps_since_s is None else gaps_since_s) if missing else None
-        gaps = gaps | missing if missing else frozenset()
+        gap_run, gaps = (gap_run + 1, gaps | missing) if missing else (0, frozenset())
     newest = replace(
         report,
         hardware_errors=report.hardware_errors or old.hardware_errors,
@@ -86,7 +85,7 @@ def see_bus(watch: BusWatch, report: BusReport, now_s: float, servos: ServosConf
     )
     disarmed_run = 0 if report.armed else watch.disarmed_run + 1
     rebooted = watch.rebooted or report.rebooted
-    return BusWatch(now_s, newest, errors, since_s, astray, currents, strain, rebooted, disarmed_run, gaps_since_s, gaps)
+    return BusWatch(now_s, newest, errors, since_s, astray, currents, strain, rebooted, disarmed_run, gap_run, gaps)
 
 
 def excused(watch: BusWatch, now_s: float) -> BusWatch:
@@ -130,7 +129,7 @@ def bus_faults(watch: BusWatch, now_s: float, servos: ServosConfig, safety: Safe
         faults.append(Fault(Cause.BUS_NOISE, f"{bad} in {safety.bus_errors_window_s:g} s (at most {safety.bus_errors})"))
     if silent := [n for n, misses in zip(JOINT_NAMES, newest.misses, strict=False) if misses >= safety.missed_answers]:
         faults.append(Fault(Cause.SERVO_SILENT, ", ".join(silent)))
-    elif watch.gaps_since_s is not None and now_s - watch.gaps_since_s > safety.bus_disarm_s:
+    elif watch.gap_run > safety.bus_disarm_s * servos.bus_hz:
         # Each by itself answers often enough. But positions of all at once, which the motion goes by, are never there.
         names = ", ".join(name for name in JOINT_NAMES if name in watch.gaps)
         faults.append(Fault(Cause.SERVO_SILENT, f"in turns, {names}: not all in one cycle for {safety.bus_disarm_s:g} s"))
