@@ -30,15 +30,20 @@ _DISAGREEMENT_DEG = 30.0
 
 @dataclass(frozen=True, slots=True)
 class StudyOptions:
-    """What the command line says about the study; None where it says nothing."""
+    """What the command line says about the study; None where it says nothing, ``asked`` "" for what lies outside studies."""
 
-    name: str = ""
+    asked: str | None = None
     rater: str | None = None
     repeats: int | None = None
     mirror: bool = False
     turn: bool = False
     seed: int | None = None
     order: str | None = None
+
+    @property
+    def name(self) -> str:
+        """In which answers are given; "" outside studies."""
+        return self.asked or ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +257,7 @@ def _report(store_path: Path, options: AnnotateOptions) -> int:
     from core.study.annotation_report import agreement_report, choose_study, write_measures
 
     with AnnotationStore(store_path, read_only=True) as store:
-        annotations = choose_study(store.annotations(), options.study.name or None, str(store_path))
+        annotations = choose_study(store.annotations(), options.study.asked, str(store_path))
         annotations = _of_rater(annotations, options.study.rater)
         names = {sha256: image.name for sha256, image in store.images().items()}
         tell_problems(store.problems)
@@ -291,8 +296,8 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
 
     assert options.out is not None
     annotations, images = read_annotated(store_path, paths, options.frames or FRAMES)
-    if options.study.name:
-        annotations = [one for one in annotations if one.key.study == options.study.name]
+    if options.study.asked is not None:
+        annotations = [one for one in annotations if one.key.study == options.study.asked]
     annotations = _of_rater(annotations, options.study.rater)
     if options.export == "dataset":
         count, problems = export_training_set(annotations, images, options.out)
@@ -306,7 +311,7 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
 
         if options.out.exists():
             raise AnnotationError(f"{options.out}: is there already; choose another --out")
-        rows, _, _, missed = compared_rows(annotations, images, config, options.study.name or None, str(store_path))
+        rows, _, _, missed = compared_rows(annotations, images, config, options.study.asked, str(store_path))
         try:
             write_measurements(options.out, rows)
         except OSError as error:
@@ -410,7 +415,7 @@ def _join(store_path: Path, options: AnnotateOptions) -> int:
     is_new = not store_path.exists()
     try:
         with AnnotationStore(store_path) as store:
-            joined = join(store, options.joins, options.study.name or None, names)
+            joined = join(store, options.joins, options.study.asked, names)
     except AnnotationError:
         if is_new:
             store_path.unlink(missing_ok=True)

@@ -82,8 +82,12 @@ def _names_of(folders: set[Path]) -> dict[Path, str]:
 def raters_agreement(
     annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], study: str | None, where: str, seed: int
 ) -> dict[str, Any] | None:
-    """How well raters agree with themselves and each other (``agreement_report``); None when nobody measured anything twice."""
-    done = choose_study(annotations, study, where)
+    """How well raters agree with themselves and each other on the images that are here (``agreement_report``).
+
+    None when nobody measured anything twice.
+    """
+    here = {image.sha256 for image in images}
+    done = [one for one in choose_study(annotations, study, where) if one.key.sha256 in here]
     raters = {one.key.rater for one in done}
     if len(raters) < 2 and all(one.key.repeat == 1 for one in done):
         return None

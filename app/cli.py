@@ -92,10 +92,13 @@ def main() -> None:
 
 
 def _refuse_empty(words: Sequence[str]) -> None:
-    """No option and no argument takes an empty text: as a path it would mean this folder, and as a name nothing at all."""
+    """No option and no argument takes an empty text: as a path it would mean this folder, and as a name nothing at all.
+
+    But a study without a name is what was measured outside studies.
+    """
     for before, word in zip(["", *words], words, strict=False):
         option, has_value, value = word.partition("=") if word.startswith("--") else (before, word == "", word)
-        if has_value and not value:
+        if has_value and not value and option != "--study":
             what = option if option.startswith("-") and option.strip("-") else "an argument"
             raise UserError(f"{what} is empty: give it a value, or leave it out (is a variable of a script not set?)")
 

@@ -41,7 +41,12 @@ def annotate(
     paths: Annotated[list[Path] | None, typer.Argument(help="folders, pictures, videos or sessions; default: this folder")] = None,
     store: Annotated[Path | None, typer.Option(help="annotation file; default: annotations.lumenpilot.sqlite there")] = None,
     rater: Annotated[str | None, typer.Option(help="who annotates; default: the user's name")] = None,
-    study: Annotated[str, typer.Option(help="blind study of this name: begun at the first call, gone on with at later ones")] = "",
+    study: Annotated[
+        str | None,
+        typer.Option(
+            help='blind study of this name: begun at the first call, gone on with at later ones; --report, --export: "" outside any'
+        ),
+    ] = None,
     repeats: Annotated[int | None, typer.Option(min=1, max=20, help="how often a study shows each image; default: 2")] = None,
     mirror: Annotated[bool, typer.Option("--mirror", help="repeats of a study are shown mirrored")] = False,
     turn: Annotated[bool, typer.Option("--turn", help="repeats of a study are shown turned by 180 degrees")] = False,
@@ -69,6 +74,8 @@ def annotate(
     """Measure angles and states by hand, draw masks; as a study with several raters, blind and repeated."""
     from app.annotate_command import AnnotateOptions, StudyOptions, run_annotate
 
+    if study == "" and not report and export is None:  # who annotates into a study that has no name would not be blind
+        raise UserError("--study is empty: give it a value, or leave it out (is a variable of a script not set?)")
     options = AnnotateOptions(
         paths=tuple(paths or ()),
         store=store,
@@ -104,7 +111,9 @@ def evaluate(
     manual_sd: Annotated[
         float | None, typer.Option(min=0, max=30, help="SD of one such manual measure, degrees; default: 1.5")
     ] = None,
-    study: Annotated[str | None, typer.Option(help="this study of images annotated by hand, its raters and repeats too")] = None,
+    study: Annotated[
+        str | None, typer.Option(help='this study of images annotated by hand, its raters and repeats too; "": outside studies')
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of the drawn images, their manual errors and the bootstrap")] = 0,
     model: ModelOption = None,
     preset: PresetOption = None,

@@ -193,7 +193,7 @@ def _perceive_annotated(
     from app.annotate_command import read_annotated
     from app.annotate_evaluation import compared_rows, raters_agreement
 
-    answers, images = read_annotated(annotations, [annotations.parent])
+    answers, images = read_annotated(annotations, _places_of(annotations))
     notes = []
     recorded = _recorded(annotations.parent, config, model) if as_recorded else None
     if recorded is not None:
@@ -214,11 +214,23 @@ def _perceive_annotated(
     return _Study(rows, source, notes, agreement, interrupted=missed > 0)
 
 
+def _places_of(annotations: Path) -> list[Path]:
+    """Where the annotated images may be: in the file's folder, and those of other folders where they were seen last."""
+    from core.study.annotation_store import AnnotationStore
+
+    folder = annotations.parent.resolve()
+    with AnnotationStore(annotations, read_only=True) as store:
+        seen = [Path(os.path.normpath(folder / image.name)) for image in store.images().values()]
+    elsewhere = [path for path in seen if path.parent != folder and path.is_file()]
+    own = [] if elsewhere and len(elsewhere) == len(seen) else [annotations.parent]
+    return [*own, *sorted(elsewhere)]
+
+
 def _how_answered(
     annotations: Path, answers: Sequence[StoredAnnotation], images: Sequence[FoundImage], study: str | None
 ) -> list[str]:
     """What a reader must know of the manual answers: which are not among the figures, and which know the algorithm's own."""
-    from core.study.annotation_report import choose_study
+    from core.study.annotation_report import choose_study, undecided
     from core.study.annotation_store import AnnotationStore
 
     done, here = choose_study(answers, study, str(annotations)), {image.sha256 for image in images}
@@ -227,6 +239,11 @@ def _how_answered(
         taken_over, after_look = store.taken_over(), store.given_after_look()
     taken = sum(one.key.sha256 in here and one.key in taken_over for one in done)
     notes = [f"Of the annotated images {gone} are not where they were; they are in none of the figures."] if gone else []
+    if tied := undecided(one for one in done if one.key.sha256 in here):
+        notes.append(
+            f"On {tied} images no state was given most often (two raters of different minds, for one); that of the rater whose "
+            "name comes first counts there."
+        )
     if taken:
         notes.append(
             f"Of the manual answers {taken} began with the algorithm's own lines (key G): they agree with it the more for that. "

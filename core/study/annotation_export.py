@@ -17,7 +17,7 @@ from core.images import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS, UNMEASURED, write_mask, write_png
 from core.study.annotation_images import FoundImage
 from core.study.annotation_records import StoredAnnotation
-from core.study.annotation_report import manual_measurements
+from core.study.annotation_report import finished, manual_measurements, studies_of
 from core.study.annotations import AnnotationError, MaskPolygon, MaskTarget, measure_lines
 from core.study.mask_areas import area_polygon
 from core.study.mask_polygons import fill
@@ -53,7 +53,8 @@ def export_training_set(
     Raises
     ------
     AnnotationError
-        The folder is not empty or cannot be written, or there is nothing to write; or `go_on`, asked before each image, is False.
+        The folder is not empty or cannot be written, or there is nothing to write; the images were measured in several studies; or
+        `go_on`, asked before each image, is False.
     """
     sources = mask_source(annotations)
     here = {image.sha256: image for image in images}
@@ -68,6 +69,9 @@ def export_training_set(
             complete[sha256] = one
     if not complete:
         raise AnnotationError("no image has both a vessel and a robot mask; draw them, or take the model's over, in annotate")
+    measured = finished([one for one in annotations if one.key.sha256 in complete])
+    if len(studies := studies_of(measured)) > 1:
+        raise AnnotationError(f"the images were measured in several studies ({', '.join(studies)}); choose one with --study NAME")
     try:
         if out.exists() and any(out.iterdir()):
             raise AnnotationError(f"{out}: is not empty; choose another --out")
@@ -81,7 +85,7 @@ def export_training_set(
             for target in MaskTarget:
                 mask = fill(one.content.masks, target, image.record.size)
                 write_mask(out / "masks" / f"{stem}_{target.value}.png", mask)
-        rows = [json.dumps(row, allow_nan=False) for row in _truth_rows(annotations, complete, here, stems)]
+        rows = [json.dumps(row, allow_nan=False) for row in _truth_rows(measured, complete, here, stems)]
         (out / "truth.jsonl").write_text("\n".join(rows) + "\n", encoding="utf-8")
     except OSError as error:
         raise AnnotationError(f"{error.filename or out}: cannot be written ({error.strerror}); choose another --out") from None
@@ -112,21 +116,22 @@ def _stems(images: Sequence[FoundImage]) -> dict[str, str]:
 
 
 def _truth_rows(
-    annotations: Sequence[StoredAnnotation],
+    measured: Sequence[StoredAnnotation],
     complete: Mapping[str, StoredAnnotation],
     here: Mapping[str, FoundImage],
     stems: Mapping[str, str],
 ) -> list[dict[str, Any]]:
-    """Truth by hand: angle and state are the raters' common answer, lines and distances those of the first one that has them."""
-    own = [one for one in annotations if one.key.sha256 in complete]
-    common = {row.image: row for row in manual_measurements(own, {sha256: sha256 for sha256 in complete})}
+    """Truth by hand, from finished answers: angle and state of the common one, lines and distances of the first that has them."""
+    common = {row.image: row for row in manual_measurements(measured, {sha256: sha256 for sha256 in complete})}
     rows = []
     for sha256 in complete:
-        manual = common[sha256]
-        theta = manual.manual_angle_deg
-        lines = next((a for a in own if a.key.sha256 == sha256 and a.theta_deg is not None and not a.content.cannot_tell), None)
+        manual = common.get(sha256)
+        theta = manual.manual_angle_deg if manual is not None else None
+        lines = next(
+            (a for a in measured if a.key.sha256 == sha256 and a.theta_deg is not None and not a.content.cannot_tell), None
+        )
         row: dict[str, Any] = {"stem": stems[sha256], "source": "annotated by hand", "reason": None}
-        if lines is None or theta is None or manual.state is None:
+        if lines is None or theta is None or manual is None or manual.state is None:
             nothing = ("head_xy", "theta_deg", "theta_signed_deg", "d_head_px", "d_tail_px", "crossed", "state")
             rows.append(row | dict.fromkeys(nothing) | {"reason": UNMEASURED})
             continue

@@ -20,18 +20,28 @@ from core.study.annotations import AnnotationError, Status, status_of
 from core.study.bootstrap import Floats, members
 from core.study.classification import kappa
 from core.study.evaluation import Measurement
+from core.types import PoseState
 
 _Table = Mapping[tuple[str, str, int], StoredAnnotation]
 """Finished annotations by rater, image, repeat."""
 
 
+def finished(annotations: Iterable[StoredAnnotation]) -> list[StoredAnnotation]:
+    """Those with both lines and a state, and those of whom could not tell."""
+    return [one for one in annotations if _status(one) in (Status.DONE, Status.CANNOT_TELL)]
+
+
+def studies_of(annotations: Iterable[StoredAnnotation]) -> list[str]:
+    """The studies that they are of, as a message names them."""
+    return [repr(name) if name else "'' (outside studies)" for name in sorted({one.key.study for one in annotations})]
+
+
 def choose_study(annotations: Sequence[StoredAnnotation], study: str | None, where: str) -> list[StoredAnnotation]:
     """The finished annotations of one study; without a name, of the only one there is. Raises AnnotationError."""
-    done = [one for one in annotations if _status(one) in (Status.DONE, Status.CANNOT_TELL)]
-    names = sorted({one.key.study for one in done})
+    done = finished(annotations)
+    names = studies_of(done)
     if study is None and len(names) > 1:
-        listed = ", ".join(repr(name) if name else "'' (outside studies)" for name in names)
-        raise AnnotationError(f"{where}: holds several studies ({listed}); choose one with --study NAME")
+        raise AnnotationError(f"{where}: holds several studies ({', '.join(names)}); choose one with --study NAME")
     chosen = [one for one in done if study is None or one.key.study == study]
     if not chosen:
         of_study = f" of study {study!r}" if study else ""
@@ -210,6 +220,15 @@ def manual_measurements(annotations: Iterable[StoredAnnotation], names: Mapping[
     for one in sorted(annotations, key=lambda one: (one.key.rater, one.key.repeat)):
         by_image.setdefault(one.key.sha256, []).append(one)
     return [_common(names.get(image, image), group) for image, group in by_image.items()]
+
+
+def undecided(annotations: Iterable[StoredAnnotation]) -> int:
+    """On how many images no state was given most often: two raters of different minds, for one."""
+    states: dict[str, Counter[PoseState]] = {}
+    for one in annotations:
+        if one.content.state is not None and not one.content.cannot_tell:
+            states.setdefault(one.key.sha256, Counter())[one.content.state] += 1
+    return sum(len(most) > 1 and most[0][1] == most[1][1] for most in (found.most_common(2) for found in states.values()))
 
 
 def _common(name: str, group: Sequence[StoredAnnotation]) -> Measurement:

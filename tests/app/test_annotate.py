@@ -158,19 +158,19 @@ def test_annotated_images_that_are_elsewhere_are_counted(folder: Path, tmp_path:
 
 
 def test_a_study_is_gone_on_with_as_it_was_begun(folder: Path) -> None:
-    first = queue(folder, name="pilot", turn=True, seed=4)
+    first = queue(folder, asked="pilot", turn=True, seed=4)
     assert len(first) == 6
     assert {view for _, repeat, view in first if repeat == 2} == {View.TURNED}
-    assert queue(folder, name="pilot") == first
+    assert queue(folder, asked="pilot") == first
     for other in ({"mirror": True}, {"repeats": 3}, {"seed": 5}, {"order": "even"}):
         with pytest.raises(UserError, match=r"was begun otherwise: shown 2 times \(as is, turned\), order random, seed 4"):
-            queue(folder, name="pilot", **other)
+            queue(folder, asked="pilot", **other)
 
 
 def test_a_study_goes_on_without_an_image_that_vanished(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    queue(folder, name="pilot")
+    queue(folder, asked="pilot")
     (folder / "1.png").unlink()
-    assert {name for name, _, _ in queue(folder, name="pilot")} == {"0.png", "2.png"}
+    assert {name for name, _, _ in queue(folder, asked="pilot")} == {"0.png", "2.png"}
     assert "1.png: belongs to the study, but is not here; left out" in capsys.readouterr().err
 
 

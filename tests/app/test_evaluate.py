@@ -407,6 +407,57 @@ def test_a_study_is_evaluated_with_its_raters_and_repeats(tmp_path: Path, capsys
     assert len((out / "raters.csv").read_text().splitlines()) == 9
 
 
+def test_images_of_other_folders_are_found_where_they_were_annotated(tmp_path: Path) -> None:
+    """Sessions beside each other, one file: only those in the file's own folder were found, and the others said to be gone."""
+    images = [tmp_path / f"session_{index // 2}" / f"frame_{index}.png" for index in range(4)]
+    for index, image in enumerate(images):
+        image.parent.mkdir(exist_ok=True)
+        write_png(image, tube(index)[0])
+    store = images[0].parent / "annotations.lumenpilot.sqlite"
+    for rater, tilts in (("al", [0.0, 10.0, 5.0, 2.0]), ("bo", [2.0, 12.0, 9.0, 6.0])):
+        measure(store, images, tilts, study="main", rater=rater)
+    metrics = evaluate(store.parent, out=tmp_path / "out", study_name="main")
+    assert not any("not where they were" in note for note in metrics["notes"])
+    assert metrics["agreement"]["annotations"] == 8
+    rows = read_measurements(tmp_path / "out" / "measurements.csv")
+    assert [(row.image, row.group) for row in rows] == [(image.name, image.parent.name) for image in images]
+
+
+def test_raters_are_compared_on_the_images_that_are_here_only(tmp_path: Path) -> None:
+    """Those that are gone were told to be in none of the figures, and were in the raters' agreement, by their hashes."""
+    images = [tmp_path / f"frame_{index}.png" for index in range(3)]
+    for index, image in enumerate(images):
+        write_png(image, tube(index)[0])
+    store = tmp_path / "annotations.lumenpilot.sqlite"
+    for repeat, tilts in ((1, [0.0, 10.0, 5.0]), (2, [0.0, 10.0, 25.0])):
+        measure(store, images, tilts, study="main", rater="al", repeat=repeat)
+    images[2].unlink()
+    metrics = evaluate(tmp_path, out=tmp_path / "out", study_name="main")
+    assert "Of the annotated images 1 are not where they were; they are in none of the figures." in metrics["notes"]
+    within = metrics["agreement"]["within"]
+    assert (within["n"], within["sd_deg"]) == (2, pytest.approx(0.0, abs=1e-6))
+    lines = (tmp_path / "out" / "raters.csv").read_text().splitlines()[1:]
+    assert {line.partition(",")[0] for line in lines} == {"frame_0.png", "frame_1.png"}
+
+
+def test_what_was_measured_outside_studies_can_be_chosen(tmp_path: Path) -> None:
+    images = [tmp_path / f"frame_{index}.png" for index in range(2)]
+    for index, image in enumerate(images):
+        write_png(image, tube(index)[0])
+    store = tmp_path / "annotations.lumenpilot.sqlite"
+    measure(store, images, [0.0, 10.0])
+    measure(store, images, [5.0, 5.0], study="main")
+    command = [sys.executable, str(MAIN), "evaluate", str(tmp_path), "--out", str(tmp_path / "out"), "--json", "--study", ""]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = read_measurements(tmp_path / "out" / "measurements.csv")
+    assert [row.angle_1 for row in rows] == pytest.approx([0.0, degrees(atan(10 / 40))], abs=0.05)
+    command = [sys.executable, str(MAIN), "annotate", str(tmp_path), "--report", "--json", "--study="]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["study"] == ""
+
+
 def test_an_interrupted_evaluation_of_annotated_images_keeps_what_was_perceived(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

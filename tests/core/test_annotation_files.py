@@ -87,6 +87,26 @@ def test_an_image_without_angle_trains_but_has_no_truth_of_it(image: FoundImage,
     assert (truth["frame"]["theta_deg"], truth["frame"]["state"], truth["frame"]["reason"]) == (None, None, "not measured by hand")
 
 
+def test_truth_is_of_finished_answers_of_one_study(image: FoundImage, tmp_path: Path) -> None:
+    """Half-drawn lines of one rater, and another study's angle, went into the mean that training takes for the truth."""
+    done = stored(with_masks(VESSEL_BOX, ROBOT_BOX), theta=10.0)
+    begun = stored(replace(LINES, state=None), "ben", theta=80.0)
+    export_training_set([done, begun], [image], tmp_path / "set")
+    row = find_labelled(tmp_path / "set")[1]["frame"]
+    assert (row["theta_deg"], row["state"]) == (10.0, "B")
+    other = replace(stored(LINES, "cleo", theta=50.0), key=ItemKey("ab" * 32, "other", "cleo"))
+    with pytest.raises(
+        AnnotationError, match=r"measured in several studies \('' \(outside studies\), 'other'\); choose one with --study"
+    ):
+        export_training_set([done, other], [image], tmp_path / "set2")
+    assert not (tmp_path / "set2").exists()
+
+
+def test_masks_of_an_answer_that_is_not_finished_train_without_truth(image: FoundImage, tmp_path: Path) -> None:
+    export_training_set([stored(Annotation(masks=(VESSEL_BOX, ROBOT_BOX)))], [image], tmp_path / "set")
+    assert find_labelled(tmp_path / "set")[1]["frame"]["reason"] == "not measured by hand"
+
+
 def test_coco_goes_out_and_comes_back(image: FoundImage, tmp_path: Path) -> None:
     hole = np.zeros((48, 64), bool)
     hole[5:40, 5:60] = True

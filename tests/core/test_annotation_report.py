@@ -10,7 +10,7 @@ import pytest
 
 from core.config import PerceptionConfig
 from core.study.annotation_records import ItemKey, StoredAnnotation
-from core.study.annotation_report import agreement_report, choose_study, manual_measurements, write_measures
+from core.study.annotation_report import agreement_report, choose_study, manual_measurements, undecided, write_measures
 from core.study.annotations import Annotation, AnnotationError, View, measure_lines
 from core.study.evaluation import EvaluationError, evaluate, read_measurements, write_measurements
 from core.types import PoseState
@@ -175,3 +175,11 @@ def _pose(theta_deg: float, turn_deg: float) -> tuple[list[tuple[float, float]],
     along, back = np.array([math.cos(vessel), math.sin(vessel)]), np.array([math.cos(robot), math.sin(robot)])
     head = np.array([320.0, 240.0])
     return [tuple(head - 80 * back), tuple(head)], [tuple(head - 40 * along), tuple(head + 40 * along)]
+
+
+def test_images_on_which_no_state_was_given_most_often_are_counted() -> None:
+    """There the name that comes first decides, which a reader has to know."""
+    states = {"1": "BD", "2": "BBD", "3": "BDDB", "4": "A", "5": ""}
+    answers = [answer(image, f"r{k}", 1, 1.0, PoseState(s)) for image, given in states.items() for k, s in enumerate(given)]
+    assert undecided(answers) == 2
+    assert undecided([*answers, answer("1", "r9", 1, None, PoseState.D)]) == 2, "who could not tell says nothing"
