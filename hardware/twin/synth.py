@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import os
-import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -24,6 +22,7 @@ import numpy as np
 from core.config import PerceptionConfig
 from core.errors import UserError
 from core.learning.dataset import mask_png, png
+from core.parent_process import end_with_parent
 from core.types import Points
 from core.whole_file import is_aside, sweep_unfinished, write_whole
 from hardware.twin.appearance import LOOK_FAMILIES, Appearance, default_appearance, make_view, random_appearance
@@ -229,7 +228,7 @@ def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, o
     elif missing:
         # Spawned, not forked: physics and OpenCV own threads that a fork would cut off.
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent) as pool:
+        with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
             jobs = [pool.submit(_write_episode, plan, episode) for episode in missing]
             try:
                 for job in as_completed(jobs):
@@ -239,18 +238,6 @@ def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, o
                 pool.shutdown(wait=False, cancel_futures=True)
     rows = [_episode_file(plan, episode).read_bytes() for episode in range(plan.episodes)]
     write_whole(plan.out / "truth.jsonl", b"".join(rows))
-
-
-def _end_with_parent() -> None:
-    """A worker whose parent was killed would wait for work for ever."""
-
-    def watch() -> None:
-        parent = multiprocessing.parent_process()
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def _prepare(plan: SynthPlan) -> None:
