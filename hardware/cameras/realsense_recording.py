@@ -63,9 +63,10 @@ class RealSenseRecording:
         try:
             rs.config.enable_device_from_file(config, str(self._path), repeat_playback=False)
             config.enable_stream(rs.stream.color)
-            self._playback = pipeline.start(config).get_device().as_playback()
-            # At the library's own pace frames are dropped while we look at one.
+            # At the library's own pace frames are dropped while we look at one; and also those that it hands out before it is told.
+            self._playback = config.resolve(rs.pipeline_wrapper(pipeline)).get_device().as_playback()
             self._playback.set_real_time(False)
+            pipeline.start(config)
         except RuntimeError as error:
             reason = " ".join(str(error).split())[:120]
             raise DeviceError(f"{self._path}: cannot be played as a RealSense recording with colour ({reason})") from None

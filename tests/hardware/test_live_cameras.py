@@ -447,6 +447,20 @@ def test_sixty_of_sixty_frames_come_exactly_from_a_recording(bag: Path) -> None:
         assert frame.lost == 0
 
 
+def test_a_machine_that_stands_still_while_a_recording_opens_loses_no_frames(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begin = rs.pipeline.start
+
+    def slowly(pipeline: rs.pipeline, config: rs.config) -> rs.pipeline_profile:
+        profile = begin(pipeline, config)
+        time.sleep(1.0)  # twenty frames more than the library holds ready, at its own pace
+        return profile
+
+    monkeypatch.setattr(rs.pipeline, "start", slowly)
+    recording = RealSenseRecording(bag, paced=False)
+    recording.open()
+    assert [frame.index for frame in _until_the_end(recording) if frame] == list(range(60))
+
+
 def test_a_moment_of_silence_before_the_last_frames_is_not_the_end(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Stalled:
         """The library on a machine that stands still: it has read the whole file, and what it read comes late."""
