@@ -24,6 +24,7 @@ def add_operator_menus(window: OperatorWindow) -> None:
             None,
             MenuEntry(tr("&Record, or end the recording"), recorder.toggle, ("F9", "Shift+F9")),
             MenuEntry(tr("Save the &last seconds"), recorder.save_last, ("F10", "Shift+F10")),
+            MenuEntry(tr("&Mark this moment"), recorder.mark, ("M", "Shift+M")),
         ]
     )
     add_scene_view_menu(window, panels)

@@ -44,6 +44,7 @@ class Recorder(QObject):
         self._target: Event | None = None
         self._config = config
         self._shown = RecordStatus()
+        self._marks = 0
         self._timer = QTimer(self)
         self._timer.setInterval(_LOOK_EVERY_MS)
         self._timer.timeout.connect(self._look)
@@ -85,6 +86,7 @@ class Recorder(QObject):
         if status.recording or status.armed:
             writer.stop()
         else:
+            self._marks = 0  # on paper each session's marks count from 1
             writer.start()
 
     def stop(self, why: str) -> None:
@@ -103,10 +105,28 @@ class Recorder(QObject):
             return
         writer.save_last()
 
-    def note(self, text: str) -> None:
-        """Keep a note with the session."""
-        if self._writer is not None:
-            self._writer.event(EventKind.NOTE, text)
+    @Slot()
+    def mark(self) -> None:
+        """Mark this moment with a numbered note in the session, or in the last seconds; what it was can be said in the player.
+
+        Nothing is typed here: hands stay on the controls, and Space stays STOP.
+        """
+        if self._writer is None:
+            return
+        writer = self._living(self._writer)
+        status = writer.status()
+        is_recorded = status.recording or status.armed
+        if not is_recorded and status.ring_s <= 0.0:
+            self.said.emit(tr("Nothing is being recorded that could be marked: F9 begins a session"), True)
+            return
+        if not writer.event(EventKind.NOTE, f"mark {self._marks + 1}"):
+            self.said.emit(tr("Not marked: the recorder is behind"), True)
+            return
+        self._marks += 1
+        if is_recorded:
+            self.said.emit(tr("Mark {number} is in the session", number=self._marks), False)
+        else:
+            self.said.emit(tr("Mark {number} is in the last seconds: F10 saves them", number=self._marks), False)
 
     def target(self, target: Point | None) -> None:
         """Keep the operator's destination, source pixels."""

@@ -87,9 +87,8 @@ def operator_stops(panels: OperatorPanels, *, has_robot: bool) -> tuple[TourStop
         TourStop(
             tr("Keep it"),
             tr(
-                "F9 records a session: every picture and all that was understood, advised, asked and sent. F10 keeps the last "
-                "seconds "
-                "without a recording, P a snapshot. F1 shows all keys; Help, Tour shows this again."
+                "F9 records a session: every picture and all that was understood, advised, asked and sent. M marks a moment, F10 "
+                "keeps the last seconds without a recording, P a snapshot. F1 shows all keys; Help, Tour shows this again."
             ),
             (panels.record_bar,),
         ),

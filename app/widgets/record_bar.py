@@ -56,8 +56,13 @@ class RecordBar(QWidget):
             else ""
         )
         where = str(self._status.folder) if self._status.folder is not None else ""
-        tip = [tr("F9 begins or ends a session"), tr("F10 saves the last seconds without having recorded"), where, free]
-        return "\n".join(line for line in (*tip, tr_text(self._status.warning), tr_text(self._status.problem)) if line)
+        keys = (
+            tr("F9 begins or ends a session"),
+            tr("F10 saves the last seconds without having recorded"),
+            tr("M marks this moment with a number"),
+        )
+        lines = (*keys, where, free, tr_text(self._status.warning), tr_text(self._status.problem))
+        return "\n".join(line for line in lines if line)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:

@@ -2952,6 +2952,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/operator_menus.py"/>
+        <source>&amp;Mark this moment</source>
+        <translation>标记此刻(&amp;M)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_menus.py"/>
         <source>S&amp;TOP</source>
         <translation>停止(&amp;T)</translation>
     </message>
@@ -3654,6 +3659,26 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/recorder.py"/>
         <source>Nothing to save yet: record.ring_s is 0, or the rig has just been opened</source>
         <translation>尚无可保存内容：record.ring_s 为 0，或装置刚打开</translation>
+    </message>
+    <message>
+        <location filename="../../app/recorder.py"/>
+        <source>Nothing is being recorded that could be marked: F9 begins a session</source>
+        <translation>当前没有在录制，无法标记：按 F9 开始会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/recorder.py"/>
+        <source>Not marked: the recorder is behind</source>
+        <translation>未标记：录制器跟不上</translation>
+    </message>
+    <message>
+        <location filename="../../app/recorder.py"/>
+        <source>Mark {number} is in the session</source>
+        <translation>标记 {number} 已写入会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/recorder.py"/>
+        <source>Mark {number} is in the last seconds: F10 saves them</source>
+        <translation>标记 {number} 在最近几秒中：按 F10 保存</translation>
     </message>
     <message>
         <location filename="../../app/recorder.py"/>
@@ -5165,8 +5190,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/tour_stops.py"/>
-        <source>F9 records a session: every picture and all that was understood, advised, asked and sent. F10 keeps the last seconds without a recording, P a snapshot. F1 shows all keys; Help, Tour shows this again.</source>
-        <translation>F9 录制会话：每幅图像以及理解、建议、要求和发送的全部内容。F10 保存没有录制的最近几秒，P 截图。F1 显示所有按键；“帮助”中的“导览”可再次显示本导览。</translation>
+        <source>F9 records a session: every picture and all that was understood, advised, asked and sent. M marks a moment, F10 keeps the last seconds without a recording, P a snapshot. F1 shows all keys; Help, Tour shows this again.</source>
+        <translation>F9 录制会话：每幅图像以及理解、建议、要求和发送的全部内容。M 标记此刻，F10 保存没有录制的最近几秒，P 截图。F1 显示所有按键；“帮助”中的“导览”可再次显示本导览。</translation>
     </message>
     <message>
         <location filename="../../app/tour_stops.py"/>
@@ -6697,6 +6722,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/record_bar.py"/>
         <source>F10 saves the last seconds without having recorded</source>
         <translation>F10 保存没有录制的最近几秒</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/record_bar.py"/>
+        <source>M marks this moment with a number</source>
+        <translation>M 用编号标记此刻</translation>
     </message>
     <message>
         <location filename="../../app/widgets/record_bar.py"/>

@@ -88,6 +88,59 @@ def test_the_last_seconds_are_there_without_having_recorded(
     reader.close()
 
 
+def _notes(session: Path) -> list[str]:
+    reader = SessionReader(session)
+    assert reader.wait(10.0)
+    notes = [event.text for event in reader.events if event.kind is EventKind.NOTE]
+    reader.close()
+    return notes
+
+
+def test_a_moment_is_marked_with_a_number_that_counts_from_one_in_each_session(
+    running: OperatorWindow, qtbot: QtBot, tmp_path: Path
+) -> None:
+    for marks in (2, 1):
+        qtbot.keyClick(running, Key.Key_F9)
+        until(qtbot, lambda: running.recorder.status.recording)
+        for number in range(marks):
+            qtbot.keyClick(running, Key.Key_M)
+            assert running.panels.toast.text() == f"Mark {number + 1} is in the session"
+        before = running.recorder.status.saved
+        qtbot.keyClick(running, Key.Key_F9)
+        until(qtbot, lambda before=before: running.recorder.status.saved != before)
+    assert [_notes(session) for session in sessions(tmp_path / "sessions")] == [["mark 1", "mark 2"], ["mark 1"]]
+
+
+def test_a_moment_is_marked_while_shift_is_held_as_the_deadman(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    qtbot.keyClick(running, Key.Key_F9)
+    until(qtbot, lambda: running.recorder.status.recording)
+    qtbot.keyClick(running, Key.Key_M, Qt.KeyboardModifier.ShiftModifier)
+    qtbot.keyClick(running, Key.Key_F9)
+    until(qtbot, lambda: running.recorder.status.saved is not None)
+    (session,) = sessions(tmp_path / "sessions")
+    assert _notes(session) == ["mark 1"]
+
+
+def test_a_moment_of_the_last_seconds_can_be_marked(
+    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot, tmp_path: Path
+) -> None:
+    config = Config.model_validate({"record": {"folder": str(tmp_path / "sessions"), "ring_s": 30.0}})
+    window = make_window(lambda _config: FakeEngine(bench), config)
+    window.start()
+    until(qtbot, lambda: window.recorder.status.ring_s > 0.3)
+    qtbot.keyClick(window, Key.Key_M)
+    assert window.panels.toast.text() == "Mark 1 is in the last seconds: F10 saves them"
+    qtbot.keyClick(window, Key.Key_F10)
+    until(qtbot, lambda: window.recorder.status.saved is not None)
+    (session,) = sessions(tmp_path / "sessions")
+    assert _notes(session) == ["mark 1"]
+
+
+def test_without_anything_to_mark_it_is_said(running: OperatorWindow, qtbot: QtBot) -> None:
+    qtbot.keyClick(running, Key.Key_M)
+    assert "F9 begins a session" in running.panels.toast.text()
+
+
 def test_nothing_to_save_is_said(running: OperatorWindow, qtbot: QtBot) -> None:
     qtbot.keyClick(running, Key.Key_F10)
     assert "Nothing to save yet" in running.panels.toast.text()
