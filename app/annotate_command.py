@@ -89,7 +89,7 @@ def run_annotate(options: AnnotateOptions) -> int:
     if options.salvage:
         return _salvage(store_path, options.out)
     if options.report:
-        return _report(store_path, options)
+        return _report(store_path, options, config)
     if options.export is not None:
         return _export(store_path, paths, options, config)
     if options.joins:
@@ -252,15 +252,17 @@ def _sureness(store: AnnotationStore, images: Sequence[FoundImage], order: Order
 # ---- agreement
 
 
-def _report(store_path: Path, options: AnnotateOptions) -> int:
+def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
     from app.annotate_evaluation import groups_of
+    from core.study.annotation_measures import measured_alike
     from core.study.annotation_report import agreement_report, choose_study, write_measures
 
     with AnnotationStore(store_path, read_only=True) as store:
         annotations = choose_study(store.annotations(), options.study.asked, str(store_path))
-        annotations = _of_rater(annotations, options.study.rater)
-        names = {sha256: image.name for sha256, image in store.images().items()}
-        tell_problems(store.problems)
+        images = store.images()
+        annotations, notes = measured_alike(_of_rater(annotations, options.study.rater), images, config.perception)
+        names = {sha256: image.name for sha256, image in images.items()}
+        tell_problems([*store.problems, *notes])
     study = annotations[0].key.study
     paths = {sha256: store_path.parent / name for sha256, name in names.items()}
     places = groups_of(list(paths.values()))
@@ -307,10 +309,12 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         count = export_coco(annotations, images, options.out)
         sys.stderr.write(f"masks of {count} images in {options.out}\n")
     else:
-        from app.annotate_evaluation import compared_rows
+        from app.annotate_evaluation import compared_rows, fitted_alike
 
         if options.out.exists():
             raise AnnotationError(f"{options.out}: is there already; choose another --out")
+        annotations, notes = fitted_alike(annotations, images, config, options.study.asked, str(store_path))
+        tell_problems(notes)
         rows, _, _, missed = compared_rows(annotations, images, config, options.study.asked, str(store_path))
         try:
             write_measurements(options.out, rows)

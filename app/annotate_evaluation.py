@@ -14,11 +14,20 @@ from app.taken_frames import recording_of
 from core.config import Config
 from core.names import name_as_text, name_of
 from core.study.annotation_images import FoundImage
+from core.study.annotation_measures import measured_alike
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotation_report import agreement_report, choose_study, manual_measurements
 from core.study.annotations import AnnotationError
 from core.study.evaluation import Measurement
 from core.types import Frame
+
+
+def fitted_alike(
+    annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], config: Config, study: str | None, where: str
+) -> tuple[list[StoredAnnotation], list[str]]:
+    """The finished answers of one study, measured as the algorithm is (``measured_alike``), and notes for the reader."""
+    records = {image.sha256: image.record for image in images}
+    return measured_alike(choose_study(annotations, study, where), records, config.perception)
 
 
 def compared_rows(

@@ -191,7 +191,7 @@ def _perceive_annotated(
 ) -> _Study:
     """Images that were annotated by hand, against the algorithm; those of a session as it was set in the session."""
     from app.annotate_command import read_annotated
-    from app.annotate_evaluation import compared_rows, raters_agreement
+    from app.annotate_evaluation import compared_rows, fitted_alike, raters_agreement
 
     answers, images = read_annotated(annotations, _places_of(annotations))
     notes = []
@@ -200,6 +200,8 @@ def _perceive_annotated(
         config, told = recorded
         notes += told
     notes += _how_answered(annotations, answers, images, study)
+    answers, told = fitted_alike(answers, images, config, study, str(annotations))
+    notes += told
     rows, reasons, engine, missed = compared_rows(answers, images, config, study, str(annotations))
     source: dict[str, Any] = {
         "kind": "annotated by hand",

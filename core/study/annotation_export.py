@@ -16,6 +16,7 @@ from core.config import PerceptionConfig
 from core.images import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS, UNMEASURED, write_mask, write_png
 from core.study.annotation_images import FoundImage
+from core.study.annotation_measures import measured_alike
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotation_report import finished, manual_measurements, studies_of
 from core.study.annotations import AnnotationError, MaskPolygon, MaskTarget, measure_lines
@@ -72,6 +73,8 @@ def export_training_set(
     measured = finished([one for one in annotations if one.key.sha256 in complete])
     if len(studies := studies_of(measured)) > 1:
         raise AnnotationError(f"the images were measured in several studies ({', '.join(studies)}); choose one with --study NAME")
+    # By the method's own lengths, as the truth of every other set is.
+    measured, _ = measured_alike(measured, {sha256: image.record for sha256, image in here.items()}, PerceptionConfig())
     try:
         if out.exists() and any(out.iterdir()):
             raise AnnotationError(f"{out}: is not empty; choose another --out")

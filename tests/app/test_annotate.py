@@ -100,6 +100,37 @@ def test_the_agreement_is_printed_and_written(folder: Path, tmp_path: Path, caps
     assert json.loads(capsys.readouterr().out)["study"] == "pilot"
 
 
+def test_a_report_tells_that_angles_were_drawn_under_other_lengths(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Angles that had been fitted to other lengths went into one figure with the others, and nothing said so."""
+    annotate(folder)
+    assert run(folder, report=True, as_json=True) == 0
+    before = capsys.readouterr()
+    assert "fitted otherwise" not in before.err
+    config = tmp_path / "other.toml"
+    config.write_text("[perception.vectors]\nvessel_half_length_px = 10.0\nrobot_length_px = 20.0\n")
+    assert run(folder, report=True, as_json=True, config_path=config) == 0
+    after = capsys.readouterr()
+    assert [row["theta_deg"] for row in json.loads(after.out)["measures"]] == pytest.approx(
+        [row["theta_deg"] for row in json.loads(before.out)["measures"]]
+    ), "straight lines have one angle whatever their length"
+    assert "fitted otherwise" not in after.err
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        (image, *_), _ = find_images(sorted(folder.glob("*.png")), store)
+        robot = ((200.0, 240.0), (270.0, 240.0), (290.0, 220.0))
+        content = Annotation(robot, ((150.0, 200.0), (400.0, 200.0)), PoseState.C)
+        entry = History().edit("draw", content)
+        assert entry is not None
+        measured = measure_lines(content, image.record.size, Config().perception)
+        store.save(ItemKey(image.sha256, "", "cleo"), View.AS_IS, entry, content, measured, 9.0)
+    assert run(folder, report=True, as_json=True, config_path=config) == 0
+    told = capsys.readouterr()
+    assert "Of the manual angles 1 were fitted otherwise" in told.err
+    (row,) = [row for row in json.loads(told.out)["measures"] if row["rater"] == "cleo"]
+    assert row["theta_deg"] == pytest.approx(45.0)
+
+
 def test_annotations_become_a_training_set_a_coco_file_and_come_back(folder: Path, tmp_path: Path) -> None:
     annotate(folder)
     run(folder, export="dataset", out=tmp_path / "set")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import random
 from dataclasses import replace
 from pathlib import Path
@@ -45,11 +46,18 @@ def with_masks(*masks: MaskPolygon) -> Annotation:
     return Annotation(LINES.robot, LINES.vessel, LINES.state, masks=masks)
 
 
+def tilted(annotation: Annotation, theta_deg: float) -> Annotation:
+    """The robot's line turned about its head, by so much against the vessel."""
+    (tail_x, _), (head_x, head_y) = annotation.robot
+    rise = (head_x - tail_x) * math.tan(math.radians(theta_deg))
+    return replace(annotation, robot=((tail_x, head_y - rise), (head_x, head_y)))
+
+
 def test_a_training_set_is_what_training_reads(image: FoundImage, tmp_path: Path) -> None:
     out = tmp_path / "set"
     older, newer = (
         stored(with_masks(VESSEL_BOX), changed="2026-01-01"),
-        stored(with_masks(VESSEL_BOX, ROBOT_BOX), "bob", "2026-01-02", 3.0),
+        stored(tilted(with_masks(VESSEL_BOX, ROBOT_BOX), 3.0), "bob", "2026-01-02", 3.0),
     )
     assert export_training_set([older, newer], [image], out) == (1, [])
     (sample,), truth = find_labelled(out)
@@ -58,7 +66,7 @@ def test_a_training_set_is_what_training_reads(image: FoundImage, tmp_path: Path
     assert np.array_equal(vessel, fill([VESSEL_BOX], MaskTarget.VESSEL, SIZE)), "the newest masks count"
     assert robot.sum() == 21 * 5
     row = truth["frame"]
-    assert (row["theta_deg"], row["state"], row["head_xy"]) == (3.0, "B", [50.0, 20.0])
+    assert (row["theta_deg"], row["state"], row["head_xy"]) == (pytest.approx(3.0), "B", [50.0, 20.0])
     with pytest.raises(AnnotationError, match="is not empty; choose another --out"):
         export_training_set([newer], [image], out)
 
@@ -89,12 +97,12 @@ def test_an_image_without_angle_trains_but_has_no_truth_of_it(image: FoundImage,
 
 def test_truth_is_of_finished_answers_of_one_study(image: FoundImage, tmp_path: Path) -> None:
     """Half-drawn lines of one rater, and another study's angle, went into the mean that training takes for the truth."""
-    done = stored(with_masks(VESSEL_BOX, ROBOT_BOX), theta=10.0)
-    begun = stored(replace(LINES, state=None), "ben", theta=80.0)
+    done = stored(tilted(with_masks(VESSEL_BOX, ROBOT_BOX), 10.0), theta=10.0)
+    begun = stored(replace(tilted(LINES, 80.0), state=None), "ben", theta=80.0)
     export_training_set([done, begun], [image], tmp_path / "set")
     row = find_labelled(tmp_path / "set")[1]["frame"]
-    assert (row["theta_deg"], row["state"]) == (10.0, "B")
-    other = replace(stored(LINES, "cleo", theta=50.0), key=ItemKey("ab" * 32, "other", "cleo"))
+    assert (row["theta_deg"], row["state"]) == (pytest.approx(10.0), "B")
+    other = replace(stored(tilted(LINES, 50.0), "cleo", theta=50.0), key=ItemKey("ab" * 32, "other", "cleo"))
     with pytest.raises(
         AnnotationError, match=r"measured in several studies \('' \(outside studies\), 'other'\); choose one with --study"
     ):
