@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from core.learning.half_precision import halved, rounded
 from core.learning.model_file import (
     INFO,
     ONNX,
@@ -52,6 +53,8 @@ def save_model(
 ) -> ModelInfo:
     """Write weights, ONNX and manifest. The folder appears whole or not at all; an older model of that name is replaced last.
 
+    Weights are kept in half precision (``half_precision``).
+
     From `examples`, typical RGB images at working size, an eight-bit copy learns ranges and rounding; without them there is none.
     `second_look` is the folder of a second look's network that comes along as it is.
 
@@ -63,8 +66,8 @@ def save_model(
     from safetensors.torch import save
 
     with _put_in_place(folder) as scratch:
-        state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
-        (scratch / WEIGHTS).write_bytes(save(state))
+        network = rounded(network)
+        (scratch / WEIGHTS).write_bytes(save(halved(network.state_dict())))
         export_onnx(network, network.shape.stride, scratch / ONNX)
         cuts = whole_strides(examples, network.shape.stride)
         if cuts:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from core.learning.half_precision import halve_onnx
 from core.types import Image
 
 if TYPE_CHECKING:
@@ -31,7 +32,10 @@ def export_eight_bit(network: DualUNet, examples: Sequence[Image], path: Path) -
 
 
 def export_onnx(network: DualUNet | EightBitUNet, stride: int, path: Path) -> None:
-    """Export with free height and width (multiples of `stride`); pre- and post-processing are inside the graph."""
+    """Export with free height and width (multiples of `stride`); pre- and post-processing are inside the graph.
+
+    Weights are kept in half precision.
+    """
     import warnings
 
     import torch
@@ -54,3 +58,4 @@ def export_onnx(network: DualUNet | EightBitUNet, stride: int, path: Path) -> No
             dynamo=False,
         )
     network.train(was_training)
+    halve_onnx(path)

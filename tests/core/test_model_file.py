@@ -12,6 +12,7 @@ import torch
 
 from core.config import SegmentationConfig
 from core.learning.growing import with_first_look
+from core.learning.half_precision import rounded
 from core.learning.model_file import (
     INFO,
     MODELS,
@@ -122,7 +123,7 @@ def test_an_unknown_model_names_the_known_ones(tmp_path: Path) -> None:
 
 def test_weights_survive_the_round_trip(model: Path) -> None:
     torch.manual_seed(1)
-    original = DualUNet(TINY).eval().state_dict()
+    original = rounded(DualUNet(TINY).eval()).state_dict()
     loaded, info = load_network(model)
     assert info.stride == 32
     for name, tensor in loaded.state_dict().items():
@@ -171,6 +172,7 @@ def test_a_shipped_models_files_are_those_of_its_manifest(manifest: Path) -> Non
     there = {path.name for path in manifest.parent.iterdir() if path.is_file()}
     assert there == {INFO, WEIGHTS, ONNX} | ({ONNX_INT8} if info.onnx_int8_sha256 is not None else set())
     check_files(info, manifest.parent, sorted(there - {INFO}))
+    assert all(path.stat().st_size <= 12_000_000 for path in manifest.parent.iterdir() if path.is_file())
 
 
 def test_what_else_lies_in_a_models_folder_outlives_the_model(model: Path) -> None:
