@@ -189,7 +189,30 @@ def test_the_clock() -> None:
     steps = itertools.count()
     slow = (0.0005 * number for number in itertools.count())
     _bad(machine.check_clock(lambda: next(slow), lambda: 0.001 * next(steps)), "of the real rate", "clock source")
+    steps = itertools.count()
+    fast = (0.002 * number for number in itertools.count())
+    _bad(machine.check_clock(lambda: next(fast), lambda: 0.001 * next(steps)), "of the real rate", "clock source")
     _bad(machine.check_clock(wall=lambda: 1e6, watched_s=0.0005), "1970.*date is wrong", "set-ntp")
+
+
+@pytest.mark.parametrize("stall", [0, 1, 2, -1, -2, -3])
+def test_a_process_that_stands_still_between_two_clocks_is_no_fault_of_theirs(stall: int) -> None:
+    """It was one: on a busy machine the check said that the clock runs at 1.076 of the real rate."""
+
+    def check(late: int | None) -> tuple[machine.Check, int]:
+        now, read = 0.0, 0
+
+        def clock() -> float:
+            nonlocal now, read
+            now += 0.5 if read == late else 1e-6
+            read += 1
+            return now
+
+        return machine.check_clock(clock, clock, watched_s=0.001), read
+
+    well, count = check(None)
+    _good(well, "monotonic")
+    _good(check(stall % count)[0], "monotonic")
 
 
 # --- the model -------------------------------------------------------------------------------------------------------------------
