@@ -313,9 +313,9 @@ def _export(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
 
         if options.out.exists():
             raise AnnotationError(f"{options.out}: is there already; choose another --out")
-        annotations, notes = fitted_alike(annotations, images, config, options.study.asked, str(store_path))
+        done, notes = fitted_alike(annotations, images, config, options.study.asked, str(store_path))
         tell_problems(notes)
-        rows, _, _, missed = compared_rows(annotations, images, config, options.study.asked, str(store_path))
+        rows, _, _, missed = compared_rows(done, images, config)
         try:
             write_measurements(options.out, rows)
         except OSError as error:

@@ -25,15 +25,21 @@ from core.types import Frame
 def fitted_alike(
     annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], config: Config, study: str | None, where: str
 ) -> tuple[list[StoredAnnotation], list[str]]:
-    """The finished answers of one study, measured as the algorithm is (``measured_alike``), and notes for the reader."""
+    """The finished answers of one study to the images that are here, measured as the algorithm is, and notes for the reader.
+
+    Raises AnnotationError where there are none, or several studies.
+    """
     records = {image.sha256: image.record for image in images}
-    return measured_alike(choose_study(annotations, study, where), records, config.perception)
+    done = [one for one in choose_study(annotations, study, where) if one.key.sha256 in records]
+    if not done:
+        raise AnnotationError(f"{where}: none of its annotated images is here")
+    return measured_alike(done, records, config.perception)
 
 
 def compared_rows(
-    annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], config: Config, study: str | None, where: str
+    done: Sequence[StoredAnnotation], images: Sequence[FoundImage], config: Config
 ) -> tuple[list[Measurement], dict[str, int], str, int]:
-    """A row for each image that was answered by hand and is here; an interruption (Ctrl-C) keeps what was done until then.
+    """A row for each image with one of these answers (``fitted_alike``); an interruption (Ctrl-C) keeps what was done until then.
 
     Returns
     -------
@@ -45,9 +51,6 @@ def compared_rows(
     from core.perception.pipeline import open_pipeline
 
     here = {image.sha256: image for image in images}
-    done = [one for one in choose_study(annotations, study, where) if one.key.sha256 in here]
-    if not done:
-        raise AnnotationError(f"{where}: none of its annotated images is here")
     manual = manual_measurements(done, {image.sha256: image.sha256 for image in images})
     pipeline = open_pipeline(config.perception)
     groups = groups_of([here[row.image].path for row in manual])
@@ -88,15 +91,11 @@ def _names_of(folders: set[Path]) -> dict[Path, str]:
     return {folder: name_as_text(folder.absolute().relative_to(common).as_posix()) for folder in folders}
 
 
-def raters_agreement(
-    annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], study: str | None, where: str, seed: int
-) -> dict[str, Any] | None:
-    """How well raters agree with themselves and each other on the images that are here (``agreement_report``).
+def raters_agreement(done: Sequence[StoredAnnotation], images: Sequence[FoundImage], seed: int) -> dict[str, Any] | None:
+    """How well raters agree with themselves and each other by these answers (``fitted_alike``, ``agreement_report``).
 
     None when nobody measured anything twice.
     """
-    here = {image.sha256 for image in images}
-    done = [one for one in choose_study(annotations, study, where) if one.key.sha256 in here]
     raters = {one.key.rater for one in done}
     if len(raters) < 2 and all(one.key.repeat == 1 for one in done):
         return None

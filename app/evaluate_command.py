@@ -200,9 +200,9 @@ def _perceive_annotated(
         config, told = recorded
         notes += told
     notes += _how_answered(annotations, answers, images, study)
-    answers, told = fitted_alike(answers, images, config, study, str(annotations))
+    done, told = fitted_alike(answers, images, config, study, str(annotations))
     notes += told
-    rows, reasons, engine, missed = compared_rows(answers, images, config, study, str(annotations))
+    rows, reasons, engine, missed = compared_rows(done, images, config)
     source: dict[str, Any] = {
         "kind": "annotated by hand",
         "name": name_as_text(name_of(annotations.parent)),
@@ -211,7 +211,7 @@ def _perceive_annotated(
     unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
     notes += [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
     notes += [f"Interrupted after {len(rows)} of {len(rows) + missed} images."] if missed else []
-    agreement = raters_agreement(answers, images, study, str(annotations), seed)
+    agreement = raters_agreement(done, images, seed)
     source |= {"preset": preset, "engine": engine, "refused": reasons, "study": study}
     return _Study(rows, source, notes, agreement, interrupted=missed > 0)
 

@@ -31,10 +31,12 @@ def measured_alike(
     others = sum(not _is_same(was.theta_deg, now.theta_deg) for was, now in zip(annotations, alike, strict=True))
     if not others:
         return alike, []
+    gone = sum(was.theta_deg is not None and now.theta_deg is None for was, now in zip(annotations, alike, strict=True))
     lengths = f"robot {config.vectors.robot_length_px:g} px, vessel twice {config.vectors.vessel_half_length_px:g} px"
     return alike, [
         f"Of the manual angles {others} were fitted otherwise when they were drawn (with other lengths of the lines, say); here "
         f"all are fitted anew to what was drawn, as the algorithm's are ({lengths})."
+        + (f" On {gone} of them too little was drawn for these lengths: they have a state, and no angle." if gone else "")
     ]
 
 

@@ -72,15 +72,19 @@ def test_closing_the_window_ends_the_session_properly(running: OperatorWindow, q
     reader.close()
 
 
-def test_the_last_seconds_are_there_without_having_recorded(
-    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot, tmp_path: Path
-) -> None:
+@pytest.fixture
+def remembering(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot, tmp_path: Path) -> OperatorWindow:
+    """A window that records nothing and keeps the last seconds, of which there are some."""
     config = Config.model_validate({"record": {"folder": str(tmp_path / "sessions"), "ring_s": 5.0}})
     window = make_window(lambda _config: FakeEngine(bench), config)
     window.start()
-    until(qtbot, lambda: window._recorder.status.ring_s > 0.3)
-    qtbot.keyClick(window, Key.Key_F10)
-    until(qtbot, lambda: window._recorder.status.saved is not None)
+    until(qtbot, lambda: window.recorder.status.ring_s > 0.3)
+    return window
+
+
+def test_the_last_seconds_are_there_without_having_recorded(remembering: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    qtbot.keyClick(remembering, Key.Key_F10)
+    until(qtbot, lambda: remembering.recorder.status.saved is not None)
     (session,) = sessions(tmp_path / "sessions")
     reader = SessionReader(session)
     assert reader.wait(10.0)
@@ -124,17 +128,11 @@ def test_a_moment_is_marked_while_shift_is_held_as_the_deadman(running: Operator
     assert _notes(session) == ["mark 1"]
 
 
-def test_a_moment_of_the_last_seconds_can_be_marked(
-    make_window: MakeWindow, bench: FakeBench, qtbot: QtBot, tmp_path: Path
-) -> None:
-    config = Config.model_validate({"record": {"folder": str(tmp_path / "sessions"), "ring_s": 30.0}})
-    window = make_window(lambda _config: FakeEngine(bench), config)
-    window.start()
-    until(qtbot, lambda: window.recorder.status.ring_s > 0.3)
-    qtbot.keyClick(window, Key.Key_M)
-    assert window.panels.toast.text() == "Mark 1 is in the last seconds: F10 saves them"
-    qtbot.keyClick(window, Key.Key_F10)
-    until(qtbot, lambda: window.recorder.status.saved is not None)
+def test_a_moment_of_the_last_seconds_can_be_marked(remembering: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    qtbot.keyClick(remembering, Key.Key_M)
+    assert remembering.panels.toast.text() == "Mark 1 is in the last seconds: F10 saves them"
+    qtbot.keyClick(remembering, Key.Key_F10)
+    until(qtbot, lambda: remembering.recorder.status.saved is not None)
     (session,) = sessions(tmp_path / "sessions")
     assert _notes(session) == ["mark 1"]
 
