@@ -17,7 +17,13 @@ def synth(
     seed: Annotated[int, typer.Option(min=0, help="first phantom seed; sixteen frames use one seed")] = 0,
     width: Annotated[int, typer.Option(min=160, max=4096)] = 640,
     height: Annotated[int, typer.Option(min=120, max=4096)] = 480,
-    family: Annotated[list[str] | None, typer.Option(help="only these families of looks, or bench: the twin's own")] = None,
+    family: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="only these families of looks, rare ones among them (gel, drape, stage_light, glow, tank, picture, resin: drawn "
+            "only where they are named), or bench: the twin's own; may be repeated"
+        ),
+    ] = None,
     phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,
     workers: Annotated[int, typer.Option(min=1, max=64, help="processes")] = 1,
     scheduler: SchedulerOption = None,

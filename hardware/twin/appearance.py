@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.types import Points
-from hardware.twin.look_families import LOOK_FAMILIES, draw_family
+from hardware.twin.look_families import LOOK_FAMILIES, RARE_FAMILIES, draw_family
 from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.robot_families import ROBOT_LOOKS
 from hardware.twin.view import View
 
-__all__ = ["LOOK_FAMILIES", "ROBOT_LOOKS", "Appearance", "default_appearance", "make_view", "random_appearance"]
+__all__ = ["LOOK_FAMILIES", "RARE_FAMILIES", "ROBOT_LOOKS", "Appearance", "default_appearance", "make_view", "random_appearance"]
 
 Rgb = tuple[float, float, float]
 
@@ -27,7 +27,7 @@ class Appearance:
 
     Settings in px mean pixels of an image whose longer side has 640; other sizes scale them. ``light_deg`` is the direction towards
     the lamp as seen on the board (0 = right, 90 = down). ``material`` is how the lumen is made: a silicone ``tube``, a transparent
-    ``block``, an open opaque ``channel``, or an ``xray`` picture.
+    ``block``, a turbid ``gel``, an open opaque ``channel``, or an ``xray`` picture.
     """
 
     family: str = "silicone_white"
@@ -35,7 +35,7 @@ class Appearance:
 
     # board and what lies around it
     board_rgb: Rgb = (0.86, 0.87, 0.86)
-    board_texture: str = "speckle"  # plain, speckle, wood, grid, brushed, cloth
+    board_texture: str = "speckle"  # plain, speckle, wood, grid, brushed, cloth, folds, layers, patches
     texture_strength: float = 0.25
     table_rgb: Rgb = (0.45, 0.42, 0.40)
     light_gradient: float = 0.15
@@ -51,6 +51,8 @@ class Appearance:
     edge_mm: float = 0.45
     refraction_mm: float = 1.2
     lumen_shade: float = 0.15
+    scatter_mm: float = 0.0  # how far a turbid gel spreads what is seen through it
+    glow: float = 0.0  # light that the liquid gives by itself
 
     # light
     light_deg: float = 235.0
@@ -61,6 +63,8 @@ class Appearance:
     lamp_mm: float = 5.0
     tube_shadow: float = 0.25
     shadow_mm: float = 2.5
+    caustics: float = 0.0  # net of light beneath rippling water
+    lamp_rgb: tuple[Rgb, Rgb] = ((1.0, 1.0, 1.0), (1.0, 1.0, 1.0))  # of the lamp's side and of the far side
 
     # robot and catheter sheath
     robot_look: str = "ringed"
@@ -128,17 +132,18 @@ def random_appearance(seed: int, family: str | None = None) -> Appearance:
     Parameters
     ----------
     seed : any non-negative integer.
-    family : one of ``LOOK_FAMILIES``; None draws one.
+    family : one of ``LOOK_FAMILIES`` or ``RARE_FAMILIES``; None draws one of the former.
 
     Raises
     ------
     ValueError
         If `family` is unknown.
     """
-    if family is not None and family not in LOOK_FAMILIES:
-        raise ValueError(f"unknown look family {family!r}; known: {', '.join(LOOK_FAMILIES)}")
+    known = (*LOOK_FAMILIES, *RARE_FAMILIES)
+    if family is not None and family not in known:
+        raise ValueError(f"unknown look family {family!r}; known: {', '.join(known)}")
     chosen = family or LOOK_FAMILIES[int(np.random.default_rng([seed, 7919]).integers(len(LOOK_FAMILIES)))]
-    rng = np.random.default_rng([seed, LOOK_FAMILIES.index(chosen), 104729])
+    rng = np.random.default_rng([seed, known.index(chosen), 104729])
     return Appearance(**draw_family(chosen, rng))
 
 

@@ -32,6 +32,8 @@ def paint_board(appearance: Appearance, grid_mm: F32, pixels_per_mm: float, rng:
     board = np.empty((*shape, 3), np.float32)
     board[:] = np.asarray(appearance.board_rgb, np.float32)
     board += (_texture(appearance, grid_mm, pixels_per_mm, rng) * np.float32(0.25 * appearance.texture_strength))[..., None]
+    if appearance.board_texture == "patches":
+        _paint_patches(board, appearance, pixels_per_mm, rng)
     if appearance.material == "xray":
         return np.clip(board, 0, 1)
     # Beyond the board lies the table; a thin dark line and a soft shadow part the two.
@@ -53,7 +55,30 @@ def light_field(appearance: Appearance, grid_mm: F32, rng: Generator) -> F32:
     along = (grid_mm[..., 0] - np.float32(BOARD_MM[0] / 2)) * np.float32(np.cos(angle) / 100)
     along += (grid_mm[..., 1] - np.float32(BOARD_MM[1] / 2)) * np.float32(np.sin(angle) / 100)
     soft = smooth_noise(rng, grid_mm.shape[:2], grid_mm.shape[1] / 2.5)
-    return np.asarray(np.clip(1 + np.float32(appearance.light_gradient) * (0.6 * along + 0.4 * soft), 0.3, 1.7), np.float32)
+    light = np.clip(1 + np.float32(appearance.light_gradient) * (0.6 * along + 0.4 * soft), 0.3, 1.7)
+    if appearance.caustics:
+        light *= 1 + np.float32(appearance.caustics) * _caustics(grid_mm.shape[:2], grid_mm.shape[1] / 640, rng)
+    return np.asarray(light, np.float32)
+
+
+def _caustics(shape: tuple[int, int], scale: float, rng: Generator) -> F32:
+    """The net of light that ripples on water throw on the ground, in about -0.3..1, (H, W)."""
+    lines = np.zeros(shape, np.float32)
+    for cell in (70.0, 38.0):
+        lines += np.clip(1 - 3.5 * np.abs(smooth_noise(rng, shape, cell * scale)), 0, 1) ** 2
+    return np.asarray(np.clip(0.7 * lines - 0.3, -0.3, 1), np.float32)
+
+
+def _paint_patches(board: F32, appearance: Appearance, pixels_per_mm: float, rng: Generator) -> None:
+    """A printed picture on the board: patches of other colours with outlines, as drawings of organs have."""
+    shape = board.shape[:2]
+    for _ in range(int(rng.integers(2, 7))):
+        field = smooth_noise(rng, shape, rng.uniform(18, 70) * pixels_per_mm) - np.float32(rng.uniform(-0.1, 0.45))
+        colour = np.clip(np.asarray(appearance.board_rgb) + rng.normal(0, 0.28, 3), 0, 1).astype(np.float32)
+        amount = np.clip(field * np.float32(30 * rng.uniform(0.3, 1.5)) + np.float32(0.5), 0, 1)
+        board += (amount * np.float32(rng.uniform(0.4, 1.0)))[..., None] * (colour - board)
+        outline = np.exp(-((field * np.float32(rng.uniform(20, 60))) ** 2)) * np.float32(rng.uniform(0.0, 0.6))
+        board *= (1 - outline)[..., None]
 
 
 def _texture(appearance: Appearance, grid_mm: F32, pixels_per_mm: float, rng: Generator) -> F32:
@@ -77,7 +102,23 @@ def _texture(appearance: Appearance, grid_mm: F32, pixels_per_mm: float, rng: Ge
     if kind == "cloth":
         weave = np.sin(grid_mm[..., 0] * np.float32(4.0)) * np.sin(grid_mm[..., 1] * np.float32(4.0))
         return np.asarray(0.4 * weave + 0.5 * smooth_noise(rng, shape, 25 * pixels_per_mm), np.float32)
+    if kind == "folds":
+        return _folds(grid_mm, shape, pixels_per_mm, rng)
+    if kind == "layers":
+        height = 14 * smooth_noise(rng, shape, 35 * pixels_per_mm) + grid_mm @ rng.normal(0, 0.5, 2).astype(np.float32)
+        return np.asarray(np.sin(height * np.float32(2 * np.pi / rng.uniform(1.2, 3.0))), np.float32)
     return 0.15 * smooth_noise(rng, shape, 30 * pixels_per_mm)
+
+
+def _folds(grid_mm: F32, shape: tuple[int, int], pixels_per_mm: float, rng: Generator) -> F32:
+    """Creases of a cloth that was not drawn tight, lit from one side, and its weave."""
+    shade = 0.25 * smooth_noise(rng, shape, 1.0 * pixels_per_mm)
+    for _ in range(int(rng.integers(2, 5))):
+        angle, pitch = rng.uniform(0, np.pi), rng.uniform(30, 110)
+        across = grid_mm[..., 0] * np.float32(np.cos(angle)) + grid_mm[..., 1] * np.float32(np.sin(angle))
+        crease = np.sin((across + 12 * smooth_noise(rng, shape, 45 * pixels_per_mm)) * np.float32(2 * np.pi / pitch))
+        shade += np.float32(rng.uniform(0.4, 1.0)) * np.sign(crease) * np.exp(-4 * np.abs(crease))
+    return np.asarray(np.clip(cv2.GaussianBlur(shade, (0, 0), max(0.6, 0.5 * pixels_per_mm)), -1.5, 1.5), np.float32)
 
 
 def _streaks(rng: Generator, shape: tuple[int, int], pixels_per_mm: float) -> F32:

@@ -29,7 +29,7 @@ class CameraEffects:
         self.reach_px = int(np.ceil(3 * self._sigma)) + self._motion.shape[0] // 2 + 1
         self._colour = _colour_matrix(appearance)
         self._tone = _tone_table(appearance)
-        self._vignette = _vignette(appearance, size)
+        self._gain = _gain(appearance, size)
         self._noise = _noise_pool(appearance, size, rng)
 
     def expose(self, scene: F32, window: Window) -> Image:
@@ -40,8 +40,8 @@ class CameraEffects:
         if self._motion.shape[0] > 1:
             seen = np.asarray(cv2.filter2D(seen, -1, self._motion, borderType=cv2.BORDER_REPLICATE), np.float32)
         coloured = np.asarray(cv2.transform(seen, self._colour), np.float32)
-        if self._vignette is not None:
-            coloured *= self._vignette[window][..., None]
+        if self._gain is not None:
+            coloured *= self._gain[window]
         levels = cv2.convertScaleAbs(np.maximum(coloured, 0), alpha=255.0)
         return np.asarray(cv2.LUT(levels, self._tone), np.uint8)
 
@@ -93,9 +93,10 @@ def _tone_table(appearance: Appearance) -> NDArray[np.uint8]:
     return np.asarray(np.rint(255 * toned), np.uint8)
 
 
-def _vignette(appearance: Appearance, size: tuple[int, int]) -> F32 | None:
-    """Fall-off towards the corners, and an X-ray collimator's rounded black frame."""
-    if not appearance.vignette and not appearance.collimator:
+def _gain(appearance: Appearance, size: tuple[int, int]) -> F32 | None:
+    """Fall-off towards the corners, an X-ray collimator's rounded black frame, and lamps of two colours; (H, W, 1) or (H, W, 3)."""
+    tinted = any(value != 1.0 for lamp in appearance.lamp_rgb for value in lamp)
+    if not appearance.vignette and not appearance.collimator and not tinted:
         return None
     width, height = size
     x = np.linspace(-1, 1, width, dtype=np.float32)[None, :]
@@ -104,7 +105,12 @@ def _vignette(appearance: Appearance, size: tuple[int, int]) -> F32 | None:
     if appearance.collimator:
         corner = np.maximum(np.maximum(np.abs(x), np.abs(y)), (np.abs(x) + np.abs(y)) / np.float32(1.75))
         gain *= np.clip((np.float32(appearance.collimator) - corner) * 40 + 1, 0.08, 1)
-    return np.asarray(gain, np.float32)
+    if tinted:
+        angle = np.deg2rad(appearance.light_deg)
+        near = (0.5 + 0.5 * np.clip(1.2 * (x * np.float32(np.cos(angle)) + y * np.float32(np.sin(angle))), -1, 1))[..., None]
+        lamp, other = (np.asarray(rgb, np.float32) for rgb in appearance.lamp_rgb)
+        return np.asarray(gain[..., None] * (other + near * (lamp - other)), np.float32)
+    return np.asarray(gain, np.float32)[..., None]
 
 
 def _noise_pool(appearance: Appearance, size: tuple[int, int], rng: Generator) -> NDArray[np.int16] | None:

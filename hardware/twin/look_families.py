@@ -10,6 +10,7 @@ from collections.abc import Callable
 from numpy.random import Generator
 
 from hardware.twin.draws import Knobs, any_hue, grey, hue, pick, uniform
+from hardware.twin.rare_looks import RARE
 from hardware.twin.robot_families import ROBOT_LOOKS, absorb, draw_robot_look, stand_out
 
 
@@ -217,13 +218,15 @@ _FAMILIES: dict[str, Callable[[Generator], Knobs]] = {
     "subtraction": _subtraction,
 }
 LOOK_FAMILIES = tuple(_FAMILIES)
+RARE_FAMILIES = tuple(RARE)
+"""Looks that are drawn only where they are named (``rare_looks.py``)."""
 
 
 def draw_family(family: str, rng: Generator) -> Knobs:
     """All knobs of an appearance of `family`; only fields that differ from the defaults' meaning are drawn by the family itself."""
     look = ROBOT_LOOKS[int(rng.integers(len(ROBOT_LOOKS)))]
     robot, common = draw_robot_look(look, rng), _common(rng)
-    own = _FAMILIES[family](rng)
+    own = (_FAMILIES | RARE)[family](rng)
     knobs = {"family": family, **common, **robot, **own}
     if knobs.get("material") == "xray":
         absorb(knobs, rng)

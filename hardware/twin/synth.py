@@ -25,7 +25,7 @@ from core.learning.dataset import mask_png, png
 from core.parent_process import end_with_parent
 from core.types import Points
 from core.whole_file import is_aside, sweep_unfinished, write_whole
-from hardware.twin.appearance import LOOK_FAMILIES, Appearance, default_appearance, make_view, random_appearance
+from hardware.twin.appearance import LOOK_FAMILIES, RARE_FAMILIES, Appearance, default_appearance, make_view, random_appearance
 from hardware.twin.autopilot import RouteFollower
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
@@ -35,8 +35,9 @@ from hardware.twin.truth import truth_of
 
 FRAMES_PER_EPISODE = 16
 BENCH_LOOK = "bench"
-LOOKS = (*LOOK_FAMILIES, BENCH_LOOK)
-"""What a set may be limited to: families of random looks, and the twin's own fixed look, which is in none of them."""
+LOOKS = (*LOOK_FAMILIES, *RARE_FAMILIES, BENCH_LOOK)
+"""What a set may be limited to: families of random looks, rare ones that are drawn only where they are named, and the twin's own
+fixed look, which is in none of them."""
 _EMPTY_SHARE = 0.03
 _STEP_S = 0.02
 _FEED_MM_S = 40.0

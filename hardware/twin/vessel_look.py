@@ -1,4 +1,4 @@
-"""How the lumen and its wall look: silicone tube, clear block, open channel, or X-ray contrast.
+"""How the lumen and its wall look: silicone tube, clear block, turbid gel, open channel, or X-ray contrast.
 
 A picture has two layers. ``under`` (H, W, 3) is what lies behind the robot; ``front_alpha`` (H, W) and ``front`` (H, W, 3, already
 multiplied by alpha) lie over it: highlights of the tube, lamp reflections, fittings.
@@ -72,10 +72,12 @@ def surface_of(field: LumenField, scale: float, lamp: tuple[float, float]) -> Su
 
 def paint_vessel(appearance: Appearance, board: F32, surface: Surface, rng: Generator) -> Layers:
     """Both layers with the vessel in its material on `board` (H, W, 3)."""
-    paint = {"tube": _tube, "block": _block, "channel": _channel, "xray": _xray}[appearance.material]
+    paint = {"tube": _tube, "block": _block, "gel": _gel, "channel": _channel, "xray": _xray}[appearance.material]
     shape = board.shape[:2]
     layers = Layers(board, np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32))
     paint(appearance, layers, surface, rng)
+    if appearance.glow:
+        _glow(appearance, layers, surface)
     np.clip(layers.under, 0, 1, out=layers.under)
     return layers
 
@@ -114,6 +116,23 @@ def _block(appearance: Appearance, layers: Layers, surface: Surface, rng: Genera
     _edges(appearance, layers, surface, (0.0,))
     _highlight(appearance, layers, surface, surface.field.ratio, inside, rng, 0.6)
     _lamps(appearance, layers, surface, np.full(inside.shape, 0.7, np.float32), rng)
+
+
+def _gel(appearance: Appearance, layers: Layers, surface: Surface, rng: Generator) -> None:
+    """A lumen left free in a turbid gel: no edges, everything behind it spread and milky, reflections on the flat top."""
+    _fill_liquid(appearance, layers, surface)
+    spread = max(0.5, appearance.scatter_mm * surface.scale)
+    layers.under = np.asarray(cv2.GaussianBlur(layers.under, (0, 0), spread, borderType=cv2.BORDER_REPLICATE), np.float32)
+    cloud = np.float32(appearance.wall_haze) * (1 + np.float32(0.25) * smooth_noise(rng, surface.facing.shape, 25 * surface.scale))
+    layers.under += cloud[..., None] * (np.asarray(appearance.wall_rgb, np.float32) - layers.under)
+    _lamps(appearance, layers, surface, np.full(surface.facing.shape, 0.8, np.float32), rng)
+
+
+def _glow(appearance: Appearance, layers: Layers, surface: Surface) -> None:
+    """The liquid's own light, and what of it the air, the walls and the board around scatter."""
+    source = np.float32(appearance.glow) * surface.inside() * (0.4 + 0.6 * _depth(surface))
+    near = np.asarray(cv2.GaussianBlur(source, (0, 0), max(1.0, 2.5 * surface.scale), borderType=cv2.BORDER_REPLICATE), np.float32)
+    layers.under += (source + 0.35 * near)[..., None] * np.asarray(appearance.liquid_rgb, np.float32)
 
 
 def _channel(appearance: Appearance, layers: Layers, surface: Surface, rng: Generator) -> None:
