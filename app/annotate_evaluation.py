@@ -16,7 +16,7 @@ from core.names import name_as_text, name_of
 from core.study.annotation_images import FoundImage
 from core.study.annotation_measures import measured_alike
 from core.study.annotation_records import StoredAnnotation
-from core.study.annotation_report import agreement_report, choose_study, manual_measurements
+from core.study.annotation_report import agreement_report, answer_notes, choose_study, manual_measurements
 from core.study.annotations import AnnotationError
 from core.study.evaluation import Measurement
 from core.types import Frame
@@ -33,7 +33,8 @@ def fitted_alike(
     done = [one for one in choose_study(annotations, study, where) if one.key.sha256 in records]
     if not done:
         raise AnnotationError(f"{where}: none of its annotated images is here")
-    return measured_alike(done, records, config.perception)
+    alike, notes = measured_alike(done, records, config.perception)
+    return alike, [*answer_notes(alike), *notes]
 
 
 def compared_rows(

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.study.agreement import LIMITS_SD, icc_absolute, repeat_metrics, within_subject
+from core.study.annotation_persons import raters_alike
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotations import AnnotationError, Status, status_of
 from core.study.bootstrap import Floats, members
@@ -220,6 +221,32 @@ def manual_measurements(annotations: Iterable[StoredAnnotation], names: Mapping[
     for one in sorted(annotations, key=lambda one: (one.key.rater, one.key.repeat)):
         by_image.setdefault(one.key.sha256, []).append(one)
     return [_common(names.get(image, image), group) for image, group in by_image.items()]
+
+
+def answer_notes(annotations: Iterable[StoredAnnotation]) -> list[str]:
+    """What a reader must know of whose these answers are: names that may be one person's, and second measures of two kinds."""
+    by_image: dict[str, list[StoredAnnotation]] = {}
+    for one in annotations:
+        by_image.setdefault(one.key.sha256, []).append(one)
+    raters = {one.key.rater for group in by_image.values() for one in group}
+    notes = [f"The {line}: figures between raters count them so." for line in raters_alike(raters)]
+    kinds = Counter(kind for group in by_image.values() if (kind := _second_measure(group)) is not None)
+    if len(kinds) > 1:
+        notes.append(
+            f"The second manual measure is a rater's later one on {kinds['repeat']} images and another rater's on "
+            f"{kinds['rater']}: "
+            "figures of two manual measures (ICC, repeatability) mix what one rater and what several are uncertain by."
+        )
+    return notes
+
+
+def _second_measure(group: Sequence[StoredAnnotation]) -> str | None:
+    """Whose ``angle_2`` of ``manual_measurements`` is: of a "repeat", of another "rater", or None where there is none."""
+    repeats = [one.key.repeat for one in group if one.theta_deg is not None and not one.content.cannot_tell]
+    later = sum(repeat > 1 for repeat in repeats)
+    if later:
+        return "repeat" if later < len(repeats) else None
+    return "rater" if len(repeats) > 1 else None
 
 
 def undecided(annotations: Iterable[StoredAnnotation]) -> int:
