@@ -255,14 +255,14 @@ def _sureness(store: AnnotationStore, images: Sequence[FoundImage], order: Order
 def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
     from app.annotate_evaluation import groups_of
     from core.study.annotation_measures import measured_alike
-    from core.study.annotation_report import agreement_report, answer_notes, choose_study, write_measures
+    from core.study.annotation_report import agreement_report, choose_study, rater_notes, write_measures
 
     with AnnotationStore(store_path, read_only=True) as store:
         annotations = choose_study(store.annotations(), options.study.asked, str(store_path))
         images = store.images()
         annotations, notes = measured_alike(_of_rater(annotations, options.study.rater), images, config.perception)
         names = {sha256: image.name for sha256, image in images.items()}
-        tell_problems([*store.problems, *answer_notes(annotations), *notes])
+        tell_problems([*store.problems, *rater_notes(annotations), *notes])
     study = annotations[0].key.study
     paths = {sha256: store_path.parent / name for sha256, name in names.items()}
     places = groups_of(list(paths.values()))

@@ -16,7 +16,13 @@ from core.names import name_as_text, name_of
 from core.study.annotation_images import FoundImage
 from core.study.annotation_measures import measured_alike
 from core.study.annotation_records import StoredAnnotation
-from core.study.annotation_report import agreement_report, answer_notes, choose_study, manual_measurements
+from core.study.annotation_report import (
+    agreement_report,
+    choose_study,
+    manual_measurements,
+    rater_notes,
+    second_measure_notes,
+)
 from core.study.annotations import AnnotationError
 from core.study.evaluation import Measurement
 from core.types import Frame
@@ -34,7 +40,7 @@ def fitted_alike(
     if not done:
         raise AnnotationError(f"{where}: none of its annotated images is here")
     alike, notes = measured_alike(done, records, config.perception)
-    return alike, [*answer_notes(alike), *notes]
+    return alike, [*rater_notes(alike), *second_measure_notes(alike), *notes]
 
 
 def compared_rows(

@@ -223,21 +223,24 @@ def manual_measurements(annotations: Iterable[StoredAnnotation], names: Mapping[
     return [_common(names.get(image, image), group) for image, group in by_image.items()]
 
 
-def answer_notes(annotations: Iterable[StoredAnnotation]) -> list[str]:
-    """What a reader must know of whose these answers are: names that may be one person's, and second measures of two kinds."""
+def rater_notes(annotations: Iterable[StoredAnnotation]) -> list[str]:
+    """Names of raters that may be one person's."""
+    raters = {one.key.rater for one in annotations}
+    return [f"The {line}: figures between raters count them so." for line in raters_alike(raters)]
+
+
+def second_measure_notes(annotations: Iterable[StoredAnnotation]) -> list[str]:
+    """Where the second of ``manual_measurements`` is a rater's own on some images and another rater's on others."""
     by_image: dict[str, list[StoredAnnotation]] = {}
     for one in annotations:
         by_image.setdefault(one.key.sha256, []).append(one)
-    raters = {one.key.rater for group in by_image.values() for one in group}
-    notes = [f"The {line}: figures between raters count them so." for line in raters_alike(raters)]
     kinds = Counter(kind for group in by_image.values() if (kind := _second_measure(group)) is not None)
-    if len(kinds) > 1:
-        notes.append(
-            f"The second manual measure is a rater's later one on {kinds['repeat']} images and another rater's on "
-            f"{kinds['rater']}: "
-            "figures of two manual measures (ICC, repeatability) mix what one rater and what several are uncertain by."
-        )
-    return notes
+    if len(kinds) < 2:
+        return []
+    return [
+        f"The second manual measure is a rater's later one on {kinds['repeat']} images and another rater's on {kinds['rater']}; "
+        "figures of two manual measures (ICC, repeatability) mix what one rater and what several are uncertain by."
+    ]
 
 
 def _second_measure(group: Sequence[StoredAnnotation]) -> str | None:

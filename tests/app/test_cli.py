@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from app import learning_commands
 from app.cli import app, main
 from core.session.manifest import read_manifest
+from hardware.twin.rare_looks import RARE
 from tests.core.session_data import record, tick_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -145,3 +146,8 @@ def test_a_name_that_the_output_cannot_hold_is_no_traceback(tmp_path: Path, enco
     recovered = read_manifest(named.with_name(named.name + "_recovered")).recovered
     assert recovered is not None
     assert recovered.origin.endswith("\\xff")
+
+
+def test_the_help_of_synth_names_every_rare_look() -> None:
+    """It is written out there: whoever asks for help does not wait for the twin to be imported."""
+    assert f"({', '.join(RARE)}: drawn" in " ".join(help_of("synth").split())

@@ -12,9 +12,10 @@ from core.config import PerceptionConfig
 from core.study.annotation_records import ItemKey, StoredAnnotation
 from core.study.annotation_report import (
     agreement_report,
-    answer_notes,
     choose_study,
     manual_measurements,
+    rater_notes,
+    second_measure_notes,
     undecided,
     write_measures,
 )
@@ -194,9 +195,9 @@ def test_images_on_which_no_state_was_given_most_often_are_counted() -> None:
 
 def test_names_that_may_be_one_persons_are_told() -> None:
     done = [answer("a", "Anna", 1, 10.0, PoseState.B), answer("b", "anna ", 1, 10.0, PoseState.B)]
-    (note,) = answer_notes(done)
+    (note,) = rater_notes(done)
     assert note == "The raters 'Anna' and 'anna ' are taken for different people: figures between raters count them so."
-    assert answer_notes(done[:1]) == []
+    assert rater_notes(done[:1]) == []
 
 
 @pytest.mark.parametrize("cannot_tell", [False, True])
@@ -204,11 +205,11 @@ def test_second_measures_of_two_kinds_are_told(cannot_tell: bool) -> None:
     """Image "a" was measured twice by Ann, "b" by two raters, "c" once; where Bob could not tell, "b" has one measure alone."""
     done = [answer("a", "ann", repeat, 10.0, PoseState.B) for repeat in (1, 2)]
     done += [answer("b", "ann", 1, 10.0, PoseState.B), answer("c", "ann", 1, 10.0, PoseState.B)]
-    assert answer_notes(done) == []
-    notes = answer_notes([*done, answer("b", "bob", 1, None if cannot_tell else 11.0, PoseState.B)])
+    assert second_measure_notes(done) == []
+    notes = second_measure_notes([*done, answer("b", "bob", 1, None if cannot_tell else 11.0, PoseState.B)])
     if cannot_tell:
         assert notes == []
     else:
-        assert notes[0].startswith("The second manual measure is a rater's later one on 1 images and another rater's on 1:")
+        assert notes[0].startswith("The second manual measure is a rater's later one on 1 images and another rater's on 1;")
         rows = {row.image: row.counts for row in manual_measurements([*done, answer("b", "bob", 1, 11.0, PoseState.B)], {})}
         assert rows["b"] == rows["a"], "the same columns hold both kinds"
