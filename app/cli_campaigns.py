@@ -25,7 +25,9 @@ def trial(
     out: Annotated[Path | None, typer.Option(help="folder for trials.jsonl and report.html; trials already there are kept")] = None,
     true_masks: Annotated[bool, typer.Option("--true-masks", help="the twin's own masks instead of the network's")] = False,
     max_seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="simulated time after which a trial has failed")] = 120.0,
-    look: Annotated[str, typer.Option(help="random: every trial another picture; bench: the default clear one")] = "random",
+    look: Annotated[
+        str, typer.Option(help="random: every trial another picture; bench: the default clear one; or a family, as in synth")
+    ] = "random",
     scheduler: SchedulerOption = None,
     model: ModelOption = None,
     config: ConfigOption = None,

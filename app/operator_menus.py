@@ -38,7 +38,6 @@ def add_operator_menus(window: OperatorWindow) -> None:
             None,
             MenuEntry(tr("&Clear destination"), window.clear_target, hint="Esc"),
             None,
-            *(panels.picker.menu_entries() if panels.picker is not None else ()),
             MenuEntry(tr("Start the &rig again"), window.ask_restart, ("F5",)),
         ],
     )

@@ -15,6 +15,7 @@ from app.drive_desk import DriveDesk
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
 from app.event_model import EventKind
 from app.language import tr
+from app.look_menu import LookMenu
 from app.next_step import Step, Undriven
 from app.operator_menus import add_operator_menus
 from app.operator_panels import OperatorPanels
@@ -50,7 +51,7 @@ class OperatorWindow(WindowFrame):
 
     Parameters
     ----------
-    config : what is opened first; choosing a phantom changes ``config.twin.phantom``.
+    config : what is opened first; choosing a phantom or look changes ``config.twin``.
     open_engine : opens rig and engine for a configuration; called in the engine's thread, may take seconds, may raise.
     kind : what the permanent banner says.
     phantoms : (name, title) of the phantoms to choose from; only the bench twin has any.
@@ -91,6 +92,10 @@ class OperatorWindow(WindowFrame):
         self._tour = TourOverlay(self._panels, kept_clear=(self._panels.mode_bar.stop, self._panels.alerts))
         self._tour.ended.connect(self._panels.live.setFocus)
         add_operator_menus(self)
+        picker = self._panels.picker
+        self._looks: LookMenu | None = None
+        if picker is not None:
+            self._looks = LookMenu(self, lambda: self._config.twin, lambda: self._kind is RigKind.SIM, picker.menu_entries())
         self._wire()
         self._show_kind()
 
@@ -186,6 +191,8 @@ class OperatorWindow(WindowFrame):
         self._snapshots.failed.connect(self._on_snapshot_failed)
         if panels.picker is not None:
             panels.picker.chosen.connect(self._choose_phantom)
+        if self._looks is not None:
+            self._looks.chosen.connect(self._choose_look)
 
     def take(self, step: Step) -> None:
         """A step that the operator asks for, by key, button or menu."""
@@ -209,6 +216,8 @@ class OperatorWindow(WindowFrame):
         self._stale_after_s = PLAYBACK_STALE_AFTER_S if self._kind is RigKind.PLAYBACK else STALE_AFTER_S
         self._panels.show_kind(self._kind, has_servos=self._config.rig.robot != "none")
         self.setWindowTitle(f"LumenPilot \N{EM DASH} {tr(self._kind.value)}")
+        if self._looks is not None:
+            self._looks.renew()
 
     @property
     def phase(self) -> Phase:
@@ -338,8 +347,20 @@ class OperatorWindow(WindowFrame):
             self.say(tr("The phantom stays as it is: {why}", why=why), is_fault=True)
             if self._panels.picker is not None:
                 self._panels.picker.show_name(self._config.twin.phantom)
-            return
-        twin = self._config.twin.model_copy(update={"phantom": name})
+        else:
+            self._change_twin({"phantom": name})
+
+    @Slot(dict, str)
+    def _choose_look(self, change: dict[str, object], title: str) -> None:
+        """What changes of the twin's configuration; unless that would break something off."""
+        if why := self._at_work():
+            self.say(tr("The look stays as it is: {why}", why=why), is_fault=True)
+        else:
+            self._change_twin(change)
+            self.say(tr("Look: {title}", title=title))
+
+    def _change_twin(self, change: dict[str, object]) -> None:
+        twin = self._config.twin.model_copy(update=change)
         self._config = self._config.model_copy(update={"twin": twin})
         self._panels.live.setFocus()
         self._start_rig()

@@ -14,7 +14,8 @@ from rich.table import Table
 
 from core.config import RESOURCES
 from core.study.trial import worst
-from hardware.twin.trial import TrialPlan
+from hardware.twin.look_titles import BENCH_LOOK
+from hardware.twin.trial import RANDOM_LOOK, TrialPlan
 
 Rows = Sequence[Mapping[str, Any]]
 _WORST = 6
@@ -140,7 +141,7 @@ def write_report(out: Path, by_policy: Mapping[str, Rows], plan: TrialPlan) -> N
     lowest = worst(everything, _WORST)
     environment = Environment(loader=FileSystemLoader(RESOURCES / "report"), autoescape=True, undefined=StrictUndefined)
     environment.trim_blocks = environment.lstrip_blocks = True
-    looks = "random looks" if plan.look == "random" else "the default look"
+    looks = {RANDOM_LOOK: "random looks", BENCH_LOOK: "the default look"}.get(plan.look, f"looks: {plan.look}")
     seen = "true masks instead of the network" if plan.true_masks else f"model {plan.config.perception.segmentation.model}"
     text = environment.get_template("trial.html.j2").render(
         title="Closed-loop trials in the bench twin",

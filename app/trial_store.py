@@ -84,6 +84,7 @@ def _described(plan: TrialPlan) -> dict[str, Any]:
     settings["policy"].pop("name")
     settings["twin"].pop("phantom")
     settings["twin"].pop("appearance_seed")
+    settings["twin"].pop("look")
     weights = None
     if not plan.true_masks:
         from core.learning.model_file import model_folder, read_model_info

@@ -212,7 +212,10 @@ class TwinConfig(_Section):
     """The bench twin: a simulated robot, phantom and camera."""
 
     phantom: str = Field("s_curve", min_length=1, description="a named phantom, or random:<seed>")
-    appearance_seed: int = Field(0, ge=0, le=2**31 - 1, description="of light, board and camera noise; 0 = the clear bench")
+    look: str | None = Field(None, min_length=1, description="a family of looks, as in synth --family; empty: by appearance_seed")
+    appearance_seed: int = Field(
+        0, ge=0, le=2**31 - 1, description="of light, board and camera noise; without a look, 0 = the clear bench"
+    )
     image_width_px: int = Field(640, ge=160, le=4096, description="of its camera")
     image_height_px: int = Field(480, ge=120, le=4096, description="of its camera")
     frames_per_second: float = Field(30.0, gt=0.0, le=240.0, description="in lock-step: trials, data sets")

@@ -27,6 +27,7 @@ from core.types import Points
 from core.whole_file import is_aside, sweep_unfinished, write_whole
 from hardware.twin.appearance import LOOK_FAMILIES, RARE_FAMILIES, Appearance, default_appearance, make_view, random_appearance
 from hardware.twin.autopilot import RouteFollower
+from hardware.twin.look_titles import BENCH_LOOK
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import TwinPhysics
@@ -34,7 +35,6 @@ from hardware.twin.renderer import Picture, Renderer
 from hardware.twin.truth import truth_of
 
 FRAMES_PER_EPISODE = 16
-BENCH_LOOK = "bench"
 LOOKS = (*LOOK_FAMILIES, *RARE_FAMILIES, BENCH_LOOK)
 """What a set may be limited to: families of random looks, rare ones that are drawn only where they are named, and the twin's own
 fixed look, which is in none of them."""

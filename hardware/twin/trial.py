@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -23,9 +22,10 @@ from core.policy_config import PolicyName
 from core.study.accuracy import TrueMasks
 from core.study.trial import Measure, Row, TrialLog, trial_row
 from core.types import Advice, Command, Frame, Point, Points, Scene, Speed
-from hardware.twin.appearance import default_appearance, random_appearance
+from hardware.twin.appearance import Appearance, default_appearance, random_appearance
 from hardware.twin.autopilot import RouteFollower
 from hardware.twin.camera import TwinCamera
+from hardware.twin.look_titles import BENCH_LOOK, LOOK_TITLES, RARE_TITLES
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.view import View
@@ -46,21 +46,22 @@ _STOPPED_S = 2.0
 _NO_PROGRESS_S, _PROGRESS_MM = 40.0, 2.0  # time to back out of a missed branch and to try again
 _HELP_S, _HELP_MM_S, _MAX_HELP = 1.0, 5.0, 5
 
-
-Look = Literal["random", "bench"]
+RANDOM_LOOK = "random"
+TRIAL_LOOKS = (RANDOM_LOOK, *LOOK_TITLES, *RARE_TITLES)
 
 
 @dataclass(frozen=True, slots=True)
 class TrialPlan:
     """What all trials of a campaign share.
 
-    ``true_masks``: the twin's masks stand in for the network's. ``look``: every trial another picture, or the default clear bench.
+    ``true_masks``: the twin's masks stand in for the network's. ``look`` of ``TRIAL_LOOKS``: every trial another
+    picture, of any of the ten families or of the one named, or all of them the default clear bench.
     """
 
     config: Config
     true_masks: bool = False
     max_seconds: float = 120.0
-    look: Look = "random"
+    look: str = RANDOM_LOOK
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,6 +109,12 @@ def start_mm(phantom: Phantom, target: Target) -> float:
     return max(_START_MM, min(_START_MOST_MM, first_mm - _BEFORE_JUNCTION_MM, target.at_mm - _LEAST_WAY_MM / 2))
 
 
+def _appearance(look: str, seed: int) -> Appearance:
+    if look == BENCH_LOOK:
+        return default_appearance()
+    return random_appearance(seed, None if look == RANDOM_LOOK else look)
+
+
 class Trial:
     """One trial. ``run`` turns it to its end and returns its row.
 
@@ -122,7 +129,7 @@ class Trial:
         config, own_seed = plan.config, FIRST_SEED + seed
         phantom = make_phantom(f"random:{own_seed}")
         self._plan, self._seed, self._name = plan, seed, policy
-        look = random_appearance(own_seed) if plan.look == "random" else default_appearance()
+        look = _appearance(plan.look, own_seed)
         self._world = TwinWorld(config.twin, phantom=phantom, appearance=look, perception=config.perception, seed=own_seed)
         self.target = choose_target(phantom, self._world.view, own_seed)
         self._camera = TwinCamera(self._world, lock_step=True)

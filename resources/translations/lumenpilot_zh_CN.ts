@@ -1027,6 +1027,96 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>Clear bench</source>
+        <translation>清晰台架</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Silicone on white</source>
+        <translation>白底硅胶</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Silicone on red</source>
+        <translation>红底硅胶</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Silicone on dark</source>
+        <translation>深色底硅胶</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Silicone on a coloured board</source>
+        <translation>彩色底板硅胶</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Tinted liquid</source>
+        <translation>有色液体</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Opaque channels</source>
+        <translation>不透明通道</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Channels in a clear block</source>
+        <translation>透明块中的通道</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Lit from behind</source>
+        <translation>背光照明</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Fluoroscopy</source>
+        <translation>透视成像</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Subtraction angiography</source>
+        <translation>减影血管造影</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Turbid gel</source>
+        <translation>浑浊凝胶</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Creased drape</source>
+        <translation>有褶皱的铺巾</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Lamps of two colours</source>
+        <translation>双色灯光</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Glowing liquid</source>
+        <translation>发光液体</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Tank of rippling water</source>
+        <translation>水面波动的水槽</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Printed photograph</source>
+        <translation>印刷照片</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Layers of printed resin</source>
+        <translation>分层打印树脂</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>camera</source>
         <translation>相机</translation>
     </message>
@@ -2666,6 +2756,21 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>重置布局(&amp;R)</translation>
     </message>
     <message>
+        <location filename="../../app/look_menu.py"/>
+        <source>Any of the ten &amp;families</source>
+        <translation>十类外观中任意一类(&amp;F)</translation>
+    </message>
+    <message>
+        <location filename="../../app/look_menu.py"/>
+        <source>&amp;Twin</source>
+        <translation>数字孪生(&amp;T)</translation>
+    </message>
+    <message>
+        <location filename="../../app/look_menu.py"/>
+        <source>Another &amp;look</source>
+        <translation>换一种外观(&amp;L)</translation>
+    </message>
+    <message>
         <location filename="../../app/menus.py"/>
         <source>&amp;About LumenPilot</source>
         <translation>关于 LumenPilot(&amp;A)</translation>
@@ -3114,6 +3219,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/operator_window.py"/>
         <source>The phantom stays as it is: {why}</source>
         <translation>体模保持不变：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_window.py"/>
+        <source>The look stays as it is: {why}</source>
+        <translation>外观保持不变：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator_window.py"/>
+        <source>Look: {title}</source>
+        <translation>外观：{title}</translation>
     </message>
     <message>
         <location filename="../../app/operator_window.py"/>
@@ -9549,13 +9664,23 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
+        <source>Look</source>
+        <translation>外观</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>a family of looks, as in synth --family; empty: by appearance_seed</source>
+        <translation>外观类别，同 synth --family；留空：由 appearance_seed 决定</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
         <source>Appearance seed</source>
         <translation>外观种子</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>of light, board and camera noise; 0 = the clear bench</source>
-        <translation>灯光、底板和相机噪声的种子；0 = 干净的台架</translation>
+        <source>of light, board and camera noise; without a look, 0 = the clear bench</source>
+        <translation>光照、底板和相机噪声的种子；未选外观时 0 = 清晰台架</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

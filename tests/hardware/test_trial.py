@@ -62,6 +62,13 @@ def test_a_policy_that_gives_up_ends_the_trial_without_waiting_for_progress() ->
     assert 2.0 <= row["time_s"] < 3.0
 
 
+@pytest.mark.parametrize("look", ["fluoroscopy", "tank"])
+def test_the_look_may_be_named(look: str) -> None:
+    config, masks = Config(), TrueMasks()
+    trial = Trial(TrialPlan(config, true_masks=True, look=look), 3, "pursuit", Pipeline(masks, config.perception), masks)
+    assert trial._world.appearance == random_appearance(FIRST_SEED + 3, look)
+
+
 class _GivesUp:
     def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         return Advice(Speed.STOP, 0.0, 0.0, "missed")

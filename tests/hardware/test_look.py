@@ -1,0 +1,46 @@
+"""How the configured twin looks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from core.config import TwinConfig
+from hardware.twin.appearance import default_appearance, random_appearance
+from hardware.twin.look import appearance_of
+from hardware.twin.look_titles import LOOK_TITLES, RARE_TITLES
+from hardware.twin.synth import LOOKS
+
+
+def test_all_looks_have_a_title() -> None:
+    titles = LOOK_TITLES | RARE_TITLES
+    assert set(titles) == set(LOOKS)
+    assert len(set(titles.values())) == len(titles)
+
+
+def test_without_a_look_the_seed_says_which() -> None:
+    assert appearance_of(TwinConfig()) == default_appearance()
+    assert appearance_of(TwinConfig(appearance_seed=7)) == random_appearance(7)
+
+
+@pytest.mark.parametrize("look", ["fluoroscopy", "tank"])
+@pytest.mark.parametrize("seed", [0, 7])
+def test_a_family_is_drawn_by_the_seed(look: str, seed: int) -> None:
+    found = appearance_of(TwinConfig(look=look, appearance_seed=seed))
+    assert found == random_appearance(seed, look)
+    assert found.family == look
+
+
+def test_clear_bench_by_its_name_whatever_the_seed() -> None:
+    assert appearance_of(TwinConfig(look="bench", appearance_seed=7)) == default_appearance()
+
+
+def test_lens_is_the_configured_one() -> None:
+    config = TwinConfig(look="tank", appearance_seed=3, lens_distortion=-0.1)
+    assert appearance_of(config) == replace(random_appearance(3, "tank"), distortion=-0.1)
+
+
+def test_unknown_look_is_told_with_the_known_ones() -> None:
+    with pytest.raises(ValueError, match=r"twin\.look: unknown look 'moon'; known: bench, silicone_white, .*resin"):
+        appearance_of(TwinConfig(look="moon"))
