@@ -58,11 +58,6 @@ class LookMenu(QObject):
         menus[0].aboutToShow.connect(self.renew)
         self.renew()
 
-    @property
-    def shown(self) -> str:
-        """The title of the look that is marked; empty: none is."""
-        return next((plain(action.text()) for action in self._looks.values() if action.isChecked()), "")
-
     def renew(self) -> None:
         """Mark the look in use; nothing can be chosen while another rig is open."""
         for action in self._actions:
