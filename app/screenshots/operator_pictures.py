@@ -96,7 +96,7 @@ def small_and_light(studio: Studio) -> None:
         with OperatorScene(studio) as scene:
             scene.window.choose_target(*_TARGET)
             scene.stage.jog = _FEED
-            scene.show(scene.play(60), "operator_light")
+            scene.show(scene.play(35), "operator_light")
     finally:
         theme.apply_theme(studio.application, theme.Theme.DARK)
 
