@@ -52,8 +52,9 @@ def run_synth(
     scheduler: str | None = None,
 ) -> None:
     """Write a labelled set; raises SynthError, and ClusterError with `scheduler`."""
+    from hardware.twin.look_titles import LOOKS
     from hardware.twin.phantoms import make_phantom
-    from hardware.twin.synth import LOOKS, SynthError, SynthPlan, write_set
+    from hardware.twin.synth import SynthError, SynthPlan, write_set
 
     unknown = [name for name in families or () if name not in LOOKS]
     if unknown:
@@ -111,7 +112,7 @@ class TrainInputs:
         """Families of the frames made now; None: all. Raises DatasetError when `without` names an unknown one, or leaves none."""
         from core.learning.dataset import DatasetError
         from hardware.twin.look_families import LOOK_FAMILIES
-        from hardware.twin.synth import LOOKS
+        from hardware.twin.look_titles import LOOKS
 
         unknown = next((look for look in self.without if look not in LOOKS), None)
         if unknown is not None:

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QMainWindow, QMenu
 from app.language import mark, tr, tr_text
 from app.menus import MenuEntry, add_menu, plain
 from core.config import TwinConfig
-from hardware.twin.look_titles import BENCH_LOOK, LOOK_TITLES, RARE_TITLES
+from hardware.twin.look_titles import BENCH_LOOK, BENCH_TITLE, LOOK_TITLES, RARE_TITLES, look_of
 
 _ANY = mark("Any of the ten &families")
 _SEED_MAX = 999_999
@@ -39,8 +39,8 @@ class LookMenu(QObject):
     ) -> None:
         super().__init__(window)
         self._current, self._has_twin = current, has_twin
-        (bench, *ten), rare = LOOK_TITLES.items(), RARE_TITLES.items()
-        lists: list[list[tuple[str | None, str]]] = [[bench, (None, _ANY), *ten], [*rare]]
+        usual: list[tuple[str | None, str]] = [(BENCH_LOOK, BENCH_TITLE), (None, _ANY), *LOOK_TITLES.items()]
+        lists: list[list[tuple[str | None, str]]] = [usual, [*RARE_TITLES.items()]]
         entries: list[MenuEntry | None] = [*phantoms, None, MenuEntry(tr("Another &look"), self.roll, ("L",))]
         for looks in lists:
             entries.append(None)
@@ -62,7 +62,7 @@ class LookMenu(QObject):
         """Mark the look in use; nothing can be chosen while another rig is open."""
         for action in self._actions:
             action.setEnabled(self._has_twin())
-        current = _look_of(self._current())
+        current = look_of(self._current())
         for look, action in self._looks.items():
             action.setChecked(look == current)
 
@@ -70,7 +70,7 @@ class LookMenu(QObject):
         """Another picture of this look. The clear bench has only one: any of the ten families, then."""
         if self._has_twin():
             twin = self._current()
-            look = _look_of(twin)
+            look = look_of(twin)
             self._change(None if look == BENCH_LOOK else look, twin.appearance_seed % _SEED_MAX + 1)
 
     def _choose(self, look: str | None) -> None:
@@ -81,7 +81,3 @@ class LookMenu(QObject):
     def _change(self, look: str | None, seed: int) -> None:
         title = plain(self._looks[look].text()) if look in self._looks else str(look)
         self.chosen.emit({"look": look, "appearance_seed": seed}, title)
-
-
-def _look_of(twin: TwinConfig) -> str | None:
-    return twin.look if twin.look is not None or twin.appearance_seed else BENCH_LOOK

@@ -15,7 +15,6 @@ from app.drive_desk import DriveDesk
 from app.engine_thread import EngineLike, EngineStatus, EngineThread, Phase
 from app.event_model import EventKind
 from app.language import tr
-from app.look_menu import LookMenu
 from app.next_step import Step, Undriven
 from app.operator_menus import add_operator_menus
 from app.operator_panels import OperatorPanels
@@ -23,6 +22,7 @@ from app.recorder import Recorder
 from app.snapshot import Origin, SnapshotWriter, pictures_folder
 from app.tick_pace import TickPace
 from app.tour_stops import operator_stops
+from app.twin_desk import TwinDesk
 from app.widgets.tour_overlay import TourOverlay
 from app.window_frame import WindowFrame
 from core.config import Config, PerceptionConfig
@@ -92,10 +92,7 @@ class OperatorWindow(WindowFrame):
         self._tour = TourOverlay(self._panels, kept_clear=(self._panels.mode_bar.stop, self._panels.alerts))
         self._tour.ended.connect(self._panels.live.setFocus)
         add_operator_menus(self)
-        picker = self._panels.picker
-        self._looks: LookMenu | None = None
-        if picker is not None:
-            self._looks = LookMenu(self, lambda: self._config.twin, lambda: self._kind is RigKind.SIM, picker.menu_entries())
+        self._twin = TwinDesk(self, self._panels.picker) if self._panels.picker is not None else None
         self._wire()
         self._show_kind()
 
@@ -189,10 +186,6 @@ class OperatorWindow(WindowFrame):
         panels.record_bar.clicked.connect(self._recorder.toggle)
         self._snapshots.saved.connect(panels.toast.show_message)
         self._snapshots.failed.connect(self._on_snapshot_failed)
-        if panels.picker is not None:
-            panels.picker.chosen.connect(self._choose_phantom)
-        if self._looks is not None:
-            self._looks.chosen.connect(self._choose_look)
 
     def take(self, step: Step) -> None:
         """A step that the operator asks for, by key, button or menu."""
@@ -216,8 +209,8 @@ class OperatorWindow(WindowFrame):
         self._stale_after_s = PLAYBACK_STALE_AFTER_S if self._kind is RigKind.PLAYBACK else STALE_AFTER_S
         self._panels.show_kind(self._kind, has_servos=self._config.rig.robot != "none")
         self.setWindowTitle(f"LumenPilot \N{EM DASH} {tr(self._kind.value)}")
-        if self._looks is not None:
-            self._looks.renew()
+        if self._twin is not None:
+            self._twin.renew()
 
     @property
     def phase(self) -> Phase:
@@ -326,44 +319,18 @@ class OperatorWindow(WindowFrame):
     @Slot()
     def ask_restart(self) -> None:
         """Open the rig anew, unless that would break something off; a rig that shows no new picture has nothing to lose."""
-        why = self._at_work() if self._phase is Phase.RUNNING and not self._is_stale else ""
+        why = self.at_work() if self._phase is Phase.RUNNING and not self._is_stale else ""
         if why:
             self.say(tr("The rig stays as it is: {why}", why=why), is_fault=True)
         else:
             self.restart()
 
-    def _at_work(self) -> str:
+    def at_work(self) -> str:
         """What opening the rig anew would break off; empty: nothing."""
         view = self._desk.view
         if view is not None and view.mode in ARMED_MODES:
             return tr("the robot is armed: disarm it first")
         return tr("a session is being recorded: end it first") if self._recorder.status.recording else ""
-
-    @Slot(str)
-    def _choose_phantom(self, name: str) -> None:
-        """Unless that would break something off: its key lies among those that drive."""
-        why = self._at_work()
-        if why:
-            self.say(tr("The phantom stays as it is: {why}", why=why), is_fault=True)
-            if self._panels.picker is not None:
-                self._panels.picker.show_name(self._config.twin.phantom)
-        else:
-            self._change_twin({"phantom": name})
-
-    @Slot(dict, str)
-    def _choose_look(self, change: dict[str, object], title: str) -> None:
-        """What changes of the twin's configuration; unless that would break something off."""
-        if why := self._at_work():
-            self.say(tr("The look stays as it is: {why}", why=why), is_fault=True)
-        else:
-            self._change_twin(change)
-            self.say(tr("Look: {title}", title=title))
-
-    def _change_twin(self, change: dict[str, object]) -> None:
-        twin = self._config.twin.model_copy(update=change)
-        self._config = self._config.model_copy(update={"twin": twin})
-        self._panels.live.setFocus()
-        self._start_rig()
 
     @Slot(object)
     def _on_status(self, status: EngineStatus) -> None:

@@ -1,12 +1,14 @@
-"""What people call the families of looks; apart from their drawing, which a menu does not need."""
+"""How looks are called, and which one is configured; apart from their drawing, which a menu does not need."""
 
 from __future__ import annotations
 
+from core.config import TwinConfig
+
 BENCH_LOOK = "bench"
-"""The twin's own look, the default one."""
+"""The twin's own fixed look, which is in none of the families."""
+BENCH_TITLE = "Clear bench"
 
 LOOK_TITLES = {
-    BENCH_LOOK: "Clear bench",
     "silicone_white": "Silicone on white",
     "silicone_red": "Silicone on red",
     "silicone_dark": "Silicone on dark",
@@ -18,7 +20,7 @@ LOOK_TITLES = {
     "fluoroscopy": "Fluoroscopy",
     "subtraction": "Subtraction angiography",
 }
-"""The twin's own look and the ten families, in the order of menus."""
+"""The ten families, of which looks are drawn where none is named."""
 
 RARE_TITLES = {
     "gel": "Turbid gel",
@@ -29,4 +31,12 @@ RARE_TITLES = {
     "picture": "Printed photograph",
     "resin": "Layers of printed resin",
 }
-"""The looks of rigs of other kinds (``rare_looks.py``)."""
+"""Looks of rigs of other kinds, drawn only where they are named (``rare_looks.py``)."""
+
+LOOKS = (*LOOK_TITLES, *RARE_TITLES, BENCH_LOOK)
+"""All that a look may be called."""
+
+
+def look_of(config: TwinConfig) -> str | None:
+    """The name of the configured look; None: any of the ten families, by the seed."""
+    return config.look if config.look is not None or config.appearance_seed else BENCH_LOOK

@@ -25,8 +25,9 @@ from core.learning.dataset import mask_png, png
 from core.parent_process import end_with_parent
 from core.types import Points
 from core.whole_file import is_aside, sweep_unfinished, write_whole
-from hardware.twin.appearance import LOOK_FAMILIES, RARE_FAMILIES, Appearance, default_appearance, make_view, random_appearance
+from hardware.twin.appearance import Appearance, make_view
 from hardware.twin.autopilot import RouteFollower
+from hardware.twin.look import named_appearance
 from hardware.twin.look_titles import BENCH_LOOK
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
@@ -35,9 +36,6 @@ from hardware.twin.renderer import Picture, Renderer
 from hardware.twin.truth import truth_of
 
 FRAMES_PER_EPISODE = 16
-LOOKS = (*LOOK_FAMILIES, *RARE_FAMILIES, BENCH_LOOK)
-"""What a set may be limited to: families of random looks, rare ones that are drawn only where they are named, and the twin's own
-fixed look, which is in none of them."""
 _EMPTY_SHARE = 0.03
 _STEP_S = 0.02
 _FEED_MM_S = 40.0
@@ -135,9 +133,8 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
 
 def _look(plan: SynthPlan, look_seed: int, rng: np.random.Generator) -> Appearance:
     family = str(rng.choice(plan.families)) if plan.families else None
-    if family == BENCH_LOOK:
-        return replace(default_appearance(), family=BENCH_LOOK)
-    return random_appearance(look_seed, family)
+    look = named_appearance(family, look_seed)
+    return replace(look, family=BENCH_LOOK) if family == BENCH_LOOK else look
 
 
 def make_episode(plan: SynthPlan, number: int) -> Episode:

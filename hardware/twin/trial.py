@@ -22,9 +22,9 @@ from core.policy_config import PolicyName
 from core.study.accuracy import TrueMasks
 from core.study.trial import Measure, Row, TrialLog, trial_row
 from core.types import Advice, Command, Frame, Point, Points, Scene, Speed
-from hardware.twin.appearance import Appearance, default_appearance, random_appearance
 from hardware.twin.autopilot import RouteFollower
 from hardware.twin.camera import TwinCamera
+from hardware.twin.look import named_appearance
 from hardware.twin.look_titles import BENCH_LOOK, LOOK_TITLES, RARE_TITLES
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
@@ -47,7 +47,7 @@ _NO_PROGRESS_S, _PROGRESS_MM = 40.0, 2.0  # time to back out of a missed branch 
 _HELP_S, _HELP_MM_S, _MAX_HELP = 1.0, 5.0, 5
 
 RANDOM_LOOK = "random"
-TRIAL_LOOKS = (RANDOM_LOOK, *LOOK_TITLES, *RARE_TITLES)
+TRIAL_LOOKS = (RANDOM_LOOK, BENCH_LOOK, *LOOK_TITLES, *RARE_TITLES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,12 +109,6 @@ def start_mm(phantom: Phantom, target: Target) -> float:
     return max(_START_MM, min(_START_MOST_MM, first_mm - _BEFORE_JUNCTION_MM, target.at_mm - _LEAST_WAY_MM / 2))
 
 
-def _appearance(look: str, seed: int) -> Appearance:
-    if look == BENCH_LOOK:
-        return default_appearance()
-    return random_appearance(seed, None if look == RANDOM_LOOK else look)
-
-
 class Trial:
     """One trial. ``run`` turns it to its end and returns its row.
 
@@ -129,7 +123,7 @@ class Trial:
         config, own_seed = plan.config, FIRST_SEED + seed
         phantom = make_phantom(f"random:{own_seed}")
         self._plan, self._seed, self._name = plan, seed, policy
-        look = _appearance(plan.look, own_seed)
+        look = named_appearance(None if plan.look == RANDOM_LOOK else plan.look, own_seed)
         self._world = TwinWorld(config.twin, phantom=phantom, appearance=look, perception=config.perception, seed=own_seed)
         self.target = choose_target(phantom, self._world.view, own_seed)
         self._camera = TwinCamera(self._world, lock_step=True)

@@ -3217,21 +3217,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/operator_window.py"/>
-        <source>The phantom stays as it is: {why}</source>
-        <translation>体模保持不变：{why}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>The look stays as it is: {why}</source>
-        <translation>外观保持不变：{why}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
-        <source>Look: {title}</source>
-        <translation>外观：{title}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator_window.py"/>
         <source>the picture is not live</source>
         <translation>当前不是实时图像</translation>
     </message>
@@ -5502,6 +5487,21 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/training_job.py"/>
         <source>Training failed: {why}</source>
         <translation>训练失败：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/twin_desk.py"/>
+        <source>The phantom stays as it is: {why}</source>
+        <translation>体模保持不变：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/twin_desk.py"/>
+        <source>The look stays as it is: {why}</source>
+        <translation>外观保持不变：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/twin_desk.py"/>
+        <source>Look: {title}</source>
+        <translation>外观：{title}</translation>
     </message>
     <message>
         <location filename="../../app/widgets/advice_line.py"/>

@@ -90,7 +90,7 @@ def test_marked_look_stays_marked_when_it_is_chosen_again(window: OperatorWindow
 def test_nothing_is_broken_off_for_a_look(
     window: OperatorWindow, opened: list[TwinConfig], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(window, "_at_work", lambda: "the robot is armed: disarm it first")
+    monkeypatch.setattr(window, "at_work", lambda: "the robot is armed: disarm it first")
     _entries(window)["Turbid gel"].trigger()
     assert len(opened) == 1
     assert window.panels.toast.text() == "The look stays as it is: the robot is armed: disarm it first"

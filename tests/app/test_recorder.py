@@ -152,7 +152,8 @@ def test_the_key_of_another_phantom_does_not_end_a_recording(running: OperatorWi
     before = running.config.twin.phantom
     qtbot.keyClick(running, Key.Key_F9)
     until(qtbot, lambda: running.recorder.status.recording)
-    running._choose_phantom("y_branch")
+    assert running.panels.picker is not None
+    running.panels.picker.chosen.emit("y_branch")
     assert running.config.twin.phantom == before
     assert "The phantom stays as it is: a session is being recorded" in running.panels.toast.text()
     assert running.recorder.status.recording
@@ -215,7 +216,8 @@ def restart(window: OperatorWindow) -> None:
 
 
 def choose_phantom(window: OperatorWindow) -> None:
-    window._choose_phantom("tree")
+    assert window.panels.picker is not None
+    window.panels.picker.chosen.emit("tree")
 
 
 @pytest.mark.parametrize("again", [restart, choose_phantom])

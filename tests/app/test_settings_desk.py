@@ -187,7 +187,8 @@ def test_what_was_saved_without_a_restart_waits_for_the_next_one(at: Bench, qtbo
     assert at.desk.dialog is not None
     at.desk.dialog.save.click()
     assert at.window.config.advice.fast_mm_s == 8.0, "what is recorded says what acts"
-    at.window._choose_phantom("tree")
+    assert at.window.panels.picker is not None
+    at.window.panels.picker.chosen.emit("tree")
     until(qtbot, lambda: len(at.configs) == 2)
     assert at.configs[1].advice.fast_mm_s == 9.0
     assert at.configs[1].twin.phantom == "tree"
@@ -395,7 +396,8 @@ def test_what_somebody_edits_in_the_rig_file_acts_when_the_rig_is_started_again(
     path = write_rig(make_rig(load_config(), "bench 1", None), tmp_path / "bench 1.toml")
     at.window.use_config(with_rig(at.window.config, read_rig(path), path))
     until(qtbot, lambda: len(at.configs) == 2)
-    at.window._choose_phantom("y_junction")
+    assert at.window.panels.picker is not None
+    at.window.panels.picker.chosen.emit("y_junction")
     until(qtbot, lambda: len(at.configs) == 3)
     file = path.read_text(encoding="utf-8")
     path.write_text(file.replace("max_pull_mm = 2.0", "max_pull_mm = 4.5"), encoding="utf-8")

@@ -7,16 +7,16 @@ from dataclasses import replace
 import pytest
 
 from core.config import TwinConfig
-from hardware.twin.appearance import default_appearance, random_appearance
+from hardware.twin.appearance import LOOK_FAMILIES, RARE_FAMILIES, default_appearance, random_appearance
 from hardware.twin.look import appearance_of
-from hardware.twin.look_titles import LOOK_TITLES, RARE_TITLES
-from hardware.twin.synth import LOOKS
+from hardware.twin.look_titles import BENCH_TITLE, LOOK_TITLES, LOOKS, RARE_TITLES
 
 
 def test_all_looks_have_a_title() -> None:
-    titles = LOOK_TITLES | RARE_TITLES
-    assert set(titles) == set(LOOKS)
-    assert len(set(titles.values())) == len(titles)
+    assert tuple(LOOK_TITLES) == LOOK_FAMILIES
+    assert tuple(RARE_TITLES) == RARE_FAMILIES
+    titles = [BENCH_TITLE, *LOOK_TITLES.values(), *RARE_TITLES.values()]
+    assert len(set(titles)) == len(titles) == len(LOOKS)
 
 
 def test_without_a_look_the_seed_says_which() -> None:
@@ -42,5 +42,5 @@ def test_lens_is_the_configured_one() -> None:
 
 
 def test_unknown_look_is_told_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=r"twin\.look: unknown look 'moon'; known: bench, silicone_white, .*resin"):
+    with pytest.raises(ValueError, match=r"unknown look 'moon'; known: silicone_white, .*resin, bench"):
         appearance_of(TwinConfig(look="moon"))
