@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+import torch
 from rich.progress import Progress
 from torch import Tensor
 from torch.utils.data import Dataset
@@ -16,6 +17,9 @@ from core.config import SegmentationConfig
 from core.errors import UserError
 from core.learning.crops import FrameCrops, Looks, NearCrops
 from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample
+from core.learning.device_crops import DeviceCrops
+from core.learning.device_frames import DeviceFrames, fits
+from core.learning.device_windows import DeviceWindows, first_looks
 from core.learning.growing import deepened, widened, with_first_look
 from core.learning.model_file import SECOND_LOOK, check_model, load_network, model_folder, second_look_of
 from core.learning.model_writing import save_model, save_with_second_look
@@ -79,7 +83,9 @@ class FrameLesson:
         stride = self.network.shape.stride
         return -(-crop[0] // stride) * stride, -(-crop[1] // stride) * stride
 
-    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> FrameCrops | None:
+    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> FrameCrops | DeviceCrops | None:
+        if (frames := _on_device(self._samples, plan, bar, interrupt)) is not None:
+            return DeviceCrops(frames, plan)
         if self._init is None or plan.focus_share == 0:
             return FrameCrops(self._samples, plan)
         segment = open_segmenter(_seen_by(self._init, plan))
@@ -117,12 +123,17 @@ class SecondLookLesson:
             if wider == (shape.widths, shape.decoder_widths):
                 raise UserError(f"the second look of {init} is as wide already; leave --widen out")
             self.network = widened(self.network, *wider)
-        self._shown: NearCrops | None = None
+        self._shown: NearCrops | DeviceWindows | None = None
 
     def sides(self, crop: tuple[int, int]) -> tuple[int, int]:
         return WINDOW_PX, WINDOW_PX
 
-    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> NearCrops | None:
+    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> NearCrops | DeviceWindows | None:
+        frames = None if self._deepen else _on_device(self._samples, plan, bar, interrupt, least_px=WINDOW_PX)
+        if frames is not None:
+            track = bar.track(range(len(frames)), description="first look")
+            self._shown = DeviceWindows(frames, *first_looks(load_network(self._base)[0], frames, track), plan)
+            return self._shown
         plain = open_segmenter(_seen_by(self._init, plan))
         # Streams look once at the whole, single pictures eight times: the second look has to get on with both. Two stand for
         # eight here, where thousands of frames are looked at.
@@ -149,12 +160,34 @@ class SecondLookLesson:
     def _examples(self) -> list[Planes]:
         """Windows from all over the training."""
         examples: list[Planes] = []
+        if isinstance(self._shown, DeviceWindows):
+            return self._shown.examples(4 * _EXAMPLES)
         if self._shown is not None:
             step = max(1, len(self._shown) // (4 * _EXAMPLES))
             for index in range(0, len(self._shown), step):
                 with suppress(DatasetError):  # as in _readable
                     examples.append(np.ascontiguousarray(self._shown[index][0].numpy().transpose(1, 2, 0)))
         return examples
+
+
+def _on_device(
+    samples: list[Sample], plan: TrainingPlan, bar: Progress, interrupt: Interrupt, least_px: int = 0
+) -> DeviceFrames | None:
+    """The frames in a GPU's memory, whose crops it makes itself; None: there is no GPU, no room, or they are of several sizes."""
+    if not torch.cuda.is_available():
+        return None
+    device = torch.device("cuda")
+    if not fits(len(samples), device):
+        return None
+
+    def numbers() -> Iterator[int]:
+        for number in bar.track(range(len(samples)), description="frames to the GPU"):
+            if interrupt.asked:
+                return
+            yield number
+
+    frames = DeviceFrames.load(samples, device, numbers())
+    return frames if frames is not None and min(frames.size) >= least_px and not interrupt.asked else None
 
 
 def _seen_by(model: str, plan: TrainingPlan) -> SegmentationConfig:

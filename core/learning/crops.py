@@ -23,21 +23,21 @@ from core.perception.thinning import thin
 from core.perception.windows import window_around
 from core.types import Mask, Point
 
-_MISSED_SHARE = 0.35
+MISSED_SHARE = 0.35
 """Of the second look's windows: as many show a pixel that the first look got wrong. The others show what it would look at."""
-_LAST_SHARE = 0.5
-_JITTER_PX = 10.0
-_EDGE_PX = 4
+LAST_SHARE = 0.5
+JITTER_PX = 10.0
+EDGE_PX = 4
 """What is wrong farther than this from the robot's outline is no blur of it: a piece was missed or invented."""
-_WALL_PX = 3
+WALL_PX = 3
 """Nor is what of a vessel is wrong farther than this from its wall: the line between the walls may lie more than a pixel aside."""
-_WALL_REACH_PX = 60.0
+WALL_REACH_PX = 60.0
 """So near to the robot's ends: the vessel's vector is fitted to 20 px to each side of the head."""
 _WRONG_PLACES = 32
-_WRONG_JITTER_PX = 30.0
-_END_REACH_PX = 20.0
+WRONG_JITTER_PX = 30.0
+END_REACH_PX = 20.0
 """Standard deviation of what counts as near to a robot's end: half of the 40 px that its vector and the vessel's are fitted to."""
-_BORDER_PX = 8.0
+BORDER_PX = 8.0
 
 Crop = tuple[Tensor, Tensor]
 """uint8 (planes, h, w) and its labels uint8 (2 or 3, h, w): vessel, robot (0, 1), and where the plan weighs the robot's ends, how
@@ -133,8 +133,8 @@ class Looks:
             probabilities = look_again(image, probabilities, near)
             last = Seen.of(*probabilities)
         found_vessel, found_robot = (probability >= np.float32(0.5) for probability in probabilities)
-        shifted = _wrong(found_vessel, vessel, _WALL_PX) & (_end_distances(robot) <= _WALL_REACH_PX)
-        return cls(first, last, tuple(_some_of(_wrong(found_robot, robot, _EDGE_PX)) + _some_of(shifted)))
+        shifted = _wrong(found_vessel, vessel, WALL_PX) & (_end_distances(robot) <= WALL_REACH_PX)
+        return cls(first, last, tuple(_some_of(_wrong(found_robot, robot, EDGE_PX)) + _some_of(shifted)))
 
 
 class NearCrops(Dataset[Crop]):
@@ -159,9 +159,9 @@ class NearCrops(Dataset[Crop]):
         place = self._failed[int(rng.integers(len(self._failed)))] if focused else self._order[index]
         sample, looks = self._samples[place], self._looks[place]
         image, vessel, robot = self._kept.frame(sample)
-        seen = looks.last if rng.random() < _LAST_SHARE else looks.first
+        seen = looks.last if rng.random() < LAST_SHARE else looks.first
         seen_vessel, seen_robot = self._kept.get((sample.image, seen is not looks.first), seen.probabilities)
-        center = _beside(looks.wrong, _WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, seen.places, rng)
+        center = _beside(looks.wrong, WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, seen.places, rng)
         x, y, width, height = window_around(center, (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
         cut = _filled(np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]]))
@@ -176,12 +176,12 @@ class NearCrops(Dataset[Crop]):
 
 def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...], rng: Generator) -> Point:
     """Where the first look went wrong, or where the second one would look, a bit beside it."""
-    if rng.random() < _MISSED_SHARE:
+    if rng.random() < MISSED_SHARE:
         rows, columns = np.nonzero((seen_robot > 127) != robot)
         if len(rows):
             pick = int(rng.integers(len(rows)))
             return float(columns[pick]), float(rows[pick])
-    return _beside(places, _JITTER_PX, robot, rng)
+    return _beside(places, JITTER_PX, robot, rng)
 
 
 def _beside(places: tuple[Point, ...], jitter_px: float, robot: Mask, rng: Generator) -> Point:
@@ -221,26 +221,26 @@ def _tensors(image: NDArray[np.uint8], vessel: Mask, robot: Mask, plan: Training
 
 def _nearness(robot: Mask) -> NDArray[np.uint8]:
     """How near each pixel is to an end of the true robot, 255 there; where the cut-out's border cuts it off it does not end."""
-    return np.asarray(np.rint(255 * np.exp(-0.5 * (_end_distances(robot) / np.float32(_END_REACH_PX)) ** 2)), np.uint8)
+    return np.asarray(np.rint(255 * np.exp(-0.5 * (_end_distances(robot) / np.float32(END_REACH_PX)) ** 2)), np.uint8)
 
 
 def _end_distances(robot: Mask) -> NDArray[np.float32]:
     """How far each pixel is from the nearest end of the true robot; infinite where it has none."""
     rows, columns = np.ogrid[: robot.shape[0], : robot.shape[1]]
     nearest = np.full(robot.shape, np.inf, np.float32)
-    for x, y in _true_ends(robot):
+    for x, y in true_ends(robot):
         np.minimum(nearest, (rows - y) ** 2 + (columns - x) ** 2, out=nearest)
     return np.sqrt(nearest)
 
 
-def _true_ends(robot: Mask) -> list[tuple[int, int]]:
+def true_ends(robot: Mask) -> list[tuple[int, int]]:
     """Ends (x, y) of a true mask's skeleton inside the cut-out: farther from its border than thinning draws back an end."""
     left, top, across, down = cv2.boundingRect(robot.view(np.uint8))
     if not across:
         return []
     box = np.ascontiguousarray(robot[top : top + down, left : left + across])
     half_width = float(cv2.distanceTransform(np.pad(box, 1).view(np.uint8), cv2.DIST_L2, 3).max())
-    margin = max(_BORDER_PX, half_width + 3.0)
+    margin = max(BORDER_PX, half_width + 3.0)
     height, width = robot.shape
     ends = ((x + left, y + top) for x, y in end_pixels(thin(box)))
     return [(x, y) for x, y in ends if min(x, y, width - 1 - x, height - 1 - y) >= margin]

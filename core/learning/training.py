@@ -6,12 +6,11 @@ import copy
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
 import torch
 from torch import Tensor
-from torch.utils.data import DataLoader, Dataset
+from torch.utils.data import DataLoader, Dataset, IterableDataset
 
 from core.learning.dataset import DatasetError
 from core.learning.optimizer import make_optimizers
@@ -22,6 +21,22 @@ Crop = tuple[Tensor, Tensor]
 
 _SMALL_AREA_PX = 50.0
 """Of a crop whose robot is smaller than this, a few pixels more or less do not decide the Dice."""
+
+
+@runtime_checkable
+class Attentive(Protocol):
+    """Crops that follow how the training goes: what it finds hard they show more often."""
+
+    def note(self, lost: Tensor) -> None:
+        """What was lost, (n,), of each crop that was shown last, on their device."""
+
+
+@runtime_checkable
+class Watching(Protocol):
+    """Crops that ask the network, as it is then, what it sees."""
+
+    def watch(self, network: torch.nn.Module) -> None:
+        """Which network that is, in evaluation mode."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +83,10 @@ class Progress:
     images_per_s: float
 
 
-def loss_of(logits: Tensor, target: Tensor, robot_weight: float, end_weight: float = 0.0) -> tuple[Tensor, Tensor]:
-    """Cross entropy + Dice of both tasks, and the plain soft Dice (2,) of vessel and robot over the batch.
+def loss_of(logits: Tensor, target: Tensor, robot_weight: float, end_weight: float = 0.0) -> tuple[Tensor, Tensor, Tensor]:
+    """Cross entropy + Dice of both tasks, the plain soft Dice (2,) of both over the batch, and what each crop lost (N,).
+
+    That is, as in ``difficulty.py``, what a crop's Dice of the robot lacks, and half of what that of the vessel does.
 
     ``target`` (N, 2 or 3, H, W) are vessel, robot, and how near a pixel is to an end of the robot (0..1): in the loss it counts
     ``1 + end_weight`` times there, so that losses of different weights do not compare.
@@ -89,10 +106,12 @@ def loss_of(logits: Tensor, target: Tensor, robot_weight: float, end_weight: flo
         both, either = both * counts, either * counts
     overlap, size = both.sum(dim=(2, 3)), either.sum(dim=(2, 3))
     dice = (2 * overlap.sum(dim=0) + 1) / (size.sum(dim=0) + 1)
-    each = ((2 * overlap + _SMALL_AREA_PX) / (size + _SMALL_AREA_PX)).mean(dim=0)
+    of_each = (2 * overlap + _SMALL_AREA_PX) / (size + _SMALL_AREA_PX)
+    each = of_each.mean(dim=0)
+    lost = ((1 - of_each.detach()) * weights.new_tensor([0.5, 1.0])).sum(dim=1)
     # The robot is some 2 % of the pixels: unweighted, its entropy would drown in the background's.
     entropy = entropy * logits.new_tensor([1.0, 5.0])
-    return ((entropy + 1 - 0.5 * (dice + each)) * weights).sum(), plain.detach()
+    return ((entropy + 1 - 0.5 * (dice + each)) * weights).sum(), plain.detach(), lost
 
 
 def computes_in_bf16(device: torch.device) -> bool:
@@ -114,6 +133,9 @@ def _batches(
     crops: Dataset[tuple[Tensor, Tensor]], plan: TrainingPlan, failed: list[DatasetError]
 ) -> Iterator[tuple[Tensor, Tensor]]:
     """All of them, or until a frame cannot be read, or the process that reads them has gone: that goes into `failed`."""
+    if isinstance(crops, IterableDataset):  # it makes whole batches, where the network is
+        yield from crops
+        return
     try:
         yield from DataLoader(crops, plan.batch, num_workers=plan.workers, prefetch_factor=4 if plan.workers else None)
     except DatasetError as error:
@@ -144,7 +166,8 @@ def train(
 ) -> tuple[DualUNet, int]:
     """Train `network` in place; returns the network with averaged weights and the number of steps done.
 
-    `crops` (``crops.py``) gives ``plan.steps * plan.batch`` crops with their labels.
+    `crops` gives ``plan.steps * plan.batch`` crops with their labels (``crops.py``), or whole batches of them without end
+    (``device_crops.py``, ``device_windows.py``).
     `should_stop` is asked after every step; what was learnt until then is returned. `on_last` is given it first, while the crops'
     workers still run: processes have broken down when these ended. Both it and `on_checkpoint` are given a network on the CPU.
     Where the device computes in bf16, autocast is used.
@@ -160,10 +183,13 @@ def train(
             if isinstance(module, torch.nn.BatchNorm2d):
                 module.eval()
     average = copy.deepcopy(network).eval()
+    if isinstance(crops, Watching):
+        crops.watch(average)
     in_bf16 = computes_in_bf16(device)
     optimizers = make_optimizers(network, plan.learning_rate, plan.weight_decay)
     shares = [[group["lr"] / plan.learning_rate for group in optimizer.param_groups] for optimizer in optimizers]
-    smooth_loss, smooth_dice = 0.0, np.zeros(2)
+    averaged = [(kept, new) for kept, new in zip(average.state_dict().values(), network.state_dict().values(), strict=True)]
+    smooth_loss, smooth_dice = torch.zeros((), device=device), torch.zeros(2, device=device)
     done, mark, marked = 0, time.monotonic(), 0
     failed: list[DatasetError] = []
     for image, target in _batches(crops, plan, failed):
@@ -176,22 +202,25 @@ def train(
         labels = target.to(device).float()
         if labels.shape[1] > 2:
             labels[:, 2] /= 255
-        loss, dice = loss_of(logits.float(), labels, plan.robot_weight, plan.end_weight)
+        loss, dice, lost = loss_of(logits.float(), labels, plan.robot_weight, plan.end_weight)
+        if isinstance(crops, Attentive):
+            crops.note(lost)
         for optimizer in optimizers:
             optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
         for optimizer in optimizers:
             optimizer.step()
-        _average(average, network, min(plan.average_decay, (1 + done) / (10 + done)))
+        _average(averaged, min(plan.average_decay, (1 + done) / (10 + done)))
+        # Kept where they are: asked for after every step, a GPU would wait for the processor.
         blend = max(0.02, 1 / (done + 1))
-        smooth_loss += blend * (float(loss.detach()) - smooth_loss)
-        smooth_dice += blend * (dice.cpu().numpy() - smooth_dice)
+        smooth_loss.lerp_(loss.detach(), blend)
+        smooth_dice.lerp_(dice, blend)
         done += 1
         if done % report_every == 0 or done == plan.steps:
             now = time.monotonic()
             rate = (done - marked) * plan.batch / max(now - mark, 1e-9)
-            on_progress(Progress(done, plan.steps, smooth_loss, float(smooth_dice[0]), float(smooth_dice[1]), rate))
+            on_progress(Progress(done, plan.steps, float(smooth_loss), float(smooth_dice[0]), float(smooth_dice[1]), rate))
             mark, marked = now, done
         if done % checkpoint_every == 0 and done < plan.steps:
             on_checkpoint(_on_cpu(average), done)
@@ -211,8 +240,8 @@ def _on_cpu(network: DualUNet) -> DualUNet:
 
 
 @torch.no_grad()
-def _average(average: DualUNet, network: DualUNet, decay: float) -> None:
-    for kept, new in zip(average.state_dict().values(), network.state_dict().values(), strict=True):
+def _average(averaged: list[tuple[Tensor, Tensor]], decay: float) -> None:
+    for kept, new in averaged:
         if kept.dtype.is_floating_point:
             kept.lerp_(new, 1 - decay)
         else:
