@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import os
+from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 from torch.utils.data import IterableDataset
@@ -31,6 +33,8 @@ from core.perception.second_look import WINDOW_PX, Planes, places_to_look
 from core.perception.windows import MARGIN_PX
 
 _LOOKED_AT_ONCE = 32
+_LOTS_AHEAD = 8
+"""Of what was seen, while processors look for the ends in it."""
 _LAST_SHIFT_PX = 16
 """How far beside a window that is looked at again the one lies through which it was looked at before, at most."""
 
@@ -205,14 +209,23 @@ def first_looks(network: nn.Module, frames: DeviceFrames, track: Iterable[int]) 
     seen = torch.empty((len(frames), *frames.size, 2), dtype=torch.uint8, device=frames.device)
     places: list[Tensor] = []
     counted = iter(track)
+    asked: deque[Iterator[Tensor]] = deque()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for lot, found in looked_at(network, frames, range(0, len(frames), _LOOKED_AT_ONCE)):
             seen[lot] = found
-            robots = (found[..., 1].cpu().numpy().astype(np.float32)) / 255
-            places += pool.map(lambda robot: padded_places(places_to_look(robot)), robots)
+            asked.append(pool.map(_places_in, found[..., 1].cpu().numpy()))
+            if len(asked) > _LOTS_AHEAD:
+                places += asked.popleft()
             for _ in range(len(found)):
                 next(counted, None)
+        for lots in asked:
+            places += lots
+    next(counted, None)  # a bar that is told of the end is full
     return seen, torch.stack(places).to(frames.device)
+
+
+def _places_in(robot: NDArray[np.uint8]) -> Tensor:
+    return padded_places(places_to_look(robot.astype(np.float32) / np.float32(255)))
 
 
 def _cut(store: Tensor, numbers: Tensor, corner: Tensor) -> Tensor:
