@@ -84,7 +84,7 @@ class FrameLesson:
         return -(-crop[0] // stride) * stride, -(-crop[1] // stride) * stride
 
     def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> FrameCrops | DeviceCrops | None:
-        if (frames := _on_device(self._samples, plan, bar, interrupt)) is not None:
+        if (frames := _on_device(self._samples, bar, interrupt)) is not None:
             return DeviceCrops(frames, plan)
         if self._init is None or plan.focus_share == 0:
             return FrameCrops(self._samples, plan)
@@ -129,10 +129,11 @@ class SecondLookLesson:
         return WINDOW_PX, WINDOW_PX
 
     def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> NearCrops | DeviceWindows | None:
-        frames = None if self._deepen else _on_device(self._samples, plan, bar, interrupt, least_px=WINDOW_PX)
+        frames = None if self._deepen else _on_device(self._samples, bar, interrupt, least_px=WINDOW_PX)
         if frames is not None:
             track = bar.track(range(len(frames)), description="first look")
-            self._shown = DeviceWindows(frames, *first_looks(load_network(self._base)[0], frames, track), plan)
+            first, info = load_network(self._base)
+            self._shown = DeviceWindows(frames, *first_looks(first, info.stride, frames, track), plan)
             return self._shown
         plain = open_segmenter(_seen_by(self._init, plan))
         # Streams look once at the whole, single pictures eight times: the second look has to get on with both. Two stand for
@@ -170,14 +171,18 @@ class SecondLookLesson:
         return examples
 
 
-def _on_device(
-    samples: list[Sample], plan: TrainingPlan, bar: Progress, interrupt: Interrupt, least_px: int = 0
-) -> DeviceFrames | None:
-    """The frames in a GPU's memory, whose crops it makes itself; None: there is no GPU, no room, or they are of several sizes."""
-    if not torch.cuda.is_available():
-        return None
+def _gpu(frames: int) -> torch.device | None:
+    """A GPU with room for so many frames, if there is one."""
     device = torch.device("cuda")
-    if not fits(len(samples), device):
+    return device if torch.cuda.is_available() and fits(frames, device) else None
+
+
+def _on_device(samples: list[Sample], bar: Progress, interrupt: Interrupt, least_px: int = 0) -> DeviceFrames | None:
+    """The frames in a GPU's memory, which makes its crops itself then.
+
+    None: there is no GPU or no room, they are of several sizes or smaller than `least_px`, or it was interrupted.
+    """
+    if (device := _gpu(len(samples))) is None:
         return None
 
     def numbers() -> Iterator[int]:

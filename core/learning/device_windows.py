@@ -71,7 +71,8 @@ class DeviceWindows(IterableDataset[Crop]):
             yield self._batch(self._plan.batch)
 
     def examples(self, count: int) -> list[Planes]:
-        """Typical windows (160, 160, 5), uint8."""
+        """Typical windows (160, 160, 5), uint8, as after the first look alone."""
+        self._network = None  # it has left the device when the training is over
         planes = self._batch(count)[0].to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy()
         return [np.ascontiguousarray(one) for one in planes]
 
@@ -179,14 +180,14 @@ class DeviceWindows(IterableDataset[Crop]):
 
 
 @torch.no_grad()
-def looked_at(network: nn.Module, frames: DeviceFrames, numbers: Iterable[int]) -> Iterator[tuple[slice, Tensor]]:
+def looked_at(network: nn.Module, stride: int, frames: DeviceFrames, numbers: Iterable[int]) -> Iterator[tuple[slice, Tensor]]:
     """What a first look sees in some of the frames after each other, uint8 (n, H, W, 2), and which these are.
 
     Of every second frame it is the mean with its mirror image: streams look once, single pictures from all sides, and the second
-    look has to get on with both. `numbers` are those of the first frames of each lot, and maybe move a bar.
+    look has to get on with both. `numbers` are those of the first frames of each lot; height and width have to be multiples of
+    `stride` for the network.
     """
     height, width = frames.size
-    stride = 32
     device = frames.device
     for first in numbers:
         lot = slice(first, min(first + _LOOKED_AT_ONCE, len(frames)))
@@ -200,7 +201,7 @@ def looked_at(network: nn.Module, frames: DeviceFrames, numbers: Iterable[int]) 
         yield lot, (plain[:, :, :height, :width] * 255).round().to(torch.uint8).permute(0, 2, 3, 1)
 
 
-def first_looks(network: nn.Module, frames: DeviceFrames, track: Iterable[int]) -> tuple[Tensor, Tensor]:
+def first_looks(network: nn.Module, stride: int, frames: DeviceFrames, track: Iterable[int]) -> tuple[Tensor, Tensor]:
     """What a first look sees in all frames, uint8 (N, H, W, 2), and where a second one would go to then, float32 (N, k, 2).
 
     `track` gives the numbers of the frames after each other, and maybe moves a bar.
@@ -211,7 +212,7 @@ def first_looks(network: nn.Module, frames: DeviceFrames, track: Iterable[int]) 
     counted = iter(track)
     asked: deque[Iterator[Tensor]] = deque()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for lot, found in looked_at(network, frames, range(0, len(frames), _LOOKED_AT_ONCE)):
+        for lot, found in looked_at(network, stride, frames, range(0, len(frames), _LOOKED_AT_ONCE)):
             seen[lot] = found
             asked.append(pool.map(_places_in, found[..., 1].cpu().numpy()))
             if len(asked) > _LOTS_AHEAD:

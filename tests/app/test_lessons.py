@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
+from rich.progress import Progress
 
+from app import lessons
+from app.learning_commands import HeldOutWatch, Interrupt
 from app.lessons import FrameLesson, SecondLookLesson
+from app.teaching import Classroom
 from core.errors import UserError
-from core.learning.model_file import ONNX, SECOND_LOOK, WEIGHTS, ModelError, load_network
+from core.learning.crops import FrameCrops, NearCrops
+from core.learning.dataset import Sample, find_samples, write_mask, write_png
+from core.learning.device_crops import DeviceCrops
+from core.learning.device_windows import DeviceWindows
+from core.learning.model_file import ONNX, ONNX_INT8, SECOND_LOOK, WEIGHTS, ModelError, load_network, read_model_info
 from core.learning.model_writing import save_model, save_with_second_look
+from core.learning.training import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
 
 SMALL = UNetShape((4, 4, 8, 8, 200), (4, 4, 4, 80), 1, 2)
@@ -56,3 +66,60 @@ def test_a_model_with_a_damaged_part_is_refused_before_anything_is_taught(
         else:
             SecondLookLesson([], str(whole), deepen=False)
     assert len(str(raised.value).splitlines()) == 1
+
+
+@pytest.fixture
+def samples(tmp_path: Path) -> list[Sample]:
+    rng = np.random.default_rng(0)
+    for part in ("images", "masks"):
+        (tmp_path / "set" / part).mkdir(parents=True)
+    for number in range(3):
+        vessel, robot = np.zeros((480, 640), bool), np.zeros((480, 640), bool)
+        vessel[200:240], robot[216:224, : 200 + 100 * number] = True, True
+        picture = rng.integers(0, 60, (480, 640, 3), np.uint8)
+        picture[vessel] += 90
+        picture[robot] += 90
+        write_png(tmp_path / "set" / "images" / f"{number}.png", picture)
+        write_mask(tmp_path / "set" / "masks" / f"{number}_vessel.png", vessel)
+        write_mask(tmp_path / "set" / "masks" / f"{number}_robot.png", robot)
+    return find_samples([tmp_path / "set"])
+
+
+def test_where_there_is_a_gpu_it_makes_the_crops_of_both_lessons(
+    small: Path, samples: list[Sample], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[int] = []
+    monkeypatch.setattr(lessons, "_gpu", lambda count: asked.append(count) or torch.device("cpu"))
+    monkeypatch.setattr(lessons, "_EXAMPLES", 2)
+    plan = TrainingPlan(steps=2, batch=2, crop=(64, 64), warmup_steps=1, focus_share=0.4, end_weight=4)
+    log: list[str] = []
+    with Progress(disable=True) as bar:
+        for out, lesson in (
+            ("first", FrameLesson(samples, str(small), None, deepen=False, shallow=False)),
+            ("near", SecondLookLesson(samples, str(small), deepen=False)),
+        ):
+            watch = HeldOutWatch(None, tmp_path / out, None, log.append)
+            shown = lesson.crops(plan, bar, Interrupt())
+            assert isinstance(shown, DeviceCrops if out == "first" else DeviceWindows)
+            assert Classroom(tmp_path / out, {}, log.append, None, bar, Interrupt(), watch).teach(lesson, plan) == 2
+    assert asked == [3] * 4
+    assert read_model_info(tmp_path / "first").training["steps_done"] == 2
+    assert (tmp_path / "near" / SECOND_LOOK / ONNX_INT8).is_file(), "its examples come from the GPU's windows"
+    assert len([line for line in log if "step 2 loss" in line]) == 2
+
+
+def test_what_a_gpu_cannot_take_is_the_processors(
+    small: Path, samples: list[Sample], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, interrupt = TrainingPlan(steps=1, batch=1, crop=(64, 64)), Interrupt()
+    whole = FrameLesson(samples, str(small), None, deepen=False, shallow=False)
+    with Progress(disable=True) as bar:
+        monkeypatch.setattr(lessons, "_gpu", lambda _: None)
+        assert isinstance(whole.crops(plan, bar, interrupt), FrameCrops), "there is none, or it has no room"
+        monkeypatch.setattr(lessons, "_gpu", lambda _: torch.device("cpu"))
+        monkeypatch.setattr(lessons, "WINDOW_PX", 600)
+        near = SecondLookLesson(samples, str(small), deepen=False)
+        assert isinstance(near.crops(plan, bar, interrupt), NearCrops), "its windows are cut from larger pictures only"
+        interrupt.asked = True
+        assert near.crops(plan, bar, interrupt) is None
+        assert not isinstance(whole.crops(plan, bar, interrupt), DeviceCrops)
