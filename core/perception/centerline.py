@@ -28,11 +28,24 @@ ROUTE_WEIGHT = 1.0
 WALL_WEIGHT = 4.0
 LEAVES_ROUTE, SAME_ROUTE = 0.5, 0.1
 """Off the route by more than the first (0 to 1), a path leaves it; by up to the second more than another one, both keep to it."""
+BEGINNING_SHARE = 0.1
+"""Of half the piece's length (2 of 20 px): where a route begins backwards, as long as it takes to tell."""
 TIE_COST = 0.2
 """A path whose cost is this much above the best one's no longer counts as nearly as good."""
 SAME_COST = 1e-9
 TIE_ANGLE_DEG = 20.0
 """Two nearly as good paths that differ by this much make the answer fully ambiguous; by less, proportionally less so."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ahead:
+    """What of the operator's route lies ahead of the head; ``goes_back``: it begins the way that the robot came.
+
+    Then the robot is beside the route, however that goes on, and the piece beside it does not turn back with the route.
+    """
+
+    points: Points
+    goes_back: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,8 +139,8 @@ def centerline_at(
     incidence = incidence_of(graph)
     # One scale for all candidates: a narrow branch must not count the same distance for more than its wide trunk does.
     scale = max((near.radius for near in feet), default=1.0)
-    ahead = _route_ahead(route, head, half_length_px, scale, vessel)
     direction = np.asarray(robot_direction, np.float64)
+    ahead = _route_ahead(route, head, direction, half_length_px, scale, vessel)
     candidates = []
     for near in feet:
         backward = _walks(graph, incidence, near.edge, near.position, False, 2.0 * half_length_px)
@@ -146,7 +159,7 @@ def centerline_at(
                     candidates.append(candidate)
     if not candidates:
         return None
-    if ahead is not None and not _is_turned(ahead, direction):
+    if ahead is not None and not _is_turned(ahead.points, direction):
         candidates = _on_route(candidates)
     # The same line is found from each edge it runs along: rounding alone must not decide which one's radius counts.
     least = min(candidate.cost for candidate in candidates)
@@ -189,7 +202,9 @@ def _walks(
     return walks
 
 
-def _route_ahead(route: Route | None, head: Point, half_length: float, radius: float, vessel: Mask | None) -> Points | None:
+def _route_ahead(
+    route: Route | None, head: Point, direction: NDArray[np.float64], half_length: float, radius: float, vessel: Mask | None
+) -> _Ahead | None:
     """The part of the route that lies ahead of the head, or None where the route does not pass by."""
     if route is None or len(route.points) < 2:
         return None
@@ -199,7 +214,9 @@ def _route_ahead(route: Route | None, head: Point, half_length: float, radius: f
     distance, position, _ = place
     ahead = polyline.cut(route.points, position, position + 2.0 * half_length)
     near = distance <= max(1.5 * radius, 0.5 * half_length)
-    return ahead if near and float(polyline.arc_length(ahead)[-1]) > MIN_PIECE_SHARE * half_length else None
+    if not near or float(polyline.arc_length(ahead)[-1]) <= MIN_PIECE_SHARE * half_length:
+        return None
+    return _Ahead(ahead, _begins_backwards(ahead, direction, half_length))
 
 
 def _candidate(
@@ -211,7 +228,7 @@ def _candidate(
     head: Point,
     direction: NDArray[np.float64],
     half_length: float,
-    ahead: Points | None,
+    ahead: _Ahead | None,
 ) -> _Candidate | None:
     distance, position, nearest = place
     piece = polyline.cut(line, position - half_length, position + half_length, along)
@@ -220,10 +237,9 @@ def _candidate(
     if length < MIN_PIECE_SHARE * 2.0 * half_length:
         return None
     travel = float((piece[-1] - piece[0]) @ direction)
-    if ahead is not None:
+    if ahead is not None and not ahead.goes_back and not _is_turned(ahead.points, direction):
         # On the route its direction is the direction of travel, even if the head is bent to a bit beyond a right angle.
-        if not _is_turned(ahead, direction):
-            travel = float((piece[-1] - piece[0]) @ (ahead[-1] - ahead[0]))
+        travel = float((piece[-1] - piece[0]) @ (ahead.points[-1] - ahead.points[0]))
     if travel < 0.0:
         piece, before, after = piece[::-1], after, before
     chord = piece[-1] - piece[0]
@@ -234,8 +250,17 @@ def _candidate(
     cost = turn_cost + PLACE_WEIGHT * place_cost + SHORTNESS_WEIGHT * (1.0 - length / (2.0 * half_length))
     # A path whose lumen the head is outside of is another vessel, however well it would fit.
     cost += WALL_WEIGHT * max(0.0, distance / radius - 1.0)
-    off_route = _off_route(polyline.cut(piece, before, length), ahead, scale) if ahead is not None else 0.0
+    off_route = 0.0
+    if ahead is not None:
+        forward = polyline.cut(piece, before, length)
+        backs_out = ahead.goes_back and _begins_backwards(forward, direction, half_length)
+        off_route = 1.0 if backs_out else _off_route(forward, ahead.points, scale)
     return _Candidate(piece, nearest, radius, cost + ROUTE_WEIGHT * off_route, off_route, distance <= radius)
+
+
+def _begins_backwards(way: Points, direction: NDArray[np.float64], half_length: float) -> bool:
+    """Whether a way leads away behind the robot at first, as to the other branch of a fork that it has passed."""
+    return _is_turned(polyline.cut(way, 0.0, BEGINNING_SHARE * half_length), direction)
 
 
 def _is_turned(ahead: Points, direction: NDArray[np.float64]) -> bool:

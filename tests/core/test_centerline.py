@@ -139,6 +139,26 @@ def test_a_robot_in_another_vessel_than_the_routes_is_not_said_to_be_in_it() -> 
     assert beyond.nearest[1] < 80
 
 
+@pytest.mark.parametrize("radius", [6.0, 10.0, 15.0])
+@pytest.mark.parametrize("past", [6, 10, 16, 20, 30])
+@pytest.mark.parametrize("angle", [10, 27, 40])
+def test_a_robot_beside_the_route_past_a_fork_is_measured_forwards(radius: float, past: int, angle: int) -> None:
+    """The way begins backwards there; the piece goes on with the route, or along the robot's own branch, and never turns back."""
+    fork = graph_of([(0, 100), (100, 100), (200, 150), (200, 50)], [(0, 1), (1, 2), (1, 3)], radius)
+    own = np.array(direction(-26.57))
+    head = np.array([100.0, 100.0]) + past * own
+    robot = direction(-angle)
+    route = plan_route(fork, (head[0], head[1]), (200, 150))
+    assert route is not None
+    found = centerline_at(fork, (head[0], head[1]), robot, HALF, route)
+    assert found is not None
+    chord = found.piece[-1] - found.piece[0]
+    assert float(chord @ robot) > 0.4 * float(np.hypot(*chord))
+    assert np.hypot(*chord) > 0.85 * float(polyline.arc_length(found.piece)[-1])
+    if past > 2 * radius:
+        assert float(chord @ own) > 0.95 * float(np.hypot(*chord)), "it is in its own branch alone"
+
+
 def _side_by_side(*, joined: bool) -> tuple[VesselGraph, Mask]:
     """A wide vessel (y = 100, 40 px) and a narrow one (y = 129, 10 px) with 3 px of wall between: one edge round a bend, or two."""
     vessel = np.zeros((200, 400), np.bool_)
