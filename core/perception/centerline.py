@@ -28,8 +28,8 @@ ROUTE_WEIGHT = 1.0
 WALL_WEIGHT = 4.0
 LEAVES_ROUTE, SAME_ROUTE = 0.5, 0.1
 """Off the route by more than the first (0 to 1), a path leaves it; by up to the second more than another one, both keep to it."""
-BEGINNING_SHARE = 0.1
-"""Of half the piece's length (2 of 20 px): where a route begins backwards, as long as it takes to tell."""
+FORK_SHARE = 0.25
+"""Of half the piece's length (5 of 20 px): so near to a fork a route passes it, even one that was found in an earlier frame."""
 TIE_COST = 0.2
 """A path whose cost is this much above the best one's no longer counts as nearly as good."""
 SAME_COST = 1e-9
@@ -39,9 +39,9 @@ TIE_ANGLE_DEG = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Ahead:
-    """What of the operator's route lies ahead of the head; ``goes_back``: it begins the way that the robot came.
+    """What of the operator's route lies ahead of the head; ``goes_back``: to a fork first that the robot has passed.
 
-    Then the robot is beside the route, however that goes on, and the piece beside it does not turn back with the route.
+    Then the robot is beside the route, however that goes on, and travels the way that it points.
     """
 
     points: Points
@@ -140,7 +140,8 @@ def centerline_at(
     # One scale for all candidates: a narrow branch must not count the same distance for more than its wide trunk does.
     scale = max((near.radius for near in feet), default=1.0)
     direction = np.asarray(robot_direction, np.float64)
-    ahead = _route_ahead(route, head, direction, half_length_px, scale, vessel)
+    forks = [graph.edges[touching[0][0]].points[0 if touching[0][1] else -1] for touching in incidence if len(touching) > 2]
+    ahead = _route_ahead(route, head, direction, half_length_px, scale, vessel, forks)
     candidates = []
     for near in feet:
         backward = _walks(graph, incidence, near.edge, near.position, False, 2.0 * half_length_px)
@@ -154,7 +155,7 @@ def centerline_at(
                 place = polyline.nearest(line, head, along)
                 if vessel is not None and place[0] < near.distance - SAME_COST and is_walled_off(head, place[2], vessel):
                     place = near.distance, float(along[len(back) - 1]), (float(onward[0, 0]), float(onward[0, 1]))
-                candidate = _candidate(line, along, place, near.radius, scale, head, direction, half_length_px, ahead)
+                candidate = _candidate(line, along, place, near.radius, scale, head, direction, half_length_px, ahead, forks)
                 if candidate is not None:
                     candidates.append(candidate)
     if not candidates:
@@ -203,7 +204,13 @@ def _walks(
 
 
 def _route_ahead(
-    route: Route | None, head: Point, direction: NDArray[np.float64], half_length: float, radius: float, vessel: Mask | None
+    route: Route | None,
+    head: Point,
+    direction: NDArray[np.float64],
+    half_length: float,
+    radius: float,
+    vessel: Mask | None,
+    forks: list[Points],
 ) -> _Ahead | None:
     """The part of the route that lies ahead of the head, or None where the route does not pass by."""
     if route is None or len(route.points) < 2:
@@ -216,7 +223,7 @@ def _route_ahead(
     near = distance <= max(1.5 * radius, 0.5 * half_length)
     if not near or float(polyline.arc_length(ahead)[-1]) <= MIN_PIECE_SHARE * half_length:
         return None
-    return _Ahead(ahead, _begins_backwards(ahead, direction, half_length))
+    return _Ahead(ahead, _goes_back(ahead, direction, half_length, forks))
 
 
 def _candidate(
@@ -229,6 +236,7 @@ def _candidate(
     direction: NDArray[np.float64],
     half_length: float,
     ahead: _Ahead | None,
+    forks: list[Points],
 ) -> _Candidate | None:
     distance, position, nearest = place
     piece = polyline.cut(line, position - half_length, position + half_length, along)
@@ -253,14 +261,20 @@ def _candidate(
     off_route = 0.0
     if ahead is not None:
         forward = polyline.cut(piece, before, length)
-        backs_out = ahead.goes_back and _begins_backwards(forward, direction, half_length)
+        backs_out = _goes_back(forward, direction, half_length, forks)
         off_route = 1.0 if backs_out else _off_route(forward, ahead.points, scale)
     return _Candidate(piece, nearest, radius, cost + ROUTE_WEIGHT * off_route, off_route, distance <= radius)
 
 
-def _begins_backwards(way: Points, direction: NDArray[np.float64], half_length: float) -> bool:
-    """Whether a way leads away behind the robot at first, as to the other branch of a fork that it has passed."""
-    return _is_turned(polyline.cut(way, 0.0, BEGINNING_SHARE * half_length), direction)
+def _goes_back(way: Points, direction: NDArray[np.float64], half_length: float, forks: list[Points]) -> bool:
+    """Whether a way from the head leads to a fork that lies behind the robot, as to the other branch of one that it has passed."""
+    along = polyline.arc_length(way)
+    met = (polyline.nearest(way, (float(x), float(y)), along) for x, y in forks)
+    first = min((position for distance, position, _ in met if distance <= FORK_SHARE * half_length), default=0.0)
+    # All of the way there is behind: one round a bend of the robot's own vessel is not.
+    return first > 0.0 and all(
+        float((polyline.cut(way, 0.0, share * first, along)[-1] - way[0]) @ direction) < 0.0 for share in (0.5, 1.0)
+    )
 
 
 def _is_turned(ahead: Points, direction: NDArray[np.float64]) -> bool:

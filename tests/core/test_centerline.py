@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from core.config import VectorConfig, load_config
 from core.perception import centerline, polyline
 from core.perception.centerline import centerline_at, plan_route, window_at
-from core.perception.vectors import fit_vessel_vector
+from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.types import GraphEdge, Mask, Point, Points, Route, VesselGraph
 from tests.core.drawing import direction
 
@@ -139,24 +139,69 @@ def test_a_robot_in_another_vessel_than_the_routes_is_not_said_to_be_in_it() -> 
     assert beyond.nearest[1] < 80
 
 
-@pytest.mark.parametrize("radius", [6.0, 10.0, 15.0])
-@pytest.mark.parametrize("past", [6, 10, 16, 20, 30])
-@pytest.mark.parametrize("angle", [10, 27, 40])
-def test_a_robot_beside_the_route_past_a_fork_is_measured_forwards(radius: float, past: int, angle: int) -> None:
-    """The way begins backwards there; the piece goes on with the route, or along the robot's own branch, and never turns back."""
-    fork = graph_of([(0, 100), (100, 100), (200, 150), (200, 50)], [(0, 1), (1, 2), (1, 3)], radius)
-    own = np.array(direction(-26.57))
-    head = np.array([100.0, 100.0]) + past * own
-    robot = direction(-angle)
-    route = plan_route(fork, (head[0], head[1]), (200, 150))
+def _fork(own_deg: float, other_deg: float, radius: float) -> VesselGraph:
+    own, other = (tuple(float(v) for v in 300.0 + 200.0 * np.array(direction(angle))) for angle in (own_deg, other_deg))
+    return graph_of([(0.0, 300.0), (300.0, 300.0), own, other], [(0, 1), (1, 2), (1, 3)], radius)
+
+
+def _driven_into(own_deg: float, bend_px: float) -> Points:
+    """A robot's way along the stem and, round a bend of this radius, into a branch that turns up."""
+    before = bend_px * np.tan(np.radians(-own_deg) / 2.0)
+    stem = np.column_stack([np.arange(100.0, 300.0 - before), np.full(int(np.ceil(200.0 - before)), 300.0)])
+    turned = np.radians(np.arange(0.0, -own_deg, 2.0))
+    bend = np.array([300.0 - before, 300.0 - bend_px]) + bend_px * np.column_stack([np.sin(turned), np.cos(turned)])
+    branch = 300.0 + np.outer(before + np.arange(0.0, 70.0), direction(own_deg))
+    return np.concatenate([stem, bend, branch])
+
+
+@pytest.mark.parametrize(("own_deg", "other_deg"), [(-90, 90), (-90, 0), (-75, 15), (-60, 30), (-45, 0), (-27, 27)])
+@pytest.mark.parametrize("radius", [8.0, 15.0])
+def test_a_robot_that_goes_beside_its_route_is_measured_forwards(own_deg: float, other_deg: float, radius: float) -> None:
+    """Past the fork the way begins backwards; the piece never turns back with it, though the robot's 40 px lag behind its head."""
+    fork = _fork(own_deg, other_deg, radius)
+    way = _driven_into(own_deg, 20.0)
+    thetas = []
+    for length in np.arange(150.0, float(polyline.arc_length(way)[-1]), 1.0):
+        path = polyline.cut(way, 0.0, length)
+        robot, head = fit_robot_vector(path, 40.0), (float(path[-1, 0]), float(path[-1, 1]))
+        assert robot is not None
+        route = plan_route(fork, head, (float(fork.nodes[3][0]), float(fork.nodes[3][1])))
+        found = centerline_at(fork, head, robot.direction, HALF, route)
+        vessel = fit_vessel_vector(found) if found is not None else None
+        assert vessel is not None
+        thetas.append(np.degrees(np.arccos(np.clip(np.dot(vessel.direction, robot.direction), -1.0, 1.0))))
+    assert max(thetas) < 75
+    assert thetas[-1] < 1, "in its own branch alone"
+    assert max(thetas) > 0.35 * (other_deg - own_deg), "near the fork it is told how far to turn"
+
+
+@pytest.mark.parametrize("bent", [100, 115, 122])
+@pytest.mark.parametrize("bend_px", [25.0, 60.0])
+def test_where_there_is_no_fork_the_route_tells_the_direction_in_a_bend_too(bent: int, bend_px: float) -> None:
+    turned = np.radians(np.arange(0.0, 181.0))
+    line = 100.0 + bend_px * np.column_stack([np.sin(turned), -np.cos(turned)])
+    even = polyline.resample(np.concatenate([[[0.0, 100.0 - bend_px]], line, [[0.0, 100.0 + bend_px]]]), 1.0)
+    graph = VesselGraph(even[[0, -1]], (GraphEdge(0, 1, even, np.full(len(even), 8.0)),))
+    head = (float(line[20, 0]), float(line[20, 1]))
+    route = plan_route(graph, head, (5.0, 100.0 + bend_px))
     assert route is not None
-    found = centerline_at(fork, (head[0], head[1]), robot, HALF, route)
+    found = centerline_at(graph, head, direction(20 + bent), HALF, route)
     assert found is not None
-    chord = found.piece[-1] - found.piece[0]
-    assert float(chord @ robot) > 0.4 * float(np.hypot(*chord))
-    assert np.hypot(*chord) > 0.85 * float(polyline.arc_length(found.piece)[-1])
-    if past > 2 * radius:
-        assert float(chord @ own) > 0.95 * float(np.hypot(*chord)), "it is in its own branch alone"
+    assert found.piece[-1][1] > found.nearest[1] > found.piece[0][1]
+
+
+def test_where_its_branch_ends_at_the_head_it_is_still_in_it() -> None:
+    nodes = [
+        (0.0, 300.0),
+        (300.0, 300.0),
+        tuple(300.0 + 9.0 * np.array(direction(-27))),
+        tuple(300.0 + 200.0 * np.array(direction(27))),
+    ]
+    fork = graph_of(nodes, [(0, 1), (1, 2), (1, 3)], 10.0)
+    head = (float(300.0 + 11.0 * direction(-27)[0]), float(300.0 + 11.0 * direction(-27)[1]))
+    found = centerline_at(fork, head, direction(-19), HALF, plan_route(fork, head, nodes[3]))
+    assert found is not None
+    assert found.piece[-1].tolist() == pytest.approx(list(nodes[2]))
 
 
 def _side_by_side(*, joined: bool) -> tuple[VesselGraph, Mask]:
