@@ -216,6 +216,9 @@ def run_train(
             kept = f"; what was learnt before is kept, go on with --init {out}" if room.has_kept else ""
             advice = "" if isinstance(error, LoaderLost) else "; mend this frame, or remove it"
             raise DatasetError(f"{error}{advice}{kept}") from None
+        except torch.OutOfMemoryError:
+            kept = f"; what was learnt before is kept, go on with --init {out}" if room.has_kept else ""
+            raise DatasetError(f"the GPU has too little memory for this --batch and --crop; give smaller ones{kept}") from None
     steps, done = room.steps_total, room.steps_before
     if teller is not None:
         teller.tell({"model": str(out), "steps_done": done, "steps": steps})

@@ -84,7 +84,7 @@ class FrameLesson:
         return -(-crop[0] // stride) * stride, -(-crop[1] // stride) * stride
 
     def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> FrameCrops | DeviceCrops | None:
-        if (frames := _on_device(self._samples, bar, interrupt)) is not None:
+        if (frames := _on_device(self._samples, plan, bar, interrupt)) is not None:
             return DeviceCrops(frames, plan)
         if self._init is None or plan.focus_share == 0:
             return FrameCrops(self._samples, plan)
@@ -129,11 +129,11 @@ class SecondLookLesson:
         return WINDOW_PX, WINDOW_PX
 
     def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> NearCrops | DeviceWindows | None:
-        frames = None if self._deepen else _on_device(self._samples, bar, interrupt, least_px=WINDOW_PX)
+        frames = None if self._deepen else _on_device(self._samples, plan, bar, interrupt, least_px=WINDOW_PX)
         if frames is not None:
-            track = bar.track(range(len(frames)), description="first look")
             first, info = load_network(self._base)
-            self._shown = DeviceWindows(frames, *first_looks(first, info.stride, frames, track), plan)
+            found = first_looks(first, info.stride, frames, _until_asked(len(frames), "first look", bar, interrupt))
+            self._shown = None if found is None else DeviceWindows(frames, *found, plan)
             return self._shown
         plain = open_segmenter(_seen_by(self._init, plan))
         # Streams look once at the whole, single pictures eight times: the second look has to get on with both. Two stand for
@@ -171,28 +171,32 @@ class SecondLookLesson:
         return examples
 
 
-def _gpu(frames: int) -> torch.device | None:
-    """A GPU with room for so many frames, if there is one."""
+def _gpu(frames: int, batch: int) -> torch.device | None:
+    """A GPU with room for so many frames and the crops of a batch, if there is one."""
     device = torch.device("cuda")
-    return device if torch.cuda.is_available() and fits(frames, device) else None
+    return device if torch.cuda.is_available() and fits(frames, batch, device) else None
 
 
-def _on_device(samples: list[Sample], bar: Progress, interrupt: Interrupt, least_px: int = 0) -> DeviceFrames | None:
+def _on_device(
+    samples: list[Sample], plan: TrainingPlan, bar: Progress, interrupt: Interrupt, least_px: int = 0
+) -> DeviceFrames | None:
     """The frames in a GPU's memory, which makes its crops itself then.
 
     None: there is no GPU or no room, they are of several sizes or smaller than `least_px`, or it was interrupted.
     """
-    if (device := _gpu(len(samples))) is None:
+    count = len({sample.image for sample in samples})
+    if (device := _gpu(count, plan.batch)) is None:
         return None
-
-    def numbers() -> Iterator[int]:
-        for number in bar.track(range(len(samples)), description="frames to the GPU"):
-            if interrupt.asked:
-                return
-            yield number
-
-    frames = DeviceFrames.load(samples, device, numbers())
+    frames = DeviceFrames.load(samples, device, _until_asked(count, "frames to the GPU", bar, interrupt))
     return frames if frames is not None and min(frames.size) >= least_px and not interrupt.asked else None
+
+
+def _until_asked(count: int, what: str, bar: Progress, interrupt: Interrupt) -> Iterator[int]:
+    """The numbers below `count`, told by a bar, until somebody interrupts."""
+    for number in bar.track(range(count), description=what):
+        if interrupt.asked:
+            return
+        yield number
 
 
 def _seen_by(model: str, plan: TrainingPlan) -> SegmentationConfig:

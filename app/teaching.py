@@ -14,8 +14,8 @@ from app.lessons import FrameLesson, Lesson, SecondLookLesson, has_second_look
 from app.progress_lines import Teller
 from core.learning.dataset import Sample
 from core.learning.model_file import ModelError
+from core.learning.training import Attentive, TrainingPlan, train
 from core.learning.training import Progress as Report
-from core.learning.training import TrainingPlan, train
 from core.perception.unet import DualUNet
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ class Classroom:
         crops = lesson.crops(plan, self.bar, self.interrupt)
         if crops is None:
             return None
+        self.log(f"{time.strftime('%H:%M:%S')} the {'GPU' if isinstance(crops, Attentive) else 'processor'} makes the crops\n")
         if held_out is not None:
             held_out.look(lesson.network, 0)
         if self.interrupt.asked:

@@ -13,7 +13,7 @@ from torch.utils.data import IterableDataset
 
 from core.learning.augment import random_clutter
 from core.learning.crops import BORDER_PX, END_REACH_PX, Crop
-from core.learning.device_frames import DeviceFrames, Shown
+from core.learning.device_frames import DeviceFrames, Share, Shown
 from core.learning.device_looks import drawn, happens, random_looks
 from core.learning.training import TrainingPlan
 
@@ -29,15 +29,18 @@ class DeviceCrops(IterableDataset[Crop]):
 
     def __init__(self, frames: DeviceFrames, plan: TrainingPlan) -> None:
         self._frames, self._plan = frames, plan
+        self.device = frames.device
         self._generator = torch.Generator(frames.device).manual_seed(plan.seed)
-        self._shown = Shown(len(frames), plan.focus_share, self._generator)
+        self._shown = Shown(frames.turns, plan.focus_share, self._generator)
+        self._looks = Share(plan.look_share)
+        self._tells = torch.ones(0, dtype=torch.bool, device=frames.device)
         rng = np.random.default_rng((plan.seed, 3))
         pictures = np.stack([random_clutter(plan.crop, rng) for _ in range(_CLUTTER_PICTURES)]) if plan.clutter_share else None
         self._clutter = None if pictures is None else torch.from_numpy(pictures).to(frames.device)
 
     def note(self, lost: Tensor) -> None:
         """What was lost, (n,), of the crops that were shown last."""
-        self._shown.note(lost)
+        self._shown.note(lost, self._tells)
 
     def __iter__(self) -> Iterator[Crop]:
         while True:
@@ -47,23 +50,24 @@ class DeviceCrops(IterableDataset[Crop]):
         plan, generator = self._plan, self._generator
         numbers, _ = self._shown.draw(plan.batch)
         images, masks, ends = random_crops(self._frames, numbers, plan.crop, generator)
+        # A crop beside the robot is easy, whatever its frame is.
+        self._tells = masks[:, 1].flatten(1).any(dim=1)
         if plan.strip_share > 0:
-            images = torch.where(
-                happens(plan.strip_share, len(images), generator), with_strips(images, masks, ends, generator), images
-            )
+            covered = with_strips(images, masks, ends, generator)
+            images = torch.where(happens(plan.strip_share, len(images), generator), covered, images)
         if self._clutter is not None:
             is_clutter = happens(plan.clutter_share, len(images), generator)
             some = torch.randint(len(self._clutter), (len(images),), generator=generator, device=generator.device)
             images = torch.where(is_clutter, self._clutter[some].permute(0, 3, 1, 2).float(), images)
             masks = torch.where(is_clutter, 0.0, masks)
             ends = torch.where(is_clutter[:, 0], torch.inf, ends)
-        images = some_changed(images, plan.look_share, generator)
+            self._tells &= ~is_clutter.view(-1)
+        images = some_changed(images, self._looks.of(len(images)), generator)
         return images, labels_of(masks, ends, plan)
 
 
-def some_changed(images: Tensor, share: float, generator: torch.Generator) -> Tensor:
-    """A random share of pictures (n, 3, h, w) in a random look."""
-    count = round(len(images) * share)
+def some_changed(images: Tensor, count: int, generator: torch.Generator) -> Tensor:
+    """So many of the pictures (n, 3, h, w), drawn at random, in a random look."""
     if not count:
         return images
     some = torch.randperm(len(images), generator=generator, device=generator.device)[:count]
@@ -122,15 +126,14 @@ def random_crops(
     mirror = 1.0 - 2.0 * happens(0.5, n, generator).view(n).float()
     target = (0.5 + drawn(-0.25, 0.25, (n, 2), generator)) * torch.tensor([width, height], device=frames.device)
     cos, sin = torch.cos(angle), torch.sin(angle)
-    # crop = forth (frame - center) + target
-    forth = torch.stack([torch.stack([mirror * cos, mirror * sin], dim=1), torch.stack([-sin, cos], dim=1)], dim=1)
-    forth = forth * scale[:, None, None]
-    back = torch.linalg.inv(forth)
+    # In a crop: (mirror turn scale) (frame - center) + target. Written out: a GPU's products of matrices may be of few bits.
     columns, rows = torch.meshgrid(
         torch.arange(width, device=frames.device), torch.arange(height, device=frames.device), indexing="xy"
     )
-    at = torch.stack([columns, rows], dim=-1).float()[None] - target[:, None, None, :]
-    source = torch.einsum("nij,nhwj->nhwi", back, at) + center[:, None, None, :]
+    across = ((columns - target[:, 0, None, None]) * (mirror / scale)[:, None, None]).float()
+    down = ((rows - target[:, 1, None, None]) / scale[:, None, None]).float()
+    turn = cos[:, None, None], sin[:, None, None]
+    source = torch.stack([turn[0] * across - turn[1] * down, turn[1] * across + turn[0] * down], dim=-1) + center[:, None, None]
     grid = 2 * source / (extent - 1) - 1
     cut = functional.grid_sample(torch.cat([whole, masks], dim=1), grid, mode="bilinear", align_corners=True)
     # What lies beyond the picture is one colour without labels; mirrored, robots would meet their own reflection.
@@ -138,7 +141,10 @@ def random_crops(
     pick = torch.rand((2, n), generator=generator, device=generator.device)
     fill = whole[torch.arange(n, device=frames.device), :, (pick[0] * tall).long(), (pick[1] * wide).long()][:, :, None, None]
     images = torch.where(inside, cut[:, :3].round(), fill)
-    ends = torch.einsum("nij,nkj->nki", forth, frames.ends[numbers] - center[:, None]) + target[:, None]
+    x, y = (frames.ends[numbers] - center[:, None]).unbind(-1)
+    along = (cos[:, None] * x + sin[:, None] * y) * (mirror * scale)[:, None]
+    beside = (cos[:, None] * y - sin[:, None] * x) * scale[:, None]
+    ends = torch.stack([along, beside], dim=-1) + target[:, None]
     ends = torch.where(frames.ends[numbers].isfinite(), ends, torch.inf)
     return images, (cut[:, 3:] > 0.5).float() * inside, ends
 
@@ -160,11 +166,11 @@ def _with_strip(images: Tensor, masks: Tensor, ends: Tensor, generator: torch.Ge
     takes_robot = happens(0.75, n, generator)[:, 0] & robot.any(dim=2, keepdim=True).any(dim=1, keepdim=True)
     under = torch.where(takes_robot, robot, vessel)
     middle, is_there = some_pixel(under, generator)
-    which = torch.randint(ends.shape[1], (n,), generator=generator, device=generator.device)
-    end = ends[torch.arange(n, device=ends.device), which]
     limits = torch.tensor([width, height], device=ends.device)
-    at_end = takes_robot.view(n) & ((end >= 0) & (end < limits)).all(dim=1)
-    middle = torch.where(at_end[:, None], end, middle)
+    chance = torch.rand(ends.shape[:2], generator=generator, device=generator.device)
+    best, which = chance.masked_fill(~((ends >= 0) & (ends < limits)).all(dim=-1), -1.0).max(dim=1)
+    at_end = takes_robot.view(n) & (best >= 0) & happens(0.5, n, generator).view(n)
+    middle = torch.where(at_end[:, None], ends[torch.arange(n, device=ends.device), which], middle)
     across = _across(under, middle) + torch.randn((n,), generator=generator, device=generator.device) * 0.3
     middle = middle + torch.randn((n, 2), generator=generator, device=generator.device) * 4
     rows = torch.arange(height, device=images.device, dtype=torch.float32)[None, :, None] - middle[:, 1, None, None]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import os
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 
 import numpy as np
 import torch
@@ -26,13 +26,16 @@ from core.learning.crops import (
     Crop,
 )
 from core.learning.device_crops import labels_of, some_changed, some_pixel
-from core.learning.device_frames import ROBOT, VESSEL, DeviceFrames, Shown, padded_places, parted
+from core.learning.device_frames import ROBOT, VESSEL, DeviceFrames, Share, Shown, padded_places, parted
 from core.learning.device_looks import drawn
 from core.learning.training import TrainingPlan, computes_in_bf16
 from core.perception.second_look import WINDOW_PX, Planes, places_to_look
+from core.perception.segmentation import cores
 from core.perception.windows import MARGIN_PX
 
 _LOOKED_AT_ONCE = 32
+_WAYS = 8
+"""Orientations of a window."""
 _LOTS_AHEAD = 8
 """Of what was seen, while processors look for the ends in it."""
 _LAST_SHIFT_PX = 16
@@ -55,7 +58,9 @@ class DeviceWindows(IterableDataset[Crop]):
     def __init__(self, frames: DeviceFrames, seen: Tensor, places: Tensor, plan: TrainingPlan) -> None:
         self._frames, self._seen, self._places, self._plan = frames, seen, places, plan
         self._generator = torch.Generator(frames.device).manual_seed(plan.seed)
-        self._shown = Shown(len(frames), plan.focus_share, self._generator)
+        self.device = frames.device
+        self._shown = Shown(frames.turns, plan.focus_share, self._generator)
+        self._looks, self._last, self._way = Share(plan.look_share), Share(LAST_SHARE), 0
         self._network: nn.Module | None = None
 
     def note(self, lost: Tensor) -> None:
@@ -83,10 +88,12 @@ class DeviceWindows(IterableDataset[Crop]):
         # Quarter turns and mirror images cost no sharpness; the first look has seen all other angles and sizes.
         order = torch.randperm(count, generator=generator, device=generator.device)
         pixels = torch.cat([planes, masks], dim=1)
-        for way, part in enumerate(order.chunk(8)):
-            pixels[part], ends[part] = _turned(pixels[part], ends[part], way)
+        for first in range(min(_WAYS, count)):
+            part = order[first::_WAYS]
+            pixels[part], ends[part] = _turned(pixels[part], ends[part], (self._way + first) % _WAYS)
+        self._way = (self._way + count) % _WAYS
         planes, masks = pixels[:, :5], pixels[:, 5:]
-        images = some_changed(planes[:, :3], self._plan.look_share, generator)
+        images = some_changed(planes[:, :3], self._looks.of(count), generator)
         return torch.cat([images, planes[:, 3:]], dim=1), labels_of(masks, ends, self._plan)
 
     def _windows(self, numbers: Tensor, hard: int) -> tuple[Tensor, Tensor, Tensor]:
@@ -119,24 +126,27 @@ class DeviceWindows(IterableDataset[Crop]):
         place = torch.where((best >= 0)[:, None], place, anywhere)
         jitter = torch.where(is_hard, WRONG_JITTER_PX, JITTER_PX)[:, None]
         place = place + torch.randn((n, 2), generator=generator, device=generator.device) * jitter
-        wrong, is_wrong = some_pixel(self._wrong(numbers, hard), generator)
-        wrong = (
-            wrong
-            + torch.randn((n, 2), generator=generator, device=generator.device)
-            * torch.where(is_hard, WRONG_JITTER_PX, 0.0)[:, None]
-        )
+        (wrong, is_wrong), (shifted, is_shifted) = (some_pixel(mask, generator) for mask in self._wrong(numbers, hard))
+        takes_vessel = is_shifted & (~is_wrong | (torch.rand((n,), generator=generator, device=generator.device) < 0.5))
+        wrong, is_wrong = torch.where(takes_vessel[:, None], shifted, wrong), is_wrong | is_shifted
+        aside = torch.where(is_hard, WRONG_JITTER_PX, 0.0)[:, None]
+        wrong = wrong + torch.randn((n, 2), generator=generator, device=generator.device) * aside
         takes_wrong = is_wrong & (is_hard | (torch.rand((n,), generator=generator, device=generator.device) < MISSED_SHARE))
         return torch.where(takes_wrong[:, None], wrong, place)
 
-    def _wrong(self, numbers: Tensor, hard: int) -> Tensor:
-        """Where the first look was wrong, bool (n, H, W): the robot anywhere; in hard frames only what is no blur of an edge."""
+    def _wrong(self, numbers: Tensor, hard: int) -> tuple[Tensor, Tensor]:
+        """Where the first look was wrong, bool (n, H, W), of the robot, and of the vessel beside its ends.
+
+        The robot anywhere; in hard frames, where alone the vessel is asked for, only what is no blur of an edge.
+        """
         bits, found = self._frames.pixels[numbers, :, :, 3], self._seen[numbers] > 127
-        wrong = found[..., 1] != ((bits & ROBOT) > 0)
+        robot = found[..., 1] != ((bits & ROBOT) > 0)
+        vessel = torch.zeros_like(robot)
         if hard:
-            robot = _far(found[:hard, ..., 1], (bits[:hard] & ROBOT) > 0, EDGE_PX)
-            vessel = _far(found[:hard, ..., 0], (bits[:hard] & VESSEL) > 0, WALL_PX)
-            wrong[:hard] = robot | (vessel & self._beside_ends(numbers[:hard]))
-        return wrong
+            robot[:hard] = _far(found[:hard, ..., 1], (bits[:hard] & ROBOT) > 0, EDGE_PX)
+            shifted = _far(found[:hard, ..., 0], (bits[:hard] & VESSEL) > 0, WALL_PX)
+            vessel[:hard] = shifted & self._beside_ends(numbers[:hard])
+        return robot, vessel
 
     def _beside_ends(self, numbers: Tensor) -> Tensor:
         height, width = self._frames.size
@@ -152,7 +162,7 @@ class DeviceWindows(IterableDataset[Crop]):
         """What was seen, (n, 2, 160, 160), 0..255; of some windows with what the network says of one a bit beside."""
         assert self._network is not None
         generator = self._generator
-        some = torch.randperm(len(numbers), generator=generator, device=generator.device)[: round(len(numbers) * LAST_SHARE)]
+        some = torch.randperm(len(numbers), generator=generator, device=generator.device)[: self._last.of(len(numbers))]
         shift = torch.randint(-_LAST_SHIFT_PX, _LAST_SHIFT_PX + 1, (len(some), 2), generator=generator, device=generator.device)
         beside = self._corner((corner[some] + WINDOW_PX // 2 + shift).float())
         image, _ = parted(_cut(self._frames.pixels, numbers[some], beside))
@@ -201,24 +211,24 @@ def looked_at(network: nn.Module, stride: int, frames: DeviceFrames, numbers: It
         yield lot, (plain[:, :, :height, :width] * 255).round().to(torch.uint8).permute(0, 2, 3, 1)
 
 
-def first_looks(network: nn.Module, stride: int, frames: DeviceFrames, track: Iterable[int]) -> tuple[Tensor, Tensor]:
+def first_looks(network: nn.Module, stride: int, frames: DeviceFrames, track: Iterable[int]) -> tuple[Tensor, Tensor] | None:
     """What a first look sees in all frames, uint8 (N, H, W, 2), and where a second one would go to then, float32 (N, k, 2).
 
-    `track` gives the numbers of the frames after each other, and maybe moves a bar.
+    `track` gives the numbers of the frames after each other, and maybe moves a bar; None where it ends sooner.
     """
     network = network.to(frames.device, memory_format=torch.channels_last).eval()  # type: ignore[call-overload]
     seen = torch.empty((len(frames), *frames.size, 2), dtype=torch.uint8, device=frames.device)
     places: list[Tensor] = []
     counted = iter(track)
     asked: deque[Iterator[Tensor]] = deque()
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         for lot, found in looked_at(network, stride, frames, range(0, len(frames), _LOOKED_AT_ONCE)):
             seen[lot] = found
             asked.append(pool.map(_places_in, found[..., 1].cpu().numpy()))
             if len(asked) > _LOTS_AHEAD:
                 places += asked.popleft()
-            for _ in range(len(found)):
-                next(counted, None)
+            if len(list(islice(counted, len(found)))) < len(found):
+                return None
         for lots in asked:
             places += lots
     next(counted, None)  # a bar that is told of the end is full

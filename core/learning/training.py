@@ -25,7 +25,9 @@ _SMALL_AREA_PX = 50.0
 
 @runtime_checkable
 class Attentive(Protocol):
-    """Crops that follow how the training goes: what it finds hard they show more often."""
+    """Crops that are made where the network learns, and follow how that goes: what it finds hard they show more often."""
+
+    device: torch.device
 
     def note(self, lost: Tensor) -> None:
         """What was lost, (n,), of each crop that was shown last, on their device."""
@@ -86,7 +88,7 @@ class Progress:
 def loss_of(logits: Tensor, target: Tensor, robot_weight: float, end_weight: float = 0.0) -> tuple[Tensor, Tensor, Tensor]:
     """Cross entropy + Dice of both tasks, the plain soft Dice (2,) of both over the batch, and what each crop lost (N,).
 
-    That is, as in ``difficulty.py``, what a crop's Dice of the robot lacks, and half of what that of the vessel does.
+    That is, much as in ``difficulty.py``, what a crop's soft Dice of the robot lacks, and half of what that of the vessel does.
 
     ``target`` (N, 2 or 3, H, W) are vessel, robot, and how near a pixel is to an end of the robot (0..1): in the loss it counts
     ``1 + end_weight`` times there, so that losses of different weights do not compare.
@@ -176,7 +178,7 @@ def train(
     torch.manual_seed(plan.seed)
     if plan.threads:
         torch.set_num_threads(plan.threads)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    device = crops.device if isinstance(crops, Attentive) else torch.device("cuda" if torch.cuda.is_available() else "cpu")
     network = network.to(device, memory_format=torch.channels_last).train()  # type: ignore[call-overload]
     if plan.keeps_statistics:
         for module in network.modules():

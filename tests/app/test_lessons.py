@@ -89,7 +89,7 @@ def test_where_there_is_a_gpu_it_makes_the_crops_of_both_lessons(
     small: Path, samples: list[Sample], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[int] = []
-    monkeypatch.setattr(lessons, "_gpu", lambda count: asked.append(count) or torch.device("cpu"))
+    monkeypatch.setattr(lessons, "_gpu", lambda count, batch: asked.append(count + batch) or torch.device("cpu"))
     monkeypatch.setattr(lessons, "_EXAMPLES", 2)
     plan = TrainingPlan(steps=2, batch=2, crop=(64, 64), warmup_steps=1, focus_share=0.4, end_weight=4)
     log: list[str] = []
@@ -102,7 +102,8 @@ def test_where_there_is_a_gpu_it_makes_the_crops_of_both_lessons(
             shown = lesson.crops(plan, bar, Interrupt())
             assert isinstance(shown, DeviceCrops if out == "first" else DeviceWindows)
             assert Classroom(tmp_path / out, {}, log.append, None, bar, Interrupt(), watch).teach(lesson, plan) == 2
-    assert asked == [3] * 4
+    assert asked == [3 + 2] * 4
+    assert len([line for line in log if "the GPU makes the crops" in line]) == 2
     assert read_model_info(tmp_path / "first").training["steps_done"] == 2
     assert (tmp_path / "near" / SECOND_LOOK / ONNX_INT8).is_file(), "its examples come from the GPU's windows"
     assert len([line for line in log if "step 2 loss" in line]) == 2
@@ -114,9 +115,9 @@ def test_what_a_gpu_cannot_take_is_the_processors(
     plan, interrupt = TrainingPlan(steps=1, batch=1, crop=(64, 64)), Interrupt()
     whole = FrameLesson(samples, str(small), None, deepen=False, shallow=False)
     with Progress(disable=True) as bar:
-        monkeypatch.setattr(lessons, "_gpu", lambda _: None)
+        monkeypatch.setattr(lessons, "_gpu", lambda *_: None)
         assert isinstance(whole.crops(plan, bar, interrupt), FrameCrops), "there is none, or it has no room"
-        monkeypatch.setattr(lessons, "_gpu", lambda _: torch.device("cpu"))
+        monkeypatch.setattr(lessons, "_gpu", lambda *_: torch.device("cpu"))
         monkeypatch.setattr(lessons, "WINDOW_PX", 600)
         near = SecondLookLesson(samples, str(small), deepen=False)
         assert isinstance(near.crops(plan, bar, interrupt), NearCrops), "its windows are cut from larger pictures only"

@@ -14,7 +14,7 @@ from torch.utils.data import Dataset
 
 from app.learning_commands import HeldOutWatch, Interrupt, TrainInputs, TrainOutputs, run_train
 from app.teaching import Classroom
-from core.learning.dataset import write_mask, write_png
+from core.learning.dataset import DatasetError, write_mask, write_png
 from core.learning.model_file import ModelError
 from core.learning.training import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
@@ -107,3 +107,18 @@ def test_a_training_that_is_interrupted_before_its_first_step_is_no_success(
         run_train(TrainOutputs(tmp_path / "model"), TrainInputs([tmp_path / "set"]), None, 4, TrainingPlan(steps=1))
     assert "interrupted before the first step" in capsys.readouterr().err
     assert not (tmp_path / "model").exists()
+
+
+def test_a_gpu_without_room_for_a_batch_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("images", "masks"):
+        (tmp_path / "set" / name).mkdir(parents=True)
+    write_png(tmp_path / "set" / "images" / "a.png", np.full((48, 64, 3), 90, np.uint8))
+    for target in ("vessel", "robot"):
+        write_mask(tmp_path / "set" / "masks" / f"a_{target}.png", np.zeros((48, 64), bool))
+
+    def teach(*_: object) -> None:
+        raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 20.00 MiB.\nMore lines.")
+
+    monkeypatch.setattr(Classroom, "teach", teach)
+    with pytest.raises(DatasetError, match=r"the GPU has too little memory for this --batch and --crop; give smaller ones$"):
+        run_train(TrainOutputs(tmp_path / "model"), TrainInputs([tmp_path / "set"]), None, 4, TrainingPlan(steps=1))

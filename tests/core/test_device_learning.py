@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from core.learning.crops import EDGE_PX, _nearness, _wrong, true_ends
 from core.learning.dataset import DatasetError, Sample, find_samples, write_mask, write_png
 from core.learning.device_crops import DeviceCrops, _with_strip, nearness, random_crops, some_pixel, with_strips
-from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, Shown, fits, padded_places
+from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, Share, Shown, fits, padded_places
 from core.learning.device_looks import compressed, random_looks
 from core.learning.device_windows import DeviceWindows, _far, _turned, first_looks
 from core.learning.training import Progress, TrainingPlan, train
@@ -112,7 +112,7 @@ def test_reading_ends_where_it_is_told_to(samples: list[Sample]) -> None:
 
 
 def test_no_processor_is_taken_for_a_gpu() -> None:
-    assert not fits(1, _CPU)
+    assert not fits(1, 1, _CPU)
 
 
 def test_more_ends_than_are_told_are_left_out() -> None:
@@ -120,15 +120,26 @@ def test_more_ends_than_are_told_are_left_out() -> None:
     assert padded_places([(1.0, 2.0)] * (MOST_ENDS + 2)).tolist() == [[1.0, 2.0]] * MOST_ENDS
 
 
+def test_a_frame_that_is_given_twice_is_read_once_and_shown_twice(samples: list[Sample]) -> None:
+    frames = DeviceFrames.load([samples[0], samples[1], samples[0]], _CPU, range(2))
+    assert frames is not None
+    assert (len(frames), frames.turns.tolist()) == (2, [0, 1, 0])
+    drawn, _ = Shown(frames.turns, 0.0, _generator()).draw(6)
+    assert torch.bincount(drawn).tolist() == [4, 2]
+    hard, count = Shown(frames.turns, 0.9, _generator()).draw(1000)
+    assert count == 900
+    assert float((hard[:count] == 0).float().mean()) == pytest.approx(2 / 3, abs=0.06)
+
+
 def test_all_frames_are_shown_in_turn() -> None:
-    shown = Shown(10, 0.0, _generator())
+    shown = Shown(torch.arange(10), 0.0, _generator())
     drawn = torch.cat([shown.draw(4)[0] for _ in range(5)])
     assert sorted(drawn[:10].tolist()) == sorted(drawn[10:].tolist()) == list(range(10))
     assert drawn[:10].tolist() != drawn[10:].tolist()
 
 
 def test_what_was_lost_is_shown_more_often() -> None:
-    shown = Shown(20, 0.5, _generator())
+    shown = Shown(torch.arange(20), 0.5, _generator())
     for _ in range(30):
         numbers, hard = shown.draw(8)
         assert hard == 4
@@ -137,6 +148,27 @@ def test_what_was_lost_is_shown_more_often() -> None:
     counts = torch.bincount(drawn, minlength=20)
     assert counts[7] > 5 * counts[:7].max()
     assert (counts > 0).sum() > 10, "what is known may be drawn, too"
+
+
+def test_a_frame_that_is_shown_twice_at_once_counts_by_the_mean_and_nothing_that_is_no_number_counts() -> None:
+    shown = Shown(torch.tensor([0, 0, 1]), 0.0, _generator())
+    numbers, _ = shown.draw(3)
+    first, second = (int(place) for place in (numbers == 0).nonzero())
+    lost = torch.zeros(3)
+    lost[first], lost[second] = 1.0, 0.5
+    lost[3 - first - second] = torch.nan
+    shown.note(lost)
+    assert shown._lost.tolist() == pytest.approx([0.15 + 0.375, 0.15])
+    shown.note(torch.ones(3), torch.zeros(3, dtype=torch.bool))
+    assert shown._lost.tolist() == pytest.approx([0.525, 0.15]), "what shows nothing of a frame tells nothing of it"
+
+
+@pytest.mark.parametrize("batch", [1, 2, 12])
+def test_shares_come_true_over_small_batches(batch: int) -> None:
+    share = Share(0.35)
+    assert sum(share.of(batch) for _ in range(600 // batch)) == 210
+    assert Share(1.0).of(batch) == batch
+    assert Share(0.0).of(batch) == 0
 
 
 @pytest.mark.parametrize("size", [(192, 256), (384, 384)])
@@ -193,6 +225,14 @@ def test_clutter_shows_nothing_of_ours(frames: DeviceFrames) -> None:
     images, labels = next(iter(DeviceCrops(frames, plan)))
     assert not labels.any()
     assert len({float(image.sum()) for image in images}) > 4
+
+
+def test_clutter_tells_nothing_of_the_frame_that_it_stands_for(frames: DeviceFrames) -> None:
+    plan = TrainingPlan(batch=8, crop=(64, 64), clutter_share=1.0, look_share=0.0)
+    crops = DeviceCrops(frames, plan)
+    next(iter(crops))
+    crops.note(torch.ones(8))
+    assert crops._shown._lost.tolist() == pytest.approx([0.3] * 4)
 
 
 def test_the_robots_end_is_as_near_as_a_processor_finds_it() -> None:
@@ -257,6 +297,8 @@ def test_strips_lie_across_the_robot_and_leave_the_rest(frames: DeviceFrames) ->
     assert changed.float().mean(dim=(1, 2)).max() < 0.02
     extents = [np.ptp(np.argwhere(change.numpy()), axis=0) for change in changed]
     assert np.mean([tall > wide for tall, wide in extents]) > 0.8, "the robot lies along the picture"
+    at_end = [bool(change[:, 300:].any()) for change in changed]
+    assert 0.25 < np.mean(at_end) < 0.9, "half of them at an end, where there is one"
     twice = (with_strips(images, masks, frames.ends[numbers], _generator()) != images).any(dim=1)
     assert twice.float().mean() > changed.float().mean()
 
@@ -286,6 +328,36 @@ def _seen(frames: DeviceFrames) -> tuple[Tensor, Tensor]:
     seen[0, :, 272:, 1] = 0
     places = [padded_places(places_to_look(robot.numpy().astype(np.float32) / 255)) for robot in seen[..., 1]]
     return seen, torch.stack(places)
+
+
+@pytest.mark.parametrize("batch", [1, 4, 12])
+def test_windows_come_in_all_orientations_whatever_the_batch(
+    frames: DeviceFrames, batch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ways: list[int] = []
+
+    def watched(planes: Tensor, ends: Tensor, way: int) -> tuple[Tensor, Tensor]:
+        ways.extend([way] * len(planes))
+        return _turned(planes, ends, way)
+
+    monkeypatch.setattr("core.learning.device_windows._turned", watched)
+    batches = iter(DeviceWindows(frames, *_seen(frames), TrainingPlan(batch=batch, look_share=0.0)))
+    for _ in range(24 // batch):
+        next(batches)
+    assert np.bincount(ways).tolist() == [3] * 8
+
+
+def test_a_tip_and_a_wall_that_are_wrong_are_shown_as_often(frames: DeviceFrames) -> None:
+    seen, places = _seen(frames)
+    seen[0, :176, :, 0] = 0
+    seen[0, 150:180, 250:360, 0] = 255  # a wall that was found 30 px aside, beside the end
+    windows = DeviceWindows(frames, seen, places, TrainingPlan(batch=1))
+    robot, vessel = windows._wrong(torch.zeros(2, dtype=torch.long), 1)
+    assert vessel[0].sum() > 3 * robot[0].sum() > 300
+    assert not vessel[1].any()
+    centers = torch.cat([windows._centers(torch.zeros(24, dtype=torch.long), 24) for _ in range(2)])
+    beside = (centers[:, 1] < 182).float()
+    assert 0.3 < float(beside.mean()) < 0.75, "the wall is much larger than the tip"
 
 
 @pytest.mark.parametrize("focus", [0.0, 0.5])
@@ -382,7 +454,9 @@ def test_every_second_first_look_is_the_mean_with_the_mirror_image(frames: Devic
     def track() -> itertools.chain[int]:
         return itertools.chain((told.append(n) or n for n in range(len(frames))), iter(lambda: told.append(-1) or 0, 0))
 
-    seen, places = first_looks(_Colours(), 64, frames, track())
+    looks = first_looks(_Colours(), 64, frames, track())
+    assert looks is not None
+    seen, places = looks
     assert seen.shape == (4, 480, 640, 2)
     assert told == [0, 1, 2, 3, -1], "the bar is told of the end"
     # Plain: nothing is seen on the left. Mirrored: on neither side for sure.
@@ -391,6 +465,10 @@ def test_every_second_first_look_is_the_mean_with_the_mirror_image(frames: Devic
     assert abs(int(seen[1, 240, 100, 0]) - 127) < 5
     assert abs(int(seen[1, 240, 400, 0]) - 127) < 5
     assert places.shape == (4, MOST_ENDS, 2)
+
+
+def test_first_looks_end_where_they_are_told_to(frames: DeviceFrames) -> None:
+    assert first_looks(_Colours(), 64, frames, range(2)) is None
 
 
 def test_training_on_a_device_learns_and_tells_its_crops_what_was_lost(frames: DeviceFrames) -> None:

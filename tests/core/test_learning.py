@@ -376,7 +376,8 @@ def test_the_loss_is_torchs_cross_entropy_and_dice() -> None:
 
     entropy = torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction="none").mean(dim=(0, 2, 3))
     expected = entropy * torch.tensor([1.0, 5.0]) + 1 - 0.5 * (dice((0, 2, 3), 1) + dice((2, 3), 50).mean(dim=0))
-    loss, plain, _ = loss_of(logits, target, robot_weight=1.5)
+    loss, plain, lost = loss_of(logits, target, robot_weight=1.5)
+    torch.testing.assert_close(lost, (1 - dice((2, 3), 50)) @ torch.tensor([0.5, 1.0]))
     torch.testing.assert_close(loss, (expected * torch.tensor([1.0, 1.5])).sum())
     torch.testing.assert_close(plain, dice((0, 2, 3), 1))
 
