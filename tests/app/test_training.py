@@ -217,7 +217,7 @@ def test_models_are_listed_with_what_is_known_of_them() -> None:
     (own_models() / "broken").mkdir()
     (own_models() / "broken" / "model.json").write_text("{")
     models = {model.name: model for model in installed_models()}
-    assert list(models) == ["default", "wide", "broken", "own_1"]
+    assert list(models) == ["default", "broken", "own_1"]
     assert not models["default"].is_own
     assert "damaged" in models["broken"].figures
     assert models["own_1"].figures == (
