@@ -13,7 +13,7 @@ from torch.utils.data import IterableDataset
 
 from core.learning.augment import random_clutter
 from core.learning.crops import BORDER_PX, END_REACH_PX, Crop
-from core.learning.device_frames import DeviceFrames, Share, Shown
+from core.learning.device_frames import ROBOT, DeviceFrames, Share, Shown
 from core.learning.device_looks import drawn, happens, random_looks
 from core.learning.training import TrainingPlan
 
@@ -51,7 +51,8 @@ class DeviceCrops(IterableDataset[Crop]):
         numbers, _ = self._shown.draw(plan.batch)
         images, masks, ends = random_crops(self._frames, numbers, plan.crop, generator)
         # A crop beside the robot is easy, whatever its frame is.
-        self._tells = masks[:, 1].flatten(1).any(dim=1)
+        has_robot = ((self._frames.pixels[numbers, :, :, 3] & ROBOT) > 0).flatten(1).any(dim=1)
+        self._tells = masks[:, 1].flatten(1).any(dim=1) | ~has_robot
         if plan.strip_share > 0:
             covered = with_strips(images, masks, ends, generator)
             images = torch.where(happens(plan.strip_share, len(images), generator), covered, images)

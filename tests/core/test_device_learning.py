@@ -235,6 +235,21 @@ def test_clutter_tells_nothing_of_the_frame_that_it_stands_for(frames: DeviceFra
     assert crops._shown._lost.tolist() == pytest.approx([0.3] * 4)
 
 
+def test_a_crop_beside_the_robot_tells_nothing_but_that_of_an_empty_frame_does() -> None:
+    vessel, robot = _masks()
+    full = torch.from_numpy(np.dstack([_picture(vessel, robot), vessel * VESSEL | robot * ROBOT]).astype(np.uint8))
+    empty = full.clone()
+    empty[..., 3] &= VESSEL
+    frames = DeviceFrames(torch.stack([full, empty]), torch.full((2, MOST_ENDS, 2), torch.inf), torch.arange(2))
+    crops = DeviceCrops(frames, TrainingPlan(batch=16, crop=(32, 32), clutter_share=0.0, look_share=0.0))
+    _, labels = next(iter(crops))
+    shows_robot = labels[:, 1].flatten(1).any(dim=1)
+    is_empty = crops._shown._drawn == 1
+    assert crops._tells.tolist() == (shows_robot | is_empty).tolist()
+    assert (~crops._tells).any()
+    assert (crops._tells & ~shows_robot).any()
+
+
 def test_the_robots_end_is_as_near_as_a_processor_finds_it() -> None:
     _, robot = _masks()
     ends = torch.stack([padded_places([(float(x), float(y)) for x, y in true_ends(robot)])])
