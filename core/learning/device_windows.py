@@ -163,6 +163,8 @@ class DeviceWindows(IterableDataset[Crop]):
         assert self._network is not None
         generator = self._generator
         some = torch.randperm(len(numbers), generator=generator, device=generator.device)[: self._last.of(len(numbers))]
+        if not len(some):
+            return seen
         shift = torch.randint(-_LAST_SHIFT_PX, _LAST_SHIFT_PX + 1, (len(some), 2), generator=generator, device=generator.device)
         beside = self._corner((corner[some] + WINDOW_PX // 2 + shift).float())
         image, _ = parted(_cut(self._frames.pixels, numbers[some], beside))

@@ -414,6 +414,17 @@ def test_half_of_the_windows_come_with_what_was_seen_in_the_end(frames: DeviceFr
     assert torch.equal(planes[plain][:, 3] > 127, labels[plain][:, 0] > 0)
 
 
+def test_of_single_windows_every_second_one_is_looked_at_again(frames: DeviceFrames) -> None:
+    windows, network = DeviceWindows(frames, *_seen(frames), TrainingPlan(batch=1, look_share=0.0)), _Says(0.0)
+    windows.watch(network)
+    batches = iter(windows)
+    asked = []
+    for _ in range(6):
+        next(batches)
+        asked.append(network.asked)
+    assert asked == [0, 1, 1, 2, 2, 3]
+
+
 def test_examples_are_what_the_first_look_gives(frames: DeviceFrames) -> None:
     windows, network = DeviceWindows(frames, *_seen(frames), TrainingPlan(batch=4)), _Says(3.0)
     windows.watch(network)
