@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import (
@@ -28,6 +28,9 @@ from rich.progress import (
 from app.cluster import over_cluster
 from app.outputs import is_same
 from app.progress_lines import ProgressLines, Teller, asked_teller
+
+if TYPE_CHECKING:
+    from app.teaching import Classroom
 
 _console = Console(stderr=True, markup=False, emoji=False)
 
@@ -213,17 +216,21 @@ def run_train(
             if then is not None and done == plan.steps:
                 teach_second_look(room, samples, then)
         except DatasetError as error:
-            kept = f"; what was learnt before is kept, go on with --init {out}" if room.has_kept else ""
             advice = "" if isinstance(error, LoaderLost) else "; mend this frame, or remove it"
-            raise DatasetError(f"{error}{advice}{kept}") from None
+            raise DatasetError(f"{error}{advice}{_kept(room)}") from None
         except torch.OutOfMemoryError:
-            kept = f"; what was learnt before is kept, go on with --init {out}" if room.has_kept else ""
-            raise DatasetError(f"the GPU has too little memory for this --batch and --crop; give smaller ones{kept}") from None
+            problem = "the GPU has too little memory for this --batch and --crop; give smaller ones"
+            raise DatasetError(problem + _kept(room)) from None
     steps, done = room.steps_total, room.steps_before
     if teller is not None:
         teller.tell({"model": str(out), "steps_done": done, "steps": steps})
     ending = "" if done == steps else f" (interrupted after {done} of {steps} steps; go on with --init {out})"
     _console.print(f"model written to {out}{ending}", soft_wrap=True)
+
+
+def _kept(room: Classroom) -> str:
+    """What is told of a training that breaks off."""
+    return f"; what was learnt before is kept, go on with --init {room.out}" if room.has_kept else ""
 
 
 def _end_like_an_interrupt() -> None:

@@ -32,7 +32,7 @@ class DeviceCrops(IterableDataset[Crop]):
         self.device = frames.device
         self._generator = torch.Generator(frames.device).manual_seed(plan.seed)
         self._shown = Shown(frames.turns, plan.focus_share, self._generator)
-        self._looks = Share(plan.look_share)
+        self._looks, self._strips = Share(plan.look_share), Share(plan.strip_share)
         self._tells = torch.ones(0, dtype=torch.bool, device=frames.device)
         rng = np.random.default_rng((plan.seed, 3))
         pictures = np.stack([random_clutter(plan.crop, rng) for _ in range(_CLUTTER_PICTURES)]) if plan.clutter_share else None
@@ -53,9 +53,9 @@ class DeviceCrops(IterableDataset[Crop]):
         # A crop beside the robot is easy, whatever its frame is.
         has_robot = ((self._frames.pixels[numbers, :, :, 3] & ROBOT) > 0).flatten(1).any(dim=1)
         self._tells = masks[:, 1].flatten(1).any(dim=1) | ~has_robot
-        if plan.strip_share > 0:
-            covered = with_strips(images, masks, ends, generator)
-            images = torch.where(happens(plan.strip_share, len(images), generator), covered, images)
+        if covered := self._strips.of(len(images)):
+            some = torch.randperm(len(images), generator=generator, device=generator.device)[:covered]
+            images[some] = with_strips(images[some], masks[some], ends[some], generator)
         if self._clutter is not None:
             is_clutter = happens(plan.clutter_share, len(images), generator)
             some = torch.randint(len(self._clutter), (len(images),), generator=generator, device=generator.device)

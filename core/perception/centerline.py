@@ -140,7 +140,8 @@ def centerline_at(
     # One scale for all candidates: a narrow branch must not count the same distance for more than its wide trunk does.
     scale = max((near.radius for near in feet), default=1.0)
     direction = np.asarray(robot_direction, np.float64)
-    forks = [graph.edges[touching[0][0]].points[0 if touching[0][1] else -1] for touching in incidence if len(touching) > 2]
+    meeting = [touching[0] for touching in incidence if len(touching) > 2] if route is not None else []
+    forks = [graph.edges[index].points[0 if starts else -1] for index, starts in meeting]
     ahead = _route_ahead(route, head, direction, half_length_px, scale, vessel, forks)
     candidates = []
     for near in feet:
