@@ -14,7 +14,7 @@ from core.errors import UserError
 def synth(
     out: Annotated[Path, typer.Option(help="folder of the set; an interrupted one is continued")],
     count: Annotated[int, typer.Option(min=1, help="frames")],
-    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; sixteen frames use one seed")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; sixteen looks use one seed")] = 0,
     width: Annotated[int, typer.Option(min=160, max=4096)] = 640,
     height: Annotated[int, typer.Option(min=120, max=4096)] = 480,
     family: Annotated[
@@ -25,13 +25,17 @@ def synth(
         ),
     ] = None,
     phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,
+    poses: Annotated[
+        int, typer.Option(min=1, max=64, help="poses of the robot in every look: more frames for the time, of fewer looks")
+    ] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="processes")] = 1,
     scheduler: SchedulerOption = None,
 ) -> None:
     """Randomised labelled frames from the bench twin: images, masks, truth."""
     from app.learning_commands import run_synth
 
-    run_synth(out, count, seed, (width, height), tuple(family) if family else None, phantom, workers=workers, scheduler=scheduler)
+    families = tuple(family) if family else None
+    run_synth(out, count, seed, (width, height), families, phantom, poses, workers=workers, scheduler=scheduler)
 
 
 def train(

@@ -50,6 +50,7 @@ def run_synth(
     size: tuple[int, int],
     families: tuple[str, ...] | None,
     phantom: str | None,
+    poses: int = 1,
     *,
     workers: int = 1,
     scheduler: str | None = None,
@@ -67,7 +68,7 @@ def run_synth(
             make_phantom(phantom)
         except ValueError as error:
             raise SynthError(str(error)) from None
-    plan = SynthPlan(out, count, seed, size, families, phantom)
+    plan = SynthPlan(out, count, seed, size, families, phantom, poses)
     elsewhere = None if scheduler is None else partial(over_cluster, scheduler)
     with progress_bar() as bar:
         task = bar.add_task(f"frames -> {out}", total=count)

@@ -1,8 +1,9 @@
 """Labelled data sets from the twin: random phantoms, physical robot shapes, random looks, exact masks and truth.
 
-Frame ``i`` of a set belongs to episode ``i // FRAMES_PER_EPISODE``; an episode is one random phantom (seed = first seed + episode)
-through which the robot is driven once; every frame has a look of its own. A frame depends on its episode's seed alone, so a
-set can be continued after an interruption, and two sets are disjoint when their seed ranges are.
+A set is made in episodes: one random phantom (seed = first seed + episode) through which the robot is driven once, in
+``LOOKS_PER_EPISODE`` looks. Painting a look takes far longer than painting a robot into it, so a look can be shown with several
+poses of the robot. A frame depends on its episode's seed and on the plan alone, so a set can be continued after an interruption,
+and two sets are disjoint when their seed ranges are.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from hardware.twin.physics import TwinPhysics
 from hardware.twin.renderer import Picture, Renderer
 from hardware.twin.truth import truth_of
 
-FRAMES_PER_EPISODE = 16
+LOOKS_PER_EPISODE = 16
 _EMPTY_SHARE = 0.03
 _STEP_S = 0.02
 _FEED_MM_S = 40.0
@@ -44,7 +45,7 @@ _FEED_MM_S = 40.0
 @dataclass(frozen=True, slots=True)
 class SynthPlan:
     """What to write. ``families`` of ``LOOKS`` limits the looks (None: all random ones), ``phantom`` fixes the phantom (None:
-    random ones)."""
+    random ones), ``poses`` is how many poses of the robot every look is shown with."""
 
     out: Path
     count: int
@@ -52,10 +53,20 @@ class SynthPlan:
     size: tuple[int, int] = (640, 480)
     families: tuple[str, ...] | None = None
     phantom: str | None = None
+    poses: int = 1
 
     @property
     def episodes(self) -> int:
-        return -(-self.count // FRAMES_PER_EPISODE)
+        return -(-self.count // self.frames_per_episode)
+
+    @property
+    def frames_per_episode(self) -> int:
+        """Of all episodes but the last, which may have fewer."""
+        return LOOKS_PER_EPISODE * self.poses
+
+    def frames_of(self, episode: int) -> int:
+        """How many frames an episode has."""
+        return min(self.frames_per_episode, self.count - episode * self.frames_per_episode)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,8 +91,13 @@ Elsewhere = Callable[[Callable[[int], Episode], Sequence[int]], Iterable[Episode
 """Makes the episodes of these numbers on other machines, in any order."""
 
 
-def robot_shapes(phantom: Phantom, seed: int, count: int) -> list[tuple[Points, float, float]]:
-    """Drive the robot once through a phantom; `count` moments as (points mm tail->head, sheath mm, clearance mm)."""
+Shape = tuple[Points, float, float]
+"""The robot at a moment: points (N, 2) mm tail -> head, sheath mm, clearance mm."""
+
+
+def robot_shapes(phantom: Phantom, seed: int, looks: int, poses: int = 1) -> list[Shape]:
+    """Drive the robot once through a phantom; `poses` moments for each of `looks` looks, in order."""
+    count = looks * poses
     rng = np.random.default_rng((seed, 11))
     physics = TwinPhysics(phantom, seed)
     target = int(rng.choice(phantom.targets))
@@ -89,15 +105,16 @@ def robot_shapes(phantom: Phantom, seed: int, count: int) -> list[tuple[Points, 
         phantom, target, lookahead_mm=float(rng.uniform(6, 14)), wander=float(rng.choice((0.0, 0.4, 0.9))), seed=seed
     )
     moments = np.sort(rng.uniform(0.12, 0.98, count)) * follower.length_mm
-    shapes: list[tuple[Points, float, float]] = []
+    shapes: list[Shape] = []
     sheath_speed = float(rng.choice((0.0, 0.0, 6.0, 14.0)))
     for _ in range(int(3.0 * follower.length_mm / _FEED_MM_S / _STEP_S)):
         command = follower.command(physics.robot_points_mm(), _FEED_MM_S, _STEP_S)
         physics.step(type(command)(command.bend, 0.0, command.advance_mm_s, sheath_speed), _STEP_S)
         while len(shapes) < count and physics.insertion_mm >= moments[len(shapes)]:
             shapes.append((physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm()))
-            # A free wiggle between the moments: not every picture shows a robot that follows its route.
-            physics.step(type(command)(float(rng.uniform(-1, 1)), 0.0, 0.0, 0.0), float(rng.uniform(0.0, 0.15)))
+            if len(shapes) % poses == 0:
+                # A free wiggle now and then: not every picture shows a robot that follows its route.
+                physics.step(type(command)(float(rng.uniform(-1, 1)), 0.0, 0.0, 0.0), float(rng.uniform(0.0, 0.15)))
         if len(shapes) == count:
             break
     last = (physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm())
@@ -112,20 +129,24 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
     phantom = make_phantom(plan.phantom or f"random:{seed}")
     rng = np.random.default_rng((seed, 13))
     config = PerceptionConfig()
-    shapes = robot_shapes(phantom, seed, FRAMES_PER_EPISODE)
-    first = episode * FRAMES_PER_EPISODE
-    first_look = seed * FRAMES_PER_EPISODE
-    for place in range(min(FRAMES_PER_EPISODE, plan.count - first)):
-        appearance = _look(plan, first_look + place, rng)
-        view = make_view(appearance, plan.size, phantom)
-        renderer = Renderer(phantom, appearance, plan.size, seed)
-        points, sheath_mm, clearance_mm = shapes[place]
+    shapes = robot_shapes(phantom, seed, LOOKS_PER_EPISODE, plan.poses)
+    first = episode * plan.frames_per_episode
+    first_look = seed * LOOKS_PER_EPISODE
+    for place in range(plan.frames_of(episode)):
+        look, pose = divmod(place, plan.poses)
+        if pose == 0:
+            appearance = _look(plan, first_look + look, rng)
+            view = make_view(appearance, plan.size, phantom)
+            renderer = Renderer(phantom, appearance, plan.size, seed)
+        # The poses of a look lie far apart, not one behind the other.
+        moment = look + LOOKS_PER_EPISODE * pose
+        points, sheath_mm, clearance_mm = shapes[moment]
         empty = bool(rng.random() < _EMPTY_SHARE)
         robot = None if empty else points
         picture = renderer.render(robot, 0.0 if empty else sheath_mm, noise_seed=place)
         truth = truth_of(phantom, view, robot, appearance.robot_radius_mm, config).to_json()
         stem = f"{first + place:06d}"
-        stuck = place > 0 and shapes[place][0] is shapes[place - 1][0]
+        stuck = moment > 0 and points is shapes[moment - 1][0]
         row = {"stem": stem, "seed": seed, "phantom": phantom.name, "family": appearance.family}
         row |= {"clearance_mm": clearance_mm, "stuck": stuck, "robot_visible": bool(picture.robot.any())}
         yield LabelledFrame(stem, picture, row | truth)
@@ -170,8 +191,7 @@ def _episode_file(plan: SynthPlan, episode: int) -> Path:
 
 def _is_complete(plan: SynthPlan, episode: int) -> bool:
     path = _episode_file(plan, episode)
-    expected = min(FRAMES_PER_EPISODE, plan.count - episode * FRAMES_PER_EPISODE)
-    return path.is_file() and len(path.read_text(encoding="utf-8").splitlines()) >= expected
+    return path.is_file() and len(path.read_text(encoding="utf-8").splitlines()) >= plan.frames_of(episode)
 
 
 class SynthError(UserError):
@@ -216,7 +236,7 @@ def write_set(
 
 def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, on_progress: Callable[[int], None]) -> None:
     missing = [episode for episode in range(plan.episodes) if not _is_complete(plan, episode)]
-    on_progress(plan.count - sum(min(FRAMES_PER_EPISODE, plan.count - e * FRAMES_PER_EPISODE) for e in missing))
+    on_progress(plan.count - sum(map(plan.frames_of, missing)))
     if elsewhere is not None and missing:
         for made in elsewhere(partial(make_episode, plan), missing):
             on_progress(_keep(plan, made))
@@ -245,6 +265,8 @@ def _prepare(plan: SynthPlan) -> None:
         "families": plan.families and list(plan.families),
         "phantom": plan.phantom,
     }
+    if plan.poses != 1:
+        described["poses"] = plan.poses
     path = plan.out / "plan.json"
     try:
         if not path.is_file() and plan.out.is_dir() and not all(map(is_aside, plan.out.iterdir())):

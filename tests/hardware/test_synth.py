@@ -109,9 +109,24 @@ def test_the_benchs_own_look_is_the_trials_one() -> None:
     frame = next(synth.episode_frames(SynthPlan(Path("unused"), 1, 8, size=(320, 240), families=("bench",)), 0))
     phantom = make_phantom("random:8")
     renderer = Renderer(phantom, default_appearance(), (320, 240), 8)
-    points, sheath_mm, _ = synth.robot_shapes(phantom, 8, synth.FRAMES_PER_EPISODE)[0]
+    points, sheath_mm, _ = synth.robot_shapes(phantom, 8, synth.LOOKS_PER_EPISODE)[0]
     assert np.array_equal(frame.picture.image, renderer.render(points, sheath_mm, noise_seed=0).image)
     assert frame.truth["family"] == "bench"
+
+
+def test_a_look_is_shown_with_several_poses(tmp_path: Path) -> None:
+    plan = SynthPlan(tmp_path / "set", 50, 3, size=(320, 240), families=("bench",), poses=3)
+    assert (plan.episodes, plan.frames_of(0), plan.frames_of(1)) == (2, 48, 2)
+    frames = list(synth.episode_frames(plan, 0))
+    shapes = synth.robot_shapes(make_phantom("random:3"), 3, synth.LOOKS_PER_EPISODE, 3)
+    assert [frame.truth["clearance_mm"] for frame in frames[3:6]] == [shapes[1][2], shapes[17][2], shapes[33][2]]
+    assert [frame.stem for frame in frames[:4]] == ["000000", "000001", "000002", "000003"]
+    looks = [np.packbits(frame.picture.vessel).tobytes() for frame in frames]
+    assert all(looks[place] == looks[place - place % 3] for place in range(48))
+    assert len({frame.picture.robot.tobytes() for frame in frames if frame.truth["robot_visible"]}) > 40
+    with pytest.raises(SynthError, match="other settings"):
+        synth._prepare(plan)
+        synth._prepare(replace(plan, poses=2))
 
 
 def test_a_smaller_count_is_refused_not_mixed(small_set: SynthPlan) -> None:
