@@ -14,7 +14,7 @@ from core.errors import UserError
 def synth(
     out: Annotated[Path, typer.Option(help="folder of the set; an interrupted one is continued")],
     count: Annotated[int, typer.Option(min=1, help="frames")],
-    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; sixteen looks use one seed")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; 16 x --poses frames use one seed")] = 0,
     width: Annotated[int, typer.Option(min=160, max=4096)] = 640,
     height: Annotated[int, typer.Option(min=120, max=4096)] = 480,
     family: Annotated[
@@ -26,7 +26,7 @@ def synth(
     ] = None,
     phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,
     poses: Annotated[
-        int, typer.Option(min=1, max=64, help="poses of the robot in every look: more frames for the time, of fewer looks")
+        int, typer.Option(min=1, max=8, help="poses of the robot in every look: more frames in the same time, but fewer looks")
     ] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="processes")] = 1,
     scheduler: SchedulerOption = None,

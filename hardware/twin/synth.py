@@ -112,9 +112,10 @@ def robot_shapes(phantom: Phantom, seed: int, looks: int, poses: int = 1) -> lis
         physics.step(type(command)(command.bend, 0.0, command.advance_mm_s, sheath_speed), _STEP_S)
         while len(shapes) < count and physics.insertion_mm >= moments[len(shapes)]:
             shapes.append((physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm()))
-            if len(shapes) % poses == 0:
-                # A free wiggle now and then: not every picture shows a robot that follows its route.
-                physics.step(type(command)(float(rng.uniform(-1, 1)), 0.0, 0.0, 0.0), float(rng.uniform(0.0, 0.15)))
+            if len(shapes) % poses:
+                break  # the robot has not moved since
+            # A free wiggle now and then: not every picture shows a robot that follows its route.
+            physics.step(type(command)(float(rng.uniform(-1, 1)), 0.0, 0.0, 0.0), float(rng.uniform(0.0, 0.15)))
         if len(shapes) == count:
             break
     last = (physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm())
@@ -130,6 +131,8 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
     rng = np.random.default_rng((seed, 13))
     config = PerceptionConfig()
     shapes = robot_shapes(phantom, seed, LOOKS_PER_EPISODE, plan.poses)
+    # The poses of a look lie anywhere on the way, not one behind the other.
+    moments = np.random.default_rng((seed, 17)).permutation(len(shapes)) if plan.poses > 1 else np.arange(len(shapes))
     first = episode * plan.frames_per_episode
     first_look = seed * LOOKS_PER_EPISODE
     for place in range(plan.frames_of(episode)):
@@ -138,8 +141,7 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
             appearance = _look(plan, first_look + look, rng)
             view = make_view(appearance, plan.size, phantom)
             renderer = Renderer(phantom, appearance, plan.size, seed)
-        # The poses of a look lie far apart, not one behind the other.
-        moment = look + LOOKS_PER_EPISODE * pose
+        moment = int(moments[place])
         points, sheath_mm, clearance_mm = shapes[moment]
         empty = bool(rng.random() < _EMPTY_SHARE)
         robot = None if empty else points

@@ -1,5 +1,6 @@
 """Labelled sets from the twin: complete, repeatable, continued after an interruption, disjoint by seed."""
 
+import json
 import os
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -114,19 +115,39 @@ def test_the_benchs_own_look_is_the_trials_one() -> None:
     assert frame.truth["family"] == "bench"
 
 
-def test_a_look_is_shown_with_several_poses(tmp_path: Path) -> None:
-    plan = SynthPlan(tmp_path / "set", 50, 3, size=(320, 240), families=("bench",), poses=3)
+def test_a_look_is_shown_with_several_poses() -> None:
+    plan = SynthPlan(Path("unused"), 50, 3, size=(320, 240), poses=3)
     assert (plan.episodes, plan.frames_of(0), plan.frames_of(1)) == (2, 48, 2)
     frames = list(synth.episode_frames(plan, 0))
-    shapes = synth.robot_shapes(make_phantom("random:3"), 3, synth.LOOKS_PER_EPISODE, 3)
-    assert [frame.truth["clearance_mm"] for frame in frames[3:6]] == [shapes[1][2], shapes[17][2], shapes[33][2]]
-    assert [frame.stem for frame in frames[:4]] == ["000000", "000001", "000002", "000003"]
-    looks = [np.packbits(frame.picture.vessel).tobytes() for frame in frames]
-    assert all(looks[place] == looks[place - place % 3] for place in range(48))
-    assert len({frame.picture.robot.tobytes() for frame in frames if frame.truth["robot_visible"]}) > 40
+    vessels = [np.packbits(frame.picture.vessel).tobytes() for frame in frames]
+    families = [frame.truth["family"] for frame in frames]
+    for first in range(0, 48, 3):
+        assert len(set(vessels[first : first + 3])) == len(set(families[first : first + 3])) == 1
+    assert len(set(vessels)) == 16, "each look has a view of its own"
+    robots = {np.packbits(frame.picture.robot).tobytes() for frame in frames if frame.truth["robot_visible"]}
+    assert len(robots) == sum(frame.truth["robot_visible"] for frame in frames)
+    alone = list(synth.episode_frames(replace(plan, count=16, poses=1), 0))
+    assert np.array_equal(alone[0].picture.vessel, frames[0].picture.vessel), "the first look is the same"
+
+
+def test_a_pose_is_shown_once_however_many_there_are() -> None:
+    shapes = synth.robot_shapes(make_phantom("random:3"), 3, synth.LOOKS_PER_EPISODE, 8)
+    moved = [shape for shape in shapes if shape[0] is not shapes[-1][0]]
+    assert len({shape[0].tobytes() for shape in moved}) == len(moved) > 100
+
+
+def test_a_set_of_several_poses_grows_in_the_middle_of_a_look(tmp_path: Path) -> None:
+    plan = SynthPlan(tmp_path / "set", 4, 3, size=(160, 120), poses=3)
+    write_set(plan)
+    assert json.loads((plan.out / "plan.json").read_text())["poses"] == 3
+    write_set(replace(plan, count=8))
+    whole = replace(plan, out=tmp_path / "whole", count=8)
+    write_set(whole)
+    written = sorted(path.relative_to(whole.out) for path in whole.out.rglob("*") if path.is_file())
+    assert len(written) == 8 * 3 + 3
+    assert all((plan.out / name).read_bytes() == (whole.out / name).read_bytes() for name in written)
     with pytest.raises(SynthError, match="other settings"):
-        synth._prepare(plan)
-        synth._prepare(replace(plan, poses=2))
+        write_set(replace(plan, count=8, poses=1))
 
 
 def test_a_smaller_count_is_refused_not_mixed(small_set: SynthPlan) -> None:
