@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Half a day of data and thirty hours
-# of training on two cores, the last four runs of it on a GPU. It can be interrupted: the same call goes on with the data.
+# Makes the shipped model again, from nothing: data, training, calibration, test set, figures. Some five hours of data and thirty
+# hours of training on two cores, the last four runs of it on a GPU. It can be interrupted: the same call goes on with the data.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-out/default_model}

@@ -131,7 +131,7 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
     rng = np.random.default_rng((seed, 13))
     config = PerceptionConfig()
     shapes = robot_shapes(phantom, seed, LOOKS_PER_EPISODE, plan.poses)
-    # The poses of a look lie anywhere on the way, not one behind the other.
+    # Several poses of a look lie anywhere on the way, not one behind the other; single ones are shown in order.
     moments = np.random.default_rng((seed, 17)).permutation(len(shapes)) if plan.poses > 1 else np.arange(len(shapes))
     first = episode * plan.frames_per_episode
     first_look = seed * LOOKS_PER_EPISODE

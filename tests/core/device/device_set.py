@@ -13,7 +13,7 @@ from core.learning.device_frames import DeviceFrames
 
 CPU = torch.device("cpu")
 TIP = (330.0, 199.5)
-"""Of the robot in ``_frame``."""
+"""Of the robot in ``masks_of()``."""
 
 
 def masks_of(shift: int = 0) -> tuple[np.ndarray, np.ndarray]:

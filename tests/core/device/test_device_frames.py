@@ -11,17 +11,7 @@ import torch
 from core.learning.crops import true_ends
 from core.learning.dataset import DatasetError, Sample, find_samples
 from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, Share, Shown, fits, padded_places
-from tests.core.device_set import CPU, generator, loaded, masks_of, picture_of, write_frame, write_frames
-
-
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> list[Sample]:
-    return write_frames(tmp_path_factory.mktemp("set"))
-
-
-@pytest.fixture(scope="module")
-def frames(samples: list[Sample]) -> DeviceFrames:
-    return loaded(samples)
+from tests.core.device.device_set import CPU, generator, masks_of, picture_of, write_frame
 
 
 def test_frames_are_what_is_on_disk(samples: list[Sample], frames: DeviceFrames) -> None:

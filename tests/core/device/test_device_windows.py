@@ -11,23 +11,12 @@ import torch
 from torch import Tensor, nn
 
 from core.learning.crops import EDGE_PX, _wrong
-from core.learning.dataset import Sample
 from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, padded_places
 from core.learning.device_windows import DeviceWindows, _far, _turned, first_looks
 from core.learning.training import TrainingPlan, train
 from core.perception.second_look import WINDOW_PX, places_to_look
 from core.perception.unet import DualUNet, UNetShape
-from tests.core.device_set import loaded, told_by_colour, write_frames
-
-
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> list[Sample]:
-    return write_frames(tmp_path_factory.mktemp("set"))
-
-
-@pytest.fixture(scope="module")
-def frames(samples: list[Sample]) -> DeviceFrames:
-    return loaded(samples)
+from tests.core.device.device_set import told_by_colour
 
 
 class _Says(nn.Module):

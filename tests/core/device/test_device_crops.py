@@ -9,23 +9,12 @@ import torch
 from torch import Tensor
 
 from core.learning.crops import _nearness, true_ends
-from core.learning.dataset import Sample
 from core.learning.device_crops import DeviceCrops, _with_strip, nearness, random_crops, some_pixel, with_strips
 from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, padded_places
 from core.learning.device_looks import compressed, random_looks
 from core.learning.training import Progress, TrainingPlan, train
 from core.perception.unet import DualUNet, UNetShape
-from tests.core.device_set import TIP, generator, loaded, masks_of, picture_of, told_by_colour, write_frames
-
-
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> list[Sample]:
-    return write_frames(tmp_path_factory.mktemp("set"))
-
-
-@pytest.fixture(scope="module")
-def frames(samples: list[Sample]) -> DeviceFrames:
-    return loaded(samples)
+from tests.core.device.device_set import TIP, generator, masks_of, picture_of, told_by_colour
 
 
 @pytest.mark.parametrize("size", [(192, 256), (384, 384)])
