@@ -214,7 +214,8 @@ def run_accuracy(
     if interrupted and not scores:
         raise KeyboardInterrupt
     left_out.tell(len(scores))
-    figures = summarise(scores) | describe_confidence(scores) | {"stricter_gates": describe_gates(scores)}
+    confident_from = config.perception.quality.confident_from
+    figures = summarise(scores, confident_from) | describe_confidence(scores) | {"stricter_gates": describe_gates(scores)}
     if left_out:
         figures["left_out"] = len(left_out)
     if interrupted:
@@ -222,7 +223,7 @@ def run_accuracy(
     looks = {stem: str(row["family"]) for stem, row in truth.items() if row.get("family") is not None}
     if scores and all(score.stem in looks for score in scores):
         without = [] if true_masks else trained_without(model_folder(config.perception.segmentation.model))
-        figures |= summarise_looks(scores, looks, without)
+        figures |= summarise_looks(scores, looks, without, confident_from)
     part = f", interrupted after {len(scores)} of {len(samples)} frames" if interrupted else ""
     _print(figures, as_json, f"accuracy on {folder}{part}")
     if interrupted:

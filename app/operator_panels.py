@@ -35,7 +35,7 @@ from app.widgets.sim_banner import SimBanner
 from app.widgets.toast import Toast
 from app.widgets.trend_plot import TrendPlot
 from core.calibration_config import CalibrationConfig
-from core.config import Config, PoseConfig
+from core.config import Config, PerceptionConfig
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.rig_file import RigFileError, calibration_of, scaled
@@ -55,7 +55,7 @@ class OperatorPanels(ScenePanels):
     """
 
     def __init__(self, config: Config, kind: RigKind, phantoms: Sequence[tuple[str, str]]) -> None:
-        super().__init__(config.perception.pose, config.policy.pursuit.pixels_per_mm, TEXT_EVERY_S)
+        super().__init__(config.perception, config.policy.pursuit.pixels_per_mm, TEXT_EVERY_S)
         self._servo_config = config.servos
         self.banner = SimBanner(kind, has_servos=config.rig.robot != "none")
         self.record_bar = RecordBar()
@@ -89,9 +89,10 @@ class OperatorPanels(ScenePanels):
             self.picker.setVisible(kind is RigKind.SIM)
             self.picker.setEnabled(kind is RigKind.SIM)
 
-    def set_limits(self, limits: PoseConfig) -> None:
+    def set_limits(self, perception: PerceptionConfig) -> None:
         """Other limits of the pose states, on all dials."""
-        self.badge.set_limits(limits)
+        limits = perception.pose
+        self.badge.set_limits(limits, perception.quality.confident_from)
         self.gauge.set_allowed(limits.theta_allow_deg)
         self.bars.set_allowed(limits.d_allow_px)
         self.trends.set_limits(limits)
@@ -99,7 +100,7 @@ class OperatorPanels(ScenePanels):
 
     def set_config(self, config: Config) -> None:
         """What the panels know of the configuration, for a rig that is being opened with another one."""
-        self.set_limits(config.perception.pose)
+        self.set_limits(config.perception)
         known = _calibration_of(config)
         self.live.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)  # for the ghost, which may be rough
         self.servos.set_safety(config.safety)

@@ -239,7 +239,7 @@ class OperatorWindow(WindowFrame):
 
         False when nothing is perceived now.
         """
-        self._panels.set_limits(perception.pose)
+        self._panels.set_limits(perception)
         config = self._as_calibrated(self._config.model_copy(update={"perception": perception}))
         is_running = self._thread.set_perception(config.perception)
         if is_running:  # not before: a session that ends because of it would be one of nothing

@@ -46,7 +46,7 @@ class PlayerPanels(ScenePanels):
     def __init__(self, config: Config, manifest: Manifest | None, name: str, *, with_other: bool = False) -> None:
         known = manifest.known if manifest is not None else None
         pixels_per_mm = scaled(config, known).policy.pursuit.pixels_per_mm
-        super().__init__(config.perception.pose, pixels_per_mm, _TEXT_EVERY_S)
+        super().__init__(config.perception, pixels_per_mm, _TEXT_EVERY_S)
         self._scale = known.scale if known is not None else None
         self.banner = SimBanner(RigKind.PLAYBACK)
         self.banner.setFixedWidth(_BANNER_WIDTH)

@@ -22,7 +22,7 @@ from app.widgets.theta_gauge import ThetaGauge
 from app.wording import REASON_TEXT
 from core.calibration.scale import mm_per_working_px
 from core.calibration_config import ScaleConfig
-from core.config import PoseConfig
+from core.config import PerceptionConfig, PoseConfig
 from core.types import PoseState, RobotStatus, Scene, Tick
 
 _LEFT_SHARE = 0.62
@@ -34,19 +34,20 @@ class ScenePanels(QWidget):
 
     Parameters
     ----------
-    limits : of the pose states, on all dials.
+    perception : its limits of the pose states are shown on all dials.
     pixels_per_mm : of the picture.
     text_every_s : texts are renewed no more often, unless the state is another one.
     """
 
-    def __init__(self, limits: PoseConfig, pixels_per_mm: float, text_every_s: float) -> None:
+    def __init__(self, perception: PerceptionConfig, pixels_per_mm: float, text_every_s: float) -> None:
         super().__init__()
+        limits = perception.pose
         self.mode = ModeBadge()
         self.live = LiveView(pixels_per_mm)
         self.overlay_bar = OverlayBar()
         self.overlay_bar.toggled.connect(self.set_layer)
         self.advice = AdviceLine()
-        self.badge = StateBadge(limits)
+        self.badge = StateBadge(limits, perception.quality.confident_from)
         self.gauge = ThetaGauge(limits.theta_allow_deg)
         self.bars = DistanceBars(limits.d_allow_px)
         self.clearance = ClearanceBar()

@@ -56,6 +56,11 @@ def edge_of(name: str) -> QPen:
     return QPen(QColor(palette.TEXT_DIM), 1.5)
 
 
+def outline_of(name: str, width_px: float) -> QPen:
+    """The pen of a shape on a panel that is not filled; grey where the colour would be lost there."""
+    return QPen(QColor(name if palette.contrast(name, palette.PANEL) >= _SEEN else palette.TEXT_DIM), width_px)
+
+
 @cache
 def font(size: Size | int = Size.BODY, weight: QFont.Weight = QFont.Weight.Normal) -> QFont:
     """The interface font with digits of equal width, so that nothing moves when a number changes. Copy it before you change it."""

@@ -152,6 +152,7 @@ class QualityConfig(_Section):
     max_bridged_share: Share = Field(0.4, description="repaired length over path length")
     max_ambiguity: Share = Field(0.95, description="how near the second best path may come to the best one")
     min_confidence: Share = Field(0.3, description="below it there is no answer")
+    confident_from: Share = Field(0.5, description="an answer that is less sure than this is shown as unsure")
     max_novelty: float = Field(
         1.0,
         gt=0.0,

@@ -48,7 +48,7 @@ class SafetyConfig(BaseModel):
     frame_loss_warn_share: float = Field(0.1, gt=0.0, le=0.1, description="share of frames lost that warns")
     frame_loss_hold_share: float = Field(0.2, gt=0.0, le=0.2, description="share of frames lost that holds")
     frame_loss_disarm_s: float = Field(0.5, ge=0.0, le=0.5, description="loss above the hold share for so long disarms")
-    min_confidence: float = Field(0.4, ge=0.0, le=1.0, description="below, autonomy holds")
+    min_confidence: float = Field(0.5, ge=0.0, le=1.0, description="below, autonomy holds")
     confidence_hysteresis: float = Field(0.05, ge=0.0, le=0.5, description="so much more is needed to go on")
     max_drift_px: float = Field(6.0, gt=0.0, le=100.0, description="movement of the landmarks that means a moved camera")
     missed_answers: int = Field(3, ge=1, le=3, description="in a row, of one servo")

@@ -116,7 +116,7 @@ def malformed(kit: Kit) -> Seen:
         session = bench.writer.status().folder
     assert session is not None
     config = kit.folder / "user.toml"
-    config.write_text('[safety]\nmin_confidence = 0.5\n[twin]\nphantom = "tree"\n', encoding="utf-8")
+    config.write_text('[safety]\nmin_confidence = 0.6\n[twin]\nphantom = "tree"\n', encoding="utf-8")
     store = kit.folder / "a.sqlite"
     with AnnotationStore(store) as kept:
         kept.add_image(ImageRecord("0" * 64, "a.png", 640, 480), 1000, 5)

@@ -10,10 +10,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from core.config import QualityConfig
 from core.learning.dataset import UNMEASURED, DatasetError, Sample
 from core.perception.pipeline import Pipeline
 from core.study.classification import kappa
 from core.types import Frame, Image, Mask, Point, Reason, Scene
+
+_CONFIDENT_FROM = QualityConfig().confident_from
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +137,10 @@ def _at_size(mask: Mask, size: tuple[int, int]) -> Mask:
     return np.asarray(cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_AREA) > 127)
 
 
+def _is_wrong(score: FrameScore) -> bool:
+    return score.theta_error_deg is not None and (abs(score.theta_error_deg) > 10 or (score.head_error_px or 0) > 15)
+
+
 def _statistics(values: Sequence[float]) -> dict[str, float] | None:
     if not values:
         return None
@@ -141,10 +148,11 @@ def _statistics(values: Sequence[float]) -> dict[str, float] | None:
     return {"median": float(np.median(array)), "mean": float(array.mean()), "p95": float(np.percentile(array, 95))}
 
 
-def summarise(scores: Sequence[FrameScore]) -> dict[str, Any]:
+def summarise(scores: Sequence[FrameScore], confident_from: float = _CONFIDENT_FROM) -> dict[str, Any]:
     """Sums over frames: "expected" are those whose truth has a pose, "empty" those without any robot, "poseless" the rest.
 
-    Of frames that nobody has measured only the masks count.
+    Of frames that nobody has measured only the masks count. "Wrong" is an answer whose theta is off by more than 10 degrees or its
+    head by more than 15 px, "confident" one that is at least as sure as `confident_from`.
     """
     expected = [s for s in scores if s.expected]
     pairs = [(s.true_state, s.state) for s in expected if s.true_state is not None and s.state is not None]
@@ -156,7 +164,7 @@ def summarise(scores: Sequence[FrameScore]) -> dict[str, Any]:
     for s in expected:
         if s.reason is not None:
             refused[s.reason.value] = refused.get(s.reason.value, 0) + 1
-    wrong = [s for s in expected if s.theta_error_deg is not None and (abs(s.theta_error_deg) > 10 or (s.head_error_px or 0) > 15)]
+    confident = [s for s in expected if s.answered and s.confidence >= confident_from]
     return {
         "frames": len(scores),
         "expected": len(expected),
@@ -169,7 +177,9 @@ def summarise(scores: Sequence[FrameScore]) -> dict[str, Any]:
         "theta_pearson": _pearson(thetas),
         "state_agreement": sum(a == b for a, b in pairs) / len(pairs) if pairs else None,
         "state_kappa": kappa([str(a) for a, _ in pairs], [str(b) for _, b in pairs]),
-        "confident_and_wrong_share": len(wrong) / len(pairs) if pairs else None,
+        "answered_and_wrong_share": sum(map(_is_wrong, expected)) / len(pairs) if pairs else None,
+        "confident_share": len(confident) / len(expected) if expected else None,
+        "confident_and_wrong_share": sum(map(_is_wrong, confident)) / len(confident) if confident else None,
         "empty_frames": len(empty),
         "answers_on_empty_frames": sum(s.answered for s in empty),
         # The robot is seen, but its head is outside the picture or has no vessel beside it: what is answered there is wrong.
@@ -186,11 +196,18 @@ _PER_LOOK = (
     "head_error_px",
     "theta_error_deg",
     "state_agreement",
+    "answered_and_wrong_share",
+    "confident_share",
     "confident_and_wrong_share",
 )
 
 
-def summarise_looks(scores: Sequence[FrameScore], looks: Mapping[str, str], unseen: Collection[str] = ()) -> dict[str, Any]:
+def summarise_looks(
+    scores: Sequence[FrameScore],
+    looks: Mapping[str, str],
+    unseen: Collection[str] = (),
+    confident_from: float = _CONFIDENT_FROM,
+) -> dict[str, Any]:
     """The main figures of every family of looks, errors as medians, and their means over the looks.
 
     Parameters
@@ -198,6 +215,7 @@ def summarise_looks(scores: Sequence[FrameScore], looks: Mapping[str, str], unse
     scores : of the frames.
     looks : family of every frame, by its stem.
     unseen : families that training has left out; their mean is given by itself.
+    confident_from : as ``summarise`` has it.
 
     Returns
     -------
@@ -206,7 +224,7 @@ def summarise_looks(scores: Sequence[FrameScore], looks: Mapping[str, str], unse
     """
     rows: dict[str, dict[str, Any]] = {}
     for look in sorted({looks[score.stem] for score in scores}):
-        sums = summarise([score for score in scores if looks[score.stem] == look])
+        sums = summarise([score for score in scores if looks[score.stem] == look], confident_from)
         rows[look] = {key: sums[key]["median"] if isinstance(sums[key], dict) else sums[key] for key in _PER_LOOK}
     left_out = [row for look, row in rows.items() if look in unseen]
     trained = [row for look, row in rows.items() if look not in unseen]

@@ -113,7 +113,7 @@ def describe_confidence(scores: Sequence[FrameScore]) -> dict[str, Any]:
 
 
 _GATES = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98)
-_PER_GATE = ("answered_share", "state_agreement", "state_kappa", "theta_pearson", "confident_and_wrong_share")
+_PER_GATE = ("answered_share", "state_agreement", "state_kappa", "theta_pearson", "answered_and_wrong_share")
 
 
 def describe_gates(scores: Sequence[FrameScore]) -> dict[str, dict[str, float | None]]:

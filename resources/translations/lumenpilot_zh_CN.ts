@@ -4960,8 +4960,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/tool_tips.py"/>
-        <source>Chance that the answer is right (theta within 5 degrees, head within 15 px), as learnt on pictures with known truth. Below 0.30 there is no answer but a reason.</source>
-        <translation>结果正确的概率（θ 误差 5 度内，头端 15 px 内），由已知真值的图像学得。低于 0.30 时不给结果，只给原因。</translation>
+        <source>Chance that the answer is right (theta within 5 degrees, head within 15 px), as learnt on pictures with known truth. Below 0.30 there is no answer but a reason; below 0.50 it is shown as unsure, and its shape is not filled.</source>
+        <translation>结果正确的概率（θ 误差 5 度内，头端 15 px 内），由已知真值的图像学得。低于 0.30 时不给结果，只给原因；低于 0.50 时显示为“不确定”，其形状不填充。</translation>
     </message>
     <message>
         <location filename="../../app/tool_tips.py"/>
@@ -7122,6 +7122,16 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/state_badge.py"/>
         <source>Waiting</source>
         <translation>等待中</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/state_badge.py"/>
+        <source>unsure: {percent} %</source>
+        <translation>不确定：{percent} %</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/state_badge.py"/>
+        <source>{percent} % sure</source>
+        <translation>确定度 {percent} %</translation>
     </message>
     <message>
         <location filename="../../app/widgets/stop_button.py"/>
@@ -10341,6 +10351,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>below it there is no answer</source>
         <translation>低于此不给结果</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>Confident from</source>
+        <translation>确信起点</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>an answer that is less sure than this is shown as unsure</source>
+        <translation>确定度低于此的结果显示为“不确定”</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

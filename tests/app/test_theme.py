@@ -121,7 +121,7 @@ def test_style_sheets_of_widgets_follow(qapp: QApplication, qtbot: QtBot) -> Non
 
 
 def test_what_widgets_keep_painted_is_painted_anew(qapp: QApplication, qtbot: QtBot) -> None:
-    gauge, badge, trends = ThetaGauge(10.0), StateBadge(PoseConfig()), TrendPlot(PoseConfig())
+    gauge, badge, trends = ThetaGauge(10.0), StateBadge(PoseConfig(), 0.5), TrendPlot(PoseConfig())
     for widget in (gauge, badge, trends):
         qtbot.addWidget(widget)
         widget.resize(300, 200)

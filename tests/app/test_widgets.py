@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -46,7 +48,7 @@ def colours_in(widget: QWidget) -> set[str]:
 
 @pytest.mark.parametrize("state", list(PoseState))
 def test_badge_shows_letter_title_and_colour_of_the_state(qtbot: QtBot, state: PoseState) -> None:
-    badge = StateBadge(LIMITS)
+    badge = StateBadge(LIMITS, 0.5)
     qtbot.addWidget(badge)
     badge.resize(480, badge.height())
     badge.show_scene(make_scene(make_pose(state)))
@@ -56,7 +58,7 @@ def test_badge_shows_letter_title_and_colour_of_the_state(qtbot: QtBot, state: P
 
 
 def test_badge_shows_a_dash_and_the_reason_without_a_pose(qtbot: QtBot) -> None:
-    badge = StateBadge(LIMITS)
+    badge = StateBadge(LIMITS, 0.5)
     qtbot.addWidget(badge)
     badge.show_scene(make_scene(make_pose()))
     badge.show_scene(make_scene(refusal=Refusal(Reason.OUTSIDE_VESSEL, "41 % inside, 60 % needed")), renew_text=False)
@@ -65,7 +67,7 @@ def test_badge_shows_a_dash_and_the_reason_without_a_pose(qtbot: QtBot) -> None:
 
 
 def test_badge_keeps_its_sentence_until_texts_are_renewed_but_never_a_wrong_letter(qtbot: QtBot) -> None:
-    badge = StateBadge(LIMITS)
+    badge = StateBadge(LIMITS, 0.5)
     qtbot.addWidget(badge)
     badge.show_scene(make_scene(make_pose(PoseState.C, head=14.0)))
     before = badge.why
@@ -74,6 +76,43 @@ def test_badge_keeps_its_sentence_until_texts_are_renewed_but_never_a_wrong_lett
     badge.show_scene(make_scene(make_pose(PoseState.B, head=6.5, tail=12.0)), renew_text=False)
     assert badge.letter == "B"
     assert badge.why != before
+
+
+def _shown(badge: StateBadge, confidence: float, *, renew_text: bool = True) -> tuple[bool, str]:
+    badge.show_scene(make_scene(replace(make_pose(PoseState.D), confidence=confidence)), renew_text=renew_text)
+    return badge.is_unsure, badge.sureness
+
+
+def test_badge_says_how_sure_it_is_and_leaves_the_shape_of_an_unsure_state_open(qtbot: QtBot) -> None:
+    badge = StateBadge(LIMITS, 0.5)
+    qtbot.addWidget(badge)
+    badge.resize(480, badge.height())
+    assert _shown(badge, 0.974) == (False, "97 % sure")
+    filled = _share_of(badge, palette.STATE_COLOUR[PoseState.D])
+    assert _shown(badge, 1.0) == (False, "99 % sure"), "nothing is as sure as 100 %"
+    assert _shown(badge, 0.499) == (True, "unsure: 49 %")
+    assert badge.accessibleDescription().startswith("D: Crossed (unsure: 49 %). ")
+    assert 0 < _share_of(badge, palette.STATE_COLOUR[PoseState.D]) < filled / 3
+    badge.show_scene(make_scene(refusal=Refusal(Reason.NO_ROBOT)))
+    assert (badge.is_unsure, badge.sureness) == (False, "")
+    assert _shown(badge, 0.52) == (False, "52 % sure"), "after a refusal it begins anew"
+
+
+def test_an_unsure_badge_does_not_flicker_at_the_limit(qtbot: QtBot) -> None:
+    badge = StateBadge(LIMITS, 0.5)
+    qtbot.addWidget(badge)
+    assert [_shown(badge, confidence)[0] for confidence in (0.51, 0.5, 0.49, 0.51, 0.54, 0.56, 0.51)] == [
+        False, False, True, True, True, False, False
+    ]  # fmt: skip
+    assert _shown(badge, 0.1, renew_text=False) == (False, "51 % sure"), "nor between two renewals of the texts"
+    badge.set_limits(LIMITS, 0.8)
+    assert _shown(badge, 0.79)[0]
+
+
+def _share_of(badge: StateBadge, colour: str) -> int:
+    image = badge.grab().toImage()
+    pixels = ((x, y) for x in range(image.width()) for y in range(image.height()))
+    return sum(image.pixelColor(x, y).name().upper() == colour.upper() for x, y in pixels)
 
 
 # ---- gauge and bars
@@ -494,7 +533,7 @@ def test_a_notice_has_room_for_all_that_it_says(qtbot: QtBot, size: tuple[int, i
 
 
 def test_every_widget_has_an_accessible_name_and_a_tool_tip(qtbot: QtBot) -> None:
-    widgets = (StateBadge(LIMITS), ThetaGauge(10), DistanceBars(6), AdviceLine(), TrendPlot(LIMITS), PerformancePanel())
+    widgets = (StateBadge(LIMITS, 0.5), ThetaGauge(10), DistanceBars(6), AdviceLine(), TrendPlot(LIMITS), PerformancePanel())
     for widget in (*widgets, ModeBadge()):
         qtbot.addWidget(widget)
         assert widget.accessibleName(), widget
@@ -503,7 +542,7 @@ def test_every_widget_has_an_accessible_name_and_a_tool_tip(qtbot: QtBot) -> Non
 
 def test_sizes_do_not_depend_on_values(qtbot: QtBot) -> None:
     """No layout jumps when numbers change."""
-    gauge, bars, badge = ThetaGauge(10.0), DistanceBars(6.0), StateBadge(LIMITS)
+    gauge, bars, badge = ThetaGauge(10.0), DistanceBars(6.0), StateBadge(LIMITS, 0.5)
     for widget in (gauge, bars, badge):
         qtbot.addWidget(widget)
     before = [widget.sizeHint() for widget in (gauge, bars, badge)]

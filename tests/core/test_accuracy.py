@@ -138,7 +138,7 @@ def test_stricter_gates_refuse_what_promises_less() -> None:
     assert list(gates) == ["0.80", "0.90", "0.95", "0.98"]  # below all answers a gate changes nothing
     assert gates["0.80"] == {
         "answered_share": 2 / 4, "state_agreement": 1.0, "state_kappa": None, "theta_pearson": None,
-        "confident_and_wrong_share": 0.0, "theta_mean_deg": 2.0,
+        "answered_and_wrong_share": 0.0, "theta_mean_deg": 2.0,
     }  # fmt: skip
     assert (gates["0.95"]["answered_share"], gates["0.95"]["theta_mean_deg"]) == (1 / 4, 1.0)
     assert (gates["0.98"]["answered_share"], gates["0.98"]["state_agreement"], gates["0.98"]["theta_mean_deg"]) == (0.0, None, None)
@@ -165,8 +165,22 @@ def test_sums_by_hand() -> None:
     assert sums["theta_error_deg"]["median"] == 3.0  # of 1, 3 and 20: the size counts, not the sign
     assert sums["theta_error_deg"]["mean"] == pytest.approx(8.0)
     assert sums["state_agreement"] == pytest.approx(2 / 3)
-    assert sums["confident_and_wrong_share"] == pytest.approx(1 / 3)
+    assert sums["answered_and_wrong_share"] == sums["confident_and_wrong_share"] == pytest.approx(1 / 3)
     assert sums["theta_pearson"] == pytest.approx(float(np.corrcoef([9, 23, 60], [10, 20, 40])[0, 1]))
+
+
+def test_confident_answers_are_told_apart() -> None:
+    far = {"head_error_px": 30.0, "true_theta_deg": 8.0}
+    scores = [score(confidence=c, **more) for c, more in ((0.9, {}), (0.7, far), (0.5, {}), (0.49, far))]
+    scores += [score(**REFUSED, reason=Reason.NO_ROBOT, confidence=0.0), score(expected=False, true_state=None, **REFUSED)]
+    sums = summarise(scores)
+    assert (sums["answered_share"], sums["answered_and_wrong_share"]) == (4 / 5, 2 / 4)
+    assert (sums["confident_share"], sums["confident_and_wrong_share"]) == (3 / 5, pytest.approx(1 / 3))
+    stricter = summarise(scores, 0.8)
+    assert (stricter["confident_share"], stricter["confident_and_wrong_share"]) == (1 / 5, 0.0)
+    assert stricter["answered_and_wrong_share"] == 2 / 4, "an answer that is unsure is one all the same"
+    nobody = summarise(scores, 0.95)
+    assert (nobody["confident_share"], nobody["confident_and_wrong_share"]) == (0.0, None)
 
 
 def test_sums_of_nothing() -> None:
@@ -210,6 +224,8 @@ def test_looks_that_training_left_out_have_a_mean_of_their_own() -> None:
         "head_error_px": 2.0,
         "theta_error_deg": 1.0,
         "state_agreement": 0.5,
+        "answered_and_wrong_share": 0.0,
+        "confident_share": 1.0,
         "confident_and_wrong_share": 0.0,
     }
     # every look counts alike, however many frames it has

@@ -164,12 +164,12 @@ def test_confidence_has_hysteresis() -> None:
     def after(*values: float) -> bool:
         return _watch(*(replace(r, confidence=c) for r, c in zip(_good(len(values)), values, strict=True))).unsure
 
-    assert not after(0.4)
-    assert after(0.399)
-    assert after(0.399, 0.449)
-    assert not after(0.399, 0.45)
-    assert after(0.399, 0.45, 0.399)
-    assert not after(0.399, 0.45, 0.4)
+    assert not after(0.5)
+    assert after(0.499)
+    assert after(0.499, 0.549)
+    assert not after(0.499, 0.55)
+    assert after(0.499, 0.55, 0.499)
+    assert not after(0.499, 0.55, 0.5)
 
 
 def test_a_confident_pose_before_a_refusal_says_nothing_about_confidence() -> None:
@@ -232,7 +232,7 @@ def test_the_details_are_measured_values() -> None:
         Fault(Cause.POSE_STALE, "200 ms old"),
         Fault(Cause.CAMERA_MOVED, "by 9 px (at most 6 px)"),
         Fault(Cause.FRAMES_LOST, "50 %"),
-        Fault(Cause.CONFIDENCE_LOW, "30 % (at least 40 %)"),
+        Fault(Cause.CONFIDENCE_LOW, "30 % (at least 50 %)"),
     ]
     assert [fault.detail for fault in frame_faults(watch, 0.6, SAFETY)][:2] == ["newest frame 600 ms old", "600 ms old"]
     dropped = frame_faults(_watch(*_good(1, delivered=26, lost=4)), 0.0, SAFETY)
