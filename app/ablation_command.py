@@ -56,6 +56,8 @@ class Plan:
 
 def run_ablation(plan: Plan, *, as_json: bool) -> None:
     """Run it and print the tables; raises UserError. An interruption (Ctrl-C) prints what was measured until then."""
+    from core.perception.pipeline import open_pipeline
+
     if plan.folder is None and not plan.sequence:
         raise AblationError("nothing to measure on: give a labelled set (as synth writes it), --sequence N, or both")
     overrides = choose_model(plan.model)
@@ -80,7 +82,13 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
         named = {variant.name: variant.config for variant in make_variants(paper, ours)}
         chosen = {name: named[name] for name in (PAPER, f"{OURS} without {TRACKING}")} | {OURS: ours}
         result["stream"], interrupted = measure_streams(
-            chosen, pipeline_of, masks, frames=plan.sequence, phantoms=phantoms, seed=plan.seed
+            chosen,
+            pipeline_of,
+            masks,
+            live=None if plan.true_masks else lambda: open_pipeline(ours),
+            frames=plan.sequence,
+            phantoms=phantoms,
+            seed=plan.seed,
         )
     result["interrupted"] = interrupted
     _show(result, as_json, plan.out)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _FEED_MM_S = 12.0
 _START_MM = 35.0
 _WANDER = 0.6
+LIVE = f"{OURS}, as the window has it"
 
 
 def measure_streams(
@@ -24,17 +25,19 @@ def measure_streams(
     pipeline_of: Callable[[PerceptionConfig], Pipeline],
     masks: SameMasks,
     *,
+    live: Callable[[], Pipeline] | None,
     frames: int,
     phantoms: Sequence[str],
     seed: int,
 ) -> tuple[dict[str, Any] | None, bool]:
-    """The same frames of the twin, in order, through pipelines of all `configs`.
+    """The same frames of the twin, in order, through pipelines of all `configs`, and through one that looks as the window does.
 
     Parameters
     ----------
     configs : by the variant's name, ``OURS`` among them: its settings tell the truth.
     pipeline_of : makes a new pipeline that looks through `masks`.
     masks : what all pipelines share.
+    live : makes a new pipeline as the window has it, which looks for itself, mostly around the head; None: it is left out.
     frames : to be divided among the `phantoms`.
     seed : of the twin.
 
@@ -43,7 +46,8 @@ def measure_streams(
     The phantoms that were driven through and ``stream_figures`` by variant (None when there is none); whether it was interrupted.
     """
     each = -(-frames // len(phantoms))
-    streams: dict[str, list[list[StreamFrame]]] = {name: [] for name in configs}
+    names = [*configs, *([LIVE] if live is not None else [])]
+    streams: dict[str, list[list[StreamFrame]]] = {name: [] for name in names}
     driven: list[str] = []
     interrupted = False
     with progress_bar() as bar:
@@ -51,7 +55,9 @@ def measure_streams(
         try:
             for look, phantom in enumerate(phantoms):
                 pipelines = {name: pipeline_of(config) for name, config in configs.items()}
-                seen: dict[str, list[StreamFrame]] = {name: [] for name in configs}
+                if live is not None:
+                    pipelines[LIVE] = live()
+                seen: dict[str, list[StreamFrame]] = {name: [] for name in names}
                 for frame, row in _stream(phantom, look, each, seed, configs[OURS], masks):
                     for name, pipeline in pipelines.items():
                         seen[name].append(stream_frame(pipeline(frame), row))

@@ -16,6 +16,10 @@ _STREAM_COLUMNS = (
     ("frames", "frames"),
     ("answered_share", "answered"),
     ("state_agreement", "state agrees"),
+    ("theta_median_deg", "theta median, deg"),
+    ("theta_mean_deg", "theta mean, deg"),
+    ("head_median_px", "head median, px"),
+    ("wrong_share", "wrong"),
     ("swapped_frames", "head-tail swaps"),
     ("jumps", f"jumps > {JUMP_PX:.0f} px"),
     ("theta_lag_frames", "theta lag, frames"),
@@ -144,7 +148,7 @@ def _stream_cells(figures: dict[str, Any]) -> list[str]:
         value = figures[key]
         if value is None:
             cells.append("-")
-        elif key in ("answered_share", "state_agreement"):
+        elif key in ("answered_share", "state_agreement", "wrong_share"):
             cells.append(f"{100.0 * value:.1f} %")
         else:
             cells.append(f"{value:.2f}".replace("-", _MINUS) if isinstance(value, float) else str(value))

@@ -24,6 +24,8 @@ CELL_PX = 8
 """Pictures are compared by the means of cells of this size: noise averages out, an edge that moves by 3 px does not."""
 CHANGED_LEVELS = 8.0
 """Grey levels of 255. Noise of 20 levels moves a cell's mean by less than 3."""
+NOISE = 4.0
+"""In a noisier picture a cell has changed when it did by so many times as much as half of all do."""
 CHANGED_SHARE = 0.03
 """Of the cells outside the window. The robot's body, which slides along itself, is less."""
 
@@ -61,14 +63,23 @@ class Glances:
         """The next look is a whole one."""
         self._background = None
 
-    def choose(self, image: Image, captured_s: float) -> tuple[Background, Window] | None:
-        """The window (x, y, width, height) to look at in a working image and what is known of the rest, or None: all of it."""
+    @property
+    def cells(self) -> NDArray[np.float32]:
+        """Of the picture of the last ``choose``."""
+        assert self._cells is not None
+        return self._cells
+
+    def choose(self, image: Image, captured_s: float, refresh_s: float) -> tuple[Background, Window] | None:
+        """The window (x, y, width, height) to look at in a working image and what is known of the rest, or None: all of it.
+
+        `refresh_s`: the last whole look is no older than that.
+        """
         self._cells = cells_of(image)
         before, side = self._background, self._config.window_px
         height, width = image.shape[:2]
         if before is None or before.vessel.shape != (height, width) or side >= max(height, width):
             return None
-        if not 0.0 <= captured_s - before.captured_s <= self._config.refresh_s:
+        if not 0.0 <= captured_s - before.captured_s <= refresh_s:
             return None
         if not self._is_in_sight(before, captured_s, side / 2 - MARGIN_PX):
             return None
@@ -123,8 +134,21 @@ def cells_of(image: Image) -> NDArray[np.float32]:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
-def has_changed(before: NDArray[np.float32], now: NDArray[np.float32], window: Window) -> bool:
-    """Whether the picture outside the window is another one; a change of brightness or colour of all of it alike does not count."""
+def has_changed(
+    before: NDArray[np.float32],
+    now: NDArray[np.float32],
+    window: Window,
+    levels: float = CHANGED_LEVELS,
+    share: float = CHANGED_SHARE,
+) -> bool:
+    """Whether the picture outside the window is another one; a change of brightness or colour of all of it alike does not count.
+
+    Parameters
+    ----------
+    before, now : cells (h / 8, w / 8, 3) of both pictures.
+    window : where changes do not count.
+    levels, share : another picture is one of which more than such a share of cells has changed by more than so many grey levels.
+    """
     if before.shape != now.shape:
         return True
     outside = np.ones(now.shape[:2], np.bool_)
@@ -134,7 +158,8 @@ def has_changed(before: NDArray[np.float32], now: NDArray[np.float32], window: W
     if not len(difference):
         return True
     difference -= np.median(difference, axis=0)
-    return float(np.mean(np.abs(difference).max(axis=1) > CHANGED_LEVELS)) > CHANGED_SHARE
+    size = np.abs(difference).max(axis=1)
+    return float(np.mean(size > max(levels, NOISE * float(np.median(size))))) > share
 
 
 def look(segment: Segmenter, image: Image, window: Window, robot_probability: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -22,7 +22,8 @@ from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
 from core.perception.route_memory import RouteMemory
 from core.perception.second_look import MOST_LOOKS, SecondLook
-from core.perception.segmentation import Segmenter, Turned, open_second_look, open_segmenter, recognise, to_working
+from core.perception.segmentation import Recognised, Segmenter, Turned, open_second_look, open_segmenter, recognise, to_working
+from core.perception.standing_vessel import GATHERING_S, StandingVessel
 from core.perception.tracking import Memory, check_in_view, check_jump, recall, recall_ends, remember
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
@@ -87,7 +88,14 @@ class _Past:
         self.routes = RouteMemory(config)
         self.lookalikes = Lookalikes(config)
         self.glances = Glances(config)
+        self.standing = StandingVessel()
         self.unlike = False
+
+    @property
+    def refresh_s(self) -> float:
+        """The longest time between two whole looks."""
+        longest = self._config.refresh_s
+        return min(longest, GATHERING_S) if self.standing.is_gathering else longest
 
     def recall(self, captured_s: float) -> _Before:
         memory, config = self.memory, self._config
@@ -100,7 +108,7 @@ class _Past:
 
     def forget(self) -> None:
         self.memory, self.unlike = None, False
-        for part in (self.routes, self.lookalikes, self.glances):
+        for part in (self.routes, self.lookalikes, self.glances, self.standing):
             part.forget()
 
 
@@ -110,7 +118,8 @@ class Pipeline:
     A call perceives a frame of a stream: the last frames decide between near-equal paths, an impossible jump of the head is
     refused, and the state is steadied. ``perceive_single`` knows nothing of other frames and leaves the stream's memory alone;
     it may look with another `single` sight, which takes its time. With a `glance`, a sight that may be shown a part of a picture,
-    most frames of a stream are looked at around the robot's head only (``glance.py``).
+    most frames of a stream are looked at around the robot's head only (``glance.py``), and the others, each in another orientation,
+    tell together what is vessel (``standing_vessel.py``).
     """
 
     def __init__(
@@ -214,7 +223,8 @@ class Pipeline:
         with watch.stage("prepare"):
             image, scale_xy = to_working(frame.image, config.working_size_px)
             refusal = quality.check_image(image, config.quality)
-            chosen = past.glances.choose(image, frame.captured_s) if past and self._glance and refusal is None else None
+            has_windows = past is not None and self._glance is not None and refusal is None
+            chosen = past.glances.choose(image, frame.captured_s, past.refresh_s) if past and has_windows else None
         scene = Scene(frame.index, frame.captured_s, (width, height), scale_xy[0 if width >= height else 1], scale_xy=scale_xy)
         if refusal is not None:
             return replace(scene, refusal=refusal)
@@ -242,11 +252,17 @@ class Pipeline:
 
     def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch, past: _Past | None) -> Scene:
         """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
+        standing = self._standing_vessel(past)
         with watch.stage("network"):
-            vessel_probability, robot_probability, signature = recognise(sight.segment, [image])[0]
+            if standing is None:
+                vessel_probability, robot_probability, signature = recognise(sight.segment, [image])[0]
+            else:
+                vessel_probability, robot_probability, signature = _recognise_turned(sight.segment, image, standing)
         if (broken := quality.check_finite(vessel_probability, robot_probability)) is not None:
             return _unseen(scene, vessel_probability, robot_probability, broken)
         with watch.stage("masks"):
+            if standing is not None:
+                vessel_probability = standing.add(vessel_probability)
             found = masks.clean(vessel_probability, robot_probability, self._config)
             if past is not None:
                 found = replace(found, robot=past.lookalikes.without(found.robot, image, scene.captured_s))
@@ -255,6 +271,15 @@ class Pipeline:
             if known is not None and known.working_size_px == self._config.working_size_px and found.vessel.any():
                 scene = replace(scene, novelty=known.novelty(signature) if signature is not None else None)
         return self._draw(scene, found, watch)
+
+    def _standing_vessel(self, past: _Past | None) -> StandingVessel | None:
+        """What earlier whole looks at this picture have told of its vessel; None: every look tells it alone."""
+        if past is None or self._glance is None:
+            return None
+        if past.unlike:  # whether it still is, only the picture as it is tells
+            past.standing.forget()
+        past.standing.meet(past.glances.cells)
+        return past.standing
 
     def _draw(self, scene: Scene, found: Masks, watch: _Stopwatch) -> Scene:
         """Skeletons and vessel graph of the masks found."""
@@ -385,6 +410,12 @@ class Pipeline:
         if bare.refusal is not None or bare.path is None or bare.robot_vector is None or bare.vessel_vector is None:
             return None
         return bare.path.head, measure(bare.robot_vector, bare.vessel_vector, self._config.pose).theta_signed_deg
+
+
+def _recognise_turned(segmenter: Segmenter, image: Image, standing: StandingVessel) -> Recognised:
+    """``recognise`` in the orientation whose turn it is. Only the picture as it is tells of what kind it is."""
+    vessel, robot, signature = recognise(segmenter, [standing.turned(image)])[0]
+    return standing.upright(vessel), standing.upright(robot), signature if standing.is_upright else None
 
 
 def _unseen(scene: Scene, vessel: NDArray[np.float32], robot: NDArray[np.float32], why: Refusal) -> Scene:

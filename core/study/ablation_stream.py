@@ -1,4 +1,4 @@
-"""How steady perception is in a stream: swaps of head and tail, jumps of the head, the lag and the jitter of theta."""
+"""How true and steady perception is in a stream: errors, swaps of head and tail, the head's jumps, the lag and jitter of theta."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from core.types import Point, Scene
 
 JUMP_PX = 20.0
+WRONG_DEG, WRONG_PX = 10.0, 15.0
 LAGS = np.arange(-4.0, 8.01, 0.25)
 """Lags that are tried, in frames."""
 LAG_CAP_DEG = 10.0
@@ -66,20 +67,28 @@ def stream_figures(streams: Sequence[Sequence[StreamFrame]]) -> dict[str, float 
     Returns
     -------
     ``frames`` with a true pose; ``answered_share``; ``state_agreement`` with the true state, which knows no hysteresis;
-    ``swapped_frames``, answers that took the tail for the head; ``jumps``, answers
-    whose head moved by more than ``JUMP_PX`` other than the true head did since the answer before; ``theta_lag_frames``, the delay
-    of the true theta that fits the found one best (None: it moved too little to tell); ``theta_jitter_deg`` and ``head_jitter_px``,
-    the robust standard deviation of the error's change from frame to frame; ``state_changes`` and ``true_state_changes``.
+    ``theta_median_deg``, ``theta_mean_deg``, ``head_median_px`` of the absolute errors; ``wrong_share`` of the answers, by more
+    than 10 degrees or 15 px; ``swapped_frames``, answers that took the tail for the head; ``jumps``, answers whose head moved by
+    more than ``JUMP_PX`` other than the true head did since the answer before; ``theta_lag_frames``, the delay of the true theta
+    that fits the found one best (None: it moved too little to tell); ``theta_jitter_deg`` and ``head_jitter_px``, the robust
+    standard deviation of the error's change from frame to frame; ``state_changes`` and ``true_state_changes``.
     """
     frames = [frame for stream in streams for frame in stream if frame.true_state is not None]
     answered = [frame for frame in frames if frame.state is not None]
     head_moves = [move for stream in streams for move in _head_moves(stream)]
     theta_moves = [_turn(b, a) for stream in streams for a, b in _pairs(_theta_errors(stream))]
     steady = [move for move in head_moves if move <= JUMP_PX]
+    errors = np.array([error for stream in streams for error in _errors(stream)], np.float64).reshape(-1, 2)
+    theta, head = errors.T
+    is_wrong = (theta > WRONG_DEG) | (head > WRONG_PX)
     return {
         "frames": len(frames),
         "answered_share": len(answered) / len(frames) if frames else None,
         "state_agreement": sum(f.state == f.true_state for f in answered) / len(answered) if answered else None,
+        "theta_median_deg": float(np.median(theta)) if len(theta) else None,
+        "theta_mean_deg": float(theta.mean()) if len(theta) else None,
+        "head_median_px": float(np.median(head)) if len(head) else None,
+        "wrong_share": float(is_wrong.mean()) if len(theta) else None,
         "swapped_frames": sum(frame.is_swapped for frame in answered),
         "jumps": len(head_moves) - len(steady),
         "theta_lag_frames": _lag(streams),
@@ -105,6 +114,16 @@ def _turn(to: float, since: float) -> float:
 def _spread(changes: Sequence[float], scale: float) -> float | None:
     """Standard deviation from the median size of changes: `scale` is 1.4826 for a number, 1/1.1774 for the length of a 2-D step."""
     return scale * float(np.median(np.abs(changes))) if changes else None
+
+
+def _errors(stream: Sequence[StreamFrame]) -> list[tuple[float, float]]:
+    """By how much theta (degrees) and the head (px) of each answer are off."""
+    thetas = _theta_errors(stream)
+    return [
+        (abs(theta), _gap(frame.head, frame.true_head))
+        for theta, frame in zip(thetas, stream, strict=True)
+        if theta is not None and frame.head is not None and frame.true_head is not None
+    ]
 
 
 def _head_moves(stream: Sequence[StreamFrame]) -> list[float]:

@@ -89,6 +89,14 @@ def test_tracking_is_measured_on_a_stream_of_the_twin() -> None:
         assert row["figures"]["swapped_frames"] == row["figures"]["jumps"] == 0
 
 
+def test_a_stream_is_also_perceived_as_the_window_does(capsys: pytest.CaptureFixture[str]) -> None:
+    run_ablation(Plan(None, sequence=6, phantoms=("tree",)), as_json=True)
+    rows = json.loads(capsys.readouterr().out)["stream"]["rows"]
+    assert [row["name"] for row in rows] == ["paper, literally", "ours without tracking", "ours", "ours, as the window has it"]
+    assert rows[-1]["figures"]["frames"] == 6
+    assert rows[-1]["figures"]["theta_median_deg"] < 5.0
+
+
 def test_an_interruption_shows_what_was_measured_until_then(
     frames: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -320,6 +320,9 @@ def test_swaps_jumps_and_changes_are_counted() -> None:
     assert found["frames"] == 7
     assert found["answered_share"] == 6 / 7
     assert found["state_agreement"] == 4 / 6
+    assert (found["theta_median_deg"], found["theta_mean_deg"]) == (0.0, 180.0 / 6)
+    assert found["head_median_px"] == 5.0  # of 0, 10, 31, 100, 0 and 0
+    assert found["wrong_share"] == 2 / 6, "the one that jumped, and the one that is turned round"
     assert found["swapped_frames"] == 1
     assert found["jumps"] == 3
     assert found["state_changes"] == 2  # C B C within the first stream; the second stands alone
@@ -343,7 +346,8 @@ def test_the_lag_of_theta_is_found(delay: float) -> None:
 
 def test_no_lag_is_told_where_nothing_turns() -> None:
     assert stream_figures([[seen(3.0, 3.0)] * 80])["theta_lag_frames"] is None
-    assert stream_figures([])["theta_lag_frames"] is None
+    nothing = stream_figures([])
+    assert [nothing[key] for key in ("theta_lag_frames", "theta_median_deg", "head_median_px", "wrong_share")] == [None] * 4
 
 
 def test_jitter_is_the_spread_of_the_errors_change() -> None:

@@ -87,18 +87,17 @@ def test_a_window_tells_the_same_pose_as_the_whole_picture(pipeline: Pipeline) -
         np.testing.assert_allclose(part.path.points, all_of_it.path.points)
 
 
-def test_after_refresh_s_all_of_it_is_looked_at_again(pipeline: Pipeline, network: Colours) -> None:
-    for index in range(12):
-        see(pipeline, 0.1 * index, picture(300))
-    assert network.shown == [WHOLE, *[WINDOW] * 10, WHOLE]
+def test_after_refresh_s_all_of_it_is_looked_at_again_and_sooner_until_all_orientations_are_seen(pipeline: Pipeline) -> None:
+    whole = [step for step in range(40) if see(pipeline, 0.125 * step, picture(300)).window is None]
+    assert whole == [0, 5, 10, 15, 24, 33], "more than 0.5 s three times, then more than 1 s"
 
 
 def test_a_slow_machine_comes_back_to_windows(pipeline: Pipeline, network: Colours) -> None:
     """A whole look that takes longer than the head needs to leave the window would make the next one whole, too, and so on."""
     for index in range(4):
-        see(pipeline, 0.3 * index, picture(300 + 5 * index))
+        see(pipeline, 0.2 * index, picture(300 + 5 * index))
     assert network.shown == [WHOLE, WHOLE, WINDOW, WINDOW]
-    see(pipeline, 1.6, picture(320))
+    see(pipeline, 1.4, picture(320))
     assert network.shown[-1] == WHOLE, "later than usual"
 
 
@@ -189,7 +188,7 @@ def test_a_windows_inner_edges_are_left_out_and_the_pictures_are_not() -> None:
 
 def test_a_stream_that_is_wound_back_is_looked_at_whole() -> None:
     glances = Glances(CONFIG.tracking)
-    assert glances.choose(picture(300), 1.0) is None
+    assert glances.choose(picture(300), 1.0, 1.0) is None
     network = Colours()
     pipeline = Pipeline(network, CONFIG, glance=Sight(network))
     see(pipeline, 5.0, picture(300))
@@ -218,7 +217,11 @@ def test_a_window_tells_nothing_of_the_kind_and_who_is_refused_for_it_is_looked_
     assert [scene.novelty is None for scene in scenes] == [False, True, True]
     assert all(scene.pose is not None for scene in scenes)
     network.signature = np.full(4, 50.0, np.float32)
-    assert see(pipeline, 0.2, picture(312)).pose is not None, "it is asked for again with the next whole look"
-    later = [see(pipeline, 2.0 + 0.05 * index, picture(312)) for index in range(2)]
-    assert [scene.refusal.reason for scene in later if scene.refusal] == [Reason.UNLIKE_TRAINING] * 2
-    assert [scene.window for scene in later] == [None, None]
+    assert see(pipeline, 0.2, picture(312)).pose is not None, "it is asked for again with the next look at the picture as it is"
+    later = [see(pipeline, 2.0 + 2.0 * index, picture(312)) for index in range(6)]
+    assert [scene.window for scene in later] == [None] * 6
+    assert [scene.novelty is None for scene in later] == [True, True, True, False, False, False]
+    reasons = [scene.refusal.reason if scene.refusal else None for scene in later]
+    assert reasons == [None] * 3 + [Reason.UNLIKE_TRAINING] * 3, "and then with every look"
+    changed = see(pipeline, 20.0, picture(312, shift=(0, 6)))
+    assert changed.novelty is not None, "another picture is looked at as it is first"
