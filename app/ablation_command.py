@@ -85,7 +85,7 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
             chosen,
             pipeline_of,
             masks,
-            live=None if plan.true_masks else lambda: open_pipeline(ours),
+            live=None if plan.true_masks else open_pipeline(ours),
             frames=plan.sequence,
             phantoms=phantoms,
             seed=plan.seed,

@@ -25,7 +25,7 @@ def measure_streams(
     pipeline_of: Callable[[PerceptionConfig], Pipeline],
     masks: SameMasks,
     *,
-    live: Callable[[], Pipeline] | None,
+    live: Pipeline | None,
     frames: int,
     phantoms: Sequence[str],
     seed: int,
@@ -37,7 +37,7 @@ def measure_streams(
     configs : by the variant's name, ``OURS`` among them: its settings tell the truth.
     pipeline_of : makes a new pipeline that looks through `masks`.
     masks : what all pipelines share.
-    live : makes a new pipeline as the window has it, which looks for itself, mostly around the head; None: it is left out.
+    live : a pipeline as the window has it, which looks for itself, mostly around the head; None: it is left out.
     frames : to be divided among the `phantoms`.
     seed : of the twin.
 
@@ -56,7 +56,8 @@ def measure_streams(
             for look, phantom in enumerate(phantoms):
                 pipelines = {name: pipeline_of(config) for name, config in configs.items()}
                 if live is not None:
-                    pipelines[LIVE] = live()
+                    live.reset()
+                    pipelines[LIVE] = live
                 seen: dict[str, list[StreamFrame]] = {name: [] for name in names}
                 for frame, row in _stream(phantom, look, each, seed, configs[OURS], masks):
                     for name, pipeline in pipelines.items():

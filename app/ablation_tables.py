@@ -57,7 +57,7 @@ def difference_table(result: dict[str, Any]) -> Table:
 
 
 def stream_table(stream: dict[str, Any]) -> Table:
-    """Steadiness in a stream, one row per variant."""
+    """Errors and steadiness in a stream, one row per variant."""
     table = Table(title=f"streams of {stream['frames_each']} frames in each of: {', '.join(stream['phantoms'])}")
     table.add_column("variant", no_wrap=True)
     for _, title in _STREAM_COLUMNS:

@@ -147,13 +147,16 @@ def ablation(
     json: JsonOption = False,
     out: Annotated[Path | None, typer.Option(help="folder for ablation.json, ablation.md and ablation_frames.csv")] = None,
     true_masks: Annotated[bool, typer.Option("--true-masks", help="the true masks instead of the network's")] = False,
-    sequence: Annotated[int, typer.Option(min=0, max=100_000, help="also measure tracking on so many frames of the twin")] = 0,
+    sequence: Annotated[int, typer.Option(min=0, max=100_000, help="also measure streams, of so many frames of the twin")] = 0,
     phantom: Annotated[list[str] | None, typer.Option(help="named phantom of these frames; default: all, in turn")] = None,
     seed: Annotated[int, typer.Option(min=0, help="of the bootstrap and of the twin")] = 0,
     model: ModelOption = None,
     config: ConfigOption = None,
 ) -> None:
-    """What each step is worth: from the paper taken literally to ours, on the same masks of the same frames."""
+    """What each step is worth: from the paper taken literally to ours, on the same masks of the same frames.
+
+    And, in streams, perception as the window has it, which looks for itself.
+    """
     from app.ablation_command import Plan, run_ablation
 
     check_masks(model, true_masks=true_masks)

@@ -94,7 +94,7 @@ class ScenePanels(QWidget):
         """`why_none` is said where the scene itself has no reason for being without."""
         if tick.scene.refusal is not None:
             why_none = tr(REASON_TEXT[tick.scene.refusal.reason].title).lower()
-        self.advice.show_advice(tick.advice, self._state, why_none, renew_text=renew_text)
+        self.advice.show_advice(tick.advice, self._state, why_none, is_unsure=self.badge.is_unsure, renew_text=renew_text)
 
     def _blank_dials(self, title: str, why: str) -> None:
         """Nothing is known now, and why."""

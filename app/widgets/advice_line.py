@@ -20,7 +20,7 @@ _CHEVRONS = {Speed.STOP: 0, Speed.SLOWEST: 1, Speed.SLOW: 2, Speed.MODERATE: 3, 
 class AdviceLine(QWidget):
     """An arrow turned by the steering angle, the speed as word and as one to four chevrons, the degrees and the reason.
 
-    Without advice it is blank and says why: an old advice is never left standing.
+    Without advice it is blank and says why: an old advice is never left standing. Of a pose that is unsure it says so.
     """
 
     def __init__(self) -> None:
@@ -28,6 +28,7 @@ class AdviceLine(QWidget):
         self._advice: Advice | None = None
         self._state: PoseState | None = None
         self._why_none = tr("waiting for the first picture")
+        self._is_unsure = False
         self.setFixedHeight(68)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(tr("Advice"))
@@ -38,19 +39,31 @@ class AdviceLine(QWidget):
         """Headline and reason as shown."""
         if self._advice is None:
             return tr("No advice: {why}", why=tr_text(self._why_none))
-        return f"{advice_headline(self._advice)}: {tr_text(self._advice.why)}"
+        return f"{advice_headline(self._advice)}: {self._why(self._advice)}"
 
     def sizeHint(self) -> QSize:
         return QSize(600, 68)
 
-    def show_advice(self, advice: Advice | None, state: PoseState | None, why_none: str, *, renew_text: bool = True) -> None:
-        """The advice for `state`, or why there is none."""
+    def show_advice(
+        self,
+        advice: Advice | None,
+        state: PoseState | None,
+        why_none: str,
+        *,
+        is_unsure: bool = False,
+        renew_text: bool = True,
+    ) -> None:
+        """The advice for `state`, whose pose may be unsure, or why there is none."""
         changed = (advice is None) is not (self._advice is None) or state is not self._state or why_none != self._why_none
         if not changed and not renew_text:
             return
-        self._advice, self._state, self._why_none = advice, state, why_none
+        self._advice, self._state, self._why_none, self._is_unsure = advice, state, why_none, is_unsure
         self.setAccessibleDescription(self.text)
         self.update()
+
+    def _why(self, advice: Advice) -> str:
+        why = tr_text(advice.why)
+        return tr("the pose is unsure; {why}", why=why) if self._is_unsure else why
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -84,10 +97,10 @@ class AdviceLine(QWidget):
         painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), headline, int(width)))
         place = Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft
         painter.drawText(QRectF(left, frame.top() + 6, width, 34), place, headline)
-        painter.setPen(QColor(palette.TEXT_DIM))
+        painter.setPen(QColor(palette.FAULT if self._is_unsure else palette.TEXT_DIM))
         why_font = theme.font(15)
         painter.setFont(why_font)
-        why = theme.elide(why_font, tr_text(advice.why), int(width))
+        why = theme.elide(why_font, self._why(advice), int(width))
         painter.drawText(QRectF(left, frame.top() + 40, width, 22), place, why)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
@@ -17,8 +18,6 @@ from core.config import PoseConfig
 from core.types import PoseState, Scene
 
 _HEIGHT = 104
-_SURE_AGAIN = 0.05
-"""An answer that was unsure is sure again only when it is by so much more than it has to be."""
 _WRAPPED = int(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap)
 
 
@@ -111,9 +110,9 @@ class StateBadge(QWidget):
         """Whether an answer is unsure, and how sure it is in words."""
         if confidence is None:
             return False, ""
-        is_unsure = confidence < self._confident_from + (_SURE_AGAIN if self._is_unsure else 0.0)
-        # Never 100 %: nothing is as sure as that.
-        percent = min(int(100 * confidence), 99)
+        is_unsure = confidence < self._confident_from
+        # Rounded down, so that it says what was decided; and never 100 %: nothing is as sure as that.
+        percent = min(math.floor(100.0 * confidence + 1e-9), 99)
         return is_unsure, tr("unsure: {percent} %", percent=percent) if is_unsure else tr("{percent} % sure", percent=percent)
 
     def paintEvent(self, event: QPaintEvent) -> None:

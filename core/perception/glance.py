@@ -9,6 +9,7 @@ frame without an answer. Then the next look is a whole one.
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 
 import cv2
@@ -22,10 +23,13 @@ from core.types import Image, Mask, Point, Scene, VesselGraph, Window
 
 CELL_PX = 8
 """Pictures are compared by the means of cells of this size: noise averages out, an edge that moves by 3 px does not."""
-CHANGED_LEVELS = 8.0
-"""Grey levels of 255. Noise of 20 levels moves a cell's mean by less than 3."""
+CHANGED_LEVELS, MOST_LEVELS = 8.0, 24.0
+"""Grey levels of 255. White noise of 20 levels moves a cell's mean by less than 3, but the grain of an X-ray by 7: there it takes
+more, up to the second."""
 NOISE = 4.0
-"""In a noisier picture a cell has changed when it did by so many times as much as half of all do."""
+"""Noise alone hardly makes a cell differ by so many times what they differ by on average."""
+NOISE_FRAMES = 64
+"""Noise is what two frames in succession have differed by, of so many the lower quartile: what moves for a while does not count."""
 CHANGED_SHARE = 0.03
 """Of the cells outside the window. The robot's body, which slides along itself, is less."""
 
@@ -58,10 +62,14 @@ class Glances:
         self._config = config
         self._background: Background | None = None
         self._cells: NDArray[np.float32] | None = None
+        self._steps: deque[float] = deque(maxlen=NOISE_FRAMES)
+        self._windows = 0
+        self._is_due = self._has_changed = False
 
     def forget(self) -> None:
         """The next look is a whole one."""
-        self._background = None
+        self._background = self._cells = None
+        self._steps.clear()
 
     @property
     def cells(self) -> NDArray[np.float32]:
@@ -69,22 +77,41 @@ class Glances:
         assert self._cells is not None
         return self._cells
 
+    @property
+    def noise(self) -> float:
+        """By how many grey levels cells differ on average where nothing moves; 0 until that is known."""
+        return sorted(self._steps)[len(self._steps) // 4] if self._steps else 0.0
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the last ``choose`` wanted all of it for no other reason than that it was time, after one window at least."""
+        return self._is_due
+
+    @property
+    def has_changed(self) -> bool:
+        """Whether the last ``choose`` saw another picture than the last whole look did."""
+        return self._has_changed
+
     def choose(self, image: Image, captured_s: float, refresh_s: float) -> tuple[Background, Window] | None:
         """The window (x, y, width, height) to look at in a working image and what is known of the rest, or None: all of it.
 
         `refresh_s`: the last whole look is no older than that.
         """
-        self._cells = cells_of(image)
+        last, self._cells = self._cells, cells_of(image)
+        if last is not None and last.shape == self._cells.shape:
+            self._steps.append(float(differences(last, self._cells).mean()))
+        self._is_due = self._has_changed = False
         before, side = self._background, self._config.window_px
         height, width = image.shape[:2]
         if before is None or before.vessel.shape != (height, width) or side >= max(height, width):
             return None
-        if not 0.0 <= captured_s - before.captured_s <= refresh_s:
-            return None
-        if not self._is_in_sight(before, captured_s, side / 2 - MARGIN_PX):
-            return None
         window = window_around(before.head, (width, height), side)
-        return None if has_changed(before.cells, self._cells, window) else (before, window)
+        self._has_changed = has_changed(before.cells, self._cells, window, self.noise)
+        age_s = captured_s - before.captured_s
+        if age_s < 0.0 or self._has_changed or not self._is_in_sight(before, captured_s, side / 2 - MARGIN_PX):
+            return None
+        self._is_due = age_s > refresh_s and self._windows > 0
+        return (before, window) if age_s <= refresh_s else None
 
     def _is_in_sight(self, before: Background, captured_s: float, reach_px: float) -> bool:
         """Whether the head must still be in its window.
@@ -99,6 +126,7 @@ class Glances:
     def remember(self, scene: Scene) -> None:
         """Keep what the frame of the last ``choose`` showed; one without an answer leaves nothing that could be relied on."""
         before = self._background
+        self._windows = self._windows + 1 if scene.window is not None else 0
         if scene.pose is None or scene.path is None or scene.masks is None or scene.skeletons is None or scene.vessel_graph is None:
             self._background = None
         elif scene.window is None:
@@ -134,20 +162,21 @@ def cells_of(image: Image) -> NDArray[np.float32]:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
-def has_changed(
-    before: NDArray[np.float32],
-    now: NDArray[np.float32],
-    window: Window,
-    levels: float = CHANGED_LEVELS,
-    share: float = CHANGED_SHARE,
-) -> bool:
+def differences(before: NDArray[np.float32], now: NDArray[np.float32]) -> NDArray[np.float32]:
+    """By how many grey levels each cell (h / 8, w / 8) differs, but for what all of them do alike."""
+    difference = now - before
+    difference -= np.median(difference, axis=(0, 1))
+    return np.asarray(np.abs(difference).max(axis=2))
+
+
+def has_changed(before: NDArray[np.float32], now: NDArray[np.float32], window: Window, noise: float = 0.0) -> bool:
     """Whether the picture outside the window is another one; a change of brightness or colour of all of it alike does not count.
 
     Parameters
     ----------
     before, now : cells (h / 8, w / 8, 3) of both pictures.
     window : where changes do not count.
-    levels, share : another picture is one of which more than such a share of cells has changed by more than so many grey levels.
+    noise : by how many grey levels cells differ on average without any change.
     """
     if before.shape != now.shape:
         return True
@@ -158,8 +187,8 @@ def has_changed(
     if not len(difference):
         return True
     difference -= np.median(difference, axis=0)
-    size = np.abs(difference).max(axis=1)
-    return float(np.mean(size > max(levels, NOISE * float(np.median(size))))) > share
+    level = min(max(CHANGED_LEVELS, NOISE * noise), MOST_LEVELS)
+    return float(np.mean(np.abs(difference).max(axis=1) > level)) > CHANGED_SHARE
 
 
 def look(segment: Segmenter, image: Image, window: Window, robot_probability: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -55,13 +55,15 @@ class Sight:
     """A network as it is asked, and what its evidence means (None: not calibrated).
 
     `swings`: how steady an answer is belongs to its evidence. It takes some four times as long as the geometry alone.
-    `familiarity`: what kind of pictures the network knows (None: nobody has told).
+    `familiarity`: what kind of pictures the network knows (None: nobody has told). `all_orientations`: it looks at each picture in
+    all of them.
     """
 
     segment: Segmenter
     calibration: Calibration | None = None
     swings: bool = False
     familiarity: Familiarity | None = None
+    all_orientations: bool = False
 
 
 _EDGE_PX = 4
@@ -223,8 +225,9 @@ class Pipeline:
         with watch.stage("prepare"):
             image, scale_xy = to_working(frame.image, config.working_size_px)
             refusal = quality.check_image(image, config.quality)
-            has_windows = past is not None and self._glance is not None and refusal is None
-            chosen = past.glances.choose(image, frame.captured_s, past.refresh_s) if past and has_windows else None
+            chosen = None
+            if past is not None and self._glance is not None and refusal is None:
+                chosen = past.glances.choose(image, frame.captured_s, past.refresh_s)
         scene = Scene(frame.index, frame.captured_s, (width, height), scale_xy[0 if width >= height else 1], scale_xy=scale_xy)
         if refusal is not None:
             return replace(scene, refusal=refusal)
@@ -261,8 +264,8 @@ class Pipeline:
         if (broken := quality.check_finite(vessel_probability, robot_probability)) is not None:
             return _unseen(scene, vessel_probability, robot_probability, broken)
         with watch.stage("masks"):
-            if standing is not None:
-                vessel_probability = standing.add(vessel_probability)
+            if standing is not None and past is not None:
+                vessel_probability = standing.add(vessel_probability, robot_probability, past.glances.cells, past.glances.noise)
             found = masks.clean(vessel_probability, robot_probability, self._config)
             if past is not None:
                 found = replace(found, robot=past.lookalikes.without(found.robot, image, scene.captured_s))
@@ -273,12 +276,15 @@ class Pipeline:
         return self._draw(scene, found, watch)
 
     def _standing_vessel(self, past: _Past | None) -> StandingVessel | None:
-        """What earlier whole looks at this picture have told of its vessel; None: every look tells it alone."""
-        if past is None or self._glance is None:
+        """What earlier whole looks have told of the vessel, ready for another one; None: every look tells it alone.
+
+        Only looks that come between windows are turned: one orientation after the other would make the head tremble.
+        """
+        if past is None or self._glance is None or self._glance.all_orientations:
             return None
-        if past.unlike:  # whether it still is, only the picture as it is tells
+        if past.glances.has_changed:
             past.standing.forget()
-        past.standing.meet(past.glances.cells)
+        past.standing.begin(is_turned=past.glances.is_due)
         return past.standing
 
     def _draw(self, scene: Scene, found: Masks, watch: _Stopwatch) -> Scene:
@@ -413,9 +419,9 @@ class Pipeline:
 
 
 def _recognise_turned(segmenter: Segmenter, image: Image, standing: StandingVessel) -> Recognised:
-    """``recognise`` in the orientation whose turn it is. Only the picture as it is tells of what kind it is."""
+    """``recognise`` in the orientation whose turn it is."""
     vessel, robot, signature = recognise(segmenter, [standing.turned(image)])[0]
-    return standing.upright(vessel), standing.upright(robot), signature if standing.is_upright else None
+    return standing.upright(vessel), standing.upright(robot), signature
 
 
 def _unseen(scene: Scene, vessel: NDArray[np.float32], robot: NDArray[np.float32], why: Refusal) -> Scene:
@@ -478,7 +484,7 @@ def open_sights(config: PerceptionConfig, *, recalibrating: bool = False) -> tup
     surest = info.calibration_mirrored or info.calibration
     swings = recalibrating or (surest is not None and surest.needs_swings)
     known = info.familiarity if not recalibrating else None
-    return Sight(plain, info.calibration, familiarity=known), Sight(turned, surest, swings, known)
+    return Sight(plain, info.calibration, familiarity=known), Sight(turned, surest, swings, known, all_orientations=True)
 
 
 class NoPerception:

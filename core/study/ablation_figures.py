@@ -13,15 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.study.ablation import Variant
-from core.study.accuracy import FrameScore
+from core.study.accuracy import WRONG_DEG, WRONG_PX, FrameScore
 
 RESAMPLES = 1000
 MIN_DEFINED = 0.9
 """A difference that is undefined in more resamples than the rest of these (a row that hardly answers) has no interval."""
 MIN_GROUPS = 10
 """Frames of one phantom are alike, so whole phantoms are drawn; with fewer than this many of them there is no interval."""
-WRONG_DEG, WRONG_PX = 10.0, 15.0
-"""An answer is wrong beyond either of these errors, as in ``accuracy.summarise``."""
 
 
 @dataclass(frozen=True, slots=True)

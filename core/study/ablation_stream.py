@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from core.study.accuracy import WRONG_DEG, WRONG_PX
 from core.types import Point, Scene
 
 JUMP_PX = 20.0
-WRONG_DEG, WRONG_PX = 10.0, 15.0
 LAGS = np.arange(-4.0, 8.01, 0.25)
 """Lags that are tried, in frames."""
 LAG_CAP_DEG = 10.0

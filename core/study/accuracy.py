@@ -16,6 +16,8 @@ from core.perception.pipeline import Pipeline
 from core.study.classification import kappa
 from core.types import Frame, Image, Mask, Point, Reason, Scene
 
+WRONG_DEG, WRONG_PX = 10.0, 15.0
+"""An answer is wrong whose theta or whose head is off by more."""
 _CONFIDENT_FROM = QualityConfig().confident_from
 
 
@@ -138,7 +140,7 @@ def _at_size(mask: Mask, size: tuple[int, int]) -> Mask:
 
 
 def _is_wrong(score: FrameScore) -> bool:
-    return score.theta_error_deg is not None and (abs(score.theta_error_deg) > 10 or (score.head_error_px or 0) > 15)
+    return score.theta_error_deg is not None and (abs(score.theta_error_deg) > WRONG_DEG or (score.head_error_px or 0) > WRONG_PX)
 
 
 def _statistics(values: Sequence[float]) -> dict[str, float] | None:
@@ -151,8 +153,8 @@ def _statistics(values: Sequence[float]) -> dict[str, float] | None:
 def summarise(scores: Sequence[FrameScore], confident_from: float = _CONFIDENT_FROM) -> dict[str, Any]:
     """Sums over frames: "expected" are those whose truth has a pose, "empty" those without any robot, "poseless" the rest.
 
-    Of frames that nobody has measured only the masks count. "Wrong" is an answer whose theta is off by more than 10 degrees or its
-    head by more than 15 px, "confident" one that is at least as sure as `confident_from`.
+    Of frames that nobody has measured only the masks count. "Wrong" is an answer beyond ``WRONG_DEG`` or ``WRONG_PX``, "confident"
+    one that is at least as sure as `confident_from`.
     """
     expected = [s for s in scores if s.expected]
     pairs = [(s.true_state, s.state) for s in expected if s.true_state is not None and s.state is not None]

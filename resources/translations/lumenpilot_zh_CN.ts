@@ -4960,8 +4960,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/tool_tips.py"/>
-        <source>Chance that the answer is right (theta within 5 degrees, head within 15 px), as learnt on pictures with known truth. Below 0.30 there is no answer but a reason; below 0.50 it is shown as unsure, and its shape is not filled.</source>
-        <translation>结果正确的概率（θ 误差 5 度内，头端 15 px 内），由已知真值的图像学得。低于 0.30 时不给结果，只给原因；低于 0.50 时显示为“不确定”，其形状不填充。</translation>
+        <source>Chance that the answer is right (theta within 5 degrees, head within 15 px), as learnt on pictures with known truth. Where it is low, the answer is shown as unsure, and its shape is not filled; where it is lower, there is a reason instead.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <location filename="../../app/tool_tips.py"/>
@@ -5512,6 +5512,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/widgets/advice_line.py"/>
         <source>No advice: {why}</source>
         <translation>无建议：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/advice_line.py"/>
+        <source>the pose is unsure; {why}</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <location filename="../../app/widgets/alert_row.py"/>

@@ -98,15 +98,25 @@ def test_badge_says_how_sure_it_is_and_leaves_the_shape_of_an_unsure_state_open(
     assert _shown(badge, 0.52) == (False, "52 % sure"), "after a refusal it begins anew"
 
 
-def test_an_unsure_badge_does_not_flicker_at_the_limit(qtbot: QtBot) -> None:
-    badge = StateBadge(LIMITS, 0.5)
+def test_the_limit_decides_whether_a_badge_is_unsure_and_nothing_that_was_before(qtbot: QtBot) -> None:
+    badge = StateBadge(LIMITS, 0.57)
     qtbot.addWidget(badge)
-    assert [_shown(badge, confidence)[0] for confidence in (0.51, 0.5, 0.49, 0.51, 0.54, 0.56, 0.51)] == [
-        False, False, True, True, True, False, False
-    ]  # fmt: skip
-    assert _shown(badge, 0.1, renew_text=False) == (False, "51 % sure"), "nor between two renewals of the texts"
+    assert _shown(badge, 0.57) == (False, "57 % sure"), "0.57 is a little less than that in binary"
+    assert _shown(badge, 0.569) == (True, "unsure: 56 %")
+    assert _shown(badge, 0.57) == (False, "57 % sure")
+    assert _shown(badge, 0.1, renew_text=False) == (False, "57 % sure"), "texts are renewed together"
     badge.set_limits(LIMITS, 0.8)
     assert _shown(badge, 0.79)[0]
+
+
+def test_advice_on_a_pose_that_is_unsure_says_so(qtbot: QtBot) -> None:
+    line = AdviceLine()
+    qtbot.addWidget(line)
+    advice = Advice(Speed.SLOWEST, 1.0, -18.4, "moving away")
+    line.show_advice(advice, PoseState.C, "", is_unsure=True)
+    assert line.text == line.accessibleDescription() == "Slowest, 18° left: the pose is unsure; moving away"
+    line.show_advice(advice, PoseState.C, "")
+    assert line.text == "Slowest, 18° left: moving away"
 
 
 def _share_of(badge: StateBadge, colour: str) -> int:
