@@ -62,7 +62,8 @@ QUANTITY = {
         mark("0 to 1"),
         mark(
             "Chance that the answer is right (theta within 5 degrees, head within 15 px), as learnt on pictures with known truth. "
-            "Where it is low, the answer is shown as unsure, and its shape is not filled; where it is lower, there is a reason instead."
+            "Where it is low, the answer is shown as unsure, and its shape is not filled; where it is lower, there is a reason "
+            "instead."
         ),
     ),
     "reason": Quantity(

@@ -4961,7 +4961,7 @@ Best close the program and start it again. Space is still STOP.</source>
     <message>
         <location filename="../../app/tool_tips.py"/>
         <source>Chance that the answer is right (theta within 5 degrees, head within 15 px), as learnt on pictures with known truth. Where it is low, the answer is shown as unsure, and its shape is not filled; where it is lower, there is a reason instead.</source>
-        <translation type="unfinished"></translation>
+        <translation>结果正确的概率（θ 误差 5 度内，头端 15 px 内），由已知真值的图像学得。偏低时结果显示为“不确定”，其形状不填充；更低时不给结果，只给原因。</translation>
     </message>
     <message>
         <location filename="../../app/tool_tips.py"/>
@@ -5516,7 +5516,7 @@ Best close the program and start it again. Space is still STOP.</source>
     <message>
         <location filename="../../app/widgets/advice_line.py"/>
         <source>the pose is unsure; {why}</source>
-        <translation type="unfinished"></translation>
+        <translation>位姿不确定；{why}</translation>
     </message>
     <message>
         <location filename="../../app/widgets/alert_row.py"/>
@@ -10439,8 +10439,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>longest time between two whole looks</source>
-        <translation>两次整图查看之间的最长时间</translation>
+        <source>longest time between two whole looks, the last four of which tell the vessel</source>
+        <translation>两次完整查看之间的最长时间；血管由最近四次完整查看得出</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
