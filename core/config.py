@@ -175,7 +175,9 @@ class TrackingConfig(_Section):
         multiple_of=32,
         description="side of what is looked at anew between two whole looks; 0 = always all",
     )
-    refresh_s: float = Field(1.5, ge=0.0, le=60.0, description="longest time between two whole looks, the last four of which tell the vessel")
+    refresh_s: float = Field(
+        1.5, ge=0.0, le=60.0, description="longest time between two whole looks, the last four of which tell the vessel"
+    )
     route_gap_px: float = Field(40.0, ge=0.0, le=1000.0, description="gap in the vessel over which a known route still holds")
     route_reach_px: float = Field(30.0, ge=0.0, le=1000.0, description="the head is on a known route if no farther beside it")
     lookalike_px: float = Field(
