@@ -11,23 +11,23 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.config import PathConfig, PerceptionConfig, TrackingConfig
+from core.config import PathConfig, PerceptionConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton, steadiness
 from core.perception.centerline import find as find_centerline
 from core.perception.evidence import Calibration, collect
 from core.perception.familiarity import Familiarity
-from core.perception.glance import Background, Glances, look
-from core.perception.lookalikes import Lookalikes
+from core.perception.glance import Background, look
+from core.perception.past import Before, Past
 from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
 from core.perception.route_memory import RouteMemory
 from core.perception.second_look import MOST_LOOKS, SecondLook
 from core.perception.segmentation import Recognised, Segmenter, Turned, open_second_look, open_segmenter, recognise, to_working
-from core.perception.standing_vessel import GATHERING_S, StandingVessel
-from core.perception.tracking import Memory, check_in_view, check_jump, recall, recall_ends, remember
+from core.perception.standing_vessel import StandingVessel
+from core.perception.tracking import check_in_view, check_jump, recall, remember
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
-from core.types import Frame, Image, Mask, Masks, Point, Reason, Refusal, RobotPath, Scene, Skeletons, VesselGraph, Window
+from core.types import Frame, Image, Mask, Masks, Point, Reason, Refusal, Scene, Skeletons, VesselGraph, Window
 
 
 class _Stopwatch:
@@ -70,50 +70,6 @@ _EDGE_PX = 4
 """Around what a mask shows the probability falls off so far."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Before:
-    """The path of the last frame, or, after a gap, the one that still tells which end is the head; whether that head came to where
-    it is from within the picture; and which pixels (h, w) of this frame are known to be no robot."""
-
-    path: RobotPath | None = None
-    ends: RobotPath | None = None
-    came_from_within: bool = False
-    none: Mask | None = None
-
-
-class _Past:
-    """What a stream remembers of its frames."""
-
-    def __init__(self, config: TrackingConfig) -> None:
-        self._config = config
-        self.memory: Memory | None = None
-        self.routes = RouteMemory(config)
-        self.lookalikes = Lookalikes(config)
-        self.glances = Glances(config)
-        self.standing = StandingVessel()
-        self.unlike = False
-
-    @property
-    def refresh_s(self) -> float:
-        """The longest time between two whole looks."""
-        longest = self._config.refresh_s
-        return min(longest, GATHERING_S) if self.standing.is_gathering else longest
-
-    def recall(self, captured_s: float) -> _Before:
-        memory, config = self.memory, self._config
-        return _Before(
-            recall(memory, captured_s, config),
-            recall_ends(memory, captured_s, config),
-            memory is not None and memory.came_from_within,
-            self.lookalikes.none,
-        )
-
-    def forget(self) -> None:
-        self.memory, self.unlike = None, False
-        for part in (self.routes, self.lookalikes, self.glances, self.standing):
-            part.forget()
-
-
 class Pipeline:
     """Perception of single images or of a stream.
 
@@ -141,7 +97,7 @@ class Pipeline:
         self._glance = glance if config.tracking.window_px else None
         self._config = config
         self._states = StateFilter(config.pose)
-        self._past = _Past(config.tracking)
+        self._past = Past(config.tracking)
         self._shape: tuple[int, ...] | None = None
 
     @property
@@ -219,7 +175,7 @@ class Pipeline:
             past.glances.remember(scene)
         return watch.finish(replace(scene, pose=self._states.update(scene.pose, scene.captured_s)))
 
-    def _perceive(self, frame: Frame, target: Point | None, watch: _Stopwatch, sight: Sight, past: _Past | None = None) -> Scene:
+    def _perceive(self, frame: Frame, target: Point | None, watch: _Stopwatch, sight: Sight, past: Past | None = None) -> Scene:
         config = self._config
         height, width = frame.image.shape[:2]
         with watch.stage("prepare"):
@@ -239,23 +195,24 @@ class Pipeline:
         unlike = self._check_kind(scene, past)
         if scene.refusal is not None:
             return replace(scene, refusal=quality.hinted(scene.refusal, unlike))
-        before = past.recall(frame.captured_s) if past is not None else _Before()
+        before = past.recall(frame.captured_s) if past is not None else Before()
         scene = self._locate(scene, image, target, watch, before, past.routes if past is not None else None)
         if scene.refusal is None and unlike is not None:
             # What was found is kept: it is what somebody who teaches the model this rig begins with.
             scene = replace(scene, refusal=unlike)
         return scene if scene.refusal is not None else self._judge(scene, image, target, watch, sight, before)
 
-    def _check_kind(self, scene: Scene, past: _Past | None) -> Refusal | None:
+    def _check_kind(self, scene: Scene, past: Past | None) -> Refusal | None:
         """Whether the picture is of a kind that the model does not know. A stream remembers; a window tells nothing of it."""
         refusal = quality.check_kind(scene.novelty, self._config.quality, refused_before=past is not None and past.unlike)
         if past is not None and scene.novelty is not None:
             past.unlike = refusal is not None
         return refusal
 
-    def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch, past: _Past | None) -> Scene:
+    def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch, past: Past | None) -> Scene:
         """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
-        standing = self._standing_vessel(past)
+        turns = past is not None and self._glance is not None and not self._glance.all_orientations
+        standing = past.next_look() if past is not None and turns else None
         with watch.stage("network"):
             if standing is None:
                 vessel_probability, robot_probability, signature = recognise(sight.segment, [image])[0]
@@ -275,18 +232,6 @@ class Pipeline:
                 scene = replace(scene, novelty=known.novelty(signature) if signature is not None else None)
         return self._draw(scene, found, watch)
 
-    def _standing_vessel(self, past: _Past | None) -> StandingVessel | None:
-        """What earlier whole looks have told of the vessel, ready for another one; None: every look tells it alone.
-
-        Only looks that come between windows are turned: one orientation after the other would make the head tremble.
-        """
-        if past is None or self._glance is None or self._glance.all_orientations:
-            return None
-        if past.glances.has_changed:
-            past.standing.forget()
-        past.standing.begin(is_turned=past.glances.is_due)
-        return past.standing
-
     def _draw(self, scene: Scene, found: Masks, watch: _Stopwatch) -> Scene:
         """Skeletons and vessel graph of the masks found."""
         config = self._config
@@ -305,7 +250,7 @@ class Pipeline:
         return replace(scene, skeletons=skeletons, vessel_graph=graph, refusal=quality.check_graph(graph, config.vectors))
 
     def _see_window(
-        self, scene: Scene, image: Image, chosen: tuple[Background, Window], sight: Sight, watch: _Stopwatch, past: _Past | None
+        self, scene: Scene, image: Image, chosen: tuple[Background, Window], sight: Sight, watch: _Stopwatch, past: Past | None
     ) -> Scene:
         """The same, with only the robot in the window seen anew."""
         config, (known, window) = self._config, chosen
@@ -332,7 +277,7 @@ class Pipeline:
         image: Image,
         target: Point | None,
         watch: _Stopwatch,
-        before: _Before,
+        before: Before,
         routes: RouteMemory | None = None,
     ) -> Scene:
         """The robot's path, the way to the target, the centerline's piece and both vectors, or why one of them is not to be had."""
@@ -372,7 +317,7 @@ class Pipeline:
                 refusal = Refusal(Reason.NO_VESSEL, "the centerline beside the head has no direction")
             return replace(scene, centerline=centerline, vessel_vector=vessel_vector, refusal=refusal)
 
-    def _judge(self, scene: Scene, image: Image, target: Point | None, watch: _Stopwatch, sight: Sight, before: _Before) -> Scene:
+    def _judge(self, scene: Scene, image: Image, target: Point | None, watch: _Stopwatch, sight: Sight, before: Before) -> Scene:
         """The pose of what was located, with its evidence and confidence, or the quality gate's word against it."""
         config, found, path, centerline = self._config, scene.masks, scene.path, scene.centerline
         robot, vessel = scene.robot_vector, scene.vessel_vector
@@ -406,7 +351,7 @@ class Pipeline:
             return replace(scene, refusal=refusal)
         return replace(scene, pose=replace(pose, confidence=confidence))
 
-    def _answer(self, scene: Scene, image: Image, target: Point | None, found: Masks, before: _Before) -> steadiness.Answer | None:
+    def _answer(self, scene: Scene, image: Image, target: Point | None, found: Masks, before: Before) -> steadiness.Answer | None:
         """Head and signed theta of the same frame with other masks; None for a refusal."""
         watch = _Stopwatch()
         bare = Scene(scene.frame_index, scene.captured_s, scene.source_size, scene.scale, scale_xy=scene.scale_xy)

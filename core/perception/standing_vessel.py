@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.glance import MOST_LEVELS, NOISE, differences
+from core.perception.glance import changed_level, differences
 from core.types import Image, Mask
 
 ORIENTATIONS = 4
@@ -114,14 +114,16 @@ def _robot_cells(robot: Map, cells: Map) -> Mask:
 
 
 def _weight(look: _Look, newest: _Look, noise: float) -> Map | None:
-    """How much an older look counts, 0 to 1 at each pixel (h, w); None where it was at another picture.
+    """How much an older look counts, 0 to 1 at each pixel (h, w), or alike at all (1, 1); None where it was at another picture.
 
     The robot moves, which does not change the vessel. A change of brightness or colour of all of the picture alike is none.
     """
     if look.vessel.shape != newest.vessel.shape or look.cells.shape != newest.cells.shape:
         return None
-    level = min(max(CHANGED_LEVELS, NOISE * noise), MOST_LEVELS)
+    level = changed_level(CHANGED_LEVELS, noise)
     has_changed = (differences(look.cells, newest.cells) > level) & ~look.robot & ~newest.robot
+    if not has_changed.any():
+        return np.ones((1, 1), np.float32)
     if float(np.mean(has_changed)) > ANOTHER_SHARE:
         return None
     changed = cv2.dilate(has_changed.view(np.uint8), _AROUND)
@@ -138,8 +140,9 @@ def _differing(look: _Look, newest: _Look, around: Mask) -> list[Mask]:
     what has changed: the clear lumen of a tube that was moved away looks as the board does."""
     half = np.float32(0.5)
     differs = ((look.vessel >= half) != (newest.vessel >= half)).view(np.uint8)
-    if not around.any() or not cv2.erode(differs, _WOBBLE).any():
+    thick = cv2.erode(differs, _WOBBLE)
+    if not thick.any():
         return []
-    _, labels = cv2.connectedComponents(cv2.dilate(cv2.erode(differs, _WOBBLE), _WOBBLE), connectivity=8)
+    _, labels = cv2.connectedComponents(cv2.dilate(thick, _WOBBLE), connectivity=8)
     touched = np.unique(labels[around & (labels > 0)]).tolist()
     return [cv2.dilate((labels == label).view(np.uint8), _WOBBLE) > 0 for label in touched]
