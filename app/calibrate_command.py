@@ -75,9 +75,9 @@ def _calibrated(
     """Calibrate the model in this folder; returns of each way of looking a title, and what ``_table`` tells of it."""
     from core.learning.model_file import sha256_of
     from core.learning.model_writing import write_calibration
+    from core.perception.engines import open_segmenter
     from core.perception.pipeline import open_pipeline, open_sights
     from core.perception.second_look import SecondLook
-    from core.perception.segmentation import open_segmenter
     from core.study.accuracy import TrueMasks, score_set
     from core.study.calibration import describe_confidence, fit, is_right
     from core.study.known_pictures import fit_familiarity, signatures_in

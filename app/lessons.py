@@ -24,8 +24,9 @@ from core.learning.growing import deepened, widened, with_first_look
 from core.learning.model_file import SECOND_LOOK, check_model, load_network, model_folder, second_look_of
 from core.learning.model_writing import save_model, save_with_second_look
 from core.learning.training import TrainingPlan
+from core.perception.engines import open_second_look, open_segmenter
 from core.perception.second_look import WINDOW_PX, Planes
-from core.perception.segmentation import Turned, open_second_look, open_segmenter
+from core.perception.segmentation import Turned
 from core.perception.unet import DualUNet, UNetShape
 from core.study.difficulty import difficulty
 from core.types import Image

@@ -14,8 +14,8 @@ from core.control.health import ModelReport
 from core.control.pilot import Pilot
 from core.control.policies import make_policy
 from core.learning.model_file import ModelError
+from core.perception.engines import cores
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
-from core.perception.segmentation import cores
 from core.rig_file import as_calibrated
 from core.types import Frame, Point, Scene
 from hardware.rig import Rig, RigKind, open_rig

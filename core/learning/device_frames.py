@@ -15,7 +15,7 @@ from torch import Tensor
 
 from core.learning.crops import true_ends
 from core.learning.dataset import WORKING_SIZE_PX, Sample
-from core.perception.segmentation import cores
+from core.perception.engines import cores
 
 MOST_ENDS = 6
 """Of a true robot, or of what was taken for one. Those of more are not told."""

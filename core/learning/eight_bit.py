@@ -9,8 +9,9 @@ from pathlib import Path
 from core.config import SegmentationConfig
 from core.learning.model_file import second_look_of
 from core.learning.model_writing import write_eight_bit
+from core.perception.engines import open_second_look, open_segmenter
 from core.perception.second_look import Planes, look_again
-from core.perception.segmentation import Probability, Segmenter, open_second_look, open_segmenter
+from core.perception.segmentation import Probability, Segmenter
 from core.types import Image
 
 _MOST_WINDOWS = 160

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from core.learning.dataset import WORKING_SIZE_PX, Sample
-from core.perception.segmentation import padded
+from core.perception.engines import padded
 from core.perception.unet import DualUNet
 from core.types import Image, Mask
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from core.config import PathConfig, PerceptionConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton, steadiness
 from core.perception.centerline import find as find_centerline
+from core.perception.engines import open_second_look, open_segmenter
 from core.perception.evidence import Calibration, collect
 from core.perception.familiarity import Familiarity
 from core.perception.glance import Background, look
@@ -22,7 +23,7 @@ from core.perception.pose import StateFilter, measure
 from core.perception.route import route_or_reason
 from core.perception.route_memory import RouteMemory
 from core.perception.second_look import MOST_LOOKS, SecondLook
-from core.perception.segmentation import Recognised, Segmenter, Turned, open_second_look, open_segmenter, recognise, to_working
+from core.perception.segmentation import Recognised, Segmenter, Turned, recognise, robot_beside, to_working
 from core.perception.standing_vessel import StandingVessel
 from core.perception.tracking import check_in_view, check_jump, recall, remember
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
@@ -132,7 +133,10 @@ class Pipeline:
         segment = self._stream.segment
         segment(np.zeros((round(0.75 * side), side, 3), np.uint8))
         if self._glance is not None:
-            self._glance.segment(np.zeros((window, window, 3), np.uint8))
+            glance = self._glance.segment
+            robot_beside(glance, np.zeros((window, window), np.float32), np.zeros((window, window, 3), np.uint8))
+            if isinstance(glance, SecondLook):
+                glance.warm_up_beside()
         if isinstance(segment, SecondLook):
             segment.warm_up()
 
@@ -255,7 +259,7 @@ class Pipeline:
         """The same, with only the robot in the window seen anew."""
         config, (known, window) = self._config, chosen
         with watch.stage("network"):
-            robot_probability = look(sight.segment, image, window, known.robot_probability)
+            robot_probability = look(sight.segment, image, window, known)
         if (broken := quality.check_finite(robot_probability)) is not None:
             return _unseen(replace(scene, window=window), known.vessel_probability, robot_probability, broken)
         with watch.stage("masks"):

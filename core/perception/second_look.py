@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception.masks import clean_mask
-from core.perception.segmentation import Probability, Recognised, Segmenter, recognise, see
+from core.perception.segmentation import Probability, Recognised, Segmenter, recognise, robots, see
 from core.perception.skeleton import MAX_KNOTS, end_pixels
 from core.perception.thinning import thin
 from core.perception.windows import MARGIN_PX, window_around
@@ -104,6 +104,10 @@ class SecondLook:
         for count in (1, 2):
             see(self._near, [window] * count)
 
+    def warm_up_beside(self) -> None:
+        """The same for ``robot_beside``."""
+        robots(self._near, [np.zeros((WINDOW_PX, WINDOW_PX, 5), np.uint8)])
+
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         return self._look(image, self._first(image))
 
@@ -111,6 +115,11 @@ class SecondLook:
         """The signatures are the first look's, which sees the whole pictures."""
         seen = recognise(self._first, images)
         return [(*self._look(image, (v, r)), signature) for image, (v, r, signature) in zip(images, seen, strict=True)]
+
+    def robot_beside(self, vessel: Probability, image: Image) -> Probability:
+        """The robot, looked at closely once."""
+        seen = vessel, robots(self._first, [image])[0]
+        return look_again(image, seen, self._near, robot_alone=True)[1]
 
     def _look(self, image: Image, seen: tuple[Probability, Probability]) -> tuple[Probability, Probability]:
         found = look_again(image, seen, self._near)
@@ -127,11 +136,16 @@ class SecondLook:
 
 
 def look_again(
-    image: Image, seen: tuple[Probability, Probability], near: Segmenter, shift_px: Point = (0.0, 0.0)
+    image: Image,
+    seen: tuple[Probability, Probability],
+    near: Segmenter,
+    shift_px: Point = (0.0, 0.0),
+    *,
+    robot_alone: bool = False,
 ) -> tuple[Probability, Probability]:
     """Probabilities of vessel and robot after a second look at the ends of what the first one has `seen` in the picture.
 
-    `shift_px`: by how much (x, y) the windows' middles lie beside the ends.
+    `shift_px`: by how much (x, y) the windows' middles lie beside the ends. `robot_alone`: the vessel stays as it is.
     """
     vessel, robot = (probability.copy() for probability in seen)
     looked: list[Point] = []
@@ -141,7 +155,7 @@ def look_again(
             if len(looked) < _MAX_LOOKS and all(math.dist(place, other) > _SEEN_PX for other in looked):
                 looked.append(place)
         middles = [(x + shift_px[0], y + shift_px[1]) for x, y in looked[before:]]
-        _look_at(middles, image, seen, near, (vessel, robot))
+        _look_at(middles, image, seen, near, (vessel, robot), robot_alone=robot_alone)
         if len(looked) == before:
             break
     return vessel, robot
@@ -153,17 +167,21 @@ def _look_at(
     seen: tuple[Probability, Probability],
     near: Segmenter,
     probabilities: tuple[Probability, Probability],
+    *,
+    robot_alone: bool,
 ) -> None:
-    """Replace both probabilities in the windows around `middles`; the network is shown those of the first look."""
+    """Replace both probabilities, or the robot's, in the windows around `middles`; the network is shown the first look's."""
     height, width = image.shape[:2]
     windows = [window_around(place, (width, height), WINDOW_PX) for place in middles]
     parts = [np.s_[y : y + down, x : x + across] for x, y, across, down in windows]
-    found = see(near, [planes_of(image[part], seen[0][part], seen[1][part]) for part in parts])
+    planes = [planes_of(image[part], seen[0][part], seen[1][part]) for part in parts]
+    found = [(robot,) for robot in robots(near, planes)] if robot_alone else see(near, planes)
+    renewed = probabilities[1:] if robot_alone else probabilities
     for (x, y, across, down), part, near_it in zip(windows, parts, found, strict=True):
         columns = _fade(across, x > 0, x + across < width)
         rows = _fade(down, y > 0, y + down < height)
         weight = rows[:, None] * columns[None, :]
-        for whole, anew in zip(probabilities, near_it, strict=True):
+        for whole, anew in zip(renewed, near_it, strict=True):
             whole[part] += weight * (anew - whole[part])
 
 

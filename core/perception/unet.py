@@ -118,6 +118,16 @@ class DualUNet(nn.Module):
 
     def with_deepest(self, image: Tensor) -> tuple[Tensor, Tensor]:
         """The logits, and what the encoder's last level gives, (N, ``shape.widths[4]``, H / stride, W / stride)."""
+        bottom, skips = self._encoded(image)
+        outputs = [self._unfolded(decoder(bottom, skips)) for decoder in (self.vessel, self.robot)]
+        return torch.cat(outputs, dim=1), bottom
+
+    def robot_alone(self, image: Tensor) -> Tensor:
+        """The robot's logits (N, 1, H, W) without the vessel's."""
+        return self._unfolded(self.robot(*self._encoded(image)))
+
+    def _encoded(self, image: Tensor) -> tuple[Tensor, list[Tensor]]:
+        """What the encoder's last level gives, and the levels above it from fine to coarse."""
         x = (image - 0.5) * 4.0
         if self.shape.fold > 1:
             x = nn.functional.pixel_unshuffle(x, self.shape.fold)
@@ -126,10 +136,10 @@ class DualUNet(nn.Module):
             x = block(nn.functional.max_pool2d(x, 2) if level else x)
             skips.append(x)
         bottom = skips.pop()
-        outputs = [decoder(bottom, skips) for decoder in (self.vessel, self.robot)]
-        if self.shape.fold > 1:
-            outputs = [nn.functional.pixel_shuffle(output, self.shape.fold) for output in outputs]
-        return torch.cat(outputs, dim=1), bottom
+        return bottom, skips
+
+    def _unfolded(self, output: Tensor) -> Tensor:
+        return nn.functional.pixel_shuffle(output, self.shape.fold) if self.shape.fold > 1 else output
 
 
 class Probabilities(nn.Module):
@@ -147,6 +157,11 @@ class Probabilities(nn.Module):
         assert isinstance(self.network, DualUNet)
         logits, deepest = self.network.with_deepest(_scaled(image))
         return torch.sigmoid(logits), deepest
+
+    def robot(self, image: Tensor) -> Tensor:
+        """The robot's probabilities (1, 1, H, W) alone, of a ``DualUNet``."""
+        assert isinstance(self.network, DualUNet)
+        return torch.sigmoid(self.network.robot_alone(_scaled(image)))
 
 
 def _scaled(image: Tensor) -> Tensor:

@@ -83,8 +83,9 @@ def check_self_test(config: PerceptionConfig) -> Check:
 
 def _eight_bit_off(config: SegmentationConfig, image: Image) -> str | None:
     """How far an eight-bit network is off where its sums are large, in a brighter picture; None: no more than it may."""
+    from core.perception.engines import OpenVinoSegmenter, open_second_look, open_segmenter
     from core.perception.second_look import WINDOW_PX, planes_of
-    from core.perception.segmentation import OpenVinoSegmenter, open_second_look, open_segmenter, see
+    from core.perception.segmentation import see
     from core.perception.windows import window_around
 
     used, used_near = open_segmenter(config), open_second_look(config)

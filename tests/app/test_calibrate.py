@@ -18,10 +18,10 @@ from core.config import PerceptionConfig
 from core.images import read_image
 from core.learning.dataset import DatasetError
 from core.learning.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, sha256_of
+from core.perception.engines import OpenVinoSegmenter
 from core.perception.evidence import WITHOUT_SWINGS
 from core.perception.pipeline import open_sights
 from core.perception.second_look import MOST_LOOKS
-from core.perception.segmentation import OpenVinoSegmenter
 from core.study.calibration import CalibrationError
 from hardware.twin.synth import SynthPlan, write_set
 

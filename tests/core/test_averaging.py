@@ -24,7 +24,7 @@ from core.learning.model_file import (
     trained_without,
 )
 from core.learning.model_writing import save_model, save_with_second_look
-from core.perception.segmentation import TorchSegmenter, open_second_look, open_segmenter
+from core.perception.engines import TorchSegmenter, open_second_look, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 
 TINY = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)

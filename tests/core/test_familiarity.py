@@ -16,11 +16,12 @@ from core.learning.dataset import DatasetError, write_png
 from core.learning.growing import with_first_look
 from core.learning.model_file import INFO, MODELS, ModelError, read_model_info
 from core.learning.model_writing import save_model, save_with_second_look, write_calibration
+from core.perception.engines import OpenVinoSegmenter, TorchSegmenter
 from core.perception.evidence import Calibration, Evidence
 from core.perception.familiarity import Familiarity, signature_of
 from core.perception.pipeline import Pipeline, Sight, open_pipeline, open_sights
 from core.perception.second_look import SecondLook
-from core.perception.segmentation import OpenVinoSegmenter, Recognised, TorchSegmenter, Turned, recognise
+from core.perception.segmentation import Recognised, Turned, recognise
 from core.perception.unet import DualUNet, UNetShape
 from core.study.known_pictures import LEAST, FamiliarityError, KnownPicture, find_known, fit_familiarity, signatures_in
 from core.types import Frame, Image, Reason, Refusal

@@ -2,6 +2,7 @@
 
 import functools
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -72,6 +73,30 @@ def test_the_first_look_is_whole_and_the_next_ones_are_windows(pipeline: Pipelin
     for index, scene in enumerate(scenes):
         assert scene.path is not None
         assert scene.path.head[0] == pytest.approx(304 + 4 * index, abs=2.0)  # the line is drawn with a round end
+
+
+def test_a_window_is_looked_at_beside_the_vessel_that_is_known() -> None:
+    class Beside(Colours):
+        """Notes which vessel it is told of, and finds the robot alone."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.told: list[np.ndarray] = []
+
+        def robot_beside(self, vessel: np.ndarray, image: Image) -> np.ndarray:
+            self.told.append(vessel)
+            return self(image)[1]
+
+    network = Beside()
+    pipeline = Pipeline(network, CONFIG, glance=Sight(network))
+    scenes = [see(pipeline, 0.05 * index, picture(300 + 4 * index)) for index in range(3)]
+    assert len(network.told) == 2
+    for scene, vessel in zip(scenes[1:], network.told, strict=True):
+        assert scene.pose is not None
+        assert scene.window is not None
+        assert scene.masks is not None
+        x, y, width, height = scene.window
+        np.testing.assert_array_equal(vessel, scene.masks.vessel_probability[y : y + height, x : x + width])
 
 
 def test_a_window_tells_the_same_pose_as_the_whole_picture(pipeline: Pipeline) -> None:
@@ -216,7 +241,8 @@ def test_a_windows_inner_edges_are_left_out_and_the_pictures_are_not() -> None:
     def ones(image: Image) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(image.shape[:2], np.float32), np.ones(image.shape[:2], np.float32)
 
-    renewed = look(ones, np.zeros(WHOLE, np.uint8), (0, 100, 256, 256), old)  # type: ignore[arg-type]
+    known = SimpleNamespace(vessel_probability=np.zeros_like(old), robot_probability=old)
+    renewed = look(ones, np.zeros(WHOLE, np.uint8), (0, 100, 256, 256), known)  # type: ignore[arg-type]
     assert old.max() == 0.25
     seen = np.argwhere(renewed == 1.0)
     assert seen.min(axis=0).tolist() == [116, 0]

@@ -16,7 +16,7 @@ from core.learning import onnx_export
 from core.learning.half_precision import rounded
 from core.learning.model_file import ONNX, ONNX_INT8, WEIGHTS, load_network
 from core.learning.model_writing import save_model
-from core.perception.segmentation import OpenVinoSegmenter
+from core.perception.engines import OpenVinoSegmenter
 from core.perception.unet import DualUNet, UNetShape
 from core.types import Image
 

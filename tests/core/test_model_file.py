@@ -30,7 +30,8 @@ from core.learning.model_file import (
     sha256_of,
 )
 from core.learning.model_writing import changed, save_model, save_with_second_look, write_figures
-from core.perception.segmentation import OpenVinoSegmenter, TorchSegmenter, open_segmenter, to_working
+from core.perception.engines import OpenVinoSegmenter, TorchSegmenter, open_segmenter
+from core.perception.segmentation import to_working
 from core.perception.unet import DualUNet, UNetShape
 
 TINY = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)

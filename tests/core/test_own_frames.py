@@ -11,7 +11,7 @@ import torch
 
 from core.learning.dataset import find_samples
 from core.learning.held_out import dice, measure_held_out
-from core.perception.segmentation import padded
+from core.perception.engines import padded
 from core.perception.unet import DualUNet, UNetShape
 from core.study.annotation_images import FoundImage, find_images
 from core.study.annotation_records import StoredAnnotation

@@ -8,9 +8,10 @@ from core.config import Config, PerceptionConfig, TrackingConfig
 from core.control.frame_reports import is_sound
 from core.learning.model_file import ModelInfo
 from core.perception import steadiness
+from core.perception.engines import OpenVinoSegmenter
 from core.perception.evidence import WITHOUT_SWINGS, Evidence
 from core.perception.pipeline import NoPerception, Pipeline, Sight, open_pipeline
-from core.perception.segmentation import OpenVinoSegmenter, Turned
+from core.perception.segmentation import Turned
 from core.perception.tracking import TURN_S
 from core.types import Frame, Image, Masks, Points, PoseState, Reason, Scene
 from hardware.twin.world import TwinWorld

@@ -13,7 +13,7 @@ from core.config import SegmentationConfig
 from core.learning.model_file import ONNX_INT8, ModelError, read_model_info
 from core.learning.model_writing import changed, save_model, write_eight_bit
 from core.learning.quantise import EightBitUNet, _Conv, _Moments, _rounded
-from core.perception.segmentation import OpenVinoSegmenter, open_segmenter
+from core.perception.engines import OpenVinoSegmenter, open_segmenter
 from core.perception.unet import DualUNet, UNetShape
 from core.types import Image
 

@@ -19,8 +19,8 @@ from core.learning.growing import with_first_look
 from core.learning.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info
 from core.learning.model_writing import save_model, save_with_second_look
 from core.learning.training import TrainingPlan
+from core.perception.engines import OpenVinoSegmenter, open_second_look
 from core.perception.second_look import MOST_LOOKS, WINDOW_PX, Planes, SecondLook, places_to_look, planes_of
-from core.perception.segmentation import OpenVinoSegmenter, open_second_look
 from core.perception.unet import DualUNet, UNetShape
 from core.perception.windows import MARGIN_PX, window_around
 from core.types import Point
@@ -127,6 +127,22 @@ def test_the_network_is_shown_the_picture_and_the_first_look() -> None:
     assert shown.shape == (WINDOW_PX, WINDOW_PX, 5)
     assert set(np.unique(shown[:, :, 4])) == {0, 230}
     assert set(np.unique(shown[:, :, 3])) == {64}
+
+
+def test_where_the_vessel_is_known_the_robot_alone_is_looked_at() -> None:
+    class Alone(Near):
+        def robots(self, images: list[Planes]) -> list[np.ndarray]:
+            return [self(planes)[1] for planes in images]
+
+    near, true, known = Alone(), bar(0, 320), np.full(SIZE, 0.5, np.float32)
+    near_both = Near()
+    segment = SecondLook(First(bar(0, 300)), near)
+    found = segment.robot_beside(known, picture_of(true))
+    assert (found[240, 250:318] > 0.5).all()
+    assert not (found[240, 324:] > 0.5).any()
+    assert {int(shown[0, 0, 3]) for shown in near.shown} == {128}, "it is shown the vessel that is known"
+    np.testing.assert_array_equal(SecondLook(First(bar(0, 300)), near_both).robot_beside(known, picture_of(true)), found)
+    assert (known == 0.5).all(), "which stays what it was"
 
 
 def test_the_second_look_fades_out_at_its_edges_but_not_at_the_pictures() -> None:

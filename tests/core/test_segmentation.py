@@ -10,14 +10,15 @@ import pytest
 import torch
 
 from core.learning.model_writing import save_model
-from core.perception.segmentation import OpenVinoSegmenter, Pairing, Turned, see
+from core.perception.engines import OpenVinoSegmenter, TorchSegmenter, _robot_alone
+from core.perception.segmentation import Pairing, Segmenter, Turned, robot_beside, robots, see
 from core.perception.unet import DualUNet, UNetShape
 
 TWO_MODELS = """
 import gc, os, signal
 import numpy as np
 from core.config import SegmentationConfig
-from core.perception.segmentation import open_segmenter
+from core.perception.engines import open_segmenter
 
 config = SegmentationConfig(device="openvino", threads=1)
 first, second = open_segmenter(config), open_segmenter(config)
@@ -72,6 +73,41 @@ def test_what_is_seen_together_is_what_is_seen_alone(undecided: Path, precision:
     assert np.abs(alone[0] - alone[1]).mean() > 0.005, "another picture, another answer"
 
 
+@pytest.mark.parametrize("engine", ["int8", "fp32", "torch"])
+def test_the_robot_alone_is_the_robot_that_is_seen_beside_the_vessel(undecided: Path, engine: str) -> None:
+    segment: Segmenter = TorchSegmenter(undecided, 1) if engine == "torch" else OpenVinoSegmenter(undecided, 1, engine)
+    both = [segment(image)[1] for image in pictures()]
+    alone = robots(segment, pictures())
+    assert [robot.shape for robot in alone] == [(70, 128)] * 5
+    for one, other in zip(both, alone, strict=True):
+        assert np.abs(one - other).mean() < 0.0005
+    assert np.abs(alone[0] - alone[1]).mean() > 0.005, "another picture, another answer"
+    again = segment(pictures()[0])
+    assert [plane.shape for plane in again] == [(70, 128)] * 2, "and both can be had as before"
+
+
+def test_the_robot_alone_leaves_the_vessels_decoder_out(undecided: Path) -> None:
+    segment = OpenVinoSegmenter(undecided, 1, "fp32")
+    counts = [
+        sum(node.get_type_name() == "Convolution" for node in model.get_ordered_ops()) for model in (segment._model, segment._robot)
+    ]
+    # ten of the encoder; four and the output of each decoder
+    assert counts == [10 + 2 * 5, 10 + 5]
+
+
+def test_a_network_of_another_shape_is_asked_for_both() -> None:
+    import openvino
+    from openvino import opset13
+
+    picture = opset13.parameter([1, 3, 16, 16], np.float32, name="picture")
+    kernels = opset13.constant(np.zeros((2, 3, 1, 1), np.float32))
+    logits = opset13.convolution(picture, kernels, [1, 1], [0, 0], [0, 0], [1, 1])
+    joined = opset13.concat([picture, picture], axis=1)
+    for end in (logits, joined):  # no two masks that were joined; and something else that was
+        model = openvino.Model([opset13.sigmoid(end)], [picture], "other")
+        assert _robot_alone(model) is model
+
+
 def test_several_threads_may_ask_one_network(undecided: Path) -> None:
     """A picture that stands is looked at again in a thread of its own, while a rig that was opened meanwhile has the network."""
     segment = OpenVinoSegmenter(undecided, 1)
@@ -96,6 +132,8 @@ def test_who_cannot_see_together_is_asked_one_by_one() -> None:
             return image[:, :, 0] / np.float32(255), image[:, :, 1] / np.float32(255)
 
     images = pictures()
+    np.testing.assert_array_equal(robot_beside(OneByOne(), images[1][:, :, 2], images[0]), images[0][:, :, 1] / np.float32(255))
+    asked.clear()
     found = see(Turned(OneByOne()), images)
     assert len(asked) == 8 * len(images)
     for image, (vessel, robot) in zip(images, found, strict=True):
