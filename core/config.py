@@ -154,7 +154,7 @@ class QualityConfig(_Section):
     min_confidence: Share = Field(0.3, description="below it there is no answer")
     confident_from: Share = Field(0.5, description="an answer that is less sure than this is shown as unsure")
     max_novelty: float = Field(
-        1.0,
+        1.25,
         gt=0.0,
         le=1000.0,
         description="distance from the pictures that the model knows; 1: hardly any of them is farther",

@@ -250,7 +250,7 @@ def test_a_picture_of_another_kind_is_refused_and_shown_as_it_was_seen() -> None
     assert scene.pose is None
     assert scene.path is not None and scene.vessel_vector is not None, "who labels it begins with what was seen"
     assert scene.refusal is not None
-    assert f"distance {scene.novelty:.2f} from the pictures that it knows (at most 1.00)" in str(scene.refusal)
+    assert f"distance {scene.novelty:.2f} from the pictures that it knows (at most 1.25)" in str(scene.refusal)
 
 
 def test_other_reasons_come_first_and_no_robot_tells_of_the_kind() -> None:
@@ -268,10 +268,11 @@ def test_in_a_stream_a_rig_at_the_limit_does_not_come_and_go() -> None:
     step = OTHER - known(1)[0]
     shares = np.linspace(0, 1, 400)
     novelty = np.array([FAMILIARITY.novelty(known(1)[0] + np.float32(share) * step) for share in shares])
-    at_limit, below, well_below = (float(shares[np.argmax(novelty > limit)]) for limit in (1.01, 0.95, 0.8))
+    config = PerceptionConfig.model_validate({"tracking": {"window_px": 0}})
+    limits = (share * config.quality.max_novelty for share in (1.01, 0.95, 0.8))
+    at_limit, below, well_below = (float(shares[np.argmax(novelty > limit)]) for limit in limits)
 
     segment = Kind(OTHER)
-    config = PerceptionConfig.model_validate({"tracking": {"window_px": 0}})
     pipeline = Pipeline(segment, config, familiarity=FAMILIARITY)
 
     def refused(share: float, at_s: float) -> bool:
