@@ -132,7 +132,7 @@ class OpenVinoSegmenter:
     ) -> list[_Taken]:
         """What `take` makes of each image (of one size), its probabilities (2, H, W) with padding, and the deepest level.
 
-        `robot_alone`: of the robot's (1, H, W) and no deepest level. `take` keeps copies: the next question, maybe another
+        `robot_alone`: of the robot's, which comes last, and no deepest level. `take` keeps copies: the next question, maybe another
         thread's, overwrites both.
         """
         taken: list[_Taken] = []
@@ -149,7 +149,9 @@ class OpenVinoSegmenter:
     def _request(self, size: tuple[int, ...], robot_alone: bool) -> Any:
         """To be asked about so many images of this height and width, with `_asking` held."""
         key = size, robot_alone
-        if key not in self._requests:
+        if key in self._requests:
+            self._requests[key] = self._requests.pop(key)  # the one that was not asked for longest goes first
+        else:
             if len(self._requests) >= self._MAX_SIZES:
                 self._requests.pop(next(iter(self._requests)))
             model = (self._robot if robot_alone else self._model).clone()
@@ -168,13 +170,13 @@ def _robot_alone(model: Any) -> Any:
     import openvino
     from openvino import opset13
 
-    joined = model.outputs[0].get_node().input_value(0).get_node()
-    while joined.get_type_name() != "Concat":
-        if joined.get_input_size() != 1:
-            return model
-        joined = joined.input_value(0).get_node()
-    logits = joined.input_value(joined.get_input_size() - 1)
-    if logits.get_partial_shape()[1].to_string() != "1":
+    ended = model.outputs[0].get_node().input_value(0).get_node()
+    joined = ended.input_value(0).get_node() if ended.get_type_name() == "Sigmoid" else ended
+    if joined.get_type_name() != "Concat" or joined is ended or joined.get_input_size() != 2:
+        return model
+    logits = joined.input_value(1)
+    shape = logits.get_partial_shape()
+    if shape.rank.is_dynamic or len(shape) != 4 or shape[1].to_string() != "1" or joined.get_attributes()["axis"] not in (1, -3):
         return model
     robot = opset13.sigmoid(logits)
     return openvino.Model([robot], model.get_parameters(), "robot")

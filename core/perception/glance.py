@@ -1,9 +1,9 @@
 """Streams: between two looks at the whole picture only the window around the robot's head is looked at anew.
 
 A phantom stands still under a camera that stands still. Vessel mask, skeleton and graph of the last whole look therefore stay
-true, and so does what it saw of the robot's body outside the window. Four things end that: time (``tracking.refresh_s``), a pause
-in which the head may have left the window, a picture that has changed elsewhere (a moved phantom, another light, a hand), and a
-frame without an answer. Then the next look is a whole one.
+true, and so does what it saw of the robot's body outside the window; in the window the robot alone is looked for, beside that
+vessel. Four things end that: time (``tracking.refresh_s``), a pause in which the head may have left the window, a picture that has
+changed elsewhere (a moved phantom, another light, a hand), and a frame without an answer. Then the next look is a whole one.
 """
 
 from __future__ import annotations

@@ -71,20 +71,19 @@ class Lookalikes:
         self._end = None
         self._seen_s[~self._known] = -math.inf
 
-    def without(self, robot: Mask, image: Image, captured_s: float, window: Window | None = None, *, noise: float = 0.0) -> Mask:
+    def without(self, robot: Mask, image: Image, captured_s: float, window: Window | None = None) -> Mask:
         """The robot's mask (h, w) of the next frame without what is none; the same object where nothing is.
 
         Parameters
         ----------
         robot, image : mask (h, w) and RGB picture (h, w, 3).
         window : (x, y, width, height) of what was looked at anew; None for all of it.
-        noise : by how many grey levels cells differ on average without any change, see ``glance.Glances.noise``.
         """
         self.none = None
         if self._travel_px == 0.0:
             return robot
         is_rewound = captured_s < self._last_s
-        if self._known.shape != robot.shape or is_rewound or self._has_moved(image, captured_s, noise):
+        if self._known.shape != robot.shape or is_rewound or self._has_moved(image, captured_s):
             self._begin(robot.shape)
         self._last_s = captured_s
         pieces = _pieces_of(robot)
@@ -109,7 +108,7 @@ class Lookalikes:
             x, y = path.points[on_path[0][0][-1]].tolist()
             self._end = (x, y), captured_s
 
-    def _has_moved(self, image: Image, captured_s: float, noise: float) -> bool:
+    def _has_moved(self, image: Image, captured_s: float) -> bool:
         """Whether the picture as a whole is another one than a moment ago: then nothing lies where it lay."""
         if captured_s - self._checked_s < _CHECK_S:
             return False
@@ -117,7 +116,7 @@ class Lookalikes:
         cells, before = cells_of(image), self._cells
         if before is None or captured_s - before[1] >= _COMPARED_S:
             self._cells = cells, captured_s
-        return before is not None and has_changed(before[0], cells, (0, 0, 0, 0), noise)
+        return before is not None and has_changed(before[0], cells, (0, 0, 0, 0))
 
     def _was_robot(self, piece: _Piece, captured_s: float) -> bool:
         return bool(np.any(captured_s - self._robots_s[piece.box][piece.mask] < _HELD_S))

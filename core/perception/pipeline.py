@@ -229,9 +229,7 @@ class Pipeline:
                 vessel_probability = standing.add(vessel_probability, robot_probability, past.glances.cells, past.glances.noise)
             found = masks.clean(vessel_probability, robot_probability, self._config)
             if past is not None:
-                found = replace(
-                    found, robot=past.lookalikes.without(found.robot, image, scene.captured_s, noise=past.glances.noise)
-                )
+                found = replace(found, robot=past.lookalikes.without(found.robot, image, scene.captured_s))
             known = sight.familiarity
             # At another size the same picture is another one to the network; without a vessel half of a signature says nothing.
             if known is not None and known.working_size_px == self._config.working_size_px and found.vessel.any():
@@ -266,8 +264,7 @@ class Pipeline:
             return _unseen(replace(scene, window=window), known.vessel_probability, robot_probability, broken)
         with watch.stage("masks"):
             robot = masks.clean_robot(robot_probability, config)
-            if past is not None:
-                robot = past.lookalikes.without(robot, image, scene.captured_s, window, noise=past.glances.noise)
+            robot = past.lookalikes.without(robot, image, scene.captured_s, window) if past is not None else robot
             found = Masks(known.vessel, robot, known.vessel_probability, robot_probability)
         scene = replace(scene, window=window, masks=found, refusal=quality.check_masks(found))
         if scene.refusal is not None:

@@ -2,7 +2,8 @@
 
 Most answers that are lost are lost at the robot's tip (docs/method.md), a few hundred of three hundred thousand pixels. The second
 network is wider than the first one on its fine levels, and in training it is shown nothing but windows around ends, and around
-pixels that the first look got wrong. What it says replaces the first look's probabilities there, of robot and vessel.
+pixels that the first look got wrong. What it says replaces the first look's probabilities there, of robot and vessel; where the
+vessel is known already, as in a stream's windows, the robot's alone, and it is shown the vessel that is known.
 """
 
 from __future__ import annotations
@@ -117,9 +118,15 @@ class SecondLook:
         return [(*self._look(image, (v, r)), signature) for image, (v, r, signature) in zip(images, seen, strict=True)]
 
     def robot_beside(self, vessel: Probability, image: Image) -> Probability:
-        """The robot, looked at closely once."""
-        seen = vessel, robots(self._first, [image])[0]
-        return look_again(image, seen, self._near, robot_alone=True)[1]
+        """The robot, looked at as often; the close looks are shown the `vessel` that is known."""
+        robot = robots(self._first, [image])[0]
+        found = look_again(image, (vessel, robot), self._near, robot_alone=True)[1]
+        if self._looks == 1:
+            return found
+        total = found.copy()
+        for shift in _SHIFTS_PX[: self._looks - 1]:
+            total += look_again(image, (vessel, found), self._near, shift, robot_alone=True)[1]
+        return np.asarray(total / self._looks, np.float32)
 
     def _look(self, image: Image, seen: tuple[Probability, Probability]) -> tuple[Probability, Probability]:
         found = look_again(image, seen, self._near)
@@ -145,7 +152,8 @@ def look_again(
 ) -> tuple[Probability, Probability]:
     """Probabilities of vessel and robot after a second look at the ends of what the first one has `seen` in the picture.
 
-    `shift_px`: by how much (x, y) the windows' middles lie beside the ends. `robot_alone`: the vessel stays as it is.
+    `shift_px`: by how much (x, y) the windows' middles lie beside the ends. `robot_alone`: the vessel stays as it was seen, by whom
+    ever.
     """
     vessel, robot = (probability.copy() for probability in seen)
     looked: list[Point] = []
@@ -170,7 +178,7 @@ def _look_at(
     *,
     robot_alone: bool,
 ) -> None:
-    """Replace both probabilities, or the robot's, in the windows around `middles`; the network is shown the first look's."""
+    """Replace both probabilities, or the robot's, in the windows around `middles`; the network is shown what was `seen`."""
     height, width = image.shape[:2]
     windows = [window_around(place, (width, height), WINDOW_PX) for place in middles]
     parts = [np.s_[y : y + down, x : x + across] for x, y, across, down in windows]

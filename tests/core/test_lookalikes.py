@@ -41,8 +41,6 @@ class Stream:
     now_s: float = 5.0
     head_x: float = 0.0
     window: tuple[int, int, int, int] | None = None
-    grain: float = 0.0
-    noise: float = 0.0
     board: NDArray[np.float64] = field(
         default_factory=lambda: 150.0 + 30.0 * np.sin(np.arange(WIDTH) / 9.0)[None, :, None] * np.ones((HEIGHT, WIDTH, 3))
     )
@@ -51,8 +49,6 @@ class Stream:
     def image(self, *robots: tuple[float, float]) -> Image:
         """The board with the robot, dark, where it really is."""
         picture = self.board + self.rng.normal(0.0, 6.0, self.board.shape)
-        coarse = self.rng.normal(0.0, self.grain, (HEIGHT // 8, WIDTH // 8, 1))
-        picture += np.kron(coarse, np.ones((8, 8, 1)))
         picture[_stretch(*robots)] = 40.0
         return np.clip(picture, 0, 255).astype(np.uint8)
 
@@ -61,7 +57,7 @@ class Stream:
         self.now_s += after_s
         self.head_x = head_x if head_x is not None else self.head_x
         picture = self.image((0, self.head_x)) if image is None else image
-        left = self.lookalikes.without(mask, picture, self.now_s, self.window, noise=self.noise)
+        left = self.lookalikes.without(mask, picture, self.now_s, self.window)
         if head_x is not None:
             self.lookalikes.learn(_path(head_x), self.now_s)
         return left
@@ -166,13 +162,6 @@ def test_a_camera_that_was_moved_hides_no_tip(stream: Stream) -> None:
     for _ in range(30):
         left = stream.see(moved, 218, image=stream.image((0, 318)))
     assert np.array_equal(left, moved)
-
-
-@pytest.mark.parametrize(("noise", "is_known"), [(0.0, False), (7.0, True)])
-def test_grain_is_no_camera_that_was_moved_once_it_is_known(stream: Stream, noise: float, is_known: bool) -> None:
-    stream.grain, stream.noise = 6.0, noise
-    left = stream.advance(100, 180, TEXT)
-    assert np.array_equal(left, _stretch((0, 180))) is is_known
 
 
 @pytest.mark.parametrize("is_doubted", [True, False])

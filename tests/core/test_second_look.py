@@ -143,6 +143,11 @@ def test_where_the_vessel_is_known_the_robot_alone_is_looked_at() -> None:
     assert {int(shown[0, 0, 3]) for shown in near.shown} == {128}, "it is shown the vessel that is known"
     np.testing.assert_array_equal(SecondLook(First(bar(0, 300)), near_both).robot_beside(known, picture_of(true)), found)
     assert (known == 0.5).all(), "which stays what it was"
+    once = len(near.shown)
+    near.shown.clear()
+    often = SecondLook(First(bar(0, 300)), near, looks=4).robot_beside(known, picture_of(true))
+    assert len(near.shown) == 4 * once, "as often as the confidence was calibrated with"
+    assert (often[240, 250:316] > 0.5).all()
 
 
 def test_the_second_look_fades_out_at_its_edges_but_not_at_the_pictures() -> None:

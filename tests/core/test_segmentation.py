@@ -103,9 +103,34 @@ def test_a_network_of_another_shape_is_asked_for_both() -> None:
     kernels = opset13.constant(np.zeros((2, 3, 1, 1), np.float32))
     logits = opset13.convolution(picture, kernels, [1, 1], [0, 0], [0, 0], [1, 1])
     joined = opset13.concat([picture, picture], axis=1)
-    for end in (logits, joined):  # no two masks that were joined; and something else that was
-        model = openvino.Model([opset13.sigmoid(end)], [picture], "other")
+    flat = opset13.parameter([4], np.float32, name="flat")
+    one = opset13.strided_slice(picture, [0, 0, 0, 0], [1, 1, 16, 16], [1, 1, 1, 1], [0, 0, 0, 0], [0, 0, 0, 0])
+    two = opset13.concat([one, one], axis=1)
+    for end, given in (
+        (opset13.sigmoid(logits), picture),  # no two masks that were joined
+        (opset13.sigmoid(joined), picture),  # something else that was
+        (opset13.sigmoid(opset13.concat([one, one], axis=2)), picture),
+        (opset13.sigmoid(opset13.concat([flat, flat], axis=0)), flat),
+        (opset13.softmax(two, 1), picture),
+        (two, picture),
+    ):
+        model = openvino.Model([end], [given], "other")
         assert _robot_alone(model) is model
+    assert _robot_alone(openvino.Model([opset13.sigmoid(two)], [picture], "ours")) is not model
+
+
+@pytest.mark.parametrize(("fold", "planes"), [(1, 3), (4, 3), (2, 5)])
+@pytest.mark.parametrize("precision", ["int8", "fp32"])
+def test_networks_of_all_shapes_can_leave_the_vessel_out(tmp_path: Path, fold: int, planes: int, precision: str) -> None:
+    torch.manual_seed(8)
+    network = DualUNet(UNetShape((4, 4, 4, 4, 4), (4, 4, 4, 4), 1, fold, inputs=planes))
+    torch.nn.init.normal_(network.robot.output.weight)
+    image = np.random.default_rng(2).integers(0, 256, (64, 128, planes)).astype(np.uint8)
+    save_model(network, tmp_path / "any", training={}, figures={}, examples=[image])
+    segment = OpenVinoSegmenter(tmp_path / "any", 1, precision)
+    (alone,) = robots(segment, [image])
+    assert segment._robot is not segment._model
+    np.testing.assert_allclose(alone, segment(image)[1], atol=1e-6)
 
 
 def test_several_threads_may_ask_one_network(undecided: Path) -> None:
