@@ -150,7 +150,7 @@ class OpenVinoSegmenter:
         """To be asked about so many images of this height and width, with `_asking` held."""
         key = size, robot_alone
         if key in self._requests:
-            self._requests[key] = self._requests.pop(key)  # the one that was not asked for longest goes first
+            self._requests[key] = self._requests.pop(key)  # last in the row: whoever was asked least recently goes first
         else:
             if len(self._requests) >= self._MAX_SIZES:
                 self._requests.pop(next(iter(self._requests)))
@@ -170,9 +170,9 @@ def _robot_alone(model: Any) -> Any:
     import openvino
     from openvino import opset13
 
-    ended = model.outputs[0].get_node().input_value(0).get_node()
-    joined = ended.input_value(0).get_node() if ended.get_type_name() == "Sigmoid" else ended
-    if joined.get_type_name() != "Concat" or joined is ended or joined.get_input_size() != 2:
+    end = model.outputs[0].get_node().input_value(0).get_node()
+    joined = end.input_value(0).get_node() if end.get_type_name() == "Sigmoid" else end
+    if end is joined or joined.get_type_name() != "Concat" or joined.get_input_size() != 2:
         return model
     logits = joined.input_value(1)
     shape = logits.get_partial_shape()

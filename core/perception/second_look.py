@@ -119,22 +119,17 @@ class SecondLook:
 
     def robot_beside(self, vessel: Probability, image: Image) -> Probability:
         """The robot, looked at as often; the close looks are shown the `vessel` that is known."""
-        robot = robots(self._first, [image])[0]
-        found = look_again(image, (vessel, robot), self._near, robot_alone=True)[1]
-        if self._looks == 1:
-            return found
-        total = found.copy()
-        for shift in _SHIFTS_PX[: self._looks - 1]:
-            total += look_again(image, (vessel, found), self._near, shift, robot_alone=True)[1]
-        return np.asarray(total / self._looks, np.float32)
+        return self._look(image, (vessel, robots(self._first, [image])[0]), robot_alone=True)[1]
 
-    def _look(self, image: Image, seen: tuple[Probability, Probability]) -> tuple[Probability, Probability]:
-        found = look_again(image, seen, self._near)
+    def _look(
+        self, image: Image, seen: tuple[Probability, Probability], *, robot_alone: bool = False
+    ) -> tuple[Probability, Probability]:
+        found = look_again(image, seen, self._near, robot_alone=robot_alone)
         if self._looks == 1:
             return found
         vessel, robot = (probability.copy() for probability in found)
         for shift in _SHIFTS_PX[: self._looks - 1]:
-            anew = look_again(image, found, self._near, shift)
+            anew = look_again(image, found, self._near, shift, robot_alone=robot_alone)
             vessel += anew[0]
             robot += anew[1]
         vessel /= self._looks
