@@ -29,6 +29,8 @@ _PLACES = 512
 """Of each example, at which a convolution's inputs are looked at to choose how its weights are rounded."""
 _DAMPING = 0.01
 """Share of the inputs' mean variance that is added to each: what a few examples say of rare inputs is not to be relied on."""
+_AT_ONCE = 64
+"""Weights of a row that are rounded before the rest of the row hears of what was lost by them."""
 _PIXEL_STEP = 4.0 / 255
 """One of 255 levels as the network sees it. Its zero lies between two levels; the copy's has to lie on one."""
 
@@ -61,9 +63,13 @@ class _Moments:
         self._products: Any = 0.0
         self._random = torch.Generator().manual_seed(0)
 
+    def choose(self, number: int) -> Tensor:
+        """Which of so many places are looked at."""
+        return torch.randperm(number, generator=self._random)[:_PLACES]
+
     def add(self, inputs: Tensor) -> None:
-        """Inputs (places, K)."""
-        chosen = inputs[torch.randperm(len(inputs), generator=self._random)[:_PLACES]].double()
+        """Inputs (places, K) at the places chosen."""
+        chosen = inputs.double()
         self._count += len(chosen)
         self._sum = self._sum + chosen.sum(0)
         self._products = self._products + chosen.T @ chosen
@@ -88,11 +94,15 @@ def _rounded(weight: Tensor, scale: Tensor, products: Tensor) -> Tensor:
     left = weight.double()[:, order]
     whole = torch.empty_like(left)
     step = scale.double()
-    for column in range(len(order)):
-        now = left[:, column]
-        whole[:, column] = torch.round(now / step).clamp(-WEIGHT_STEPS, WEIGHT_STEPS) * step
-        lost = (now - whole[:, column]) / follow[column, column]
-        left[:, column + 1 :] -= lost[:, None] * follow[column, column + 1 :]
+    for first in range(0, len(order), _AT_ONCE):
+        last = min(first + _AT_ONCE, len(order))
+        lost = left.new_empty(len(left), last - first)
+        for column in range(first, last):
+            now = left[:, column]
+            whole[:, column] = torch.round(now / step).clamp(-WEIGHT_STEPS, WEIGHT_STEPS) * step
+            lost[:, column - first] = (now - whole[:, column]) / follow[column, column]
+            left[:, column + 1 : last] -= lost[:, column - first, None] * follow[column, column + 1 : last]
+        left[:, last:] -= lost @ follow[first:last, last:]
     back = torch.empty_like(whole)
     back[:, order] = whole
     return back.to(weight.dtype)
@@ -132,15 +142,17 @@ class _Conv(nn.Module):
         self.moments = None
 
     def _see(self, x: Tensor) -> None:
+        """Take in what the weights are multiplied with at some pixels of `x` (N, C, H, W); only these are taken apart."""
         assert self.moments is not None
+        number, _, height, width = x.shape
+        chosen = self.moments.choose(number * height * width)
+        image, row, column = chosen // (height * width), chosen // width % height, chosen % width
         if self.channel == 0 and self.conv.kernel_size != (1, 1):
-            places = (
-                nn.functional.unfold(x, self.conv.kernel_size, padding=cast("tuple[int, ...]", self.conv.padding))
-                .transpose(1, 2)
-                .flatten(0, 1)
-            )
+            (down, right), (above, left) = self.conv.kernel_size, cast("tuple[int, int]", self.conv.padding)
+            around = nn.functional.pad(x, (left, left, above, above)).unfold(2, down, 1).unfold(3, right, 1)
+            places = around[image, :, row, column].flatten(1)
         else:  # each pixel for itself
-            places = x.permute(0, 2, 3, 1).flatten(0, 2)
+            places = x[image, :, row, column]
         self.moments.add(places)
 
     def forward(self, x: Tensor) -> Tensor:
