@@ -16,6 +16,8 @@ from app.operator_window import OperatorWindow
 from app.scripted_operator import ScriptedOperator
 
 _WARM_UP_S = 10.0
+_FIRST_WITHIN_S = 60.0
+"""A rig that shows nothing for so long is not waited for."""
 _LOOK_EVERY_MS = 5
 
 
@@ -33,19 +35,21 @@ class _Readings:
 
 
 class WindowWatch(QObject):
-    """Takes readings until `seconds` have passed, then closes the window. Half of it is driven by hand, the rest handed over."""
+    """Takes readings, from the first picture on for `seconds`, then closes the window.
+
+    Half of that is driven by hand, the rest handed over.
+    """
 
     def __init__(self, window: OperatorWindow, seconds: float) -> None:
         super().__init__(window)
         self._window = window
         self._seconds = seconds
         self._started_s = time.monotonic()
-        self._ended_s = self._started_s + seconds
+        self._ended_s = self._started_s + _FIRST_WITHIN_S
         self.ended_early = False
         self._process = psutil.Process()
         self.readings = _Readings()
         self._operator = ScriptedOperator(window, seconds / 2.0)
-        self._operator.start()
         self._timers: list[QTimer] = []
         for interval_ms, slot in ((_LOOK_EVERY_MS, self._look), (1000, self._weigh)):
             timer = QTimer(self)
@@ -62,10 +66,12 @@ class WindowWatch(QObject):
             self.readings.latency_ms.append((now - tick.frame.captured_s) * 1e3)
             if self.readings.first_shown_s is None:
                 self.readings.first_shown_s = now
+                self._ended_s = now + self._seconds
+                self._operator.start()
         view, servo_ms = self._window.desk.view, self.readings.servo_ms
         if view is not None and view.latency_s is not None and servo_ms[-1:] != [view.latency_s * 1e3]:
             servo_ms.append(view.latency_s * 1e3)
-        if now - self._started_s >= self._seconds:
+        if now >= self._ended_s:
             for timer in self._timers:
                 timer.stop()
             self._operator.stop()

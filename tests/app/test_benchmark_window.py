@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QObject
 from pytestqt.qtbot import QtBot
@@ -15,6 +16,7 @@ from pytestqt.qtbot import QtBot
 from app import benchmark_window
 from app.benchmark_window import WindowWatch
 from core.control.drive_view import DriveView
+from core.types import Frame, Scene, Tick
 
 ROOT = Path(__file__).parents[2]
 
@@ -40,9 +42,13 @@ def test_it_runs_the_window_and_ends_by_itself() -> None:
 
 class _Operator:
     driven_s = 0.0
+    started = 0
 
     def __init__(self, window: QObject, after_s: float) -> None: ...
-    def start(self) -> None: ...
+    def start(self) -> None:
+        _Operator.started += 1
+
+    def stop(self) -> None: ...
 
 
 class _Desk:
@@ -52,8 +58,12 @@ class _Desk:
 
 class _Window(QObject):
     desk = _Desk()
-    shown_tick = None
+    shown_tick: Tick | None = None
     max_block_ms = 0.0
+    closed = False
+
+    def close(self) -> None:
+        self.closed = True
 
 
 def test_only_blocks_that_are_longer_than_all_before_are_told(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,3 +75,41 @@ def test_only_blocks_that_are_longer_than_all_before_are_told(qtbot: QtBot, monk
         watch._weigh()
     assert [ms for _, ms, _ in watch.readings.blocks] == [12.0, 30.04, 41.0]
     assert watch.result() == {"shown_fps": 0.0}, "nothing was shown"
+
+
+def test_the_seconds_begin_with_the_first_picture(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long the rig takes to open on a slow machine."""
+    now = 1000.0
+    monkeypatch.setattr(benchmark_window, "ScriptedOperator", _Operator)
+    monkeypatch.setattr("app.benchmark_window.time.monotonic", lambda: now)
+    monkeypatch.setattr(_Operator, "started", 0)
+    window = _Window()
+    watch = WindowWatch(window, 12.0)  # type: ignore[arg-type]
+    now = 1050.0
+    watch._look()
+    assert (window.closed, _Operator.started) == (False, 0)
+    frame = Frame(0, now, np.zeros((4, 4, 3), np.uint8))
+    window.shown_tick = Tick(frame, Scene(0, now, (4, 4), 1.0), None, None, None, 0, 20.0)
+    watch._look()
+    watch._weigh()
+    now = 1061.0
+    watch._look()
+    assert (window.closed, _Operator.started) == (False, 1)
+    now = 1062.0
+    watch._look()
+    assert window.closed
+    watch.end()
+    assert not watch.ended_early
+    assert watch.result()["seconds"] == 12.0
+
+
+def test_a_rig_that_shows_nothing_is_not_waited_for_for_ever(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 1000.0
+    monkeypatch.setattr(benchmark_window, "ScriptedOperator", _Operator)
+    monkeypatch.setattr("app.benchmark_window.time.monotonic", lambda: now)
+    window = _Window()
+    watch = WindowWatch(window, 600.0)  # type: ignore[arg-type]
+    now = 1060.0
+    watch._look()
+    assert window.closed
+    assert watch.result() == {"shown_fps": 0.0}
