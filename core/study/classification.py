@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.metrics import cohen_kappa_score, fowlkes_mallows_score, precision_recall_fscore_support
 
 from core.study.bootstrap import RESAMPLES, Floats, are_too_few, interval_95, share_interval
 
@@ -16,6 +15,8 @@ _AVERAGED = ("precision", "recall", "f1")
 
 def kappa(true: Sequence[str], found: Sequence[str]) -> float | None:
     """Cohen's kappa of two labellings; None when both know one label only, where chance alone agrees."""
+    from sklearn.metrics import cohen_kappa_score  # a second, which whoever only trains or drives need not wait for
+
     return float(cohen_kappa_score(list(true), list(found))) if len({*true, *found}) > 1 else None
 
 
@@ -26,6 +27,8 @@ def fowlkes_mallows_pairs(true: Sequence[str], found: Sequence[str]) -> float | 
     """
     if any(len(set(labels)) == len(labels) for labels in (true, found)):
         return None
+    from sklearn.metrics import fowlkes_mallows_score
+
     return float(fowlkes_mallows_score(list(true), list(found)))
 
 
@@ -144,6 +147,8 @@ _KINDS = ("macro", "weighted")
 
 def _scores(manual: Sequence[str], algorithm: Sequence[str], labels: list[str]) -> Any:
     """Precision, recall and F1 of each class, NaN where undefined."""
+    from sklearn.metrics import precision_recall_fscore_support
+
     return precision_recall_fscore_support(list(manual), list(algorithm), labels=labels, zero_division=np.nan)[:3]
 
 
