@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import hashlib
 import os
 import sys
 import threading
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 
 from core.config import SegmentationConfig
 from core.learning.model_file import INFO, ONNX, ONNX_INT8, ModelError, check_files, model_folder, read_model_info, second_look_of
+from core.perception import kept_networks
 from core.perception.familiarity import signature_of
 from core.perception.segmentation import Probability, Recognised
 from core.types import Image
@@ -154,15 +157,34 @@ class OpenVinoSegmenter:
         else:
             if len(self._requests) >= self._MAX_SIZES:
                 self._requests.pop(next(iter(self._requests)))
-            model = (self._robot if robot_alone else self._model).clone()
-            options = {"PERFORMANCE_HINT": "LATENCY", "INFERENCE_NUM_THREADS": self._threads}
-            try:
-                model.reshape([*size, self.info.planes])
-                self._requests[key] = self._core.compile_model(model, "CPU", options).create_infer_request()
-            except RuntimeError as error:
-                reason = str(error).strip().splitlines()[-1]
-                raise ModelError(f"{self._file}: is no network of {INFO}'s shape ({reason}); restore the model folder") from None
+            self._requests[key] = self._compiled(size, robot_alone).create_infer_request()
         return self._requests[key]
+
+    def _compiled(self, size: tuple[int, ...], robot_alone: bool) -> Any:
+        """The network, or the part of it that shows the robot, for so many images of this size; kept from start to start."""
+        import openvino
+
+        options = {"PERFORMANCE_HINT": "LATENCY", "INFERENCE_NUM_THREADS": self._threads}
+        sha256 = self.info.onnx_int8_sha256 if self._int8 else self.info.onnx_sha256
+        name = kept_networks.name_of(sha256, _this_file(), openvino.get_version(), options, robot_alone, size)
+        if (kept := kept_networks.read(name)) is not None:
+            with contextlib.suppress(RuntimeError):  # whole, and yet not to be read: it is compiled again
+                return self._core.import_model(kept, "CPU", options)
+        model = (self._robot if robot_alone else self._model).clone()
+        try:
+            model.reshape([*size, self.info.planes])
+            compiled = self._core.compile_model(model, "CPU", options)
+        except RuntimeError as error:
+            reason = str(error).strip().splitlines()[-1]
+            raise ModelError(f"{self._file}: is no network of {INFO}'s shape ({reason}); restore the model folder") from None
+        kept_networks.keep(name, compiled.export_model().getvalue())
+        return compiled
+
+
+@functools.cache
+def _this_file() -> str:
+    """Digest of this source, which says what a network's file is made into before it is compiled."""
+    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 
 
 def _robot_alone(model: Any) -> Any:
