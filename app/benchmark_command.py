@@ -7,6 +7,7 @@ import os
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, MutableMapping, Sequence
 from pathlib import Path
@@ -127,7 +128,10 @@ def _pictures(count: int) -> Iterator[Image]:
 
 
 def _first_frame_s(config_path: Path | None) -> float | None:
-    """Seconds from starting ``main.py`` to its first overlaid frame, in a process of its own (offscreen without a display)."""
+    """Seconds from starting ``main.py`` to its first overlaid frame, in a process of its own (offscreen without a display).
+
+    As on the first day: nothing is there that an earlier start has kept.
+    """
     main = Path(sys.modules["__main__"].__file__ or "main.py").resolve()
     environment = dict(os.environ)
     _without_display(environment)
@@ -135,7 +139,9 @@ def _first_frame_s(config_path: Path | None) -> float | None:
     command = [sys.executable, str(main), "gui", "--until-first-frame", "--rig", "twin"]
     command += ["--config", str(config_path)] if config_path is not None else []
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+        with tempfile.TemporaryDirectory() as cache:
+            environment["XDG_CACHE_HOME"] = cache
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
     except subprocess.TimeoutExpired:
         sys.stderr.write("the window showed no understood frame within 120 s\n")
         return None

@@ -44,8 +44,7 @@ class WindowWatch(QObject):
         super().__init__(window)
         self._window = window
         self._seconds = seconds
-        self._started_s = time.monotonic()
-        self._ended_s = self._started_s + _FIRST_WITHIN_S
+        self._ended_s = time.monotonic() + _FIRST_WITHIN_S
         self.ended_early = False
         self._process = psutil.Process()
         self.readings = _Readings()
@@ -67,6 +66,7 @@ class WindowWatch(QObject):
             if self.readings.first_shown_s is None:
                 self.readings.first_shown_s = now
                 self._ended_s = now + self._seconds
+                self._weigh()
                 self._operator.start()
         view, servo_ms = self._window.desk.view, self.readings.servo_ms
         if view is not None and view.latency_s is not None and servo_ms[-1:] != [view.latency_s * 1e3]:
@@ -78,8 +78,11 @@ class WindowWatch(QObject):
             self._window.close()
 
     def _weigh(self) -> None:
-        """Once a second; the heartbeat keeps a block for ten, so one that is longer than any before is new."""
-        seen, at_s = self.readings, time.monotonic() - self._started_s
+        """Once a second from the first picture on; the heartbeat keeps a block for ten, so one longer than any before is new."""
+        seen = self.readings
+        if seen.first_shown_s is None:
+            return
+        at_s = time.monotonic() - seen.first_shown_s
         view, bus, block_ms = self._window.desk.view, self._window.desk.bus, self._window.max_block_ms
         if block_ms > max((ms for _, ms, _ in seen.blocks), default=0.0):
             seen.blocks.append((at_s, block_ms, view.mode.value if view is not None else ""))
@@ -93,9 +96,10 @@ class WindowWatch(QObject):
         self.ended_early, self._ended_s = now < self._ended_s, min(now, self._ended_s)
 
     def result(self) -> dict[str, Any]:
-        """Pace since the first shown frame; memory at the end of the warm-up, at the end, and its growth per minute in between.
+        """Pace since the first shown frame; memory 10 s after it, at the end, and its growth per minute in between.
 
-        The bus's cycle is the worst 99th percentile of ten seconds; of the blocks, those that were the longest so far.
+        The bus's cycle is the worst 99th percentile of ten seconds after these; of the blocks, from 10 s before the first frame on,
+        those that were the longest so far.
         """
         seen = self.readings
         if seen.first_shown_s is None:
@@ -134,6 +138,8 @@ def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     application.exec()
     signals.stop()
     watch.end()
-    if watch.ended_early:
+    if watch.readings.first_shown_s is None:
+        sys.stderr.write("note: no picture was shown; start the window (python main.py) to see why\n")
+    elif watch.ended_early:
         sys.stderr.write(f"note: closed before its {seconds:g} s; the figures are of the time until then\n")
     return watch.result()

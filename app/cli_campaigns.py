@@ -55,7 +55,8 @@ def benchmark(
     json: JsonOption = False,
     accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
     window: Annotated[
-        float | None, typer.Option(min=5.0, max=3600.0, help="run the window for so many seconds and measure its pace")
+        float | None,
+        typer.Option(min=5.0, max=3600.0, help="measure the window's pace for so many seconds from its first picture on"),
     ] = None,
     recording: Annotated[bool, typer.Option("--recording", help="how much a recording slows perception down, in turns")] = False,
     player: Annotated[

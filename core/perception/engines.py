@@ -177,7 +177,8 @@ class OpenVinoSegmenter:
         except RuntimeError as error:
             reason = str(error).strip().splitlines()[-1]
             raise ModelError(f"{self._file}: is no network of {INFO}'s shape ({reason}); restore the model folder") from None
-        kept_networks.keep(name, compiled.export_model().getvalue())
+        with contextlib.suppress(RuntimeError):  # it runs, whether it can be kept or not
+            kept_networks.keep(name, compiled.export_model().getvalue())
         return compiled
 
 

@@ -11,7 +11,6 @@ import functools
 import hashlib
 import os
 import platform
-from collections.abc import Iterator
 from pathlib import Path
 
 from platformdirs import user_cache_path
@@ -31,31 +30,34 @@ def name_of(*told: object) -> str:
 
 def read(name: str) -> bytes | None:
     """The compiled network; None when it is not there, or not as it was written."""
-    with _folder() as folder:
-        path = folder / (name + _ENDING)
+    try:
+        path = _folder() / (name + _ENDING)
         data = path.read_bytes()
-        if hashlib.sha256(data[_DIGEST_BYTES:]).digest() == data[:_DIGEST_BYTES]:
-            os.utime(path)
-            return data[_DIGEST_BYTES:]
-    return None
+    except (OSError, RuntimeError):
+        return None
+    if hashlib.sha256(data[_DIGEST_BYTES:]).digest() != data[:_DIGEST_BYTES]:
+        return None
+    with contextlib.suppress(OSError):  # one that may only be read is as good
+        os.utime(path)
+    return data[_DIGEST_BYTES:]
 
 
 def keep(name: str, compiled: bytes) -> None:
     """Keep it for the next start. Where that cannot be written, the next start compiles again."""
-    with _folder() as folder:
-        folder.mkdir(parents=True, exist_ok=True)
-        sweep_unfinished(folder)
-        write_whole(folder / (name + _ENDING), hashlib.sha256(compiled).digest() + compiled)
-        # A file that another process has just removed has no time any more, and ends this: the next one to be kept goes on.
-        for path in sorted(folder.glob("*" + _ENDING), key=lambda path: path.stat().st_mtime)[:-_MOST]:
-            path.unlink()
-
-
-@contextlib.contextmanager
-def _folder() -> Iterator[Path]:
-    """Where they are, to do something there that may fail: a missing file, a full disk, a user without a home (RuntimeError)."""
     with contextlib.suppress(OSError, RuntimeError):
-        yield user_cache_path("lumenpilot") / "networks"
+        path = _folder() / (name + _ENDING)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        sweep_unfinished(path.parent)
+        write_whole(path, hashlib.sha256(compiled).digest() + compiled)
+        others = (other for other in path.parent.glob("*" + _ENDING) if other != path)
+        # A file that another process has just removed has no time any more, and ends this: the next one to be kept goes on.
+        for old in sorted(others, key=lambda other: other.stat().st_mtime)[: 1 - _MOST]:
+            old.unlink()
+
+
+def _folder() -> Path:
+    """Where they are; RuntimeError for a user without a home."""
+    return user_cache_path("lumenpilot") / "networks"
 
 
 @functools.cache

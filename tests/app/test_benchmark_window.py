@@ -70,11 +70,12 @@ def test_only_blocks_that_are_longer_than_all_before_are_told(qtbot: QtBot, monk
     monkeypatch.setattr(benchmark_window, "ScriptedOperator", _Operator)
     window = _Window()
     watch = WindowWatch(window, 600.0)  # type: ignore[arg-type]
+    assert watch.result() == {"shown_fps": 0.0}, "nothing was shown"
+    watch.readings.first_shown_s = 0.0
     for block_ms in (12.0, 30.04, 30.04, 20.0, 41.0):
         window.max_block_ms = block_ms
         watch._weigh()
     assert [ms for _, ms, _ in watch.readings.blocks] == [12.0, 30.04, 41.0]
-    assert watch.result() == {"shown_fps": 0.0}, "nothing was shown"
 
 
 def test_the_seconds_begin_with_the_first_picture(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,11 +88,12 @@ def test_the_seconds_begin_with_the_first_picture(qtbot: QtBot, monkeypatch: pyt
     watch = WindowWatch(window, 12.0)  # type: ignore[arg-type]
     now = 1050.0
     watch._look()
+    watch._weigh()
     assert (window.closed, _Operator.started) == (False, 0)
+    assert not watch.readings.memory_mb, "nor is what was there before it opened of any interest"
     frame = Frame(0, now, np.zeros((4, 4, 3), np.uint8))
     window.shown_tick = Tick(frame, Scene(0, now, (4, 4), 1.0), None, None, None, 0, 20.0)
     watch._look()
-    watch._weigh()
     now = 1061.0
     watch._look()
     assert (window.closed, _Operator.started) == (False, 1)
@@ -101,6 +103,7 @@ def test_the_seconds_begin_with_the_first_picture(qtbot: QtBot, monkeypatch: pyt
     watch.end()
     assert not watch.ended_early
     assert watch.result()["seconds"] == 12.0
+    assert [at_s for at_s, _ in watch.readings.memory_mb] == [0.0]
 
 
 def test_a_rig_that_shows_nothing_is_not_waited_for_for_ever(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:

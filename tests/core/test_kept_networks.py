@@ -118,6 +118,44 @@ def test_where_nothing_can_be_kept_it_is_compiled(models: list[Path], compiled: 
     assert len(compiled) == 4
 
 
+def test_a_user_without_a_home_perceives_as_well(models: list[Path], compiled: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_home(*_: object) -> Path:
+        raise RuntimeError("could not determine home directory")
+
+    monkeypatch.setattr(kept_networks, "user_cache_path", no_home)
+    first, second = look(models[0]), look(models[0])
+    np.testing.assert_array_equal(first[0], second[0])
+    assert len(compiled) == 4
+
+
+def test_one_that_may_only_be_read_is_as_good(models: list[Path], compiled: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError
+
+    look(models[0])
+    monkeypatch.setattr("core.perception.kept_networks.os.utime", refuse)
+    look(models[0])
+    assert len(compiled) == 2
+
+
+def test_a_network_that_cannot_be_kept_is_used(models: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("this plug-in exports nothing")
+
+    monkeypatch.setattr(kept_networks, "keep", fail)
+    assert look(models[0])[0].shape == (2, *PICTURE.shape[:2])
+
+
+def test_what_was_kept_last_stays_whatever_the_clock_says(folder: Path) -> None:
+    for number in range(kept_networks._MOST):
+        name = f"{number:032x}"
+        kept_networks.keep(name, b"from the future")
+        os.utime(folder / f"{name}.network", (9e9, 9e9))
+    kept_networks.keep("f" * 32, b"now")
+    assert kept_networks.read("f" * 32) == b"now"
+    assert len(list(folder.iterdir())) == kept_networks._MOST
+
+
 def test_those_that_were_not_used_for_longest_go(folder: Path) -> None:
     names = [f"{number:032x}" for number in range(kept_networks._MOST)]
     for age, name in enumerate(names):
