@@ -18,7 +18,7 @@ from platformdirs import user_cache_path
 from core.whole_file import sweep_unfinished, write_whole
 
 _MOST = 32
-"""Some 3 MB each; a start of the window takes four. Those that were not used for longest go."""
+"""Some 3 MB each; a start of the window takes five. Those that were not used for longest go."""
 _ENDING = ".network"
 _DIGEST_BYTES = hashlib.sha256().digest_size
 
