@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
 import os
 import sys
 import threading
@@ -17,7 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config import SegmentationConfig
-from core.learning.model_file import INFO, ONNX, ONNX_INT8, ModelError, check_files, model_folder, read_model_info, second_look_of
+from core.learning.model_file import (
+    INFO,
+    ONNX,
+    ONNX_INT8,
+    ModelError,
+    check_files,
+    model_folder,
+    read_model_info,
+    second_look_of,
+    sha256_of,
+)
 from core.perception import kept_networks
 from core.perception.familiarity import signature_of
 from core.perception.segmentation import Probability, Recognised
@@ -185,7 +194,7 @@ class OpenVinoSegmenter:
 @functools.cache
 def _this_file() -> str:
     """Digest of this source, which says what a network's file is made into before it is compiled."""
-    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    return sha256_of(Path(__file__))
 
 
 def _robot_alone(model: Any) -> Any:
