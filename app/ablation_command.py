@@ -15,8 +15,8 @@ from rich.console import Console
 
 from app.ablation_streams import measure_streams
 from app.ablation_tables import difference_table, markdown, stream_table, value_table
-from app.learning_commands import progress_bar
 from app.left_out import LeftOut
+from app.long_work import progress_bar
 from core.config import PerceptionConfig, choose_model, load_config
 from core.errors import UserError
 from core.names import name_as_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from app.learning_commands import progress_bar
+from app.long_work import progress_bar
 from core.config import PerceptionConfig, TwinConfig
 from core.study.ablation import OURS, SameMasks
 from core.study.ablation_stream import StreamFrame, stream_figures, stream_frame

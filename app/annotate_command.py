@@ -14,8 +14,9 @@ from typing import Any
 
 from app.annotate_sources import FRAMES, asked_files, default_store, image_files, tell_problems
 from app.language import tr
-from app.learning_commands import progress_bar
+from app.long_work import progress_bar
 from core.config import Config, choose_model, load_config
+from core.perception.compiled import loops
 from core.profiles import own_config
 from core.study.annotation_images import FoundImage, find_images
 from core.study.annotation_records import ItemKey, StoredAnnotation
@@ -122,6 +123,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         images = _listed(files, store)
         rater = options.study.rater or _user()
         items = _queue(store, images, rater, options.study, config)
+        loops.load()  # drawing uses them, and may not wait
         application = make_application(own_config().window)
 
         from app.annotation_desk import AnnotationDesk

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.learning_commands import progress_bar
+from app.long_work import progress_bar
 from app.taken_frames import recording_of
 from core.config import Config
 from core.names import name_as_text, name_of

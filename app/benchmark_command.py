@@ -17,8 +17,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from app.learning_commands import progress_bar
 from app.left_out import LeftOut
+from app.long_work import progress_bar
 from core.config import Config, TwinConfig, choose_model, load_config
 from core.errors import UserError
 from core.types import Frame, Image, Scene

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from app.benchmark_command import quantiles
-from app.learning_commands import progress_bar
+from app.long_work import progress_bar
 from app.rig_engine import leaving_a_core
 from core.config import Config, TwinConfig
 from core.perception.pipeline import Pipeline, open_pipeline

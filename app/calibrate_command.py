@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from app.learning_commands import progress_bar
 from app.left_out import LeftOut
+from app.long_work import progress_bar
 from core.config import PerceptionConfig, load_config
 from core.perception.evidence import Calibration
 from core.types import Image

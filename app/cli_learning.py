@@ -32,7 +32,7 @@ def synth(
     scheduler: SchedulerOption = None,
 ) -> None:
     """Randomised labelled frames from the bench twin: images, masks, truth."""
-    from app.learning_commands import run_synth
+    from app.synth_command import run_synth
 
     families = tuple(family) if family else None
     run_synth(out, count, seed, (width, height), families, phantom, poses, workers=workers, scheduler=scheduler)
@@ -91,8 +91,8 @@ def train(
     progress_json: ProgressOption = False,
 ) -> None:
     """Train or fine-tune the network; Ctrl-C keeps what was learnt."""
-    from app.learning_commands import TrainInputs, TrainOutputs, run_train
-    from core.learning.training import TrainingPlan
+    from app.train_command import TrainInputs, TrainOutputs, run_train
+    from core.learning.training_plan import TrainingPlan
 
     if remember and (synthetic or not data or init is None):
         raise UserError("--remember N is for --data DIR and --init MODEL, without --synthetic")

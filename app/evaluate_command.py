@@ -13,8 +13,8 @@ from typing import Any
 
 from app.annotate_tables import print_agreement
 from app.evaluation_report import print_tables, render_report
-from app.learning_commands import progress_bar
 from app.left_out import LeftOut
+from app.long_work import progress_bar
 from app.outputs import check_no_input
 from app.progress_lines import asked_teller
 from core.config import Config, choose_model, load_config

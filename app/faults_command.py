@@ -12,7 +12,7 @@ from pathlib import Path
 
 from app.faults.registry import COUNT, CampaignError, FaultCase, Result, all_cases, run_case, tidy
 from app.faults.report import line_of, page_of, summary_of, to_json
-from app.learning_commands import Interrupt, progress_bar
+from app.long_work import Interrupt, progress_bar
 from core.whole_file import write_whole
 
 

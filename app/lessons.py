@@ -23,7 +23,7 @@ from core.learning.device_windows import DeviceWindows, first_looks
 from core.learning.growing import deepened, widened, with_first_look
 from core.learning.model_file import SECOND_LOOK, check_model, load_network, model_folder, second_look_of
 from core.learning.model_writing import save_model, save_with_second_look
-from core.learning.training import TrainingPlan
+from core.learning.training_plan import TrainingPlan
 from core.perception.engines import open_second_look, open_segmenter
 from core.perception.second_look import WINDOW_PX, Planes
 from core.perception.segmentation import Turned
@@ -32,7 +32,7 @@ from core.study.difficulty import difficulty
 from core.types import Image
 
 if TYPE_CHECKING:
-    from app.learning_commands import Interrupt
+    from app.long_work import Interrupt
 
 _EXAMPLES = 40
 """Training frames from which an eight-bit network learns its ranges."""

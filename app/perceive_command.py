@@ -47,7 +47,7 @@ def run_perceive(
     config_path: Path | None,
 ) -> None:
     """Perceive everything in `paths`; raises UserError when nothing could be done, ConfigError, ModelError."""
-    from app.learning_commands import progress_bar
+    from app.long_work import progress_bar
     from core.perception.pipeline import open_pipeline
 
     config = load_config(config_path, preset, choose_model(model))

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from core.config import Config
 from core.errors import UserError
+from core.perception.compiled import loops
 from core.profiles import own_config
 from core.session.manifest import Manifest
 from core.session.reader import SessionReader
@@ -25,6 +26,7 @@ def run_play(session: Path, against: Path | None = None) -> int:
     reader = SessionReader(session)
     try:
         config = recorded_config(reader.manifest)
+        loops.load()  # drawing uses them, and may not wait
         application = make_application(own_config().window)
 
         from app.layout_keeper import LayoutKeeper, Parts, overlay_switches

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.learning_commands import Interrupt, progress_bar
+from app.long_work import Interrupt, progress_bar
 from app.rig_engine import EngineMaker
 from app.window_command import window_config
 from core.config import Config

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from app.cluster import over_cluster
-from app.learning_commands import Interrupt, progress_bar
+from app.long_work import Interrupt, progress_bar
 from app.replay_command import prepare_out, write_replay
 from app.replay_session import MOST_SHOWN, ReplayOptions, SessionReplay, Watch, change_to_json, replay_session, unwatched
 from app.worker_pool import over_processes

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from app.learning_commands import Interrupt, progress_bar
+from app.long_work import Interrupt, progress_bar
 from app.outputs import check_apart, check_no_input, check_no_session
 from app.perceive_command import _make_folder
 from app.replay_session import MOST_SHOWN, ReplayOptions, change_to_json, replay_session

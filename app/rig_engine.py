@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from typing import TYPE_CHECKING
 
 from app.memory import give_back
 from app.thread_priority import let_the_window_first
@@ -21,6 +22,9 @@ from core.types import Frame, Point, Scene
 from hardware.rig import Rig, RigKind, open_rig
 from hardware.servos.bus_messages import BusStatus
 from hardware.servos.servo_robot import ServoRobot
+
+if TYPE_CHECKING:
+    from hardware.twin.twin_start import TwinProcess
 
 
 class RigEngine(Engine):
@@ -60,9 +64,12 @@ class EngineMaker:
 
     The network is loaded once and kept. So is what the operator has not acknowledged when a rig is closed: starting again is no
     acknowledgement, or F5 would clear a latched STOP.
+
+    `ahead` is what ``start_ahead`` gave for the first rig.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, ahead: TwinProcess | None = None) -> None:
+        self._ahead = ahead
         self._pilot: Pilot | None = None
         self._left_over: LeftOver | None = None
         self._perceive: Perceive | None = None
@@ -76,7 +83,8 @@ class EngineMaker:
             give_back()
         with ExitStack() as undo, ThreadPoolExecutor(1, "network", let_the_window_first) as beside:
             loading = beside.submit(self._perception, leaving_a_core(config.perception))  # both take seconds
-            rig = open_rig(config)
+            ahead, self._ahead = self._ahead, None
+            rig = open_rig(config, ahead)
             undo.callback(rig.close)
             perceive, model = loading.result()
             network = perceive if isinstance(perceive, Pipeline) else None

@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from app.learning_commands import progress_bar
+from app.long_work import progress_bar
 from core.control.modes import Mode
 from core.session.completeness import losses, rows_cut_off
 from core.session.events import frames_lost

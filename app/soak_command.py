@@ -10,7 +10,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Any
 
-from app.learning_commands import Interrupt, progress_bar
+from app.long_work import Interrupt, progress_bar
 from app.soak import Soak
 from app.soak_samples import Sample
 from core.errors import UserError

@@ -13,7 +13,7 @@ import av
 import av.error
 import numpy as np
 
-from app.learning_commands import progress_bar
+from app.long_work import progress_bar
 from app.sources import is_video
 from core.images import ImageError, read_image
 from core.learning.dataset import write_png

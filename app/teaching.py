@@ -14,12 +14,14 @@ from app.lessons import FrameLesson, Lesson, SecondLookLesson, has_second_look
 from app.progress_lines import Teller
 from core.learning.dataset import Sample
 from core.learning.model_file import ModelError
-from core.learning.training import Attentive, TrainingPlan, train
+from core.learning.training import Attentive, train
 from core.learning.training import Progress as Report
+from core.learning.training_plan import TrainingPlan
 from core.perception.unet import DualUNet
 
 if TYPE_CHECKING:
-    from app.learning_commands import HeldOutWatch, Interrupt
+    from app.held_out_watch import HeldOutWatch
+    from app.long_work import Interrupt
 
 _TOLD_EVERY = 2
 """Steps between two lines for another program: a step takes half a second and more."""

@@ -15,7 +15,7 @@ from typing import Any, cast
 from rich.console import Console
 
 from app.cluster import over_cluster
-from app.learning_commands import progress_bar
+from app.long_work import progress_bar
 from app.trial_store import Job, KeptTrials, TrialError
 from app.worker_pool import over_processes
 from core.config import choose_model, load_config

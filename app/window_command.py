@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.application import check_display, make_application, run_until_closed
-from app.rig_engine import EngineMaker
 from app.sources import VIDEO_ENDINGS
 from core.config import Config, load_config, merge
 from core.devices import DeviceError
@@ -20,13 +19,14 @@ from core.learning.dataset import IMAGE_ENDINGS
 from core.profiles import settings_of_windows
 from core.rig_file import RESERVED, find_rig, with_rig
 from core.types import Reason
-from hardware.rig import RigKind, kind_of
+from hardware.rig import RigKind, kind_of, start_ahead
 from hardware.twin.phantom import PHANTOM_TITLES
 
 if TYPE_CHECKING:
     from PySide6.QtCore import QTimer
 
     from app.operator_window import OperatorWindow
+    from app.rig_engine import EngineMaker
 
 RIGS = RESERVED
 _REALSENSE_ENDING = ".bag"
@@ -96,6 +96,7 @@ def _choose(config: Config, rig: str) -> Config:
 def make_window(config: Config, kind: RigKind, maker: EngineMaker | None = None) -> OperatorWindow:
     """The window, not shown yet. There must be an application."""
     from app.operator_window import OperatorWindow
+    from app.rig_engine import EngineMaker
 
     return OperatorWindow(config, maker or EngineMaker(), kind, list(PHANTOM_TITLES.items()))
 
@@ -104,21 +105,24 @@ def run_window(
     rig: str | None, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False, tour: bool = False
 ) -> int:
     """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
-    from app.crash_report import CrashWatch, state_folder
-    from app.layout_keeper import LayoutKeeper, Parts, overlay_switches
-    from app.operator_devices import OperatorDevices
-    from app.rig_desk import RigDesk
-    from app.settings_desk import SettingsDesk
-    from app.side_work import SideWork
-    from app.tour import tour_at_start
-
     check_display()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     file = settings_of_windows(config_path)
     is_own = config_path is None and not until_first_frame  # what is measured does not depend on who measures
     config, kind = window_config(rig, config_path, source, file.data if is_own else None)
+    ahead = start_ahead(config)  # before all that is slow to load here
+
+    from app.crash_report import CrashWatch, state_folder
+    from app.layout_keeper import LayoutKeeper, Parts, overlay_switches
+    from app.operator_devices import OperatorDevices
+    from app.rig_desk import RigDesk
+    from app.rig_engine import EngineMaker
+    from app.settings_desk import SettingsDesk
+    from app.side_work import SideWork
+    from app.tour import tour_at_start
+
     application = make_application(config.window)
-    maker = EngineMaker()
+    maker = EngineMaker(ahead)
     window = make_window(config, kind, maker)
     watch = CrashWatch(state_folder() / "crashes", lambda: window.config.model_dump(mode="json"))
     watch.install()

@@ -19,6 +19,7 @@ from hardware.cameras.straightened import StraightenedCamera
 
 if TYPE_CHECKING:
     from hardware.servos.servo_robot import ServoRobot
+    from hardware.twin.twin_start import TwinProcess
     from hardware.twin.world import TwinWorld
 
 
@@ -63,20 +64,36 @@ def kind_of(rig: RigConfig) -> RigKind:
     return RigKind.LIVE if rig.camera in {"realsense", "webcam"} and rig.source is None else RigKind.PLAYBACK
 
 
-def open_rig(config: Config) -> Rig:
+def start_ahead(config: Config) -> TwinProcess | None:
+    """Start what a rig loads for seconds, for ``open_rig`` to take over; None where there is nothing, or it cannot be started."""
+    if not _has_own_process(config):
+        return None
+    from hardware.twin.twin_start import TwinProcess
+
+    try:
+        return TwinProcess()
+    except DeviceError:  # it will be tried again, and then said
+        return None
+
+
+def open_rig(config: Config, ahead: TwinProcess | None = None) -> Rig:
     """Open camera and robot; what was opened is closed again when the rest fails. Pictures come straightened by the rig's lens.
+
+    `ahead` is what ``start_ahead`` gave, perhaps for another rig than this one.
 
     Raises
     ------
     DeviceError, RigFileError
         With one line that says what to do.
     """
+    if ahead is not None and not _has_own_process(config):
+        ahead.end()
     kind = kind_of(config.rig)
     if kind is RigKind.PLAYBACK:
         return _open_playback(config)
     calibration = calibration_of(config)
     zero = calibration.zero if calibration is not None else None
-    rig = _open_twin(config) if kind is RigKind.SIM else _open_live(config, zero)
+    rig = _open_twin(config, ahead) if kind is RigKind.SIM else _open_live(config, zero)
     if calibration is None or calibration.lens is None:
         return rig
     return replace(rig, camera=StraightenedCamera(rig.camera, calibration.lens))
@@ -143,13 +160,21 @@ def _real_servos(config: Config, zero: ZeroConfig | None) -> ServoRobot:
     return robot
 
 
-def _open_twin(config: Config) -> Rig:
+def _has_own_process(config: Config) -> bool:
+    """Whether this is a twin with servos, in a process of its own."""
+    is_driven_twin = kind_of(config.rig) is RigKind.SIM and config.rig.robot == "twin"
+    return is_driven_twin and config.twin.own_process and config.servos.driver == "dynamixel" and config.servos.port is None
+
+
+def _open_twin(config: Config, ahead: TwinProcess | None) -> Rig:
     if config.rig.robot == "servos":
         raise DeviceError(
             f'rig {config.rig.name}: the twin has servos of its own: set rig.robot = "twin", or rig.camera to a real one'
         )
-    if config.twin.own_process and config.rig.robot == "twin" and config.servos.driver == "dynamixel":
-        return _open_remote_twin(config)
+    if config.rig.robot == "twin" and config.servos.driver == "dynamixel" and config.servos.port is not None:
+        raise DeviceError(f"rig {config.rig.name} has servos of its own: leave servos.port ({config.servos.port}) out")
+    if _has_own_process(config):
+        return _open_remote_twin(config, ahead)
     from hardware.twin.camera import TwinCamera
     from hardware.twin.world import TwinWorld
 
@@ -180,22 +205,16 @@ def _direct_robot(config: Config, world: TwinWorld) -> GuardedRobot:
     return robot
 
 
-def _open_remote_twin(config: Config) -> Rig:
+def _open_remote_twin(config: Config, ahead: TwinProcess | None) -> Rig:
     """The twin and its seven software servos in a process of their own."""
     from hardware.twin.remote_twin import RemoteCamera, RemoteTwin
 
-    _check_servos(config)
     with ExitStack() as undo:
-        twin = RemoteTwin(config, START_INSERTION_MM)
+        twin = RemoteTwin(config, START_INSERTION_MM, ahead)
         undo.callback(twin.close)
         robot = _twin_servos(config, twin.port, twin.status, None)
         undo.pop_all()
     return Rig(config.rig.name, RigKind.SIM, RemoteCamera(twin), robot)
-
-
-def _check_servos(config: Config) -> None:
-    if config.servos.port is not None:
-        raise DeviceError(f"rig {config.rig.name} has servos of its own: leave servos.port ({config.servos.port}) out")
 
 
 def _servo_robot(config: Config, world: TwinWorld) -> ServoRobot:
@@ -203,7 +222,6 @@ def _servo_robot(config: Config, world: TwinWorld) -> ServoRobot:
     from hardware.twin.servo_bus import SoftServoBus
     from hardware.twin.servo_joints import drive_world, wired
 
-    _check_servos(config)
     try:
         wiring = wired(config.twin, config.servos)
     except ValueError as error:

@@ -157,7 +157,7 @@ compile_loops() {
         return
     fi
     say "set-up: compiling (some 15 seconds)"
-    folder=$("$venv/bin/python" -c 'import core.perception.compiled.loops; from core.perception.compiled.jit import folder; print(folder())') || return 0
+    folder=$("$venv/bin/python" -c 'import core.perception.compiled.all_loops; from core.perception.compiled.jit import folder; print(folder())') || return 0
     { printf '%s\n' "$folder" "$wanted" >"$compiled"; } 2>/dev/null || true
 }
 

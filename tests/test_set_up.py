@@ -19,7 +19,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 case "$*" in
 "-m venv"*) [[ $* != *--clear* ]] || rm -rf "${@: -1}"; mkdir -p "${@: -1}/bin" && cp "$0" "${@: -1}/bin/python" ;;
 "-m pip install"*) [[ ! -e offline && $PIP_USER == 0 ]] && : >"$here/../packages" ;;
-"-c import core.perception.compiled.loops"*)
+"-c import core.perception.compiled.all_loops"*)
     [[ -z ${PYTHONSAFEPATH:-} && ! -e broken ]] || exit 1
     mkdir -p "$LOOPS/__pycache__/compiled-0" && echo >>"$here/../../compilations" && echo "$LOOPS/__pycache__/compiled-0" ;;
 "-m pip uninstall"*) [[ ! -e record ]] || printf '%s\n' "$*" >>record ;;

@@ -13,10 +13,10 @@ from PySide6.QtSvg import QSvgRenderer
 from app.annotation_desk import AnnotationDesk, Item
 from app.annotator_window import AnnotatorWindow
 from app.evaluate_command import LikePaper, run_evaluate
-from app.learning_commands import run_synth
 from app.player_window import PlayerWindow
 from app.screenshots.shots import SIZE, Studio
 from app.screenshots.stage import Scenery, Stage
+from app.synth_command import run_synth
 from core.control.hand import AT_REST, Jog
 from core.control.modes import Act
 from core.errors import UserError

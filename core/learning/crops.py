@@ -15,7 +15,7 @@ from torch.utils.data import Dataset
 from core.learning.augment import random_clutter, random_crop, random_look, with_strips
 from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.kept_frames import KeptFrames
-from core.learning.training import TrainingPlan
+from core.learning.training_plan import TrainingPlan
 from core.perception.second_look import WINDOW_PX, look_again, places_to_look
 from core.perception.segmentation import Probability, Segmenter
 from core.perception.skeleton import end_pixels

@@ -15,7 +15,7 @@ from core.learning.augment import random_clutter
 from core.learning.crops import BORDER_PX, END_REACH_PX, Crop
 from core.learning.device_frames import ROBOT, DeviceFrames, Share, Shown
 from core.learning.device_looks import drawn, happens, random_looks
-from core.learning.training import TrainingPlan
+from core.learning.training_plan import TrainingPlan
 
 _CLUTTER_PICTURES = 256
 """Made once: a processor makes them."""

@@ -28,7 +28,8 @@ from core.learning.crops import (
 from core.learning.device_crops import labels_of, some_changed, some_pixel
 from core.learning.device_frames import ROBOT, VESSEL, DeviceFrames, Share, Shown, padded_places, parted
 from core.learning.device_looks import drawn
-from core.learning.training import TrainingPlan, computes_in_bf16
+from core.learning.training import computes_in_bf16
+from core.learning.training_plan import TrainingPlan
 from core.perception.engines import cores
 from core.perception.second_look import WINDOW_PX, Planes, places_to_look
 from core.perception.windows import MARGIN_PX

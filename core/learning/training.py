@@ -5,8 +5,8 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
-from typing import Any, Protocol, runtime_checkable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import torch
 from torch import Tensor
@@ -14,6 +14,7 @@ from torch.utils.data import DataLoader, Dataset, IterableDataset
 
 from core.learning.dataset import DatasetError
 from core.learning.optimizer import make_optimizers
+from core.learning.training_plan import TrainingPlan
 from core.perception.unet import DualUNet
 
 Crop = tuple[Tensor, Tensor]
@@ -39,38 +40,6 @@ class Watching(Protocol):
 
     def watch(self, network: torch.nn.Module) -> None:
         """Which network that is, in evaluation mode."""
-
-
-@dataclass(frozen=True, slots=True)
-class TrainingPlan:
-    """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours,
-    ``look_share`` of them are changed in exposure, colour, sharpness and noise, and in ``strip_share`` of the first look's ones
-    clips lie over the robot. ``stop_after`` ends before the learning rate has come down: for a run that another one goes on from.
-    ``focus_share`` of the samples are drawn by difficulty. The robot's loss counts ``robot_weight`` times the vessel's, and around
-    the robot's true ends a pixel ``1 + end_weight`` times: theta and state are measured there. With ``keeps_statistics`` the
-    normalisation stays as it was learnt: that of a few frames alike would ruin it for all others."""
-
-    steps: int = 6000
-    batch: int = 12
-    learning_rate: float = 1e-2
-    weight_decay: float = 1e-4
-    warmup_steps: int = 100
-    crop: tuple[int, int] = (256, 256)
-    clutter_share: float = 0.03
-    average_decay: float = 0.998
-    robot_weight: float = 1.5
-    look_share: float = 1.0
-    strip_share: float = 0.0
-    focus_share: float = 0.0
-    end_weight: float = 0.0
-    keeps_statistics: bool = False
-    stop_after: int | None = None
-    seed: int = 0
-    workers: int = 1
-    threads: int = 0
-
-    def to_json(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)

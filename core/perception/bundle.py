@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled.loops import lines
+from core.perception.compiled import loops
 from core.types import Points
 
 
@@ -34,14 +34,14 @@ class Bundle:
 
 def resample(bundle: Bundle, step_px: float) -> Bundle:
     """``polyline.resample`` of each line."""
-    return Bundle(*lines.resample_all(bundle.points, bundle.starts, step_px))
+    return Bundle(*loops.lines.resample_all(bundle.points, bundle.starts, step_px))
 
 
 def smooth(bundle: Bundle, sigma: float, *, keeps_bends: bool = False) -> Bundle:
     """``polyline.smooth`` of each line."""
-    return Bundle(lines.smooth(bundle.points, bundle.starts, sigma, keeps_bends), bundle.starts)
+    return Bundle(loops.lines.smooth(bundle.points, bundle.starts, sigma, keeps_bends), bundle.starts)
 
 
 def normals(bundle: Bundle) -> Points:
     """``polyline.normals`` of each line, for all points (N, 2); lines of a single point have none that means anything."""
-    return lines.normals(bundle.points, bundle.starts)
+    return loops.lines.normals(bundle.points, bundle.starts)

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled.loops import openings
+from core.perception.compiled import loops
 from core.perception.openings import STEP_PX, Gate
 from core.types import Mask, Points
 
@@ -48,7 +48,9 @@ def between_walls(trunk: Trunk, vessel: Mask) -> Trunk:
 
     Between two walls a point is wanted in the middle; beside one it is wanted a radius off. Either way by at most half a radius.
     """
-    bent = openings.trunk_between_walls(trunk.points, trunk.radius, vessel, WALL_SEARCH_PX, WALL_RADII, ONE_WALL, TRUNK_STIFFNESS)
+    bent = loops.openings.trunk_between_walls(
+        trunk.points, trunk.radius, vessel, WALL_SEARCH_PX, WALL_RADII, ONE_WALL, TRUNK_STIFFNESS
+    )
     return Trunk(trunk.ends, bent, trunk.radius)
 
 
@@ -58,7 +60,7 @@ def side_branch(gate: Gate, trunk: Trunk, vessel: Mask | None = None) -> tuple[i
     It leaves the gate in its direction, and goes straight or, where the `vessel` is given, as a parabola that its walls bend; a
     wall of the trunk says nothing of it.
     """
-    return openings.side_branch(
+    return loops.openings.side_branch(
         *gate.place,
         -gate.outward[0],
         -gate.outward[1],

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled.loops import openings
+from core.perception.compiled import loops
 from core.types import Point, Points
 
 STEP_PX = 2.0
@@ -71,7 +71,7 @@ def gate_of(arm: Arm, along: NDArray[np.float64], at_least_px: float, *, wider: 
 
     `along` is its arc length (N,); the gate lies at least `at_least_px` along it, and the opening counts as `wider` as it is.
     """
-    found, x, y, across, down, position_px, radius_px = openings.gate(
+    found, x, y, across, down, position_px, radius_px = loops.openings.gate(
         arm.points,
         arm.radius,
         arm.half_width,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
-from core.perception.compiled.loops import maps
+from core.perception.compiled import loops
 from core.types import Mask, Masks, Points
 
 STEP_PX = 2.0
@@ -46,7 +46,7 @@ def _centred(line: Points, probability: NDArray[np.float32], radius_px: float) -
     if len(line) < 3:
         return line, radius_px
     across = polyline.normals(line)
-    shift, total = maps.middles(probability, line, across, int(np.ceil(1.5 * radius_px + 2.0)), radius_px)
+    shift, total = loops.maps.middles(probability, line, across, int(np.ceil(1.5 * radius_px + 2.0)), radius_px)
     seen = total[total > 1.0]
     thickness = polyline.median(seen) if len(seen) else 2.0 * radius_px
     return line + shift[:, None] * across, 0.5 * thickness

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from core.config import PathConfig, PerceptionConfig
 from core.perception import gaps, masks, quality, robot_path, skeleton, steadiness
 from core.perception.centerline import find as find_centerline
+from core.perception.compiled import loops
 from core.perception.engines import open_second_look, open_segmenter
 from core.perception.evidence import Calibration, collect
 from core.perception.familiarity import Familiarity
@@ -408,6 +409,7 @@ def _port(config: PathConfig, image: Image) -> Point | None:
 
 def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False) -> Pipeline:
     """Load the configured model and build the pipeline around it; raises ModelError. `recalibrating`: as ``open_sights`` has it."""
+    loops.load()  # not with the first picture
     plain, turned = open_sights(config, recalibrating=recalibrating)
     stream = turned if config.segmentation.mirrored == "always" else plain
     single = plain if config.segmentation.mirrored == "never" else turned

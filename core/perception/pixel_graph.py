@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled.loops import pixels
+from core.perception.compiled import loops
 from core.types import Mask, Points
 
 
@@ -45,6 +45,6 @@ def trace(skeleton: Mask) -> PixelGraph:
     a chain and not a row of junctions. Pixels with three or more links are junctions, and touching ones are one node at their
     mean.
     """
-    nodes, starts, ends, points, marks = pixels.trace(np.flatnonzero(skeleton), skeleton.shape[1])
+    nodes, starts, ends, points, marks = loops.pixels.trace(np.flatnonzero(skeleton), skeleton.shape[1])
     lines = zip(starts.tolist(), ends.tolist(), pairwise(marks.tolist()), strict=True)
     return PixelGraph(nodes, tuple(Chain(start, end, points[first:last]) for start, end, (first, last) in lines))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled.loops import lines, maps
+from core.perception.compiled import loops
 from core.types import Mask, Point, Points
 
 BEND_SHARE = 0.5
@@ -14,17 +14,17 @@ BEND_SHARE = 0.5
 
 def arc_length(points: Points) -> NDArray[np.float64]:
     """Distance walked from the first point to each point, shape (N,)."""
-    return lines.arc_length(points)
+    return loops.lines.arc_length(points)
 
 
 def point_at(points: Points, along: NDArray[np.float64], position: NDArray[np.float64]) -> Points:
     """Points at arc-length `position` (M,), given the polyline's ``arc_length`` `along`; clamped to its ends. Shape (M, 2)."""
-    return lines.point_at(points, along, position)
+    return loops.lines.point_at(points, along, position)
 
 
 def resample(points: Points, step_px: float) -> Points:
     """Points evenly spaced by about `step_px` along the polyline, both ends kept; a single point stays as it is."""
-    return lines.resample(points, step_px)
+    return loops.lines.resample(points, step_px)
 
 
 def cut(points: Points, start_px: float, end_px: float, along: NDArray[np.float64] | None = None) -> Points:
@@ -32,7 +32,7 @@ def cut(points: Points, start_px: float, end_px: float, along: NDArray[np.float6
 
     `along` is the polyline's ``arc_length``, where it is known already.
     """
-    return lines.cut(points, start_px, end_px, lines.arc_length(points) if along is None else along)
+    return loops.lines.cut(points, start_px, end_px, loops.lines.arc_length(points) if along is None else along)
 
 
 def continued(points: Points, length_px: float, over_px: float) -> Points:
@@ -40,7 +40,7 @@ def continued(points: Points, length_px: float, over_px: float) -> Points:
 
     Its direction and its bend are taken over the last `over_px`, or all of a shorter line, and ``BEND_SHARE`` of the bend goes on.
     """
-    return lines.continued(points, length_px, over_px, BEND_SHARE)
+    return loops.lines.continued(points, length_px, over_px, BEND_SHARE)
 
 
 def nearest(points: Points, point: Point, along: NDArray[np.float64] | None = None) -> tuple[float, float, Point]:
@@ -48,8 +48,8 @@ def nearest(points: Points, point: Point, along: NDArray[np.float64] | None = No
 
     `along` is the polyline's ``arc_length``, where it is known already.
     """
-    along = lines.arc_length(points) if along is None else along
-    distance, position, x, y = lines.nearest(points, point[0], point[1], along)
+    along = loops.lines.arc_length(points) if along is None else along
+    distance, position, x, y = loops.lines.nearest(points, point[0], point[1], along)
     return distance, position, (x, y)
 
 
@@ -60,12 +60,12 @@ def smooth(points: Points, sigma: float, *, keeps_bends: bool = False) -> Points
     moment, so that parabolas stay as they are, for some more noise at the same sigma. Beyond its ends the line is mirrored through
     them: it goes on straight there, does not shrink, and the ends themselves are kept.
     """
-    return lines.smooth(points, np.array((0, len(points))), sigma, keeps_bends)
+    return loops.lines.smooth(points, np.array((0, len(points))), sigma, keeps_bends)
 
 
 def sample(values: NDArray[np.float32] | Mask, points: Points) -> NDArray[np.float64]:
     """A map (h, w) at sub-pixel places (N, 2), bilinear; places beyond its border get the border's value. Shape (N,)."""
-    return maps.sample(values, points[:, 0], points[:, 1])
+    return loops.maps.sample(values, points[:, 0], points[:, 1])
 
 
 def median(values: NDArray[np.float64]) -> float:
@@ -77,4 +77,4 @@ def median(values: NDArray[np.float64]) -> float:
 
 def normals(points: Points) -> Points:
     """Unit vectors across a polyline of at least two points, (N, 2), to its right as seen on screen."""
-    return lines.normals(points, np.array((0, len(points))))
+    return loops.lines.normals(points, np.array((0, len(points))))

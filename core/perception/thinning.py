@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled.loops import pixels
+from core.perception.compiled import loops
 from core.types import Mask
 
 MIN_HALF_SIZE_SHARE = 0.35
@@ -55,7 +55,7 @@ def thin(mask: Mask) -> Mask:
         framed = np.zeros((height + 2, width + 2), np.uint8)
         framed[1:-1, 1:-1] = mask[window]
         outer = np.flatnonzero(framed > cv2.erode(framed, _CROSS))
-        pixels.thin(framed.reshape(-1), width + 2, outer, _TURNS)
+        loops.pixels.thin(framed.reshape(-1), width + 2, outer, _TURNS)
         skeleton[window] = framed[1:-1, 1:-1]
     return skeleton
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.perception import polyline
-from core.perception.compiled.loops import openings
+from core.perception.compiled import loops
 from core.types import Mask, Points
 
 STEP_PX = 2.0
@@ -43,7 +43,7 @@ def led_on(points: Points, radius_px: float, vessel: Mask) -> Points:
     lost_px = math.dist(points[-1].tolist(), kept[-1].tolist())
     onward = polyline.continued(kept, max(REACH_RADII * radius_px, 1.5 * lost_px) + 1.0, max(radius_px, HEADING_PX))
     # Walls are looked for as far as the mask is known to reach.
-    onward = openings.end_between_walls(
+    onward = loops.openings.end_between_walls(
         onward, radius_px, lost_px, round(STEP_PX), vessel, WALL_SEARCH_PX, WIDTH_SHARE, LEAST_POINTS, STIFFNESS
     )
     way_out = _way_out(onward, limit)

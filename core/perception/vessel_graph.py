@@ -12,7 +12,7 @@ from core.config import CleaningConfig
 from core.perception import bundle, pixel_graph, polyline
 from core.perception.border_cuts import by_wall_in_view
 from core.perception.bundle import Bundle
-from core.perception.compiled.loops import maps
+from core.perception.compiled import loops
 from core.perception.junctions import are_together, rebuild
 from core.perception.lumen import RadiusMap
 from core.perception.openings import Arm
@@ -266,7 +266,7 @@ def _between_walls(
     that it has around there.
     """
     sigma = WIDTH_PX / STEP_PX
-    return maps.between_walls(
+    return loops.maps.between_walls(
         level, lines.points, lines.starts, normal, expected, SEARCH_PX, SOFTEST, sigma, WIDTH_SHARE, MOST_SHIFT_PX
     )
 

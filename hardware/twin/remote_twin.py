@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import mmap
 import os
 import select
 import struct
-import subprocess
-import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,10 +17,8 @@ from core.config import Config, TwinConfig
 from core.devices import DeviceError
 from core.types import Frame, RobotStatus
 from hardware.servos.shared_slot import SharedSlot
+from hardware.twin.twin_start import TwinProcess
 
-MODULE = "hardware.twin.twin_process"
-_ROOT = Path(__file__).resolve().parents[2]
-_START_S, _END_S = 60.0, 5.0
 _FRAME = struct.Struct("<Qdii")  # index, captured, width, height
 _STATUS = struct.Struct("<3d8dd")  # time, insertion, delivery, pulls and forces, contact (NaN: unknown)
 
@@ -76,7 +69,9 @@ def unpack_status(data: bytes) -> RobotStatus:
 
 
 class RemoteTwin:
-    """A running twin process. ``read`` and ``close`` belong to one thread, ``status`` to any.
+    """A running twin process: one that was started ahead, or a new one.
+
+    ``read`` and ``close`` belong to one thread, ``status`` to any.
 
     Raises
     ------
@@ -84,22 +79,18 @@ class RemoteTwin:
         When it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
     """
 
-    def __init__(self, config: Config, insertion_mm: float) -> None:
+    def __init__(self, config: Config, insertion_mm: float, ahead: TwinProcess | None = None) -> None:
         self._number = 0
         layout = memory_layout(config.twin)
-        with contextlib.ExitStack() as undo, contextlib.ExitStack() as always:
-            memory_fd = os.memfd_create("bench_twin", os.MFD_CLOEXEC)
-            always.callback(os.close, memory_fd)
-            os.ftruncate(memory_fd, layout.size)
-            self._wake, wake_end = os.pipe()
-            undo.callback(os.close, self._wake)
-            always.callback(os.close, wake_end)
-            self._memory = undo.enter_context(mmap.mmap(memory_fd, layout.size))
+        with contextlib.ExitStack() as undo:
+            self._process = ahead or TwinProcess()
+            undo.callback(self._process.end)
+            os.ftruncate(self._process.memory_fd, layout.size)
+            self._memory = undo.enter_context(mmap.mmap(self._process.memory_fd, layout.size))
             self._frames, self._status = layout.slots(self._memory)
-            self._process = _spawn((memory_fd, wake_end))
-            undo.callback(self._end)
             self.port, self.title = self._hello(config, insertion_mm)
             undo.pop_all()
+        self._wake = self._process.wake
         os.set_blocking(self._wake, False)
 
     def read(self, timeout_s: float) -> Frame | None:
@@ -141,53 +132,22 @@ class RemoteTwin:
 
     def close(self) -> None:
         """End the process; may be called twice."""
-        if self._process.poll() is None or not self._memory.closed:
-            self._end()
-            with contextlib.suppress(OSError):
-                os.close(self._wake)
-            self._memory.close()
+        self._process.end()
+        self._memory.close()
 
     def _hello(self, config: Config, insertion_mm: float) -> tuple[str, str]:
-        assert self._process.stdin is not None
-        message = {"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm}
-        with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(json.dumps(message).encode() + b"\n")
-            self._process.stdin.flush()
-        answer = self._said(_START_S)
+        answer = self._process.begin(config, insertion_mm)
         if "error" in answer:
             raise DeviceError(str(answer["error"]))
         if "port" not in answer:
             raise DeviceError("the bench twin did not start: free memory, then start the rig again (F5)")
         return str(answer["port"]), str(answer["title"])
 
-    def _said(self, timeout_s: float) -> dict[str, Any]:
-        """The next line of the process; empty when there is none."""
-        assert self._process.stdout is not None
-        ready, _, _ = select.select([self._process.stdout], [], [], timeout_s)
-        line = self._process.stdout.readline() if ready else b""
-        try:
-            found = json.loads(line) if line else {}
-        except ValueError:
-            found = {}
-        return found if isinstance(found, dict) else {}
-
     def _check(self) -> None:
-        code = self._process.poll()
+        code = self._process.exit_code()
         if code is not None:
-            why = self._said(0.0).get("error", f"exit code {code}")
+            why = self._process.said(0.0).get("error", f"exit code {code}")
             raise DeviceError(f"the bench twin stopped ({why}): start the rig again (F5)")
-
-    def _end(self) -> None:
-        process = self._process
-        for stream in (process.stdin, process.stdout):
-            if stream is not None:
-                with contextlib.suppress(OSError):
-                    stream.close()
-        try:
-            process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
 
 
 class RemoteCamera:
@@ -213,20 +173,3 @@ class RemoteCamera:
 
     def close(self) -> None:
         self._twin.close()
-
-
-def _spawn(ends: tuple[int, int]) -> subprocess.Popen[bytes]:
-    """The process, in a session of its own: Ctrl-C in the application's terminal does not reach it."""
-    path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH", ""))))
-    quiet = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    try:
-        return subprocess.Popen(
-            [sys.executable, "-P", "-m", MODULE, *map(str, ends)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            pass_fds=ends,
-            start_new_session=True,
-            env={**os.environ, **quiet, "PYTHONPATH": path},
-        )
-    except OSError as error:
-        raise DeviceError(f"the bench twin cannot be started ({error.strerror}): free memory, then try again") from None

@@ -1,6 +1,6 @@
 """The bench twin in a process of its own: physics, pictures and software servos take no time from the program that looks at them.
 
-The application starts it (``remote_twin``) as ``python -m hardware.twin.twin_process MEMORY WAKE``, gives it the configuration as
+The application starts it (``twin_start``) as ``python -m hardware.twin.twin_process MEMORY WAKE``, gives it the configuration as
 one line of JSON on standard input, and gets one line back: the servos' port, or what is wrong. From then on pictures and truth go
 through shared memory, a byte in the pipe WAKE tells that there is a new picture, and the end of standard input ends the process.
 """
@@ -31,7 +31,10 @@ def main(arguments: list[str]) -> int:
     """Run until standard input ends. Arguments: file descriptors of the shared memory and of the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the application decides what Ctrl-C means
     memory_fd, wake = map(int, arguments)
-    message = json.loads(sys.stdin.readline())
+    line = sys.stdin.readline()
+    if not line:  # started ahead, and not needed
+        return 0
+    message = json.loads(line)
     config = Config.model_validate(message["config"])
     layout = memory_layout(config.twin)
     with mmap.mmap(memory_fd, layout.size) as memory:

@@ -10,8 +10,9 @@ import torch
 from rich.progress import Progress
 
 from app import lessons
-from app.learning_commands import HeldOutWatch, Interrupt
+from app.held_out_watch import HeldOutWatch
 from app.lessons import FrameLesson, SecondLookLesson
+from app.long_work import Interrupt
 from app.teaching import Classroom
 from core.errors import UserError
 from core.learning.crops import FrameCrops, NearCrops
@@ -20,7 +21,7 @@ from core.learning.device_crops import DeviceCrops
 from core.learning.device_windows import DeviceWindows
 from core.learning.model_file import ONNX, ONNX_INT8, SECOND_LOOK, WEIGHTS, ModelError, load_network, read_model_info
 from core.learning.model_writing import save_model, save_with_second_look
-from core.learning.training import TrainingPlan
+from core.learning.training_plan import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
 
 SMALL = UNetShape((4, 4, 8, 8, 200), (4, 4, 4, 80), 1, 2)

@@ -11,14 +11,14 @@ import pytest
 from typer import TyperException
 
 from app.cli import app
-from app.learning_commands import TrainInputs, TrainOutputs, run_train
 from app.outputs import check_no_input, is_same
 from app.perceive_command import Outputs, _check_keeps_inputs, _written_names, run_perceive
 from app.session_command import run_export, run_info
+from app.train_command import TrainInputs, TrainOutputs, run_train
 from core.errors import UserError
 from core.learning.dataset import write_mask, write_png
 from core.learning.model_file import MODELS
-from core.learning.training import TrainingPlan
+from core.learning.training_plan import TrainingPlan
 from core.session.completeness import rows_cut_off
 from core.session.events import Event, EventKind
 from core.session.files import add_event

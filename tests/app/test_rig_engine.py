@@ -51,7 +51,7 @@ def open_engine(monkeypatch: pytest.MonkeyPatch, robots: list[Robot]) -> Open:
     """Opens the twin's rig, again and again; the robots that it opened are kept."""
     maker = _Maker()
 
-    def open_rig(config: Config) -> Rig:
+    def open_rig(config: Config, _ahead: object) -> Rig:
         robots.append(Robot())
         return Rig("twin", RigKind.SIM, _Camera([]), robots[-1])
 
@@ -102,7 +102,7 @@ def test_the_policy_and_the_watch_over_stalls_use_the_rigs_own_scale(monkeypatch
         return make_policy(name, config)
 
     monkeypatch.setattr(rig_engine, "make_policy", make)
-    monkeypatch.setattr(rig_engine, "open_rig", lambda config: Rig("twin", RigKind.SIM, _Camera([]), Robot()))
+    monkeypatch.setattr(rig_engine, "open_rig", lambda config, _ahead: Rig("twin", RigKind.SIM, _Camera([]), Robot()))
     engine = _Maker()(with_rig(Config(), read_rig(path), path))
     assert engine.pilot is not None
     told.append(engine.pilot._config.policy.pursuit.pixels_per_mm)
@@ -143,7 +143,7 @@ def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, mon
     engine.close()
     works = rig_engine.open_rig
 
-    def broken(config: Config) -> Rig:
+    def broken(config: Config, _ahead: object) -> Rig:
         raise DeviceError("no camera")
 
     monkeypatch.setattr(rig_engine, "open_rig", broken)

@@ -12,11 +12,13 @@ from rich.progress import Progress
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from app.learning_commands import HeldOutWatch, Interrupt, TrainInputs, TrainOutputs, run_train
+from app.held_out_watch import HeldOutWatch
+from app.long_work import Interrupt
 from app.teaching import Classroom
+from app.train_command import TrainInputs, TrainOutputs, run_train
 from core.learning.dataset import DatasetError, write_mask, write_png
 from core.learning.model_file import ModelError
-from core.learning.training import TrainingPlan
+from core.learning.training_plan import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
 
 _STEPS = 21

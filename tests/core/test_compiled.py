@@ -1,5 +1,9 @@
 """The compiled loops against what NumPy, OpenCV and scikit-image say, on all kinds of arrays."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -7,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from core.perception import polyline
+from core.perception.compiled import loops
 from core.perception.compiled.loops import lines, maps, openings, pixels
 from core.types import Points
 
@@ -157,3 +162,23 @@ def test_the_middle_of_the_robot_is_the_mean_place_of_what_falls_outwards(seed: 
         assert total[i] == pytest.approx(weight.sum(), abs=1e-6)
         wanted = np.clip(offsets @ weight / weight.sum(), -3.0, 3.0) if weight.sum() > 1.0 else 0.0
         assert shift[i] == pytest.approx(wanted, abs=1e-6)
+
+
+def test_they_are_loaded_when_the_first_is_called_for() -> None:
+    code = """
+import sys
+import numpy as np
+import app.perceive_command, app.train_command, core.perception.pipeline, core.session.reader, hardware.twin.world
+from core.perception import polyline
+print("numba" in sys.modules)
+polyline.arc_length(np.zeros((2, 2)))
+print("numba" in sys.modules)
+"""
+    root = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=root)
+    assert done.stdout.split() == ["False", "True"], done.stderr
+
+
+def test_a_loop_that_there_is_not_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'circles'"):
+        loops.circles  # noqa: B018

@@ -28,7 +28,8 @@ from core.learning.dataset import (
     write_png,
 )
 from core.learning.optimizer import make_optimizers, orthogonalised
-from core.learning.training import LoaderLost, Progress, TrainingPlan, computes_in_bf16, loss_of, train
+from core.learning.training import LoaderLost, Progress, computes_in_bf16, loss_of, train
+from core.learning.training_plan import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
 
 

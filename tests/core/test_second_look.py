@@ -18,7 +18,7 @@ from core.learning.dataset import Sample, write_mask, write_png
 from core.learning.growing import with_first_look
 from core.learning.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info
 from core.learning.model_writing import save_model, save_with_second_look
-from core.learning.training import TrainingPlan
+from core.learning.training_plan import TrainingPlan
 from core.perception.engines import OpenVinoSegmenter, open_second_look
 from core.perception.second_look import MOST_LOOKS, WINDOW_PX, Planes, SecondLook, places_to_look, planes_of
 from core.perception.unet import DualUNet, UNetShape

@@ -7,18 +7,20 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
+import cv2
 import numpy as np
 import psutil
 import pytest
 
-from core.config import Config
+from core.config import Config, load_config
 from core.control.gate import Source
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
-from hardware.rig import RigKind, open_rig
+from hardware.rig import RigKind, open_rig, start_ahead
 from hardware.servos.shared_slot import SharedSlot
 from hardware.twin.remote_twin import RemoteTwin, pack_frame, pack_status, unpack_frame, unpack_status
 from hardware.twin.twin_process import _serve
@@ -107,6 +109,36 @@ def test_what_is_wrong_is_said_in_one_line() -> None:
     with pytest.raises(DeviceError, match="no such phantom"):
         RemoteTwin(config, 40.0)
     assert {child.pid for child in psutil.Process().children()} <= before
+
+
+def test_a_process_that_was_started_ahead_becomes_the_twin() -> None:
+    ahead = start_ahead(CONFIG)
+    assert ahead is not None
+    twin = RemoteTwin(CONFIG, 40.0, ahead)
+    try:
+        assert twin._process.pid == ahead.pid
+        assert next_frame(twin).image.shape == (120, 160, 3)
+    finally:
+        twin.close()
+    assert not psutil.pid_exists(ahead.pid)
+
+
+@pytest.mark.parametrize(
+    "changed", [{"twin": {"own_process": False}}, {"rig": {"robot": "none"}}, {"servos": {"driver": "direct"}}]
+)
+def test_only_a_twin_with_servos_of_its_own_is_started_ahead(changed: dict[str, Any]) -> None:
+    assert start_ahead(load_config(overrides=changed)) is None
+
+
+def test_a_process_that_was_started_ahead_of_another_rig_is_ended(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    ahead = start_ahead(CONFIG)
+    assert ahead is not None
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((48, 64, 3), np.uint8))
+    rig = {"camera": "image_folder", "robot": "none", "source": str(tmp_path)}
+    open_rig(load_config(overrides={"rig": rig}), ahead).close()
+    assert ahead.exit_code() == 0
+    assert not psutil.pid_exists(ahead.pid)
+    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.real_time

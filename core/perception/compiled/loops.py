@@ -1,8 +1,29 @@
-"""All compiled loops: whoever needs some of them imports these from here, and so they are all compiled, and kept, together."""
+"""The compiled loops for all who call them: they are loaded, all together, when the first of them is called for.
 
-from core.perception.compiled import lines, maps, openings, pixels
-from core.perception.compiled.jit import finish
+That takes more than a second, most of it Numba's, and many a command perceives nothing. Who may not wait in the middle of something
+calls ``load`` before.
+"""
 
-__all__ = ["lines", "maps", "openings", "pixels"]
+from __future__ import annotations
 
-finish()
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from core.perception.compiled import lines, maps, openings, pixels
+
+__all__ = ["lines", "load", "maps", "openings", "pixels"]
+
+
+def load() -> None:
+    """Load the loops, or compile them where no machine code of them is kept (some 15 s)."""
+    from core.perception.compiled import all_loops
+
+    globals().update({name: getattr(all_loops, name) for name in all_loops.__all__})
+
+
+def __getattr__(name: str) -> Any:
+    """Called for what is not there yet (PEP 562), so that a loop that is loaded costs nothing more."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    load()
+    return globals()[name]

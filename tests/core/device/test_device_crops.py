@@ -12,7 +12,8 @@ from core.learning.crops import _nearness, true_ends
 from core.learning.device_crops import DeviceCrops, _with_strip, nearness, random_crops, some_pixel, with_strips
 from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, padded_places
 from core.learning.device_looks import compressed, random_looks
-from core.learning.training import Progress, TrainingPlan, train
+from core.learning.training import Progress, train
+from core.learning.training_plan import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
 from tests.core.device.device_set import TIP, generator, masks_of, picture_of, told_by_colour
 

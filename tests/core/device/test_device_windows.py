@@ -13,7 +13,8 @@ from torch import Tensor, nn
 from core.learning.crops import EDGE_PX, _wrong
 from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, padded_places
 from core.learning.device_windows import DeviceWindows, _far, _turned, first_looks
-from core.learning.training import TrainingPlan, train
+from core.learning.training import train
+from core.learning.training_plan import TrainingPlan
 from core.perception.second_look import WINDOW_PX, places_to_look
 from core.perception.unet import DualUNet, UNetShape
 from tests.core.device.device_set import told_by_colour

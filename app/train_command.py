@@ -1,4 +1,4 @@
-"""``synth`` and ``train``: long work with progress that can be interrupted and gone on with."""
+"""``train``: long work with progress that can be interrupted and gone on with."""
 
 from __future__ import annotations
 
@@ -6,94 +6,22 @@ import os
 import signal
 import sys
 import threading
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-
-from app.cluster import over_cluster
+from app.held_out_watch import HeldOutWatch
+from app.long_work import Interrupt, console, progress_bar
 from app.outputs import is_same
-from app.progress_lines import ProgressLines, Teller, asked_teller
+from app.progress_lines import asked_teller
+from app.synth_command import run_synth
+from core.learning.training_plan import TrainingPlan
 
 if TYPE_CHECKING:
     from app.teaching import Classroom
-
-_console = Console(stderr=True, markup=False, emoji=False)
-
-
-def progress_bar() -> Progress:
-    """The bar that all long commands show, on standard error; as lines where another program asked for them."""
-    if (teller := asked_teller()) is not None:
-        return ProgressLines(teller)
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TaskProgressColumn())
-    return Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=_console)
-
-
-def run_synth(
-    out: Path,
-    count: int,
-    seed: int,
-    size: tuple[int, int],
-    families: tuple[str, ...] | None,
-    phantom: str | None,
-    poses: int = 1,
-    *,
-    workers: int = 1,
-    scheduler: str | None = None,
-) -> None:
-    """Write a labelled set; raises SynthError, and ClusterError with `scheduler`."""
-    from hardware.twin.look_titles import LOOKS
-    from hardware.twin.phantoms import make_phantom
-    from hardware.twin.synth import SynthError, SynthPlan, write_set
-
-    unknown = [name for name in families or () if name not in LOOKS]
-    if unknown:
-        raise SynthError(f"unknown look family {unknown[0]!r}; known: {', '.join(LOOKS)}")
-    if phantom is not None:
-        try:
-            make_phantom(phantom)
-        except ValueError as error:
-            raise SynthError(str(error)) from None
-    plan = SynthPlan(out, count, seed, size, families, phantom, poses)
-    elsewhere = None if scheduler is None else partial(over_cluster, scheduler)
-    with progress_bar() as bar:
-        task = bar.add_task(f"frames -> {out}", total=count)
-        write_set(plan, workers=workers, elsewhere=elsewhere, on_progress=lambda frames: bar.advance(task, frames))
-    _console.print(f"{count} labelled frames of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}", soft_wrap=True)
-
-
-class Interrupt:
-    """Ctrl-C and a termination request ask the work to stop at the next good moment instead of tearing it down."""
-
-    def __init__(self) -> None:
-        self.asked = False
-        self._old: dict[int, Any] = {}
-
-    def __enter__(self) -> Interrupt:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            self._old[number] = signal.signal(number, self._on_signal)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._old.items():
-            signal.signal(number, handler)
-
-    def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
-        self.asked = True
+    from core.learning.dataset import Sample
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +60,7 @@ def run_train(
     inputs: TrainInputs,
     init: str | None,
     base: int | None,
-    plan: Any,
+    plan: TrainingPlan,
     *,
     deepen: bool = False,
     shallow: bool = False,
@@ -148,48 +76,17 @@ def run_train(
     """
     looks = inputs.looks_to_make()
     _end_like_an_interrupt()
+    _check_choices(init, base, plan, deepen=deepen, shallow=shallow, second_look=second_look, widen=widen)
+    out, began_with = _check_places(outputs, inputs, init, second_look=second_look)
+    folders, samples = _gather(inputs, out, looks, plan)
 
     import torch
 
     from app.lessons import FrameLesson, Lesson, SecondLookLesson
     from app.teaching import Classroom, second_plan, teach_second_look
-    from core.learning.dataset import DatasetError, find_samples
-    from core.learning.model_file import INFO, model_folder
-    from core.learning.model_writing import check_can_write, check_outside
+    from core.learning.dataset import DatasetError
     from core.learning.training import LoaderLost
-    from hardware.twin.synth import SynthFolderError
 
-    if second_look and outputs.held_out is not None:
-        raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
-    _check_choices(init, base, plan, deepen=deepen, shallow=shallow, second_look=second_look, widen=widen)
-    if outputs.held_out is not None and any(is_same(outputs.held_out, folder) for folder in inputs.data):
-        raise DatasetError(f"{outputs.held_out}: is trained on, so that it cannot judge; give --held-out another folder")
-    if not inputs.data and not inputs.synthetic:
-        raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
-    out = Path(os.path.realpath(outputs.out))
-    began_with = model_folder(init) if init is not None else None  # said before half a minute of frames is made
-    check_outside(out, [began_with] if began_with is not None else [])
-    if (out / INFO).is_file() and (began_with is None or not is_same(began_with, out)):
-        raise DatasetError(f"{out}: is a model already; choose another --out, or give --init {outputs.out} to go on with it")
-    check_can_write(out)
-    for read in [*inputs.data, *([outputs.held_out] if outputs.held_out is not None else [])]:
-        if out in (place := Path(os.path.realpath(read)), *place.parents):
-            raise DatasetError(f"{read}: lies within --out, which is replaced now and then; choose another --out")
-    folders = list(inputs.data)
-    samples = [sample for folder in folders for sample in _samples_of(folder, inputs.without)]
-    _tell_left_out(folders)
-    if inputs.synthetic:
-        folder = out.with_name(out.name + "_frames")
-        first = 1_000_000 + plan.seed % 10 * 100_000  # trials have the seeds from 2000000 on
-        try:
-            run_synth(folder, inputs.synthetic, first, (640, 480), looks, None)
-        except SynthFolderError as error:  # the folder goes with --out, and the set in it with these options
-            made = "frames are made there: give --seed, --without and their number as before, or choose another --out"
-            raise DatasetError(f"{error.problem}; {made}") from None
-        folders.append(folder)
-        if plan.keeps_statistics:  # few frames of a new look, shown as often as all that is to be remembered
-            samples *= max(1, round(inputs.synthetic / len(samples)))
-        samples += find_samples([folder])
     torch.manual_seed(plan.seed)
     lesson: Lesson
     if second_look:
@@ -212,7 +109,7 @@ def run_train(
         try:
             done = room.teach(lesson, plan)
             if done is None:
-                _console.print(f"interrupted before the first step; nothing was written to {out}", soft_wrap=True)
+                console.print(f"interrupted before the first step; nothing was written to {out}", soft_wrap=True)
                 raise KeyboardInterrupt
             if then is not None and done == plan.steps:
                 teach_second_look(room, samples, then)
@@ -226,7 +123,54 @@ def run_train(
     if teller is not None:
         teller.tell({"model": str(out), "steps_done": done, "steps": steps})
     ending = "" if done == steps else f" (interrupted after {done} of {steps} steps; go on with --init {out})"
-    _console.print(f"model written to {out}{ending}", soft_wrap=True)
+    console.print(f"model written to {out}{ending}", soft_wrap=True)
+
+
+def _check_places(outputs: TrainOutputs, inputs: TrainInputs, init: str | None, *, second_look: bool) -> tuple[Path, Path | None]:
+    """Where the model goes, and the folder of the one that is gone on with; raises DatasetError, ModelError."""
+    from core.learning.dataset import DatasetError
+    from core.learning.model_file import INFO, model_folder
+    from core.learning.model_writing import check_can_write, check_outside
+
+    if second_look and outputs.held_out is not None:
+        raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
+    if outputs.held_out is not None and any(is_same(outputs.held_out, folder) for folder in inputs.data):
+        raise DatasetError(f"{outputs.held_out}: is trained on, so that it cannot judge; give --held-out another folder")
+    if not inputs.data and not inputs.synthetic:
+        raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
+    out = Path(os.path.realpath(outputs.out))
+    began_with = model_folder(init) if init is not None else None  # said before half a minute of frames is made
+    check_outside(out, [began_with] if began_with is not None else [])
+    if (out / INFO).is_file() and (began_with is None or not is_same(began_with, out)):
+        raise DatasetError(f"{out}: is a model already; choose another --out, or give --init {outputs.out} to go on with it")
+    check_can_write(out)
+    for read in [*inputs.data, *([outputs.held_out] if outputs.held_out is not None else [])]:
+        if out in (place := Path(os.path.realpath(read)), *place.parents):
+            raise DatasetError(f"{read}: lies within --out, which is replaced now and then; choose another --out")
+    return out, began_with
+
+
+def _gather(inputs: TrainInputs, out: Path, looks: tuple[str, ...] | None, plan: TrainingPlan) -> tuple[list[Path], list[Sample]]:
+    """The folders and their samples, with those that are made now, of these `looks`; raises DatasetError."""
+    from core.learning.dataset import DatasetError, find_samples
+
+    folders = list(inputs.data)
+    samples = [sample for folder in folders for sample in _samples_of(folder, inputs.without)]
+    _tell_left_out(folders)
+    if not inputs.synthetic:
+        return folders, samples
+    from hardware.twin.synth import SynthFolderError
+
+    folder = out.with_name(out.name + "_frames")
+    first = 1_000_000 + plan.seed % 10 * 100_000  # trials have the seeds from 2000000 on
+    try:
+        run_synth(folder, inputs.synthetic, first, (640, 480), looks, None)
+    except SynthFolderError as error:  # the folder goes with --out, and the set in it with these options
+        made = "frames are made there: give --seed, --without and their number as before, or choose another --out"
+        raise DatasetError(f"{error.problem}; {made}") from None
+    if plan.keeps_statistics:  # few frames of a new look, shown as often as all that is to be remembered
+        samples *= max(1, round(inputs.synthetic / len(samples)))
+    return [*folders, folder], samples + find_samples([folder])
 
 
 def _kept(room: Classroom) -> str:
@@ -255,11 +199,10 @@ def _tell_left_out(folders: Sequence[Path]) -> None:
 
 
 def _check_choices(
-    init: str | None, base: int | None, plan: Any, *, deepen: bool, shallow: bool, second_look: bool, widen: bool
+    init: str | None, base: int | None, plan: TrainingPlan, *, deepen: bool, shallow: bool, second_look: bool, widen: bool
 ) -> None:
     """Raise DatasetError for options that could have no effect beside the others."""
     from core.learning.dataset import DatasetError
-    from core.learning.training import TrainingPlan
 
     told = {"--base": base is not None, "--shallow": shallow, "--deepen": deepen}
     shapes = [name for name, given in told.items() if given]
@@ -296,50 +239,11 @@ def _never_seen(without: Sequence[str], init: Path | None) -> list[str]:
     return unseen
 
 
-def _samples_of(folder: Path, without: Sequence[str]) -> list[Any]:
+def _samples_of(folder: Path, without: Sequence[str]) -> list[Sample]:
     from core.learning.dataset import find_samples, leave_out_looks
 
     found = find_samples([folder])
     return leave_out_looks(folder, found, without) if without else found
-
-
-class HeldOutWatch:
-    """Looks now and then how the network does on the frames that it does not learn from; without any it does nothing."""
-
-    def __init__(self, folder: Path | None, out: Path, teller: Teller | None, log: Callable[[str], object]) -> None:
-        from core.learning.dataset import find_samples
-
-        self._samples = find_samples([folder]) if folder is not None else []
-        self._name = folder.name if folder is not None else ""
-        self._pictures = out.with_name(out.name + "_pictures")
-        self._teller, self._log = teller, log
-        self.figures: dict[str, Any] = {}
-        """For the model's manifest: what is known now, and what was before."""
-
-    @property
-    def is_on(self) -> bool:
-        """Whether there are such frames."""
-        return bool(self._samples)
-
-    def look(self, network: Any, step: int) -> None:
-        """Measure, write pictures, tell."""
-        if not self._samples:
-            return
-        from app.training_pictures import write_pictures
-        from core.learning.held_out import measure_held_out
-
-        seen = measure_held_out(network, self._samples)
-        now = {"vessel_dice": round(seen.vessel_dice, 4), "robot_dice": round(seen.robot_dice, 4)}
-        before = self.figures.get("before", now)
-        self.figures = {"set": self._name, "held_out": True, "frames": len(self._samples)} | now | {"before": before}
-        self._log(f"{time.strftime('%H:%M:%S')} step {step} held out {now}\n")
-        try:
-            pictures = write_pictures(seen, self._pictures, "after" if step else "before")
-        except OSError as error:
-            pictures = []
-            self._log(f"the pictures cannot be written ({error.strerror})\n")
-        if self._teller is not None:
-            self._teller.tell({"held_out_step": step, "pictures": pictures} | now)
 
 
 def _described(folder: Path) -> dict[str, Any]:
