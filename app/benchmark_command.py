@@ -198,14 +198,16 @@ def run_accuracy(
     from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.model_file import model_folder, sha256_of, trained_without
     from core.learning.model_writing import check_can_change, write_figures
-    from core.perception.pipeline import Pipeline, open_pipeline
-    from core.study.accuracy import TrueMasks, score_set, summarise, summarise_looks
-    from core.study.calibration import describe_confidence, describe_gates
 
     config = _config(model, preset, config_path)
     if store:
         check_can_change(config.perception.segmentation.model)  # said before anything is looked at
     samples, truth = find_labelled(folder, POSE_KEYS)
+
+    from core.perception.pipeline import Pipeline, open_pipeline
+    from core.study.accuracy import TrueMasks, score_set, summarise, summarise_looks
+    from core.study.calibration import describe_confidence, describe_gates
+
     masks, left_out = TrueMasks(), LeftOut()
     pipeline = Pipeline(masks, config.perception) if true_masks else open_pipeline(config.perception)
     scores: list[FrameScore] = []

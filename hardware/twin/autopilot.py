@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 
-from core.perception.centerline import plan_route
-from core.perception.polyline import arc_length, point_at
 from core.types import Command, Point, Points
 from hardware.twin.phantom import Phantom
 
@@ -17,13 +18,8 @@ class RouteFollower:
     """
 
     def __init__(self, phantom: Phantom, target: int, *, lookahead_mm: float = 10.0, wander: float = 0.0, seed: int = 0) -> None:
-        start = phantom.graph.nodes[phantom.port]
-        goal = phantom.graph.nodes[target]
-        route = plan_route(phantom.graph, (float(start[0]), float(start[1])), (float(goal[0]), float(goal[1])))
-        if route is None:
-            raise ValueError(f"phantom {phantom.name}: node {target} cannot be reached from the port")
-        self.route: Points = route.points
-        self._along = arc_length(self.route)
+        self.route = way_from_port(phantom, target)
+        self._along = _arc_length(self.route)
         self._lookahead_mm = lookahead_mm
         self._wander = wander
         self._rng = np.random.default_rng(seed)
@@ -46,7 +42,7 @@ class RouteFollower:
         places = np.flatnonzero(near)
         nearest = places[np.argmin(np.sum((self.route[places] - head) ** 2, axis=1))]
         self._progress_mm = float(self._along[nearest])
-        goal = point_at(self.route, self._along, np.array([self._progress_mm + self._lookahead_mm]))[0]
+        goal = self._point_at(self._progress_mm + self._lookahead_mm)
         heading = _heading(robot_points_mm)
         wanted = goal - head
         right = np.array([-heading[1], heading[0]])
@@ -56,6 +52,42 @@ class RouteFollower:
         self._drift = keep * self._drift + float(np.sqrt(1 - keep**2)) * float(self._rng.normal())
         bend = float(np.clip(1.6 * error + self._wander * self._drift, -1, 1))
         return Command(bend=bend, advance_mm_s=advance_mm_s)
+
+    def _point_at(self, along_mm: float) -> NDArray[np.float64]:
+        before = int(np.searchsorted(self._along, along_mm, side="right")) - 1
+        if before >= len(self.route) - 1:
+            return self.route[-1]
+        share = (along_mm - self._along[before]) / (self._along[before + 1] - self._along[before])
+        return np.asarray(self.route[before] + share * (self.route[before + 1] - self.route[before]))
+
+
+def way_from_port(phantom: Phantom, target: int) -> Points:
+    """The shortest way (N, 2) along the phantom's true centerlines from its port to a node, mm; raises ValueError without one.
+
+    From node to node, and so without perception's loops (``plan_route``), for which a twin's process would wait a second.
+    """
+    edges = phantom.graph.edges
+    lengths = [float(_arc_length(edge.points)[-1]) for edge in edges]
+    shortest: dict[tuple[int, int], int] = {}
+    for index in sorted(range(len(edges)), key=lengths.__getitem__, reverse=True):
+        shortest[min(edges[index].start, edges[index].end), max(edges[index].start, edges[index].end)] = index
+    ends = np.array(list(shortest)).T
+    joined = coo_array(([lengths[index] for index in shortest.values()], ends), shape=(len(phantom.graph.nodes),) * 2)
+    before = dijkstra(joined.tocsr(), directed=False, indices=phantom.port, return_predecessors=True)[1].tolist()
+    pieces, node = [], target
+    while node != phantom.port:
+        if before[node] < 0:
+            raise ValueError(f"phantom {phantom.name}: node {target} cannot be reached from the port")
+        edge = edges[shortest[min(before[node], node), max(before[node], node)]]
+        pieces.append(edge.points if edge.end == node else edge.points[::-1])
+        node = before[node]
+    points = np.concatenate(pieces[::-1])
+    distinct = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])
+    return points[distinct]
+
+
+def _arc_length(points: Points) -> NDArray[np.float64]:
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
 def _heading(points: Points, over_mm: float = 3.0) -> np.ndarray:
