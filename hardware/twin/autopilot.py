@@ -56,7 +56,7 @@ class RouteFollower:
     def _point_at(self, along_mm: float) -> NDArray[np.float64]:
         before = int(np.searchsorted(self._along, along_mm, side="right")) - 1
         if before >= len(self.route) - 1:
-            return self.route[-1]
+            return np.asarray(self.route[-1])
         share = (along_mm - self._along[before]) / (self._along[before + 1] - self._along[before])
         return np.asarray(self.route[before] + share * (self.route[before + 1] - self.route[before]))
 
@@ -83,7 +83,7 @@ def way_from_port(phantom: Phantom, target: int) -> Points:
         node = before[node]
     points = np.concatenate(pieces[::-1])
     distinct = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])
-    return points[distinct]
+    return np.asarray(points[distinct])
 
 
 def _arc_length(points: Points) -> NDArray[np.float64]:

@@ -7,7 +7,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -16,14 +15,7 @@ import app.ablation_command as command
 from app.ablation_command import Plan, run_ablation
 from core.errors import UserError
 from core.study.ablation import STEPS
-
-MAIN = Path(__file__).resolve().parents[2] / "main.py"
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(MAIN), "ablation", *map(str, arguments)], capture_output=True, text=True, check=False
-    )
+from tests.app.commands import run
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +29,7 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def done(frames: Path) -> subprocess.CompletedProcess[str]:
-    return run(frames, "--true-masks", "--json", "--out", frames.parent / "out")
+    return run("ablation", frames, "--true-masks", "--json", "--out", frames.parent / "out")
 
 
 def test_json_is_one_object_with_a_row_for_each_step_on_and_off(done: subprocess.CompletedProcess[str]) -> None:
@@ -79,7 +71,7 @@ def test_a_table_is_shown_with_values_and_differences(frames: Path, capsys: pyte
 
 
 def test_tracking_is_measured_on_a_stream_of_the_twin() -> None:
-    shown = run("--true-masks", "--json", "--sequence", 8, "--phantom", "s_curve", "--phantom", "tree")
+    shown = run("ablation", "--true-masks", "--json", "--sequence", 8, "--phantom", "s_curve", "--phantom", "tree")
     assert shown.returncode == 0, shown.stderr
     stream = json.loads(shown.stdout)["stream"]
     assert (stream["phantoms"], stream["frames_each"]) == (["s_curve", "tree"], 4)
@@ -177,7 +169,7 @@ def test_bad_input_is_one_clear_line(frames: Path, tmp_path: Path) -> None:
             run_ablation(plan, as_json=True)
         assert words in str(failed.value)
         assert "\n" not in str(failed.value)
-    ended = run(poseless, "--true-masks")
+    ended = run("ablation", poseless, "--true-masks")
     assert ended.returncode == 2
     assert ended.stderr.startswith("error: ")
     assert (ended.stderr.count("\n"), ended.stdout) == (1, "")

@@ -20,6 +20,7 @@ from app.trial_command import run_one
 from core.config import Config
 from hardware.twin.synth import Episode, SynthPlan, write_set
 from hardware.twin.trial import TrialPlan
+from tests.app.commands import run
 from tests.app.golden_session import GOLDEN
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -81,9 +82,7 @@ def test_trials_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Pa
         "--out",
         tmp_path,
     )
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "main.py"), *map(str, arguments)], capture_output=True, text=True, check=False
-    )
+    done = run(*arguments)
     assert done.returncode == 0, done.stderr
     assert [json.loads(line).get("seed") for line in done.stdout.splitlines()] == [0, 1, None]
     rows = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text().splitlines()]
@@ -94,9 +93,7 @@ def test_trials_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Pa
 def test_frames_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Path) -> None:
     plan = ("synth", "--count", "20", "--seed", "3", "--width", "320", "--height", "240")
     for arguments in ((*plan, "--out", tmp_path / "far", "--scheduler", address), (*plan, "--out", tmp_path / "near")):
-        done = subprocess.run(
-            [sys.executable, str(ROOT / "main.py"), *map(str, arguments)], capture_output=True, text=True, check=False
-        )
+        done = run(*arguments)
         assert done.returncode == 0, done.stderr
     far, near = ({p.relative_to(tmp_path / at): p.read_bytes() for p in (tmp_path / at).rglob("*.*")} for at in ("far", "near"))
     assert len(near) == 3 * 20 + 2 + 2
@@ -106,9 +103,7 @@ def test_frames_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Pa
 def test_sessions_are_perceived_again_on_a_cluster(address: str, tmp_path: Path) -> None:
     """Where a path leads to them; one that a worker does not see is told, and the others go on."""
     arguments = ("replay", GOLDEN, "--scheduler", address, "--json", "--out", tmp_path / "out")
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "main.py"), *map(str, arguments)], capture_output=True, text=True, check=False
-    )
+    done = run(*arguments)
     assert done.returncode == 0, done.stderr
     told, total = (json.loads(line) for line in done.stdout.splitlines())
     alone = replay_session(ReplayOptions(GOLDEN, threads=1)).result

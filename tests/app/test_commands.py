@@ -26,13 +26,8 @@ from core.learning.crops import _Order
 from core.learning.dataset import find_samples, read_truth
 from core.learning.model_file import read_model_info
 from core.study.accuracy import FrameScore, score_set
+from tests.app.commands import MAIN, run
 from tests.app.golden_session import GOLDEN
-
-MAIN = Path(__file__).resolve().parents[2] / "main.py"
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, str(MAIN), *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
 @pytest.fixture(scope="module")

@@ -29,9 +29,9 @@ from core.study.evaluation import Measurement, read_measurements, write_measurem
 from core.study.paper_study import PAPER_CONFUSION
 from hardware.twin.world import TwinWorld
 from tests.app.annotated import measure, tube
+from tests.app.commands import MAIN, run, run_apart
 from tests.core.test_classification import label_pairs
 
-MAIN = Path(__file__).resolve().parents[2] / "main.py"
 FIGURES = {"error_distribution", "bland_altman", "scatter", "confusion"}
 
 
@@ -79,10 +79,7 @@ def test_the_papers_labels_print_the_papers_table(paper_csv: Path, tmp_path: Pat
 
 def test_json_is_all_there_is_on_standard_output(paper_csv: Path, tmp_path: Path) -> None:
     out = tmp_path / "deep" / "out"
-    done = subprocess.run(
-        [sys.executable, str(MAIN), "evaluate", "--csv", str(paper_csv), "--out", str(out), "--json"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = run_apart("evaluate", "--csv", paper_csv, "--out", out, "--json")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert json.loads(done.stdout) == json.loads((out / "metrics.json").read_text(encoding="utf-8"))
@@ -210,10 +207,7 @@ def test_names_in_a_table_cannot_change_the_report(tmp_path: Path) -> None:
 def test_errors_are_one_line_and_exit_code_2(tmp_path: Path) -> None:
     bad = tmp_path / "bad.csv"
     bad.write_text("image,angle_1\na,1\n")
-    done = subprocess.run(
-        [sys.executable, str(MAIN), "evaluate", "--csv", str(bad), "--out", str(tmp_path / "out")],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = run("evaluate", "--csv", bad, "--out", tmp_path / "out")
     assert done.returncode == 2
     assert done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
     assert "'angle_2' is missing" in done.stderr
@@ -447,13 +441,11 @@ def test_what_was_measured_outside_studies_can_be_chosen(tmp_path: Path) -> None
     store = tmp_path / "annotations.lumenpilot.sqlite"
     measure(store, images, [0.0, 10.0])
     measure(store, images, [5.0, 5.0], study="main")
-    command = [sys.executable, str(MAIN), "evaluate", str(tmp_path), "--out", str(tmp_path / "out"), "--json", "--study", ""]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run("evaluate", tmp_path, "--out", tmp_path / "out", "--json", "--study", "")
     assert done.returncode == 0, done.stderr
     rows = read_measurements(tmp_path / "out" / "measurements.csv")
     assert [row.angle_1 for row in rows] == pytest.approx([0.0, degrees(atan(10 / 40))], abs=0.05)
-    command = [sys.executable, str(MAIN), "annotate", str(tmp_path), "--report", "--json", "--study="]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run("annotate", tmp_path, "--report", "--json", "--study=")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["study"] == ""
 

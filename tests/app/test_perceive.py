@@ -15,16 +15,12 @@ import pytest
 from core.config import TwinConfig
 from core.images import read_image
 from hardware.twin.world import TwinWorld
+from tests.app.commands import MAIN, run, run_apart
 
-MAIN = Path(__file__).resolve().parents[2] / "main.py"
 KEYS = set(
     "image width height head_xy tail_xy robot_path_xy robot_vector vessel_vector theta_deg theta_signed_deg d_head_px d_tail_px "
     "crossed state confidence reason latency_ms".split()
 )
-
-
-def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, str(MAIN), *map(str, arguments)], capture_output=True, text=True, check=False, cwd=cwd)
 
 
 def rows(path: Path) -> list[dict]:
@@ -46,7 +42,7 @@ def picture(world: TwinWorld, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_picture_gives_the_contracts_object_masks_and_overlay(picture: Path, world: TwinWorld, tmp_path: Path) -> None:
-    done = run("perceive", picture, "--jsonl", tmp_path / "o.jsonl", "--masks", tmp_path / "m", "--overlay", tmp_path / "s")
+    done = run_apart("perceive", picture, "--jsonl", tmp_path / "o.jsonl", "--masks", tmp_path / "m", "--overlay", tmp_path / "s")
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""
     (row,) = rows(tmp_path / "o.jsonl")
@@ -186,7 +182,7 @@ def test_a_small_file_that_says_it_is_huge_is_refused_before_it_is_decoded(tmp_p
     values = {256: side, 257: side, 258: 8, 259: 1, 262: 1, 273: 8, 277: 1, 278: side, 279: 4}  # width, height, bits, ...
     entries = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in values.items())
     (tmp_path / "huge.tif").write_bytes(struct.pack("<2sHIIH", b"II", 42, 12, 0, len(values)) + entries + bytes(4))
-    done = run("perceive", tmp_path / "huge.tif")
+    done = run_apart("perceive", tmp_path / "huge.tif")
     assert done.returncode == 2
     assert done.stderr.rstrip().endswith("huge.tif: is larger than 120 million pixels")
 

@@ -17,8 +17,8 @@ from mcap.reader import make_reader
 
 from core.session.manifest import read_manifest
 from core.session.reader import SessionReader
+from tests.app.commands import MAIN, run
 
-MAIN = Path(__file__).resolve().parents[2] / "main.py"
 # a small picture and one thread: the machine that runs the tests may be busy
 CONFIG = """
 [twin]
@@ -29,10 +29,6 @@ working_size_px = 320
 [perception.segmentation]
 threads = 1
 """
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, str(MAIN), *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
 @pytest.fixture(scope="module")

@@ -29,18 +29,16 @@ from core.session.reader import SessionReader
 from core.study.replay import Change, Seen
 from core.study.replay_tally import Tally
 from core.types import Frame, Point, PoseState, Reason, Refusal, Scene
+from tests.app.commands import MAIN, run_apart
 from tests.app.golden_session import COUNT, GOLDEN, TRUTH
 from tests.core.session_data import record, tick_of
-
-MAIN = Path(__file__).resolve().parents[2] / "main.py"
 
 
 @pytest.fixture(scope="module")
 def replayed(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, object], Path]:
     """The golden session perceived again in its recorded configuration: what ``--json`` said, and the folder of all files."""
     out = tmp_path_factory.mktemp("replay")
-    command = [str(MAIN), "replay", str(GOLDEN), "--json", "--diff", "--jsonl", str(out / "new.jsonl"), "--out", str(out / "out")]
-    done = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=False)
+    done = run_apart("replay", GOLDEN, "--json", "--diff", "--jsonl", out / "new.jsonl", "--out", out / "out")
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout), out
 

@@ -18,10 +18,10 @@ from app.replay_campaign import run_replays, sessions_in
 from app.replay_session import ReplayOptions
 from core.errors import UserError
 from core.study.replay_tally import Tally
+from tests.app.commands import MAIN
+from tests.app.commands import run as main
 from tests.app.golden_session import COUNT, GOLDEN
 from tests.core.session_data import record, tick_of
-
-MAIN = Path(__file__).resolve().parents[2] / "main.py"
 
 
 @pytest.fixture(scope="module")
@@ -36,10 +36,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "notes.txt").write_text("of Tuesday")
     (folder / "exports").mkdir()
     return folder
-
-
-def main(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, str(MAIN), *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
 def untimed(result: dict[str, Any]) -> dict[str, Any]:

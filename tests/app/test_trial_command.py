@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +17,7 @@ from core.config import Config
 from core.learning.model_file import model_folder
 from core.study.trial import Measure, Row, TrialLog, summarise, trial_row
 from hardware.twin.trial import TrialPlan
-
-MAIN = Path(__file__).resolve().parents[2] / "main.py"
+from tests.app.commands import run, run_apart
 
 
 def fake_row(plan: TrialPlan, job: tuple[str, int]) -> Row:
@@ -192,7 +189,7 @@ def test_figures_that_miss_their_target_are_marked() -> None:
 
 def test_workers_find_what_one_process_finds(tmp_path: Path) -> None:
     arguments = ("trial", "--seeds", "0:2", "--true-masks", "--max-seconds", "1", "--workers", "2", "--json", "--out", tmp_path)
-    done = subprocess.run([sys.executable, str(MAIN), *map(str, arguments)], capture_output=True, text=True, check=False)
+    done = run_apart(*arguments)
     assert done.returncode == 0, done.stderr
     rows = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text().splitlines()]
     assert sorted(row["seed"] for row in rows) == [0, 1]
@@ -201,9 +198,8 @@ def test_workers_find_what_one_process_finds(tmp_path: Path) -> None:
 
 
 def test_errors_are_one_line_and_exit_code_2() -> None:
-    command = [sys.executable, str(MAIN), "trial", "--seeds", "0:1"]
     for extra, text in ((["--policy", "magic"], "unknown policy 'magic'"), (["--model", "nowhere"], "nowhere")):
-        done = subprocess.run([*command, *extra, "--json"], capture_output=True, text=True, check=False)
+        done = run("trial", "--seeds", "0:1", *extra, "--json")
         assert done.returncode == 2
         assert done.stdout == ""
         assert text in done.stderr
