@@ -12,6 +12,7 @@ import pytest
 
 import core.study.calibration as fitting
 import core.study.known_pictures as knowing
+from app import calibrate_command
 from app.benchmark_command import run_accuracy
 from app.calibrate_command import run_calibrate
 from core.config import PerceptionConfig
@@ -69,13 +70,14 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
     assert _looks(model, recalibrating=True) == [False, True]
     monkeypatch.setattr(fitting, "_LEAST", 1)
     monkeypatch.setattr(knowing, "LEAST", 4)
+    monkeypatch.setattr(calibrate_command, "_EXAMPLES", 2)
     more = tmp_path / "more"
     shutil.copytree(frames / "images", more)
     olds, near_before = (read_model_info(folder) for folder in (model, model / SECOND_LOOK))
     run_calibrate(frames, model=str(model), config_path=None, knows=[more], eight_bit=True)
     for folder, older in ((model, olds), (model / SECOND_LOOK, near_before)):
         newer = read_model_info(folder, verify=(WEIGHTS, ONNX, ONNX_INT8))
-        assert newer.onnx_int8_sha256 not in (None, older.onnx_int8_sha256), "its eight-bit copy is another one, from ten frames"
+        assert newer.onnx_int8_sha256 not in (None, older.onnx_int8_sha256), "its eight-bit copy is another one, from two frames"
         assert newer.weights_sha256 == older.weights_sha256
     assert not list(model.parent.glob(".older-*")), "nothing is left of the copy that it was worked on in"
     image = read_image(sorted((frames / "images").iterdir())[0])
