@@ -99,6 +99,12 @@ class EngineMaker:
         self._pilot = engine.pilot
         return engine
 
+    def close(self) -> None:
+        """End what was started ahead, where no rig was opened with it."""
+        ahead, self._ahead = self._ahead, None
+        if ahead is not None:
+            ahead.end()
+
     def _perception(self, config: PerceptionConfig) -> tuple[Perceive, ModelReport]:
         if isinstance(self._perceive, Pipeline) and self._loaded is not None and _same_network(self._loaded, config):
             self._perceive = self._perceive.with_config(config)

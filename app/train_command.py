@@ -78,15 +78,23 @@ def run_train(
     _end_like_an_interrupt()
     _check_choices(init, base, plan, deepen=deepen, shallow=shallow, second_look=second_look, widen=widen)
     out, began_with = _check_places(outputs, inputs, init, second_look=second_look)
-    folders, samples = _gather(inputs, out, looks, plan)
+    folders = list(inputs.data)
+    samples = [sample for folder in folders for sample in _samples_of(folder, inputs.without)]
+    _tell_left_out(folders)
 
-    import torch
+    import torch  # a broken one shows before hours of frames are made
 
     from app.lessons import FrameLesson, Lesson, SecondLookLesson
     from app.teaching import Classroom, second_plan, teach_second_look
     from core.learning.dataset import DatasetError
     from core.learning.training import LoaderLost
 
+    if inputs.synthetic:
+        folder, made = _made(out, inputs.synthetic, looks, plan)
+        if plan.keeps_statistics:  # few frames of a new look, shown as often as all that is to be remembered
+            samples *= max(1, round(inputs.synthetic / len(samples)))
+        folders.append(folder)
+        samples += made
     torch.manual_seed(plan.seed)
     lesson: Lesson
     if second_look:
@@ -150,27 +158,19 @@ def _check_places(outputs: TrainOutputs, inputs: TrainInputs, init: str | None, 
     return out, began_with
 
 
-def _gather(inputs: TrainInputs, out: Path, looks: tuple[str, ...] | None, plan: TrainingPlan) -> tuple[list[Path], list[Sample]]:
-    """The folders and their samples, with those that are made now, of these `looks`; raises DatasetError."""
+def _made(out: Path, count: int, looks: tuple[str, ...] | None, plan: TrainingPlan) -> tuple[Path, list[Sample]]:
+    """Frames that are made now, of these `looks`, in a folder beside the model's; raises DatasetError."""
     from core.learning.dataset import DatasetError, find_samples
-
-    folders = list(inputs.data)
-    samples = [sample for folder in folders for sample in _samples_of(folder, inputs.without)]
-    _tell_left_out(folders)
-    if not inputs.synthetic:
-        return folders, samples
     from hardware.twin.synth import SynthFolderError
 
     folder = out.with_name(out.name + "_frames")
     first = 1_000_000 + plan.seed % 10 * 100_000  # trials have the seeds from 2000000 on
     try:
-        run_synth(folder, inputs.synthetic, first, (640, 480), looks, None)
+        run_synth(folder, count, first, (640, 480), looks, None)
     except SynthFolderError as error:  # the folder goes with --out, and the set in it with these options
         made = "frames are made there: give --seed, --without and their number as before, or choose another --out"
         raise DatasetError(f"{error.problem}; {made}") from None
-    if plan.keeps_statistics:  # few frames of a new look, shown as often as all that is to be remembered
-        samples *= max(1, round(inputs.synthetic / len(samples)))
-    return [*folders, folder], samples + find_samples([folder])
+    return folder, find_samples([folder])
 
 
 def _kept(room: Classroom) -> str:

@@ -155,7 +155,10 @@ def run_window(
         else:
             tour_at_start(window, asked=tour)
 
-    code = run_until_closed(application, window, window.say, begin)
+    try:
+        code = run_until_closed(application, window, window.say, begin)
+    finally:
+        maker.close()
     watch.remove()
     return code
 

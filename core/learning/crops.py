@@ -16,6 +16,7 @@ from core.learning.augment import random_clutter, random_crop, random_look, with
 from core.learning.dataset import WORKING_SIZE_PX, Sample
 from core.learning.kept_frames import KeptFrames
 from core.learning.training_plan import TrainingPlan
+from core.perception.compiled import loops
 from core.perception.second_look import WINDOW_PX, look_again, places_to_look
 from core.perception.segmentation import Probability, Segmenter
 from core.perception.skeleton import end_pixels
@@ -71,6 +72,7 @@ class FrameCrops(Dataset[Crop]):
         self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
         self._samples, self._kept = samples, KeptFrames(len(samples))
         self._order = _Order(plan.seed, len(samples))
+        _load_for_workers(plan)
 
     def __len__(self) -> int:
         return self._plan.steps * self._plan.batch
@@ -149,6 +151,7 @@ class NearCrops(Dataset[Crop]):
         self._failed = [place for place, look in enumerate(looks) if look.wrong]
         self._samples, self._kept = samples, KeptFrames(len(samples))
         self._order = _Order(plan.seed, len(samples))
+        _load_for_workers(plan)
 
     def __len__(self) -> int:
         return self._plan.steps * self._plan.batch
@@ -172,6 +175,12 @@ class NearCrops(Dataset[Crop]):
         if rng.random() < self._plan.look_share:
             cut[:, :, :3] = random_look(cut[:, :, :3], rng)
         return _tensors(cut[:, :, :5], cut[:, :, 5] > 0, cut[:, :, 6] > 0, self._plan)
+
+
+def _load_for_workers(plan: TrainingPlan) -> None:
+    """The robot's ends are found with the compiled loops, which workers that are forked from here need not load each."""
+    if plan.end_weight > 0:
+        loops.load()
 
 
 def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...], rng: Generator) -> Point:

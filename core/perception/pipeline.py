@@ -93,6 +93,7 @@ class Pipeline:
         *,
         swings: bool = False,
     ) -> None:
+        loops.load()  # not with the first picture
         self._stream = Sight(segmenter, calibration, swings, familiarity)
         self._single = single or self._stream
         self._offered = glance
@@ -409,7 +410,6 @@ def _port(config: PathConfig, image: Image) -> Point | None:
 
 def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False) -> Pipeline:
     """Load the configured model and build the pipeline around it; raises ModelError. `recalibrating`: as ``open_sights`` has it."""
-    loops.load()  # not with the first picture
     plain, turned = open_sights(config, recalibrating=recalibrating)
     stream = turned if config.segmentation.mirrored == "always" else plain
     single = plain if config.segmentation.mirrored == "never" else turned

@@ -74,7 +74,7 @@ def way_from_port(phantom: Phantom, target: int) -> Points:
     ends = np.array(list(shortest)).T
     joined = coo_array(([lengths[index] for index in shortest.values()], ends), shape=(len(phantom.graph.nodes),) * 2)
     before = dijkstra(joined.tocsr(), directed=False, indices=phantom.port, return_predecessors=True)[1].tolist()
-    pieces, node = [], target
+    pieces, node = [phantom.graph.nodes[[target]]], target
     while node != phantom.port:
         if before[node] < 0:
             raise ValueError(f"phantom {phantom.name}: node {target} cannot be reached from the port")

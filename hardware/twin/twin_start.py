@@ -29,19 +29,24 @@ class TwinProcess:
     """
 
     def __init__(self) -> None:
-        with contextlib.ExitStack() as undo, contextlib.ExitStack() as always:
-            self.memory_fd = os.memfd_create("bench_twin", os.MFD_CLOEXEC)
-            undo.callback(os.close, self.memory_fd)
-            self.wake, wake_end = os.pipe()
-            undo.callback(os.close, self.wake)
-            always.callback(os.close, wake_end)
-            self._process = _spawn((self.memory_fd, wake_end))
-            self._files = undo.pop_all()
+        try:
+            with contextlib.ExitStack() as undo, contextlib.ExitStack() as always:
+                self.memory_fd = os.memfd_create("bench_twin", os.MFD_CLOEXEC)
+                undo.callback(os.close, self.memory_fd)
+                self.wake, wake_end = os.pipe()
+                undo.callback(os.close, self.wake)
+                always.callback(os.close, wake_end)
+                self._process = _spawn((self.memory_fd, wake_end))
+                self._files = undo.pop_all()
+        except OSError as error:
+            raise DeviceError(f"the bench twin cannot be started ({error.strerror}): free memory, then try again") from None
+        self._has_begun = False
         self.pid = self._process.pid
 
     def begin(self, config: Config, insertion_mm: float) -> dict[str, Any]:
         """Say what twin it shall be, with the memory in its length; returns what it answers, empty when it is gone."""
         assert self._process.stdin is not None
+        self._has_begun = True
         message = {"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm}
         with contextlib.suppress(BrokenPipeError):
             self._process.stdin.write(json.dumps(message).encode() + b"\n")
@@ -64,7 +69,9 @@ class TwinProcess:
         return self._process.poll()
 
     def end(self) -> None:
-        """The end of its input ends it. May be called twice."""
+        """The end of its input ends it; while it only loads there is nothing to wait for. May be called twice."""
+        if not self._has_begun:
+            self._process.kill()
         for stream in (self._process.stdin, self._process.stdout):
             if stream is not None:
                 with contextlib.suppress(OSError):
@@ -81,14 +88,11 @@ def _spawn(ends: tuple[int, int]) -> subprocess.Popen[bytes]:
     """The process, in a session of its own: Ctrl-C in the application's terminal does not reach it."""
     path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH", ""))))
     quiet = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    try:
-        return subprocess.Popen(
-            [sys.executable, "-P", "-m", _MODULE, *map(str, ends)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            pass_fds=ends,
-            start_new_session=True,
-            env={**os.environ, **quiet, "PYTHONPATH": path},
-        )
-    except OSError as error:
-        raise DeviceError(f"the bench twin cannot be started ({error.strerror}): free memory, then try again") from None
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", _MODULE, *map(str, ends)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        pass_fds=ends,
+        start_new_session=True,
+        env={**os.environ, **quiet, "PYTHONPATH": path},
+    )

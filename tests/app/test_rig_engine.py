@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
@@ -23,6 +25,7 @@ from core.policy_config import PolicyName
 from core.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.types import Frame, Point, Reason, Refusal, Scene
 from hardware.rig import Rig, RigKind
+from hardware.twin.twin_start import TwinProcess
 from tests.core.pilot_bench import Robot
 from tests.core.test_control import _Camera
 from tests.core.test_pipeline import DrawnNetwork, _draw_tapered, frame
@@ -154,3 +157,21 @@ def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, mon
     assert engine.pilot is not None
     assert engine.pilot.view.mode is Mode.STOPPED
     engine.close()
+
+
+def test_what_was_started_ahead_is_the_first_rigs_and_is_ended_where_none_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[object] = []
+
+    def open_rig(config: Config, ahead: object) -> Rig:
+        given.append(ahead)
+        return Rig("twin", RigKind.SIM, _Camera([]), Robot())
+
+    monkeypatch.setattr(rig_engine, "open_rig", open_rig)
+    ahead = cast("TwinProcess", SimpleNamespace(end=lambda: given.append("ended")))
+    maker = _Maker(ahead)
+    for _ in range(2):
+        maker(Config()).close()
+    maker.close()
+    assert given == [ahead, None]
+    _Maker(ahead).close()
+    assert given[2:] == ["ended"]

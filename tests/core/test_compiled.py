@@ -164,12 +164,17 @@ def test_the_middle_of_the_robot_is_the_mean_place_of_what_falls_outwards(seed: 
         assert shift[i] == pytest.approx(wanted, abs=1e-6)
 
 
-def test_they_are_loaded_when_the_first_is_called_for() -> None:
+def test_they_are_loaded_when_the_first_is_called_for_and_never_by_a_twin() -> None:
     code = """
 import sys
 import numpy as np
-import app.perceive_command, app.train_command, core.perception.pipeline, core.session.reader, hardware.twin.world
+import app.perceive_command, app.train_command, core.perception.pipeline, core.session.reader
+from core.config import TwinConfig
 from core.perception import polyline
+from hardware.twin.world import TwinWorld
+world = TwinWorld(TwinConfig(image_width_px=160, image_height_px=120))
+world.insert(20.0)
+world.frame()
 print("numba" in sys.modules)
 polyline.arc_length(np.zeros((2, 2)))
 print("numba" in sys.modules)

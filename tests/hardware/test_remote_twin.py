@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -24,6 +27,7 @@ from hardware.rig import RigKind, open_rig, start_ahead
 from hardware.servos.shared_slot import SharedSlot
 from hardware.twin.remote_twin import RemoteTwin, pack_frame, pack_status, unpack_frame, unpack_status
 from hardware.twin.twin_process import _serve
+from hardware.twin.twin_start import TwinProcess
 from hardware.twin.world import TwinWorld
 
 CONFIG = Config.model_validate({"twin": {"image_width_px": 160, "image_height_px": 120}})
@@ -136,9 +140,30 @@ def test_a_process_that_was_started_ahead_of_another_rig_is_ended(tmp_path: Path
     cv2.imwrite(str(tmp_path / "a.png"), np.zeros((48, 64, 3), np.uint8))
     rig = {"camera": "image_folder", "robot": "none", "source": str(tmp_path)}
     open_rig(load_config(overrides={"rig": rig}), ahead).close()
-    assert ahead.exit_code() == 0
     assert not psutil.pid_exists(ahead.pid)
     assert capfd.readouterr().err == ""
+
+
+def test_a_process_that_cannot_be_started_is_a_device_error_when_the_rig_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused() -> tuple[int, int]:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    open_before = psutil.Process().num_fds()
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "pipe", refused)
+        assert start_ahead(CONFIG) is None
+        with pytest.raises(DeviceError, match=r"the bench twin cannot be started \(Too many open files\)"):
+            TwinProcess()
+    assert psutil.Process().num_fds() == open_before
+
+
+def test_an_application_that_ends_before_it_needs_a_twin_leaves_a_process_that_ends_by_itself() -> None:
+    ends = os.memfd_create("bench_twin"), os.open(os.devnull, os.O_WRONLY)
+    command = [sys.executable, "-m", "hardware.twin.twin_process", *map(str, ends)]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, pass_fds=ends, check=False)
+    for end in ends:
+        os.close(end)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
 
 
 @pytest.mark.real_time

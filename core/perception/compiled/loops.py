@@ -1,7 +1,7 @@
 """The compiled loops for all who call them: they are loaded, all together, when the first of them is called for.
 
-That takes more than a second, most of it Numba's, and many a command perceives nothing. Who may not wait in the middle of something
-calls ``load`` before.
+On a slow processor that takes more than a second, most of it Numba's, and many a command perceives nothing. Who may not wait in the
+middle of something calls ``load`` before.
 """
 
 from __future__ import annotations
