@@ -150,7 +150,7 @@ class QualityConfig(_Section):
         description="width of the model's doubt at the vessel's walls beside the head; at a lumen that it knows some 1 px",
     )
     max_bridged_share: Share = Field(0.4, description="repaired length over path length")
-    max_ambiguity: Share = Field(0.95, description="how near the second best path may come to the best one")
+    max_ambiguity: Share = Field(0.8, description="how near the second best path may come to the best one")
     min_confidence: Share = Field(0.3, description="below it there is no answer")
     confident_from: Share = Field(0.5, description="an answer that is less sure than this is shown as unsure")
     max_novelty: float = Field(

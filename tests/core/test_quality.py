@@ -188,13 +188,15 @@ def test_paths_that_are_refused_say_the_value_and_its_limit(found: RobotPath, wh
 def test_no_centerline_and_two_that_fit_alike() -> None:
     assert quality.check_centerline(PIECE, PIECE.nearest, LIMITS) is None
     missing = quality.check_centerline(None, PIECE.nearest, LIMITS)
-    tied = quality.check_centerline(Centerline(PIECE.piece, PIECE.nearest, 20.0, ambiguity=0.99), PIECE.nearest, LIMITS)
+    tied = quality.check_centerline(Centerline(PIECE.piece, PIECE.nearest, 20.0, ambiguity=0.85), PIECE.nearest, LIMITS)
+    clearer = quality.check_centerline(Centerline(PIECE.piece, PIECE.nearest, 20.0, ambiguity=0.75), PIECE.nearest, LIMITS)
+    assert clearer is None
     assert isinstance(missing, Refusal)
     assert missing.reason is Reason.NO_VESSEL
     assert isinstance(tied, Refusal)
     assert tied.reason is Reason.AMBIGUOUS_BRANCH
-    assert "99 %" in tied.detail
-    assert "95 %" in tied.detail
+    assert "85 %" in tied.detail
+    assert "80 %" in tied.detail
 
 
 def test_a_head_farther_from_the_centerline_than_any_lumen_reaches_is_in_a_vessel_that_was_not_found() -> None:
