@@ -136,7 +136,7 @@ def run_train(
 
 def _check_places(outputs: TrainOutputs, inputs: TrainInputs, init: str | None, *, second_look: bool) -> tuple[Path, Path | None]:
     """Where the model goes, and the folder of the one that is gone on with; raises DatasetError, ModelError."""
-    from core.learning.dataset import DatasetError
+    from core.learning.dataset import DatasetError, find_samples
     from core.learning.model_file import INFO, model_folder
     from core.learning.model_writing import check_can_write, check_outside
 
@@ -155,6 +155,8 @@ def _check_places(outputs: TrainOutputs, inputs: TrainInputs, init: str | None, 
     for read in [*inputs.data, *([outputs.held_out] if outputs.held_out is not None else [])]:
         if out in (place := Path(os.path.realpath(read)), *place.parents):
             raise DatasetError(f"{read}: lies within --out, which is replaced now and then; choose another --out")
+    if outputs.held_out is not None:
+        find_samples([outputs.held_out])  # raises where there are none
     return out, began_with
 
 

@@ -155,6 +155,15 @@ def test_frames_made_for_a_training_name_the_options_that_they_hang_on(tmp_path:
         run_train(TrainOutputs(tmp_path / "m"), TrainInputs(synthetic=4), None, 4, TrainingPlan(steps=1, seed=3))
 
 
+def test_a_folder_without_frames_to_judge_by_is_told_before_frames_are_made(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("app.train_command.run_synth", lambda *_: pytest.fail("frames are made"))
+    with pytest.raises(UserError, match="nothing here: no labelled frames; needs images"):
+        outputs = TrainOutputs(tmp_path / "m", tmp_path / "nothing here")
+        run_train(outputs, TrainInputs(synthetic=4), None, 4, TrainingPlan(steps=1))
+
+
 def test_frames_within_the_model_that_is_trained_are_not_learnt_from(labelled: Path, tmp_path: Path) -> None:
     model = Path(shutil.copytree(MODELS / "default", tmp_path / "model"))
     frames = Path(shutil.copytree(labelled, model / "frames"))
