@@ -125,10 +125,11 @@ class WindowWatch(QObject):
 def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     """Run the window on the twin for some seconds and tell how it went."""
     from app.application import make_application, quit_on_signal
-    from app.window_command import make_window, window_config
+    from app.window_command import finish_loading, make_window, window_config
 
     config, kind = window_config("twin", config_path, None)
     application = make_application()
+    finish_loading()
     window = make_window(config, kind)
     application.aboutToQuit.connect(window.shut_down)
     window.show()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import logging
 import sys
@@ -16,6 +17,7 @@ from core.devices import DeviceError
 from core.errors import UserError
 from core.images import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS
+from core.perception.compiled import loops
 from core.profiles import settings_of_windows
 from core.rig_file import RESERVED, find_rig, with_rig
 from core.types import Reason
@@ -93,6 +95,15 @@ def _choose(config: Config, rig: str) -> Config:
     return config.model_copy(update={"rig": chosen, "servos": servos})
 
 
+def finish_loading() -> None:
+    """What a window needs is loaded before it is there, and stays, so that later collections of garbage are short.
+
+    Loading holds the interpreter's lock, and so stops the window, for up to a quarter of a second, mostly for such collections.
+    """
+    loops.load()
+    gc.freeze()
+
+
 def make_window(config: Config, kind: RigKind, maker: EngineMaker | None = None) -> OperatorWindow:
     """The window, not shown yet. There must be an application."""
     from app.operator_window import OperatorWindow
@@ -121,6 +132,7 @@ def run_window(
     from app.side_work import SideWork
     from app.tour import tour_at_start
 
+    finish_loading()
     application = make_application(config.window)
     maker = EngineMaker(ahead)
     window = make_window(config, kind, maker)
