@@ -8,7 +8,7 @@ import numpy as np
 
 from core.perception import polyline
 from core.perception.lumen import foot, is_walled_off
-from core.types import Mask, Point, Route, VesselGraph
+from core.types import Mask, Point, Points, Route, VesselGraph
 
 OFF_VESSEL_PX = 15.0
 """A click so far beside the lumen is still taken for one on the vessel."""
@@ -39,7 +39,7 @@ def plan_route(graph: VesselGraph, start: Point, target: Point, vessel: Mask | N
         return None
     (edge, position), (_, last_edge, last_position) = here, there
     lengths = [float(polyline.arc_length(e.points)[-1]) for e in graph.edges]
-    reached, came_by = _distances(graph, lengths, edge, position)
+    reached, came_by = distances(graph, lengths, edge, position)
     last = graph.edges[last_edge]
     ways: list[tuple[float, int | None]] = [
         (reached[last.start] + last_position, last.start),
@@ -56,16 +56,11 @@ def plan_route(graph: VesselGraph, start: Point, target: Point, vessel: Mask | N
         return Route(points if position <= last_position else points[::-1], length, target)
     by_start = node == last.start and reached[last.start] + last_position == length
     pieces = [polyline.cut(last.points, 0.0, last_position) if by_start else polyline.cut(last.points, last_position, np.inf)[::-1]]
-    while (via := came_by[node]) is not None:
-        points = graph.edges[via].points
-        pieces.append(points if graph.edges[via].end == node else points[::-1])
-        node = graph.edges[via].start if graph.edges[via].end == node else graph.edges[via].end
+    node = go_back(graph, came_by, node, pieces)
     first = graph.edges[edge]
     leaves_by_end = node == first.end and (node != first.start or 2.0 * position > lengths[edge])
     pieces.append(polyline.cut(first.points, position, np.inf) if leaves_by_end else polyline.cut(first.points, 0, position)[::-1])
-    points = np.concatenate(pieces[::-1])
-    distinct = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])
-    return Route(points[distinct], length, target)
+    return Route(joined(pieces[::-1]), length, target)
 
 
 def _place(graph: VesselGraph, point: Point, vessel: Mask | None) -> tuple[int, float] | None:
@@ -99,7 +94,7 @@ def _lumen(graph: VesselGraph, point: Point) -> tuple[float, int, float] | None:
     return outside, index, position
 
 
-def _distances(graph: VesselGraph, lengths: list[float], edge: int, position: float) -> tuple[list[float], list[int | None]]:
+def distances(graph: VesselGraph, lengths: list[float], edge: int, position: float) -> tuple[list[float], list[int | None]]:
     """Dijkstra from a place on an edge: each node's distance, and the edge it is reached by (None: straight from the place)."""
     reached = [np.inf] * len(graph.nodes)
     came_by: list[int | None] = [None] * len(graph.nodes)
@@ -117,6 +112,22 @@ def _distances(graph: VesselGraph, lengths: list[float], edge: int, position: fl
             if distance + lengths[index] < reached[following]:
                 heapq.heappush(queue, (distance + lengths[index], following, index))
     return reached, came_by
+
+
+def go_back(graph: VesselGraph, came_by: list[int | None], node: int, pieces: list[Points]) -> int:
+    """Add to `pieces` the edges by which a node was reached, the last one first, each in the direction of travel; returns the node
+    that was reached straight from the place."""
+    while (via := came_by[node]) is not None:
+        edge = graph.edges[via]
+        pieces.append(edge.points if edge.end == node else edge.points[::-1])
+        node = edge.start if edge.end == node else edge.end
+    return node
+
+
+def joined(pieces: list[Points]) -> Points:
+    """Lines one after the other as one (N, 2), without the points that stand twice."""
+    points = np.concatenate(pieces)
+    return np.asarray(points[np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])])
 
 
 def incidence_of(graph: VesselGraph) -> list[list[tuple[int, bool]]]:

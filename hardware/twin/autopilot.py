@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
+from core.perception.route import distances, go_back, incidence_of, joined
 from core.types import Command, Point, Points
 from hardware.twin.phantom import Phantom
 
@@ -66,24 +65,16 @@ def way_from_port(phantom: Phantom, target: int) -> Points:
 
     From node to node, and so without perception's loops (``plan_route``), for which a twin's process would wait a second.
     """
-    edges = phantom.graph.edges
-    lengths = [float(_arc_length(edge.points)[-1]) for edge in edges]
-    shortest: dict[tuple[int, int], int] = {}
-    for index in sorted(range(len(edges)), key=lengths.__getitem__, reverse=True):
-        shortest[min(edges[index].start, edges[index].end), max(edges[index].start, edges[index].end)] = index
-    ends = np.array(list(shortest)).T
-    joined = coo_array(([lengths[index] for index in shortest.values()], ends), shape=(len(phantom.graph.nodes),) * 2)
-    before = dijkstra(joined.tocsr(), directed=False, indices=phantom.port, return_predecessors=True)[1].tolist()
-    pieces, node = [phantom.graph.nodes[[target]]], target
-    while node != phantom.port:
-        if before[node] < 0:
-            raise ValueError(f"phantom {phantom.name}: node {target} cannot be reached from the port")
-        edge = edges[shortest[min(before[node], node), max(before[node], node)]]
-        pieces.append(edge.points if edge.end == node else edge.points[::-1])
-        node = before[node]
-    points = np.concatenate(pieces[::-1])
-    distinct = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])
-    return np.asarray(points[distinct])
+    graph = phantom.graph
+    lengths = [float(_arc_length(edge.points)[-1]) for edge in graph.edges]
+    first, starts = incidence_of(graph)[phantom.port][0]
+    reached, came_by = distances(graph, lengths, first, 0.0 if starts else lengths[first])
+    if not np.isfinite(reached[target]):
+        raise ValueError(f"phantom {phantom.name}: node {target} cannot be reached from the port")
+    pieces = [graph.nodes[[target]]]
+    if go_back(graph, came_by, target, pieces) != phantom.port:
+        pieces.append(graph.edges[first].points if starts else graph.edges[first].points[::-1])
+    return joined(pieces[::-1])
 
 
 def _arc_length(points: Points) -> NDArray[np.float64]:
