@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 from _pytest.runner import runtestprotocol
 
@@ -38,6 +39,15 @@ def no_thread_stays_behind() -> Iterator[None]:
     while (left := [t for t in threading.enumerate() if t not in before and not t.daemon]) and time.monotonic() < until:
         time.sleep(0.01)
     assert not left, f"threads left running: {[thread.name for thread in left]}"
+
+
+@pytest.fixture
+def no_process_stays_behind() -> Iterator[None]:
+    """What tests before this one left (Python's own ``resource_tracker``, say) is not counted."""
+    before = psutil.Process().children(recursive=True)
+    yield
+    left = [process for process in psutil.Process().children(recursive=True) if process not in before]
+    assert not left, f"processes left running: {left}"
 
 
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:

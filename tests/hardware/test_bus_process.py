@@ -34,7 +34,7 @@ from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servo_bus import SoftServoBus
 from tests.hardware.kill_campaign import BOUND_S, BOUND_STEPS, KINDS, strike
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("no_process_stays_behind")]
 
 ROOT = Path(__file__).resolve().parents[2]
 # Watchdog and heartbeat are patient, so that a machine that stalls does not trip them; what is about them says so.
@@ -42,12 +42,6 @@ CONFIG, SAFETY = ServosConfig(watchdog_s=2.5, heartbeat_timeout_s=3.0), SafetyCo
 FORWARD = Command(advance_mm_s=5.0)
 PATIENCE_S = 10.0
 NO_SLACK: dict[str, Any] = {"slack_mm": (0.0,) * 4, "pretension_mm": 0.3}
-
-
-@pytest.fixture(autouse=True)
-def no_process_stays_behind() -> Iterator[None]:
-    yield
-    assert psutil.Process().children(recursive=True) == []
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import psutil
 import pytest
 
 from core.safety_config import SafetyConfig
@@ -17,16 +16,10 @@ from hardware.servos.probe import ProbeFailed, ProbeLimits, ServoProbe, Stopped,
 from hardware.servos.search import find_ports, find_servos
 from hardware.twin.servo_bus import SoftServoBus
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("no_process_stays_behind")]
 
 CONFIG, SAFETY = ServosConfig(), SafetyConfig()
 LIMITS = ProbeLimits(-2.0, 2.0)
-
-
-@pytest.fixture(autouse=True)
-def no_process_stays_behind() -> Iterator[None]:
-    yield
-    assert psutil.Process().children(recursive=True) == []
 
 
 @pytest.fixture

@@ -107,12 +107,11 @@ def test_an_application_that_was_ended_is_no_error_of_the_twin() -> None:
         os.close(wake)
 
 
+@pytest.mark.usefixtures("no_process_stays_behind")
 def test_what_is_wrong_is_said_in_one_line() -> None:
     config = Config.model_validate({"twin": {"phantom": "no such phantom"}})
-    before = {child.pid for child in psutil.Process().children()}
     with pytest.raises(DeviceError, match="no such phantom"):
         RemoteTwin(config, 40.0)
-    assert {child.pid for child in psutil.Process().children()} <= before
 
 
 def test_a_process_that_was_started_ahead_becomes_the_twin() -> None:
