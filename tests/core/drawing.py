@@ -1,5 +1,6 @@
 """Masks for the tests: drawn with characters where the answer is counted by hand, as tubes where it is known by construction."""
 
+import cv2
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
@@ -22,19 +23,18 @@ def picture(mask: Mask) -> str:
 def depth(line: Points, radius: float, size: tuple[int, int] = SIZE) -> np.ndarray:
     """How deep each pixel lies in a tube with flat ends around a polyline, in px; negative outside. Shape (h, w)."""
     points = polyline.resample(np.asarray(line, np.float64), 0.5)
-    x, y = np.meshgrid(np.arange(size[0], dtype=np.float64), np.arange(size[1], dtype=np.float64))
-    nearest = np.full((size[1], size[0]), np.inf)
-    left, top = np.maximum(np.floor(points.min(axis=0) - 2 * radius - 2), 0).astype(int)
-    right, bottom = np.minimum(np.ceil(points.max(axis=0) + 2 * radius + 3), size).astype(int)
-    window = np.s_[top:bottom, left:right]
-    places = np.column_stack([x[window].ravel(), y[window].ravel()])
-    nearest[window] = cKDTree(points).query(places)[0].reshape(x[window].shape)
-    deep = radius - nearest
+    reach = 2 * radius + 2  # what lies further away is so far outside that it does not matter how far
+    near = np.zeros((size[1], size[0]), np.uint8)
+    cv2.polylines(near, [np.round(points).astype(np.int32)], isClosed=False, color=1, thickness=2 * int(reach) + 3)
+    y, x = np.nonzero(near)
+    inside = radius - cKDTree(points).query(np.column_stack([x, y]), distance_upper_bound=reach)[0]
     for end, inner in ((points[-1], points[-7]), (points[0], points[6])):
         out = (end - inner) / np.hypot(*(end - inner))
         beyond = (x - end[0]) * out[0] + (y - end[1]) * out[1]
         close = np.hypot(x - end[0], y - end[1]) < 3 * radius + 2
-        deep = np.where(close, np.minimum(deep, -beyond), deep)
+        inside[close] = np.minimum(inside, -beyond)[close]
+    deep = np.full((size[1], size[0]), -np.inf)
+    deep[y, x] = inside
     return deep
 
 

@@ -20,6 +20,7 @@ from tests.core.drawing import SIZE, curve, depth, probability
 CONFIG = PerceptionConfig()
 STAGES = ["prepare", "network", "masks", "skeletons", "gaps", "graph", "path", "pose", "total"]
 VESSEL = curve((-30, 240), (200, 220), (420, 260), (680, 230))
+LUMEN = probability(depth(VESSEL, 22.0))
 NOTHING = np.zeros((SIZE[1], SIZE[0]), np.float32)
 FRAME_S = 1 / 30
 
@@ -31,7 +32,7 @@ class DrawnNetwork:
     engine = "drawn by hand"
 
     def __init__(self) -> None:
-        self.vessel = probability(depth(VESSEL, 22.0))
+        self.vessel = LUMEN
         self.robot = NOTHING
         self.shapes: list[tuple[int, ...]] = []
 
