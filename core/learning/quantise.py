@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from copy import deepcopy
 from typing import Any, cast
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
@@ -46,9 +47,10 @@ class _Steps(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         if self.learning:
             tail = max(1, round(x.numel() * (1 - _KEPT_SHARE)))
-            flat = x.detach().flatten()
-            self.high = max(self.high, float(flat.topk(tail).values[-1]))
-            self.low = min(self.low, -float((-flat).topk(tail).values[-1]))
+            flat = x.detach().flatten().cpu().numpy()
+            low, high = tail - 1, flat.size - tail
+            ends = np.partition(flat, (low, high))  # a third of the time of torch's topk
+            self.low, self.high = min(self.low, float(ends[low])), max(self.high, float(ends[high]))
             return x
         scale = max((self.high - self.low) / 255, 1e-8)
         return torch.fake_quantize_per_tensor_affine(x, scale, round(-self.low / scale), 0, 255)
@@ -90,7 +92,9 @@ def _rounded(weight: Tensor, scale: Tensor, products: Tensor) -> Tensor:
     order = products.diagonal().argsort(descending=True, stable=True)
     damped = products[order][:, order]
     damped += torch.eye(len(order), dtype=damped.dtype) * (_DAMPING * damped.diagonal().mean()).clamp_min(1e-12)
-    follow = torch.linalg.cholesky(torch.linalg.inv(damped), upper=True)
+    # The inverse's upper Cholesky factor, without the inverse: of damped = U U^T with an upper U it is U^-1.
+    upper = torch.linalg.cholesky(damped.flip(0, 1)).flip(0, 1)
+    follow = torch.linalg.solve_triangular(upper, torch.eye(len(order), dtype=damped.dtype), upper=True)
     left = weight.double()[:, order]
     whole = torch.empty_like(left)
     step = scale.double()
