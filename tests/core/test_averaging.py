@@ -42,15 +42,22 @@ def network(seed: int, shape: UNetShape = TINY) -> DualUNet:
     return made.eval()
 
 
-@pytest.fixture
-def models(tmp_path: Path) -> list[Path]:
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Two, each with an eight-bit copy and a second look; the first has never seen two looks, the second one of these."""
-    folders = [tmp_path / "one", tmp_path / "other"]
+    made = tmp_path_factory.mktemp("models")
+    folders = [made / "one", made / "other"]
     for seed, (folder, without) in enumerate(zip(folders, (["subtraction", "backlit"], ["backlit"]), strict=True)):
         save_model(network(seed), folder, training={"without": without}, figures={}, examples=[PICTURE])
         near = network(10 + seed, replace(TINY, inputs=5))
         save_with_second_look(folder, near, folder, training={"without": without}, figures={})
     return folders
+
+
+@pytest.fixture
+def models(written: list[Path], tmp_path: Path) -> list[Path]:
+    """Copies of them, to do with as a test likes."""
+    return [Path(shutil.copytree(folder, tmp_path / folder.name)) for folder in written]
 
 
 def contents(folder: Path) -> dict[str, bytes]:
