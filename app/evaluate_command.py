@@ -159,21 +159,25 @@ def _written_names() -> list[str]:
 
 
 def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
-    from app.evaluation_figures import ENDINGS, FIGURES, draw_figures, save_figure
+    from app.evaluation_figures import ENDINGS, FIGURES, draw_figures, drawn
 
     told = json.dumps(metrics, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_whole(out / "metrics.json", told.encode())
     write_measurements(out / "measurements.csv", rows)
     (out / "raters.csv").unlink(missing_ok=True)  # of an earlier evaluation, as figures below; it would belie this one
-    figures = draw_figures(angle_pairs(rows), metrics)
+    figures = {
+        name: {ending: drawn(figure, ending) for ending in ENDINGS}
+        for name, figure in draw_figures(angle_pairs(rows), metrics).items()
+    }
     for name in FIGURES:
         for ending in ENDINGS:
             path = out / f"{name}{ending}"
             if name in figures:
-                save_figure(figures[name], path)
+                write_whole(path, figures[name][ending])
             else:
                 path.unlink(missing_ok=True)
-    write_whole(out / "report.html", render_report(metrics, figures).encode())
+    report = render_report(metrics, {name: files[".svg"] for name, files in figures.items()})
+    write_whole(out / "report.html", report.encode())
 
 
 def _annotation_file(given: Path, study: str | None) -> Path | None:

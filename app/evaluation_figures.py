@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -46,18 +46,18 @@ def draw_figures(pairs: AnglePairs, metrics: dict[str, Any]) -> dict[str, Figure
     return figures
 
 
+def drawn(figure: Figure, ending: str) -> bytes:
+    """As a file of this ending (``.svg``, ``.pdf``, ``.png``), without a date, so that equal figures are equal files."""
+    stream = BytesIO()
+    with styled():
+        figure.savefig(stream, format=ending.removeprefix("."), metadata=_DATELESS.get(ending), dpi=160)
+    return stream.getvalue()
+
+
 def save_figure(figure: Figure, path: Path) -> None:
-    """As SVG, PDF or PNG by `path`'s ending, without a date, so that equal figures are equal files; raises OSError."""
-    drawn = BytesIO()  # a disk that is full makes the PDF's writer fail in ways of its own
-    with styled():
-        figure.savefig(drawn, format=path.suffix.removeprefix("."), metadata=_DATELESS.get(path.suffix), dpi=160)
-    write_whole(path, drawn.getvalue())
-
-
-def write_svg(figure: Figure, stream: TextIO) -> None:
-    """As SVG into an open text stream."""
-    with styled():
-        figure.savefig(stream, format="svg", metadata=_DATELESS[".svg"])
+    """``drawn`` to `path`, by its ending; raises OSError."""
+    # Drawn before: a disk that is full makes the PDF's writer fail in ways of its own.
+    write_whole(path, drawn(figure, path.suffix))
 
 
 def _on_axes(draw: Callable[[Axes], None], size_in: tuple[float, float] = _SIZE_IN) -> Figure:

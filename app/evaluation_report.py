@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -16,9 +15,6 @@ from app.annotate_tables import agreement_tables, between_words
 from core.config import RESOURCES
 from core.study.bootstrap import RESAMPLES
 from core.study.paper_study import ANGLE_FIGURES, CLASS_SCORES, PAPER, STATE_FIGURES, FigureKind, Kind, Verdict, verdict
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _NAMED = 8
 """So many figures that are not bettered are named; the tables and ``against_paper`` in metrics.json have them all."""
@@ -117,8 +113,8 @@ def summary_against_paper(verdicts: Mapping[str, str | None]) -> str:
     return f"{better}; not: {', '.join(rest)}." if 0 < len(rest) <= _NAMED else f"{better}."
 
 
-def render_report(metrics: Mapping[str, Any], figures: Mapping[str, Figure]) -> str:
-    """The report as one HTML page that needs nothing else, figures inside as SVG."""
+def render_report(metrics: Mapping[str, Any], figures: Mapping[str, bytes]) -> str:
+    """The report as one HTML page that needs nothing else, inside it the figures, which are SVG files."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(loader=FileSystemLoader(RESOURCES / "report"), autoescape=True, undefined=StrictUndefined)
@@ -136,7 +132,7 @@ def render_report(metrics: Mapping[str, Any], figures: Mapping[str, Figure]) -> 
         class_rows=class_rows(state),
         angle_caption=f"Angle between robot and vessel, algorithm against manual, n = {angle['n']}.",
         state_caption=f"Pose state, algorithm against manual, n = {state['n']}.",
-        figures={name: inline_svg(figure, name) for name, figure in figures.items()},
+        figures={name: inline_svg(file, name) for name, file in figures.items()},
         agreement=_agreement(metrics.get("agreement")),
         resamples=RESAMPLES,
         drawn=_drawn(metrics["intervals"]),
@@ -197,13 +193,9 @@ def _lead(metrics: Mapping[str, Any]) -> str:
     return " · ".join(parts)
 
 
-def inline_svg(figure: Figure, prefix: str) -> str:
-    """The figure as an ``<svg>`` element for HTML: no outside names, and ids of its own among other figures."""
-    from app.evaluation_figures import write_svg
-
-    buffer = io.StringIO()
-    write_svg(figure, buffer)
-    svg = buffer.getvalue()
+def inline_svg(file: bytes, prefix: str) -> str:
+    """A figure's SVG file as an ``<svg>`` element for HTML: no outside names, and ids of its own among other figures."""
+    svg = file.decode()
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     svg = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", svg)  # HTML knows both name spaces by itself

@@ -132,6 +132,7 @@ def write_report(out: Path, by_policy: Mapping[str, Rows], plan: TrialPlan) -> N
 
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+    from app.evaluation_figures import drawn
     from app.evaluation_report import inline_svg
     from app.trial_figures import draw_spreads, draw_track
     from core.study.trial import summarise
@@ -148,8 +149,10 @@ def write_report(out: Path, by_policy: Mapping[str, Rows], plan: TrialPlan) -> N
         lead=f"{len(everything)} trials · {looks} · {seen} · {time.strftime('%Y-%m-%d', time.gmtime())}",
         policies=list(sums),
         summary=summary_rows(sums),
-        spreads=inline_svg(draw_spreads(by_policy), "spreads") if everything else "",
-        tracks=[(trial_cells(row), inline_svg(draw_track(row), f"track{place}")) for place, row in enumerate(lowest)],
+        spreads=inline_svg(drawn(draw_spreads(by_policy), ".svg"), "spreads") if everything else "",
+        tracks=[
+            (trial_cells(row), inline_svg(drawn(draw_track(row), ".svg"), f"track{place}")) for place, row in enumerate(lowest)
+        ],
         headings=HEADINGS,
         trials=[trial_cells(row) for row in everything],
     )

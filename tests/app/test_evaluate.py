@@ -41,6 +41,18 @@ def evaluate(folder: Path | None = None, csv: Path | None = None, *, out: Path, 
     return json.loads((out / "metrics.json").read_text(encoding="utf-8"))
 
 
+@pytest.fixture
+def drawing() -> None:
+    """Asked for by tests that are about figures."""
+
+
+@pytest.fixture(autouse=True)
+def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All others leave out what takes most of an evaluation's time."""
+    if "drawing" not in request.fixturenames:
+        monkeypatch.setattr("app.evaluation_figures.drawn", lambda _figure, _ending: b"<svg></svg>")
+
+
 @pytest.fixture(scope="module")
 def paper_csv(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The 44 label pairs of METHOD section 7, with made-up angles."""
@@ -89,6 +101,7 @@ def test_json_is_all_there_is_on_standard_output(paper_csv: Path, tmp_path: Path
     assert (out / "scatter.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.usefixtures("drawing")
 def test_the_same_input_gives_the_same_files(paper_csv: Path, tmp_path: Path) -> None:
     for name in ("one", "two"):
         evaluate(csv=paper_csv, out=tmp_path / name)
@@ -127,6 +140,7 @@ class _Page(HTMLParser):
         self.loads += [link for link in links if link and not link.startswith("#")]
 
 
+@pytest.mark.usefixtures("drawing")
 def test_the_report_is_one_page_that_needs_nothing_else(paper_csv: Path, tmp_path: Path) -> None:
     evaluate(csv=paper_csv, out=tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -154,6 +168,7 @@ def test_the_report_says_that_whole_sessions_are_drawn(paper_csv: Path, tmp_path
     assert read_measurements(tmp_path / "out" / "measurements.csv") == rows
 
 
+@pytest.mark.usefixtures("drawing")
 def test_figures_carry_units_and_are_valid_svg(paper_csv: Path, tmp_path: Path) -> None:
     from app.evaluation_figures import draw_figures
     from core.study.evaluation import angle_pairs
@@ -172,6 +187,7 @@ def test_figures_carry_units_and_are_valid_svg(paper_csv: Path, tmp_path: Path) 
         assert ElementTree.parse(tmp_path / f"{name}.svg").getroot().tag.endswith("svg")
 
 
+@pytest.mark.usefixtures("drawing")
 def test_a_figure_of_an_earlier_evaluation_does_not_stay(paper_csv: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     evaluate(csv=paper_csv, out=out)
@@ -181,6 +197,7 @@ def test_a_figure_of_an_earlier_evaluation_does_not_stay(paper_csv: Path, tmp_pa
     assert {path.stem for path in out.glob("*.svg")} == {"confusion"}
 
 
+@pytest.mark.usefixtures("drawing")
 @pytest.mark.parametrize(
     "rows",
     [
@@ -512,6 +529,7 @@ def test_names_that_are_no_utf8_are_shown_as_bytes(paper_csv: Path, labelled: Pa
     assert read_measurements(tmp_path / "of_set" / "measurements.csv")[-1].image == r"caf\xe9"
 
 
+@pytest.mark.usefixtures("drawing")
 @pytest.mark.parametrize("ending", [".svg", ".pdf", ".png"])
 def test_a_figure_that_the_disk_does_not_take_is_an_error_of_the_disk(tmp_path: Path, ending: str) -> None:
     full = tmp_path / f"figure{ending}"
