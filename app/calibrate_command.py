@@ -40,11 +40,14 @@ def run_calibrate(
     from core.learning.eight_bit import renew_eight_bit
     from core.learning.model_file import model_folder
     from core.learning.model_writing import changed, check_can_change
-    from core.study.known_pictures import find_known
+    from core.study.calibration import check_frames
+    from core.study.known_pictures import check_known, find_known
 
-    check_can_change(model)  # said before anything is looked at
+    check_can_change(model)  # said before anything is looked at, as all that follows
     samples, truth = find_labelled(folder, POSE_KEYS)
     pictures = [picture for known in (folder, *knows) for picture in find_known(known)]
+    check_frames(len(samples))
+    check_known(pictures)
     shown = _Shown(folder, samples, truth, pictures, [also.name for also in knows])
     target = model_folder(model)
     # New networks without a calibration of their own would be believed as the old ones were: both come, or none.

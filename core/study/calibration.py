@@ -33,6 +33,13 @@ def is_right(score: FrameScore) -> bool:
     return abs(score.theta_error_deg) <= WRONG_THETA_DEG and score.head_error_px <= WRONG_HEAD_PX
 
 
+def check_frames(number: int) -> None:
+    """Raise CalibrationError where so few frames could not be enough, whatever is answered: said before they are looked at."""
+    if number < 2 * _LEAST:
+        needed = f"a calibration needs {_LEAST} right and {_LEAST} wrong answers"
+        raise CalibrationError(f"{number} frames: {needed}; give it more frames (synth --count)")
+
+
 def fit(evidence: Sequence[Sequence[float]], right: Sequence[bool], fitted_on: dict[str, Any]) -> Calibration:
     """Fit a calibration on the evidence of answered frames (N, F) and whether each answer was right.
 

@@ -88,6 +88,16 @@ def signatures_in(
         yield (picture, signature) if usable else None
 
 
+def check_known(pictures: Sequence[KnownPicture]) -> None:
+    """Raise FamiliarityError where so few pictures could not be enough, whatever they show: said before they are looked at."""
+    _check_number(len(pictures), "pictures")
+
+
+def _check_number(number: int, of: str) -> None:
+    if number < LEAST:
+        raise FamiliarityError(f"{number} {of}; {LEAST} are needed; give it more (synth --count)")
+
+
 def fit_familiarity(
     pictures: Sequence[KnownPicture], signatures: NDArray[np.float32], working_size_px: int, fitted_on: dict[str, Any]
 ) -> Familiarity:
@@ -101,8 +111,7 @@ def fit_familiarity(
     FamiliarityError
         There are less than ``LEAST``, or all are the same.
     """
-    if len(signatures) < LEAST:
-        raise FamiliarityError(f"{len(signatures)} pictures show a vessel; {LEAST} are needed; give it more (synth --count)")
+    _check_number(len(signatures), "pictures show a vessel")
     first = _first_half(pictures)
     apart = [_Fit(signatures[~half]).distance(signatures[half]) for half in (first, ~first)]
     limit = float(np.quantile(np.concatenate(apart), _LIMIT_SHARE))
