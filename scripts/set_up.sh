@@ -134,8 +134,12 @@ install_python_packages() {
         "$python" -m venv "$venv"
     fi
     rm -f "$stamp"
-    # Wheels only: nothing is compiled here, and a machine that has no wheel is told so at once.
-    "$venv/bin/python" -m pip install --no-input --disable-pip-version-check --only-binary :all: --requirement requirements.lock
+    # Byte code of what is used comes with its first use, in a few seconds; of all packages it takes a minute. Who forbids Python to
+    # keep it (container images like to) gets it now.
+    local compile=--no-compile
+    [[ -z ${PYTHONDONTWRITEBYTECODE:-} ]] || compile=--compile
+    # Wheels only: nothing is compiled from sources, and a machine that has no wheel is told so at once.
+    "$venv/bin/python" -m pip install --no-input --disable-pip-version-check $compile --only-binary :all: --requirement requirements.lock
     rm -f "$half"
     # openvino brings this package and reports every import with it; without it, openvino falls back to its own silent stub.
     "$venv/bin/python" -m pip uninstall --quiet --yes --disable-pip-version-check openvino-telemetry

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app import benchmark_command
@@ -21,6 +22,7 @@ def test_frames_are_timed_as_often_seen_as_in_a_stream(configured: str, timed: s
 
 def test_pictures_that_are_all_refused_cannot_be_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(benchmark_command, "_first_frame_s", lambda _config_path: None)
+    monkeypatch.setattr(benchmark_command, "_pictures", lambda count: iter([np.full((480, 640, 3), 90, np.uint8)] * count))
     (tmp_path / "dark.toml").write_text("[perception.quality]\nblack_level = 255.0\n")
     with pytest.raises(
         UserError, match=r"refused before there are masks to compare \(image black\); change \[perception.quality\]"
