@@ -1,15 +1,20 @@
-"""What ``annotate`` is given: pictures, folders, labelled sets, sessions, and videos, which become pictures evenly over time."""
+"""What ``annotate`` is given: pictures, folders, labelled sets, sessions, and videos, which become pictures evenly over time; and
+what has been annotated of them, by whom."""
 
 from __future__ import annotations
 
+import getpass
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from app.long_work import progress_bar
 from app.sources import expand, is_video
 from app.taken_frames import evenly, evenly_over, take_frames, taken_of
 from core.session.session_video import is_of_session
-from core.study.annotation_store import DEFAULT_NAME
+from core.study.annotation_images import FoundImage, find_images
+from core.study.annotation_records import StoredAnnotation
+from core.study.annotation_store import DEFAULT_NAME, AnnotationStore, image_sha256
 from core.study.annotations import AnnotationError
 
 _NAMED_PROBLEMS = 20
@@ -64,6 +69,70 @@ def asked_files(paths: Sequence[Path], frames: int | None) -> list[Path]:
 def _whole(path: Path) -> list[Path]:
     """What can be annotated in it: a link that leads nowhere cannot, and keeps nobody from the rest."""
     return [file for file in expand([path]) if file.exists()]
+
+
+def listed_images(files: Sequence[Path], store: AnnotationStore) -> list[FoundImage]:
+    """The files as images that the store knows from then on; what cannot be read is told. Raises AnnotationError without any."""
+    with progress_bar() as bar:
+        task = bar.add_task("looking at the images", total=len(files))
+        images, problems = find_images(files, store, lambda: bar.advance(task))
+    tell_problems(problems)
+    if not images:
+        raise AnnotationError(f"{files[0].parent}: no image that can be read")
+    return images
+
+
+def read_annotated(
+    store_path: Path, paths: Sequence[Path], frames: int = FRAMES
+) -> tuple[list[StoredAnnotation], list[FoundImage]]:
+    """All annotations of a file and those of its images that are here; how many are not is told. Raises AnnotationError.
+
+    Of a video those pictures count that were taken from it before; where there are none, `frames` are taken.
+    """
+    files = image_files(paths, frames, taken=True)
+    with AnnotationStore(store_path, read_only=True) as store:
+        annotations = store.annotations()
+        images, problems = known_images(files, store)
+        tell_problems([*store.problems, *problems])
+    annotated, here = {one.key.sha256 for one in annotations}, {image.sha256 for image in images}
+    if here and not annotated <= here:
+        tell_problems([f"{len(annotated - here)} of {len(annotated)} annotated images are not in {paths[0]}: left out"])
+    return annotations, images
+
+
+def known_images(files: Sequence[Path], store: AnnotationStore) -> tuple[list[FoundImage], list[str]]:
+    """Those of the files that the store knows, by their content."""
+    records = store.images()
+    found: dict[str, FoundImage] = {}
+    problems = []
+    for path in files:
+        try:
+            sha256 = image_sha256(path)
+        except AnnotationError as error:
+            problems.append(str(error))
+            continue
+        if sha256 in records:
+            found.setdefault(sha256, FoundImage(path, records[sha256]))
+    return list(found.values()), problems
+
+
+def of_rater(annotations: list[StoredAnnotation], rater: str | None) -> list[StoredAnnotation]:
+    """Those of one rater; None: of all. Raises AnnotationError where there are none."""
+    if rater is None:
+        return annotations
+    own = [one for one in annotations if one.key.rater == rater]
+    if not own:
+        known = ", ".join(sorted({one.key.rater for one in annotations})) or "nobody"
+        raise AnnotationError(f"--rater {rater}: has annotated nothing here; who has: {known}")
+    return own
+
+
+def own_name() -> str:
+    """Who annotates where nobody says who: the user of this computer."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError, ImportError):  # no name for this user id
+        return "rater"
 
 
 def tell_problems(problems: Sequence[str]) -> None:

@@ -72,7 +72,8 @@ def annotate(
     config: ConfigOption = None,
 ) -> None:
     """Measure angles and states by hand, draw masks; as a study with several raters, blind and repeated."""
-    from app.annotate_command import AnnotateOptions, StudyOptions, run_annotate
+    from app.annotate_command import run_annotate
+    from app.annotate_options import AnnotateOptions, StudyOptions
 
     if study == "" and not report and export is None:  # who annotates into a study that has no name would not be blind
         raise UserError("--study is empty: give it a value, or leave it out (is a variable of a script not set?)")

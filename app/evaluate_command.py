@@ -194,8 +194,8 @@ def _perceive_annotated(
     annotations: Path, config: Config, preset: str | None, model: str | None, study: str | None, seed: int, *, as_recorded: bool
 ) -> _Study:
     """Images that were annotated by hand, against the algorithm; those of a session as it was set in the session."""
-    from app.annotate_command import read_annotated
     from app.annotate_evaluation import compared_rows, fitted_alike, raters_agreement
+    from app.annotate_sources import read_annotated
 
     answers, images = read_annotated(annotations, _places_of(annotations))
     notes = []

@@ -13,7 +13,7 @@ from core.study.annotations import AnnotationError
 
 def collect_from_file(path: Path) -> tuple[Sequence[StoredAnnotation], Sequence[FoundImage]]:
     """All annotations of a file, and those of their images that lie beside it. Raises AnnotationError."""
-    from app.annotate_command import read_annotated  # statistics, which a window does without until then
+    from app.annotate_sources import read_annotated  # statistics, which a window does without until then
 
     return read_annotated(path, [path.parent])
 

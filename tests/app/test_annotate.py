@@ -15,8 +15,10 @@ import cv2
 import numpy as np
 import pytest
 
-from app.annotate_command import AnnotateOptions, StudyOptions, _config, _queue, run_annotate
+from app.annotate_command import _config, run_annotate
 from app.annotate_evaluation import _names_of, groups_of
+from app.annotate_options import AnnotateOptions, StudyOptions
+from app.annotate_queue import queue_of
 from app.annotate_sources import asked_files, default_store, image_files
 from app.evaluate_command import run_evaluate
 from core.config import Config, TwinConfig
@@ -82,7 +84,9 @@ def queue(folder: Path, **more: object) -> list[tuple[str, int, View]]:
     options = StudyOptions(**more)  # type: ignore[arg-type]
     with AnnotationStore(folder / DEFAULT_NAME) as store:
         images, _ = find_images(sorted(folder.glob("*.png")), store)
-        return [(i.image.path.name, i.key.repeat, i.view) for i in _queue(store, images, options.rater or "ann", options, Config())]
+        return [
+            (i.image.path.name, i.key.repeat, i.view) for i in queue_of(store, images, options.rater or "ann", options, Config())
+        ]
 
 
 def test_the_agreement_is_printed_and_written(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

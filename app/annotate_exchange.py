@@ -1,0 +1,120 @@
+"""What goes out of an annotation file and comes into it: ``annotate --export``, ``--import``, ``--join`` and ``--salvage``."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from app.annotate_options import AnnotateOptions
+from app.annotate_sources import FRAMES, asked_files, listed_images, of_rater, own_name, read_annotated, tell_problems
+from core.config import Config
+from core.study.annotation_records import ItemKey
+from core.study.annotation_store import AnnotationStore
+from core.study.annotations import Annotation, AnnotationError, View, measure_lines
+
+EXPORTS = ("dataset", "csv", "coco")
+
+
+def export_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    from core.study.annotation_export import export_coco, export_training_set
+    from core.study.evaluation import write_measurements
+
+    assert options.out is not None
+    annotations, images = read_annotated(store_path, paths, options.frames or FRAMES)
+    if options.study.asked is not None:
+        annotations = [one for one in annotations if one.key.study == options.study.asked]
+    annotations = of_rater(annotations, options.study.rater)
+    if options.export == "dataset":
+        count, problems = export_training_set(annotations, images, options.out)
+        tell_problems(problems)
+        sys.stderr.write(f"{count} frames with both masks in {options.out}: train --data {options.out}\n")
+    elif options.export == "coco":
+        count = export_coco(annotations, images, options.out)
+        sys.stderr.write(f"masks of {count} images in {options.out}\n")
+    else:
+        from app.annotate_evaluation import compared_rows, fitted_alike
+
+        if options.out.exists():
+            raise AnnotationError(f"{options.out}: is there already; choose another --out")
+        done, notes = fitted_alike(annotations, images, config, options.study.asked, str(store_path))
+        tell_problems(notes)
+        rows, _, _, missed = compared_rows(done, images, config)
+        try:
+            write_measurements(options.out, rows)
+        except OSError as error:
+            raise AnnotationError(f"{options.out}: cannot be written ({error.strerror}); choose another --out") from None
+        sys.stderr.write(f"{len(rows)} images in {options.out}: evaluate --csv {options.out} --out DIR\n")
+        if missed:
+            raise KeyboardInterrupt
+    return 0
+
+
+def import_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    from core.study.annotation_import import merged, read_files
+
+    sources = [file for path in options.imports for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]
+    if not sources:
+        raise AnnotationError(f"{options.imports[0]}: no .json file in it")
+    if not any(source.is_file() for source in sources):  # before an annotation file is made for them
+        raise AnnotationError(f"{sources[0]}: no such file; nothing was imported")
+    files = asked_files(paths, options.frames)
+    rater = options.study.rater or own_name()
+    counts: Counter[str] = Counter()
+    with AnnotationStore(store_path) as store:
+        images = listed_images(files, store)
+        imported, problems = read_files(sources, images)
+        existing = {one.key: one.content for one in store.annotations(options.study.name, rater)}
+        for one in imported:
+            key = ItemKey(one.image.sha256, options.study.name, rater)
+            history = store.history(key)
+            old = existing.get(key, Annotation())
+            content = merged(old, one.content)
+            entry = history.edit(f"import {one.source.name}", content)
+            if entry is None or content == old:
+                problems.append(f"{one.source}: {one.image.path.name} has these annotations already; left as they are")
+                continue
+            store.save(key, View.AS_IS, entry, content, measure_lines(content, one.image.record.size, config.perception), 0.0)
+            existing[key] = content
+            counts[one.image.sha256] += 1
+    tell_problems(problems)
+    if not counts:
+        raise AnnotationError("nothing was imported")
+    sys.stderr.write(f"{len(counts)} images got annotations, for rater {rater}, in {store_path}\n")
+    return 0
+
+
+def join_annotations(store_path: Path, options: AnnotateOptions) -> int:
+    from core.study.annotation_join import join
+
+    names: dict[str, str] = {}
+    for said in options.names:
+        there, _, here = (part.strip() for part in said.partition("="))
+        if not there or not here or names.get(there, here) != here:
+            raise AnnotationError(f"--as {said}: must be THERE=HERE, a rater's name in the file that is joined and his name here")
+        names[there] = here
+    is_new = not store_path.exists()
+    try:
+        with AnnotationStore(store_path) as store:
+            joined = join(store, options.joins, options.study.asked, names)
+    except AnnotationError:
+        if is_new:
+            store_path.unlink(missing_ok=True)
+        raise
+    tell_problems(joined.told)
+    for path, persons in joined.persons.items():
+        who = ", ".join(here if here == there else f"{here} (there: {there})" for there, here in sorted(persons.items()))
+        sys.stderr.write(f"{path}: {who or 'nobody has answered in it'}\n")
+    sys.stderr.write(f"{joined.new} answers are new in {store_path}, {joined.grown} went on, {joined.known} were there already\n")
+    return 0
+
+
+def salvage_annotations(store_path: Path, out: Path | None) -> int:
+    from core.study.annotation_salvage import salvage
+
+    target = out or store_path.with_name(f"salvaged_{store_path.name}")
+    kept, problems = salvage(store_path, target)
+    tell_problems(problems)
+    sys.stderr.write(f"{kept} annotations saved into {target}; the damaged file is as it was\n")
+    return 0
