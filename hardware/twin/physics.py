@@ -54,14 +54,15 @@ class TwinPhysics:
     def __init__(self, phantom: Phantom, seed: int = 0, drive: DriveProperties | None = None) -> None:
         self.phantom = phantom
         self.specimen = Specimen.drawn(seed)
-        walls, self._port = wall_boxes(phantom)
+        outlines = lumen_outline(phantom.graph)
+        walls, self._port = wall_boxes(phantom, outlines)
         ways = node_distances_mm(phantom)[phantom.port, list(phantom.targets)]
         self._shaft_links = math.ceil((float(ways.max()) + _SPARE_MM - STEERABLE_MM) / SHAFT_LINK_MM)
         self.chain_mm = self._shaft_links * SHAFT_LINK_MM + STEERABLE_MM
         self._walls = walls
         self._discs = lumen_discs(phantom.graph)
         self._centers = cKDTree(self._discs[0])
-        self._outline = cKDTree(np.concatenate(lumen_outline(phantom.graph)))
+        self._outline = cKDTree(np.concatenate(outlines))
         self._lock = threading.RLock()
         self._bend, self._pitch = TendonDrive(drive or DriveProperties()), TendonDrive(drive or DriveProperties())
         self._chains: dict[int, Chain] = {}

@@ -70,11 +70,11 @@ def lumen_outline(graph: VesselGraph) -> list[Points]:
     return [low + _GRID_MM * contour[:, ::-1] for contour in find_contours(depth, 0.0)]
 
 
-def wall_boxes(phantom: Phantom) -> tuple[list[Wall], Port]:
-    """The walls of a phantom, open at its port."""
+def wall_boxes(phantom: Phantom, outlines: list[Points]) -> tuple[list[Wall], Port]:
+    """The walls of a phantom along its ``lumen_outline``, open at its port."""
     port, discs = port_of(phantom), lumen_discs(phantom.graph)
     walls = []
-    for outline in lumen_outline(phantom.graph):
+    for outline in outlines:
         corners = approximate_polygon(outline, _TOLERANCE_MM)
         for start, end in itertools.pairwise(corners):
             length = float(np.linalg.norm(end - start))

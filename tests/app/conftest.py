@@ -18,7 +18,7 @@ from pytestqt.qtbot import QtBot
 
 from app.operator_window import OperatorWindow
 from app.theme import apply_theme
-from core.config import Config
+from core.config import Config, PerceptionConfig
 from hardware.rig import RigKind
 from tests.app.fakes import FakeBench, FakeEngine
 
@@ -64,6 +64,20 @@ def _leave_out(imported: set[str]) -> None:
         gc.collect()
         gc.freeze()
         imported.update(sys.modules)
+
+
+@pytest.fixture
+def looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures that stand are looked at in one orientation of eight: for tests that are about something else than what is seen."""
+    from core.perception import pipeline
+
+    opened = pipeline.open_pipeline
+
+    def open_pipeline(config: PerceptionConfig, **how: bool) -> pipeline.Pipeline:
+        once = config.segmentation.model_copy(update={"mirrored": "never"})
+        return opened(config.model_copy(update={"segmentation": once}), **how)
+
+    monkeypatch.setattr(pipeline, "open_pipeline", open_pipeline)
 
 
 MakeWindow = Callable[..., OperatorWindow]

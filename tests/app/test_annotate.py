@@ -34,6 +34,8 @@ from core.types import PoseState
 from hardware.twin.world import TwinWorld
 from tests.core.session_data import QUICK, number_in, record, tick_of
 
+pytestmark = pytest.mark.usefixtures("looked_at_once")
+
 MAIN = Path(__file__).resolve().parents[2] / "main.py"
 BOXES = (
     MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (200.0, 10.0), (200.0, 200.0), (10.0, 200.0))),

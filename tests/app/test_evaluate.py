@@ -32,6 +32,8 @@ from tests.app.annotated import measure, tube
 from tests.app.commands import MAIN, run, run_apart
 from tests.core.test_classification import label_pairs
 
+pytestmark = pytest.mark.usefixtures("looked_at_once")
+
 FIGURES = {"error_distribution", "bland_altman", "scatter", "confusion"}
 
 

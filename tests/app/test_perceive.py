@@ -17,6 +17,8 @@ from core.images import read_image
 from hardware.twin.world import TwinWorld
 from tests.app.commands import MAIN, run, run_apart
 
+pytestmark = pytest.mark.usefixtures("looked_at_once")
+
 KEYS = set(
     "image width height head_xy tail_xy robot_path_xy robot_vector vessel_vector theta_deg theta_signed_deg d_head_px d_tail_px "
     "crossed state confidence reason latency_ms".split()

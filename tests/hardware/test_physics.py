@@ -210,8 +210,9 @@ def test_random_commands_never_break_it(name: str) -> None:
 @pytest.mark.parametrize("name", ["s_curve", "loop", "tree"])
 def test_walls_line_the_lumen_and_leave_the_port_open(name: str) -> None:
     phantom = make_phantom(name)
-    walls, port = wall_boxes(phantom)
-    outline = np.concatenate(lumen_outline(phantom.graph))
+    outlines = lumen_outline(phantom.graph)
+    walls, port = wall_boxes(phantom, outlines)
+    outline = np.concatenate(outlines)
     across = np.array([(-np.sin(wall.angle_rad), np.cos(wall.angle_rad)) for wall in walls])
     centers = np.array([(wall.x, wall.y) for wall in walls])
     half = np.array([wall.half_thickness for wall in walls])[:, None]
