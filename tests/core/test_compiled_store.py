@@ -65,13 +65,30 @@ def test_what_was_compiled_is_found_again_and_of_another_version_it_is_not(sourc
     assert first not in kept(sources / "__pycache__")
 
 
-@pytest.mark.parametrize("damage", ["a bit", "a hole", "cut", "gone", "one more", "no seal"])
-def test_damaged_machine_code_is_compiled_anew(sources: Path, damage: str) -> None:
+def test_damaged_machine_code_is_compiled_anew(sources: Path) -> None:
     """A bit of it that is wrong ends the whole program, so none is run that is not as it was."""
     assert start(sources) == "4.0 0"
     (folder,) = kept(sources / "__pycache__")
     code = next(folder.rglob("*.nbc"))
     content = bytearray(code.read_bytes())
+    content[len(content) // 2] ^= 16
+    code.write_bytes(content)
+    assert [start(sources), start(sources)] == ["4.0 0", "4.0 1"]
+
+
+@pytest.mark.parametrize("damage", ["a bit", "a hole", "cut", "gone", "one more", "no seal"])
+def test_whatever_is_damaged_is_seen_and_gone(sources: Path, damage: str) -> None:
+    filled = open_store(sources)
+    assert filled is not None
+    content = bytearray(range(256)) * 16
+    code = filled.folder / "one.nbc"
+    code.write_bytes(content)
+    filled.seal()
+    (folder,) = kept(sources / "__pycache__")
+    code = folder / code.name
+    again = open_store(sources)
+    assert again is not None
+    assert again.name is None, "what is whole is used"
     middle = len(content) // 2
     if damage == "a bit":
         content[middle] ^= 16
@@ -87,7 +104,11 @@ def test_damaged_machine_code_is_compiled_anew(sources: Path, damage: str) -> No
     elif damage == "no seal":
         (folder / store._SEAL).unlink()
     assert not is_whole(folder)
-    assert [start(sources), start(sources)] == ["4.0 0", "4.0 1"]
+    empty = open_store(sources)
+    assert empty is not None
+    assert empty.name == folder, "to be compiled anew"
+    assert list(empty.folder.iterdir()) == []
+    assert not folder.exists()
 
 
 def test_starts_at_once_all_end_well_and_leave_one(sources: Path) -> None:
