@@ -68,6 +68,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     ended(hand, process)
 
 
+@pytest.mark.slow
 def test_trials_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Path) -> None:
     arguments = (
         "trial",

@@ -93,6 +93,7 @@ def test_the_second_look_is_trained_used_and_carried_along(near: Path, frames: P
     assert (done.returncode, "needs --init MODEL" in done.stderr) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_few_frames_of_a_new_look_are_learnt_beside_what_is_to_be_remembered(near: Path, frames: Path, tmp_path: Path) -> None:
     from safetensors.numpy import load_file
 

@@ -187,6 +187,7 @@ def test_figures_that_miss_their_target_are_marked() -> None:
     assert rows["Time to the target, mean"] == ("–", "")
 
 
+@pytest.mark.slow
 def test_workers_find_what_one_process_finds(tmp_path: Path) -> None:
     arguments = ("trial", "--seeds", "0:2", "--true-masks", "--max-seconds", "1", "--workers", "2", "--json", "--out", tmp_path)
     done = run_apart(*arguments)
