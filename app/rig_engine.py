@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
 
 from app.memory import give_back
 from app.thread_priority import let_the_window_first
@@ -19,12 +18,9 @@ from core.perception.engines import cores
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
 from core.rig_file import as_calibrated
 from core.types import Frame, Point, Scene
-from hardware.rig import Rig, RigKind, open_rig
+from hardware.rig import Ahead, Rig, RigKind, open_rig
 from hardware.servos.bus_messages import BusStatus
 from hardware.servos.servo_robot import ServoRobot
-
-if TYPE_CHECKING:
-    from hardware.twin.twin_start import TwinProcess
 
 
 class RigEngine(Engine):
@@ -68,7 +64,7 @@ class EngineMaker:
     `ahead` is what ``start_ahead`` gave for the first rig.
     """
 
-    def __init__(self, ahead: TwinProcess | None = None) -> None:
+    def __init__(self, ahead: Ahead | None = None) -> None:
         self._ahead = ahead
         self._pilot: Pilot | None = None
         self._left_over: LeftOver | None = None

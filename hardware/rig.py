@@ -18,6 +18,7 @@ from core.types import RobotStatus
 from hardware.cameras.straightened import StraightenedCamera
 
 if TYPE_CHECKING:
+    from hardware.servos.bus_start import BusProcess
     from hardware.servos.servo_robot import ServoRobot
     from hardware.twin.twin_start import TwinProcess
     from hardware.twin.world import TwinWorld
@@ -64,19 +65,42 @@ def kind_of(rig: RigConfig) -> RigKind:
     return RigKind.LIVE if rig.camera in {"realsense", "webcam"} and rig.source is None else RigKind.PLAYBACK
 
 
-def start_ahead(config: Config) -> TwinProcess | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Ahead:
+    """The two processes of a twin with servos, loading."""
+
+    twin: TwinProcess
+    bus: BusProcess
+
+    def end(self) -> None:
+        """They are not needed."""
+        self.bus.end()
+        self.twin.end()
+
+
+def start_ahead(config: Config) -> Ahead | None:
     """Start what a rig loads for seconds, for ``open_rig`` to take over; None where there is nothing, or it cannot be started."""
     if not _has_own_process(config):
         return None
-    from hardware.twin.twin_start import TwinProcess
-
     try:
-        return TwinProcess()
+        return _start_twin()
     except DeviceError:  # it will be tried again, and then said
         return None
 
 
-def open_rig(config: Config, ahead: TwinProcess | None = None) -> Rig:
+def _start_twin() -> Ahead:
+    from hardware.servos.bus_start import BusProcess
+    from hardware.twin.twin_start import TwinProcess
+
+    with ExitStack() as undo:
+        twin = TwinProcess()  # first: it loads for longer
+        undo.callback(twin.end)
+        bus = BusProcess()
+        undo.pop_all()
+    return Ahead(twin, bus)
+
+
+def open_rig(config: Config, ahead: Ahead | None = None) -> Rig:
     """Open camera and robot; what was opened is closed again when the rest fails. Pictures come straightened by the rig's lens.
 
     `ahead` is what ``start_ahead`` gave, perhaps for another rig than this one.
@@ -166,7 +190,7 @@ def _has_own_process(config: Config) -> bool:
     return is_driven_twin and config.twin.own_process and config.servos.driver == "dynamixel" and config.servos.port is None
 
 
-def _open_twin(config: Config, ahead: TwinProcess | None) -> Rig:
+def _open_twin(config: Config, ahead: Ahead | None) -> Rig:
     if config.rig.robot == "servos":
         raise DeviceError(
             f'rig {config.rig.name}: the twin has servos of its own: set rig.robot = "twin", or rig.camera to a real one'
@@ -205,14 +229,16 @@ def _direct_robot(config: Config, world: TwinWorld) -> GuardedRobot:
     return robot
 
 
-def _open_remote_twin(config: Config, ahead: TwinProcess | None) -> Rig:
+def _open_remote_twin(config: Config, ahead: Ahead | None) -> Rig:
     """The twin and its seven software servos in a process of their own."""
     from hardware.twin.remote_twin import RemoteCamera, RemoteTwin
 
+    loading = ahead or _start_twin()
     with ExitStack() as undo:
-        twin = RemoteTwin(config, START_INSERTION_MM, ahead)
+        undo.callback(loading.bus.end)
+        twin = RemoteTwin(config, START_INSERTION_MM, loading.twin)
         undo.callback(twin.close)
-        robot = _twin_servos(config, twin.port, twin.status, None)
+        robot = _twin_servos(config, twin.port, twin.status, process=loading.bus)
         undo.pop_all()
     return Rig(config.rig.name, RigKind.SIM, RemoteCamera(twin), robot)
 
@@ -229,15 +255,22 @@ def _servo_robot(config: Config, world: TwinWorld) -> ServoRobot:
     servos = SoftServoBus(wiring, wire_time=True)
     servos.start()
     drive_world(world, servos, wiring)
-    return _twin_servos(config, servos.port, world.physics.status, servos.stop)
+    return _twin_servos(config, servos.port, world.physics.status, on_close=servos.stop)
 
 
-def _twin_servos(config: Config, port: str, truth: Callable[[], RobotStatus], on_close: Callable[[], None] | None) -> ServoRobot:
+def _twin_servos(
+    config: Config,
+    port: str,
+    truth: Callable[[], RobotStatus],
+    *,
+    on_close: Callable[[], None] | None = None,
+    process: BusProcess | None = None,
+) -> ServoRobot:
     """The real driver in its own process on the software servos' port; zeroed, not armed."""
     from hardware.servos.servo_robot import ServoRobot
 
     settings = config.servos.model_copy(update={"port": port})
-    robot = ServoRobot(settings, config.safety, name="bench twin with servos", truth=truth, on_close=on_close)
+    robot = ServoRobot(settings, config.safety, name="bench twin with servos", truth=truth, on_close=on_close, process=process)
     try:
         robot.connect()
         robot.zero()  # its wires are slack, as nothing has pulled yet

@@ -1,53 +1,35 @@
-"""The application's end of the bus process: starts it, talks to it, and notices when it is gone. Only ``request`` waits."""
+"""The application's end of the bus process: talks to it, and notices when it is gone. Only ``request`` waits."""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import logging
-import mmap
 import os
 import pickle
 import select
 import signal
-import socket
 import subprocess
-import sys
 import threading
 import time
-from pathlib import Path
 from typing import Any
 
 from core.safety_config import SafetyConfig
 from core.servo_config import ServosConfig
 from hardware.servos import errors
 from hardware.servos.bus_messages import BusStatus, Heartbeat, Order, pack_heartbeat, pack_order
+from hardware.servos.bus_start import BusProcess, slots
 from hardware.servos.errors import BusProcessLost, ServoError
-from hardware.servos.shared_slot import SharedSlot
 
-SMALL_BYTES, STATUS_BYTES = 64, 65_536
-MEMORY_BYTES = 2 * SharedSlot.size(SMALL_BYTES) + SharedSlot.size(STATUS_BYTES)
-MODULE = "hardware.servos.bus_process"
 STOP = b"S"
 _log = logging.getLogger(__name__)
-_ROOT = Path(__file__).resolve().parents[2]
 _END_S = 5.0
 """Longer than a torque-off that is owed is tried at the end."""
 _MESSAGE_BYTES = 65_536
 
 
-def slots(memory: mmap.mmap) -> tuple[SharedSlot, SharedSlot, SharedSlot]:
-    """Order, heartbeat and status in the shared memory."""
-    small = SharedSlot.size(SMALL_BYTES)
-    return (
-        SharedSlot(memory, 0, SMALL_BYTES),
-        SharedSlot(memory, small, SMALL_BYTES),
-        SharedSlot(memory, 2 * small, STATUS_BYTES),
-    )
-
-
 class BusLink:
-    """A running bus process. Methods may be called from any thread.
+    """A running bus process: one that was started before, or a new one. Methods may be called from any thread.
 
     Three ways lead to it: shared memory for what is repeated (orders, heartbeats, status), a socket for requests with an answer,
     and a pipe of its own for STOP. A byte in that pipe means stop; its end means that the application is gone, however it went.
@@ -58,29 +40,15 @@ class BusLink:
         When the process cannot be started.
     """
 
-    def __init__(self, servos: ServosConfig, safety: SafetyConfig) -> None:
+    def __init__(self, servos: ServosConfig, safety: SafetyConfig, process: BusProcess | None = None) -> None:
         self._lock = threading.Lock()
         self._asking = threading.Lock()
         self._asked = 0
         self._fatal = ""
         self._closed = False
-        with contextlib.ExitStack() as undo:
-            memory_fd = os.memfd_create("servo_bus", os.MFD_CLOEXEC)
-            undo.callback(os.close, memory_fd)
-            os.ftruncate(memory_fd, MEMORY_BYTES)
-            line_end, line = os.pipe()
-            undo.callback(os.close, line_end)
-            ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-            undo.callback(theirs.close)
-            with contextlib.ExitStack() as undo_ours:
-                undo_ours.callback(os.close, line)
-                undo_ours.callback(ours.close)
-                self._memory = undo_ours.enter_context(mmap.mmap(memory_fd, MEMORY_BYTES))
-                self._process = _spawn((memory_fd, line_end, theirs.fileno()))
-                undo_ours.pop_all()
-        os.set_blocking(line, False)
-        ours.setblocking(False)
-        self._line, self._socket = line, ours
+        started = process or BusProcess()
+        started.take_over()
+        self._process, self._memory, self._line, self._socket = started.process, started.memory, started.line, started.socket
         self._order, self._heartbeat, self._status = slots(self._memory)
         self._newest: tuple[int, BusStatus] | None = None
         with contextlib.suppress(OSError):  # a process that is gone already is found out by the first request
@@ -211,20 +179,3 @@ class BusLink:
             _log.error(self._fatal)
         with self._lock:
             self._memory.close()
-
-
-def _spawn(ends: tuple[int, int, int]) -> subprocess.Popen[bytes]:
-    """The bus process, in a session of its own: Ctrl-C and Ctrl-Z in the application's terminal do not reach it."""
-    path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH", ""))))
-    quiet = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    try:
-        return subprocess.Popen(
-            [sys.executable, "-P", "-m", MODULE, *map(str, ends), str(os.getpid())],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            pass_fds=ends,
-            start_new_session=True,
-            env={**os.environ, **quiet, "PYTHONPATH": path},
-        )
-    except OSError as error:
-        raise BusProcessLost(f"the servo bus process cannot be started ({error.strerror}): free memory, then try again") from None

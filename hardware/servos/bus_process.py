@@ -1,6 +1,6 @@
 """The servo bus in its own process, with the gate inside: it survives whatever happens to the application, and stops the servos.
 
-The application starts it (``bus_link``) as ``python -m hardware.servos.bus_process MEMORY LINE SOCKET PARENT``. Its life:
+The application starts it (``bus_start``) as ``python -m hardware.servos.bus_process MEMORY LINE SOCKET PARENT``. Its life:
 
 - 50 times a second it reads all servos, takes the newest order through the gate, and writes (``bus_loop``, ``bus_guard``).
 - An order is good for 100 ms and for one bounded step. Heartbeats that stop for ``heartbeat_timeout_s`` disarm; then the process

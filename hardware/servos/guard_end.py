@@ -13,11 +13,12 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from hardware.servos.bus_link import MEMORY_BYTES, slots
 from hardware.servos.bus_messages import BusStatus, Heartbeat, Order, unpack_heartbeat, unpack_order
+from hardware.servos.bus_start import MEMORY_BYTES, slots
 
 _PIPE_BYTES = 65_536
-_FIRST_S = 10.0
+_LOOK_S = 1.0
+"""So often it is looked whether the application is still there, before it has said anything."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +57,15 @@ class GuardEnd:
         return self._gone or os.getppid() != self._parent
 
     def first_message(self) -> dict[str, Any] | None:
-        """The configuration; None when the application was gone, or stopped, before it could say it."""
-        self._socket.settimeout(_FIRST_S)
-        with contextlib.suppress(OSError, ValueError):
-            message = json.loads(self._socket.recv(_PIPE_BYTES) or b"null")
+        """The configuration; None when the application was gone before it could say it. It may take as long as it likes."""
+        self._socket.settimeout(_LOOK_S)
+        while not self.is_alone:
+            try:
+                message = json.loads(self._socket.recv(_PIPE_BYTES) or b"null")
+            except TimeoutError:  # started ahead, and not needed yet
+                continue
+            except (OSError, ValueError):
+                return None
             self._socket.setblocking(False)
             return message if isinstance(message, dict) else None
         return None

@@ -20,6 +20,7 @@ from core.types import Command, RobotStatus
 from hardware.servos.bus_guard import report_of
 from hardware.servos.bus_link import BusLink
 from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order, Sent
+from hardware.servos.bus_start import BusProcess
 from hardware.servos.errors import BusProcessLost, NotReady, ServoError
 from hardware.servos.status_block import ServoReading, ServoState
 from hardware.servos.units import wire_force_mn
@@ -37,6 +38,7 @@ class ServoRobot:
     truth : tells the status instead of the servos, where the robot is simulated.
     on_close : called once, after the servos were let go.
     kept_zero : of the rig file; arming without a zero then says whether the servos have lost their turns since.
+    process : a bus process that is loading already, for the first connection.
 
     Notes
     -----
@@ -55,11 +57,13 @@ class ServoRobot:
         truth: Callable[[], RobotStatus] | None = None,
         on_close: Callable[[], None] | None = None,
         kept_zero: ZeroConfig | None = None,
+        process: BusProcess | None = None,
     ) -> None:
         self._servos, self._safety = servos, safety
         self._name = name
         self._truth, self._on_close, self._kept_zero = truth, on_close, kept_zero
         self._lock = threading.Lock()
+        self._loading = process
         self._link: BusLink | None = None
         self._closes = 0
         self._supervised = False
@@ -92,7 +96,8 @@ class ServoRobot:
             raise NotReady("no servo port is configured: set servos.port")
         try:
             with ExitStack() as undo:
-                link = BusLink(self._servos, self._safety)
+                loading, self._loading = self._loading, None
+                link = BusLink(self._servos, self._safety, loading)
                 undo.callback(link.close)
                 link.request("open", _OPEN_S)
                 with self._lock:

@@ -24,8 +24,7 @@ from core.perception.pipeline import Pipeline
 from core.policy_config import PolicyName
 from core.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.types import Frame, Point, Reason, Refusal, Scene
-from hardware.rig import Rig, RigKind
-from hardware.twin.twin_start import TwinProcess
+from hardware.rig import Ahead, Rig, RigKind
 from tests.core.pilot_bench import Robot
 from tests.core.test_control import _Camera
 from tests.core.test_pipeline import DrawnNetwork, _draw_tapered, frame
@@ -167,7 +166,7 @@ def test_what_was_started_ahead_is_the_first_rigs_and_is_ended_where_none_is_ope
         return Rig("twin", RigKind.SIM, _Camera([]), Robot())
 
     monkeypatch.setattr(rig_engine, "open_rig", open_rig)
-    ahead = cast("TwinProcess", SimpleNamespace(end=lambda: given.append("ended")))
+    ahead = cast(Ahead, SimpleNamespace(end=lambda: given.append("ended")))
     maker = _Maker(ahead)
     for _ in range(2):
         maker(Config()).close()

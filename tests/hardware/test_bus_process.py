@@ -6,6 +6,7 @@ import contextlib
 import math
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -29,7 +30,9 @@ from core.types import Command
 from hardware.rig import RigKind, open_rig
 from hardware.servos.bus_link import BusLink
 from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order
+from hardware.servos.bus_start import BusProcess
 from hardware.servos.errors import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
+from hardware.servos.guard_end import _LOOK_S
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servo_bus import SoftServoBus
 from tests.hardware.kill_campaign import BOUND_S, BOUND_STEPS, KINDS, strike
@@ -683,6 +686,26 @@ def test_a_link_whose_process_fails_at_once_says_why() -> None:
         link.close()
     with pytest.raises(BusProcessLost, match="not connected"):
         link.request("open", PATIENCE_S)
+
+
+def test_a_process_that_was_started_ahead_waits_for_its_servos_as_long_as_they_take() -> None:
+    process = BusProcess()
+    time.sleep(2.5 * _LOOK_S)
+    link = BusLink(ServosConfig(), SAFETY, process)
+    try:
+        assert link.pid == process.process.pid
+        with pytest.raises(BusProcessLost, match="no servo port is configured"):
+            link.request("open", PATIENCE_S)
+    finally:
+        link.close()
+        process.end()  # which is the link's, by then
+
+
+def test_an_application_that_goes_before_it_names_servos_leaves_a_process_that_ends_by_itself() -> None:
+    process = BusProcess()
+    process.socket.shutdown(socket.SHUT_RDWR)
+    assert process.process.wait(PATIENCE_S) == 0
+    process.end()
 
 
 def test_the_twins_rig_with_servos() -> None:

@@ -24,10 +24,12 @@ from core.control.gate import Source
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
 from hardware.rig import RigKind, open_rig, start_ahead
+from hardware.servos.bus_start import BusProcess
+from hardware.servos.errors import BusProcessLost
+from hardware.servos.servo_robot import ServoRobot
 from hardware.servos.shared_slot import SharedSlot
 from hardware.twin.remote_twin import RemoteTwin, pack_frame, pack_status, unpack_frame, unpack_status
 from hardware.twin.twin_process import _serve
-from hardware.twin.twin_start import TwinProcess
 from hardware.twin.world import TwinWorld
 
 CONFIG = Config.model_validate({"twin": {"image_width_px": 160, "image_height_px": 120}})
@@ -114,16 +116,32 @@ def test_what_is_wrong_is_said_in_one_line() -> None:
         RemoteTwin(config, 40.0)
 
 
-def test_a_process_that_was_started_ahead_becomes_the_twin() -> None:
+@pytest.mark.real_time
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_what_was_started_ahead_becomes_the_rig() -> None:
     ahead = start_ahead(CONFIG)
     assert ahead is not None
-    twin = RemoteTwin(CONFIG, 40.0, ahead)
+    rig = open_rig(CONFIG, ahead)
     try:
-        assert twin._process.pid == ahead.pid
-        assert next_frame(twin).image.shape == (120, 160, 3)
+        assert {child.pid for child in psutil.Process().children()} >= {ahead.twin.pid, ahead.bus.process.pid}
+        assert isinstance(rig.robot, ServoRobot)
+        assert rig.robot._link is not None
+        assert rig.robot._link.pid == ahead.bus.process.pid
+        frame = rig.camera.read(20.0)
+        assert frame is not None
+        assert frame.image.shape == (120, 160, 3)
+        rig.robot.connect()
+        assert rig.robot._link.pid != ahead.bus.process.pid, "the second connection has a process of its own"
     finally:
-        twin.close()
-    assert not psutil.pid_exists(ahead.pid)
+        rig.close()
+
+
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_what_was_started_ahead_of_a_twin_that_cannot_be_is_ended() -> None:
+    ahead = start_ahead(CONFIG)
+    assert ahead is not None
+    with pytest.raises(DeviceError, match="no such phantom"):
+        open_rig(Config.model_validate({"twin": {"phantom": "no such phantom"}}), ahead)
 
 
 @pytest.mark.parametrize(
@@ -133,13 +151,16 @@ def test_only_a_twin_with_servos_of_its_own_is_started_ahead(changed: dict[str, 
     assert start_ahead(load_config(overrides=changed)) is None
 
 
-def test_a_process_that_was_started_ahead_of_another_rig_is_ended(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_what_was_started_ahead_of_another_rig_is_ended(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    open_before = psutil.Process().num_fds()
     ahead = start_ahead(CONFIG)
     assert ahead is not None
     cv2.imwrite(str(tmp_path / "a.png"), np.zeros((48, 64, 3), np.uint8))
     rig = {"camera": "image_folder", "robot": "none", "source": str(tmp_path)}
     open_rig(load_config(overrides={"rig": rig}), ahead).close()
-    assert not psutil.pid_exists(ahead.pid)
+    ahead.end()  # once more
+    assert psutil.Process().num_fds() == open_before
     assert capfd.readouterr().err == ""
 
 
@@ -152,7 +173,9 @@ def test_a_process_that_cannot_be_started_is_a_device_error_when_the_rig_is_open
         patch.setattr(os, "pipe", refused)
         assert start_ahead(CONFIG) is None
         with pytest.raises(DeviceError, match=r"the bench twin cannot be started \(Too many open files\)"):
-            TwinProcess()
+            open_rig(CONFIG)
+        with pytest.raises(BusProcessLost, match=r"the servo bus process cannot be started \(Too many open files\)"):
+            BusProcess()
     assert psutil.Process().num_fds() == open_before
 
 
