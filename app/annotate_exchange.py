@@ -18,6 +18,10 @@ EXPORTS = ("dataset", "csv", "coco")
 
 
 def export_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    """``--export``: a training set, COCO masks, or the table that ``evaluate --csv`` reads, as far as it was interrupted.
+
+    Raises AnnotationError, and KeyboardInterrupt after an interrupted table was written.
+    """
     from core.study.annotation_export import export_coco, export_training_set
     from core.study.evaluation import write_measurements
 
@@ -52,6 +56,7 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 
 
 def import_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    """``--import``: the lines and masks of other programs' files, for one rater. Raises AnnotationError where there are none."""
     from core.study.annotation_import import merged, read_files
 
     sources = [file for path in options.imports for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]
@@ -86,6 +91,7 @@ def import_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 
 
 def join_annotations(store_path: Path, options: AnnotateOptions) -> int:
+    """``--join``: what other raters have answered in files of their own; raises AnnotationError, and changes nothing then."""
     from core.study.annotation_join import join
 
     names: dict[str, str] = {}
@@ -111,6 +117,7 @@ def join_annotations(store_path: Path, options: AnnotateOptions) -> int:
 
 
 def salvage_annotations(store_path: Path, out: Path | None) -> int:
+    """``--salvage``: what can be read of a damaged file, in a new one. Raises AnnotationError."""
     from core.study.annotation_salvage import salvage
 
     target = out or store_path.with_name(f"salvaged_{store_path.name}")

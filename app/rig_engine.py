@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from typing import TYPE_CHECKING
 
 from app.memory import give_back
 from app.thread_priority import let_the_window_first
@@ -18,9 +19,12 @@ from core.perception.engines import cores
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
 from core.rig_file import as_calibrated
 from core.types import Frame, Point, Scene
-from hardware.rig import Ahead, Rig, RigKind, open_rig
+from hardware.rig import Rig, RigKind, open_rig
 from hardware.servos.bus_messages import BusStatus
 from hardware.servos.servo_robot import ServoRobot
+
+if TYPE_CHECKING:
+    from hardware.twin.ahead import Ahead
 
 
 class RigEngine(Engine):

@@ -20,7 +20,7 @@ from hardware.cameras.straightened import StraightenedCamera
 if TYPE_CHECKING:
     from hardware.servos.bus_start import BusProcess
     from hardware.servos.servo_robot import ServoRobot
-    from hardware.twin.twin_start import TwinProcess
+    from hardware.twin.ahead import Ahead
     from hardware.twin.world import TwinWorld
 
 
@@ -65,39 +65,16 @@ def kind_of(rig: RigConfig) -> RigKind:
     return RigKind.LIVE if rig.camera in {"realsense", "webcam"} and rig.source is None else RigKind.PLAYBACK
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ahead:
-    """The two processes of a twin with servos, loading."""
-
-    twin: TwinProcess
-    bus: BusProcess
-
-    def end(self) -> None:
-        """They are not needed."""
-        self.bus.end()
-        self.twin.end()
-
-
 def start_ahead(config: Config) -> Ahead | None:
     """Start what a rig loads for seconds, for ``open_rig`` to take over; None where there is nothing, or it cannot be started."""
     if not _has_own_process(config):
         return None
+    from hardware.twin.ahead import start_twin
+
     try:
-        return _start_twin()
+        return start_twin()
     except DeviceError:  # it will be tried again, and then said
         return None
-
-
-def _start_twin() -> Ahead:
-    from hardware.servos.bus_start import BusProcess
-    from hardware.twin.twin_start import TwinProcess
-
-    with ExitStack() as undo:
-        twin = TwinProcess()  # first: it loads for longer
-        undo.callback(twin.end)
-        bus = BusProcess()
-        undo.pop_all()
-    return Ahead(twin, bus)
 
 
 def open_rig(config: Config, ahead: Ahead | None = None) -> Rig:
@@ -110,14 +87,19 @@ def open_rig(config: Config, ahead: Ahead | None = None) -> Rig:
     DeviceError, RigFileError
         With one line that says what to do.
     """
-    if ahead is not None and not _has_own_process(config):
-        ahead.end()
-    kind = kind_of(config.rig)
-    if kind is RigKind.PLAYBACK:
-        return _open_playback(config)
-    calibration = calibration_of(config)
-    zero = calibration.zero if calibration is not None else None
-    rig = _open_twin(config, ahead) if kind is RigKind.SIM else _open_live(config, zero)
+    with ExitStack() as unused:
+        if ahead is not None:
+            unused.callback(ahead.end)
+        kind = kind_of(config.rig)
+        if kind is RigKind.PLAYBACK:
+            return _open_playback(config)
+        calibration = calibration_of(config)
+        if kind is RigKind.SIM:
+            if _has_own_process(config):
+                unused.pop_all()
+            rig = _open_twin(config, ahead)
+        else:
+            rig = _open_live(config, calibration.zero if calibration is not None else None)
     if calibration is None or calibration.lens is None:
         return rig
     return replace(rig, camera=StraightenedCamera(rig.camera, calibration.lens))
@@ -231,9 +213,10 @@ def _direct_robot(config: Config, world: TwinWorld) -> GuardedRobot:
 
 def _open_remote_twin(config: Config, ahead: Ahead | None) -> Rig:
     """The twin and its seven software servos in a process of their own."""
+    from hardware.twin.ahead import start_twin
     from hardware.twin.remote_twin import RemoteCamera, RemoteTwin
 
-    loading = ahead or _start_twin()
+    loading = ahead or start_twin()
     with ExitStack() as undo:
         undo.callback(loading.bus.end)
         twin = RemoteTwin(config, START_INSERTION_MM, loading.twin)

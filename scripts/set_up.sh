@@ -134,10 +134,10 @@ install_python_packages() {
         "$python" -m venv "$venv"
     fi
     rm -f "$stamp"
-    # Byte code of what is used comes with its first use, in a few seconds; of all packages it takes a minute. Who forbids Python to
-    # keep it (container images like to) gets it now.
+    # Byte code of what is used comes with its first use, in a few seconds; of all packages it takes a minute. It is made now where it
+    # could not be kept then: for other users, when an administrator sets up, or where Python is forbidden to (container images do so).
     local compile=--no-compile
-    [[ -z ${PYTHONDONTWRITEBYTECODE:-} ]] || compile=--compile
+    [[ -z ${PYTHONDONTWRITEBYTECODE:-} && ($EUID != 0 || -n ${CI:-}) ]] || compile=--compile
     # Wheels only: nothing is compiled from sources, and a machine that has no wheel is told so at once.
     "$venv/bin/python" -m pip install --no-input --disable-pip-version-check $compile --only-binary :all: --requirement requirements.lock
     rm -f "$half"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
 import shutil
 import tempfile
@@ -43,10 +44,13 @@ def no_thread_stays_behind() -> Iterator[None]:
 
 @pytest.fixture
 def no_process_stays_behind() -> Iterator[None]:
-    """What tests before this one left (Python's own ``resource_tracker``, say) is not counted."""
-    before = psutil.Process().children(recursive=True)
+    """But for Python's own, which an earlier test has started and which stays."""
     yield
-    left = [process for process in psutil.Process().children(recursive=True) if process not in before]
+    left = []
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            left.append(" ".join(process.cmdline()) or str(process))
+    left = [command for command in left if "multiprocessing.resource_tracker" not in command]
     assert not left, f"processes left running: {left}"
 
 

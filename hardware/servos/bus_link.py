@@ -46,6 +46,9 @@ class BusLink:
         self._asked = 0
         self._fatal = ""
         self._closed = False
+        if process is not None and process.process.poll() is not None:  # gone while it waited, with no servos to lose
+            process.end()
+            process = None
         started = process or BusProcess()
         started.take_over()
         self._process, self._memory, self._line, self._socket = started.process, started.memory, started.line, started.socket

@@ -57,18 +57,22 @@ class GuardEnd:
         return self._gone or os.getppid() != self._parent
 
     def first_message(self) -> dict[str, Any] | None:
-        """The configuration; None when the application was gone before it could say it. It may take as long as it likes."""
+        """The configuration; None when the application was gone before it could say it. It may take as long as it likes.
+
+        One that said it and is gone is no reason to end at once: with it may have come a request or STOP, which is still owed.
+        """
         self._socket.settimeout(_LOOK_S)
-        while not self.is_alone:
+        while True:
             try:
                 message = json.loads(self._socket.recv(_PIPE_BYTES) or b"null")
             except TimeoutError:  # started ahead, and not needed yet
-                continue
+                if self.is_alone:
+                    return None
             except (OSError, ValueError):
                 return None
-            self._socket.setblocking(False)
-            return message if isinstance(message, dict) else None
-        return None
+            else:
+                self._socket.setblocking(False)
+                return message if isinstance(message, dict) else None
 
     def wait(self, timeout_s: float) -> tuple[bool, bool]:
         """Until there is news or the time is over: is there some in the pipe for STOP, is there a request?"""

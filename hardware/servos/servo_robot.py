@@ -319,6 +319,9 @@ class ServoRobot:
         with self._lock:
             self._closes += 1  # a connection that is being made by another thread is given up
         self._disconnect()
+        loading, self._loading = self._loading, None
+        if loading is not None:
+            loading.end()
         on_close, self._on_close = self._on_close, None
         if on_close is not None:
             on_close()

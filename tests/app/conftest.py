@@ -67,10 +67,18 @@ def _leave_out(imported: set[str]) -> None:
 
 
 @pytest.fixture
-def looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def all_orientations() -> None:
+    """Asked for by tests that look at pictures as they are looked at, where the others of their file do not."""
+
+
+@pytest.fixture
+def looked_at_once(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures that stand are looked at in one orientation of eight: for tests that are about something else than what is seen."""
+    import app.annotation_desk  # noqa: F401 - takes open_pipeline when it is imported, which must be the real one
     from core.perception import pipeline
 
+    if "all_orientations" in request.fixturenames:
+        return
     opened = pipeline.open_pipeline
 
     def open_pipeline(config: PerceptionConfig, **how: bool) -> pipeline.Pipeline:

@@ -144,6 +144,16 @@ def test_too_few_frames_leave_the_model_as_it_is(
     assert _files(model) == before
 
 
+def test_too_few_pictures_of_a_vessel_leave_the_model_as_it_is(frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which only looking at them tells, after everything else is done."""
+    monkeypatch.setattr(fitting, "_LEAST", 1)
+    monkeypatch.setattr(knowing, "check_known", lambda _: None)
+    before = _files(model)
+    with pytest.raises(knowing.FamiliarityError, match="pictures show a vessel; 40 are needed"):
+        run_calibrate(frames, model=str(model), config_path=None)
+    assert _files(model) == before
+
+
 def _files(folder: Path) -> dict[Path, str]:
     """Every file beside and in the folder, by its hash."""
     return {path: sha256_of(path) for path in folder.parent.rglob("*") if path.is_file()}

@@ -296,6 +296,7 @@ def _write_frame(folder: Path, stem: str, image: np.ndarray) -> None:
         cv2.imwrite(str(folder / "masks" / f"{stem}_{task}.png"), np.zeros(image.shape[:2], np.uint8))
 
 
+@pytest.mark.usefixtures("all_orientations")
 def test_a_labelled_set_is_perceived_and_its_truth_is_the_manual_measure(labelled: Path, tmp_path: Path) -> None:
     found = evaluate(labelled, out=tmp_path / "out")
     truth = [json.loads(line) for line in (labelled / "truth.jsonl").read_text().splitlines()]

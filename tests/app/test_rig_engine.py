@@ -24,7 +24,8 @@ from core.perception.pipeline import Pipeline
 from core.policy_config import PolicyName
 from core.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.types import Frame, Point, Reason, Refusal, Scene
-from hardware.rig import Ahead, Rig, RigKind
+from hardware.rig import Rig, RigKind
+from hardware.twin.ahead import Ahead
 from tests.core.pilot_bench import Robot
 from tests.core.test_control import _Camera
 from tests.core.test_pipeline import DrawnNetwork, _draw_tapered, frame

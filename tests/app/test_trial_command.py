@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
+import pickle
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -185,6 +187,12 @@ def test_figures_that_miss_their_target_are_marked() -> None:
     assert rows["Wall contact force, largest"] == ("0.700 N", "missed")
     assert rows["Wall contact force, p95"] == ("0.050 N", "met")
     assert rows["Time to the target, mean"] == ("–", "")
+
+
+def test_what_workers_are_given_is_the_same_there() -> None:
+    plan = TrialPlan(Config(), true_masks=True, max_seconds=1.0)
+    there = pickle.loads(pickle.dumps(partial(run_one, plan)))
+    assert (there.func, there.args) == (run_one, (plan,))
 
 
 @pytest.mark.slow

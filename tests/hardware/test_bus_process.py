@@ -701,6 +701,49 @@ def test_a_process_that_was_started_ahead_waits_for_its_servos_as_long_as_they_t
         process.end()  # which is the link's, by then
 
 
+def test_a_process_that_is_gone_before_its_servos_are_named_is_replaced() -> None:
+    process = BusProcess()
+    process.process.kill()
+    process.process.wait()
+    link = BusLink(ServosConfig(), SAFETY, process)
+    try:
+        assert link.pid != process.process.pid
+        with pytest.raises(BusProcessLost, match="no servo port is configured"):
+            link.request("open", PATIENCE_S)
+    finally:
+        link.close()
+
+
+def test_a_robot_that_is_never_connected_ends_the_process_that_loads_for_it() -> None:
+    process = BusProcess()
+    ServoRobot(ServosConfig(), SAFETY, process=process).close()
+    assert process.process.poll() is not None
+
+
+LETS_GO = """
+import os, signal, sys
+from core.safety_config import SafetyConfig
+from core.servo_config import ServosConfig
+from hardware.servos.bus_link import BusLink
+
+link = BusLink(ServosConfig(port=sys.argv[1]), SafetyConfig())
+link._socket.send(b'{"id": 1, "do": "torque off"}')
+print(link.pid, flush=True)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_torque_off_is_done_though_the_application_dies_while_its_bus_process_loads(servos: SoftServoBus) -> None:
+    for joint in CONFIG.joints:
+        servos.servo(joint.id).table["torque"] = 1
+    done = subprocess.run([sys.executable, "-c", LETS_GO, servos.port], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    until_s = time.monotonic() + PATIENCE_S
+    while _lives(int(done.stdout)) and time.monotonic() < until_s:
+        time.sleep(0.02)
+    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+
+
 def test_an_application_that_goes_before_it_names_servos_leaves_a_process_that_ends_by_itself() -> None:
     process = BusProcess()
     process.socket.shutdown(socket.SHUT_RDWR)

@@ -22,6 +22,7 @@ import pytest
 from core.config import Config, load_config
 from core.control.gate import Source
 from core.devices import DeviceError
+from core.rig_file import RigFileError
 from core.types import Command, Frame, RobotStatus
 from hardware.rig import RigKind, open_rig, start_ahead
 from hardware.servos.bus_start import BusProcess
@@ -149,6 +150,14 @@ def test_what_was_started_ahead_of_a_twin_that_cannot_be_is_ended() -> None:
 )
 def test_only_a_twin_with_servos_of_its_own_is_started_ahead(changed: dict[str, Any]) -> None:
     assert start_ahead(load_config(overrides=changed)) is None
+
+
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_what_was_started_ahead_of_a_rig_whose_file_is_gone_is_ended(tmp_path: Path) -> None:
+    ahead = start_ahead(CONFIG)
+    assert ahead is not None
+    with pytest.raises(RigFileError):
+        open_rig(load_config(overrides={"rig": {"file": str(tmp_path / "gone.toml")}}), ahead)
 
 
 @pytest.mark.usefixtures("no_process_stays_behind")
