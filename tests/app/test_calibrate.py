@@ -144,6 +144,7 @@ def test_too_few_frames_leave_the_model_as_it_is(
     assert _files(model) == before
 
 
+@pytest.mark.slow
 def test_too_few_pictures_of_a_vessel_leave_the_model_as_it_is(frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which only looking at them tells, after everything else is done."""
     monkeypatch.setattr(fitting, "_LEAST", 1)
