@@ -6,17 +6,14 @@ import contextlib
 import mmap
 import os
 import socket
-import subprocess
-import sys
-from pathlib import Path
 
+from hardware.child_process import start_child
 from hardware.servos.errors import BusProcessLost
 from hardware.servos.shared_slot import SharedSlot
 
 SMALL_BYTES, STATUS_BYTES = 64, 65_536
 MEMORY_BYTES = 2 * SharedSlot.size(SMALL_BYTES) + SharedSlot.size(STATUS_BYTES)
 _MODULE = "hardware.servos.bus_process"
-_ROOT = Path(__file__).resolve().parents[2]
 
 
 def slots(memory: mmap.mmap) -> tuple[SharedSlot, SharedSlot, SharedSlot]:
@@ -51,7 +48,7 @@ class BusProcess:
                 self.socket, socket_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
                 theirs.callback(socket_end.close)
                 undo.callback(self.socket.close)
-                self.process = _spawn((memory_fd, line_end, socket_end.fileno()))
+                self.process = start_child(_MODULE, (memory_fd, line_end, socket_end.fileno()), str(os.getpid()))
                 self._ours = undo.pop_all()
         except OSError as error:
             raise BusProcessLost(
@@ -72,17 +69,3 @@ class BusProcess:
         self.process.kill()
         self.process.wait()
         self._ours.close()
-
-
-def _spawn(ends: tuple[int, int, int]) -> subprocess.Popen[bytes]:
-    """The process, in a session of its own: Ctrl-C and Ctrl-Z in the application's terminal do not reach it."""
-    path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH", ""))))
-    quiet = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", _MODULE, *map(str, ends), str(os.getpid())],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        pass_fds=ends,
-        start_new_session=True,
-        env={**os.environ, **quiet, "PYTHONPATH": path},
-    )

@@ -7,15 +7,13 @@ import json
 import os
 import select
 import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 from core.config import Config
 from core.devices import DeviceError
+from hardware.child_process import start_child
 
 _MODULE = "hardware.twin.twin_process"
-_ROOT = Path(__file__).resolve().parents[2]
 _START_S, _END_S = 60.0, 5.0
 
 
@@ -36,7 +34,7 @@ class TwinProcess:
                 self.wake, wake_end = os.pipe()
                 undo.callback(os.close, self.wake)
                 always.callback(os.close, wake_end)
-                self._process = _spawn((self.memory_fd, wake_end))
+                self._process = start_child(_MODULE, (self.memory_fd, wake_end), talks=True)
                 self._files = undo.pop_all()
         except OSError as error:
             raise DeviceError(f"the bench twin cannot be started ({error.strerror}): free memory, then try again") from None
@@ -82,17 +80,3 @@ class TwinProcess:
             self._process.kill()
             self._process.wait()
         self._files.close()
-
-
-def _spawn(ends: tuple[int, int]) -> subprocess.Popen[bytes]:
-    """The process, in a session of its own: Ctrl-C in the application's terminal does not reach it."""
-    path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH", ""))))
-    quiet = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", _MODULE, *map(str, ends)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        pass_fds=ends,
-        start_new_session=True,
-        env={**os.environ, **quiet, "PYTHONPATH": path},
-    )
