@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := help
-.PHONY: help run test damage mutation lint translations setup install uninstall clean
+.PHONY: help run test tests damage mutation lint translations setup packages install uninstall clean
 
 # Tools are started as modules, so that a checkout that was moved still works (the scripts in .venv/bin name their old place).
 PY := .venv/bin/python
@@ -18,12 +18,11 @@ help:  ## this list
 run: setup  ## start the operator window (ARGS='...' is handed to main.py)
 	@exec $(PY) main.py $(ARGS)
 
-test: setup  ## ruff, mypy and pytest, no screen needed (ARGS='...' is handed to pytest)
-	@failed=
-	$(PY) -m ruff check || failed=1
-	$(PY) -m mypy || failed=1
-	$(PY) -m pytest $(ARGS) || failed=1
-	[[ -z $$failed ]]
+test:  ## ruff, mypy and pytest, no screen needed (ARGS='...' is handed to pytest)
+	@$(MAKE) --no-print-directory --keep-going lint tests
+
+tests: setup  ## pytest alone (ARGS='...' is handed to it)
+	@$(PY) -m pytest $(ARGS)
 
 damage: setup  ## 50 kills of a recording, 100 of saves, 2600 damaged files: what the tests do a few times (minutes)
 	@export LUMENPILOT_FUZZ=1000
@@ -35,17 +34,20 @@ damage: setup  ## 50 kills of a recording, 100 of saves, 2600 damaged files: wha
 mutation: setup  ## does a test fail for every small change of gate and supervisor? (a quarter of an hour)
 	@$(PY) scripts/mutation.py $(ARGS)
 
-lint: setup  ## ruff and mypy only
+lint: packages  ## ruff and mypy only
 	@failed=
 	$(PY) -m ruff check || failed=1
-	$(PY) -m mypy || failed=1
+	nice $(PY) -m mypy || failed=1 # beside the tests, with --jobs 2, it takes what they leave: they often wait
 	[[ -z $$failed ]]
 
 translations: setup  ## renew the texts of resources/translations from the code, and make the .qm files
 	@$(PY) scripts/translations.py
 
-setup:  ## make or renew .venv; returns at once when it is up to date
+setup: packages  ## make or renew .venv; returns at once when it is up to date
 	@PYTHON='$(PYTHON)' bash scripts/set_up.sh
+
+packages:
+	@PYTHON='$(PYTHON)' bash scripts/set_up.sh packages
 
 install: setup  ## put it into your desktop's menu, and the command lumenpilot into ~/.local/bin
 	@bash scripts/desktop.sh install

@@ -86,9 +86,9 @@ class OperatorWindow(WindowFrame):
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
         self._pace = TickPace(self)
         self._panels = OperatorPanels(config, kind, phantoms)
+        self.setCentralWidget(self._panels)  # before somebody listens to all events: this makes hundreds
         self._recorder = Recorder(config, kind, self._thread, self)
         self._desk = DriveDesk(self, self._thread, self._panels, self._recorder)
-        self.setCentralWidget(self._panels)
         self._tour = TourOverlay(self._panels, kept_clear=(self._panels.mode_bar.stop, self._panels.alerts))
         self._tour.ended.connect(self._panels.live.setFocus)
         add_operator_menus(self)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes .venv ready to run LumenPilot: Python 3.11, system libraries, pinned packages. Does nothing when that is done already.
-# PYTHON=/path/to/python3.11 chooses the interpreter.
+# PYTHON=/path/to/python3.11 chooses the interpreter. With the argument `packages` nothing is compiled.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -186,4 +186,4 @@ install_all() {
 }
 
 install_all
-compile_loops
+[[ ${1:-} == packages ]] || compile_loops

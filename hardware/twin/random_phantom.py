@@ -102,7 +102,7 @@ def _grown(
             own = np.array(path[: max(0, len(path) - int(3.4 * radius_mm) - 8)][::2]).reshape(-1, 2)
             others = np.concatenate([taken, np.column_stack([own, np.full(len(own), radius_mm)])])
             choices = np.clip(curvature + np.linspace(-0.02, 0.02, 9), -manner.max_curvature, manner.max_curvature)
-            costs = [_cost(path[-1], heading, c, wanted, radius_mm, others, open_end) for c in choices]
+            costs = _costs(path[-1], heading, choices, wanted, radius_mm, others, open_end)
             best = int(np.argmin(costs))
             if costs[best] > 50.0:
                 break
@@ -123,25 +123,25 @@ def _margin(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.minimum(points, np.asarray(BOARD_MM) - points).min(axis=-1))
 
 
-def _cost(
+def _costs(
     here: NDArray[np.float64],
     heading: float,
-    curvature: float,
+    curvatures: NDArray[np.float64],
     wanted: float,
     radius_mm: float,
     others: NDArray[np.float64],
     open_end: bool,
-) -> float:
-    """How bad it is to go on with `curvature`: distance from the wanted one, and lack of room at the probes ahead."""
-    angle = heading + curvature * _PROBES_MM / 2
-    probes = here + np.column_stack([np.cos(angle), np.sin(angle)]) * _PROBES_MM[:, None]
-    room = np.full(len(probes), np.inf) if open_end else _margin(probes) - radius_mm - 3.0
+) -> NDArray[np.float64]:
+    """How bad it is to go on with each of the curvatures: distance from the wanted one, and lack of room at the probes ahead."""
+    angle = heading + curvatures[:, None] * _PROBES_MM / 2
+    probes = here + np.stack([np.cos(angle), np.sin(angle)], axis=-1) * _PROBES_MM[:, None]
+    room = np.full(probes.shape[:2], np.inf) if open_end else _margin(probes) - radius_mm - 3.0
     if len(others):
-        gap = np.linalg.norm(probes[:, None] - others[None, :, :2], axis=2) - others[:, 2] - radius_mm - 3.5
-        room = np.minimum(room, gap.min(axis=1))
+        gap = np.linalg.norm(probes[:, :, None] - others[:, :2], axis=-1) - others[:, 2] - radius_mm - 3.5
+        room = np.minimum(room, gap.min(axis=-1))
     lack = np.maximum(0.0, -room) + 0.3 * np.maximum(0.0, 5.0 - room)
-    blocked = 100.0 if room[0] < 0 else 0.0
-    return float(((curvature - wanted) / 0.03) ** 2 + (lack * np.array([4.0, 2.0, 1.0, 0.5])).sum() + blocked)
+    blocked = np.where(room[:, 0] < 0, 100.0, 0.0)
+    return np.asarray(((curvatures - wanted) / 0.03) ** 2 + (lack * np.array([4.0, 2.0, 1.0, 0.5])).sum(axis=-1) + blocked)
 
 
 def _radii(rng: np.random.Generator, count: int, start_mm: float) -> NDArray[np.float64]:

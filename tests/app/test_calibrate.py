@@ -71,7 +71,9 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
     monkeypatch.setattr(fitting, "_LEAST", 1)
     monkeypatch.setattr(knowing, "LEAST", 4)
     more = tmp_path / "more"
-    shutil.copytree(frames / "images", more)
+    more.mkdir()
+    for picture in sorted((frames / "images").iterdir())[:3]:
+        shutil.copy(picture, more)
     run_calibrate(frames, model=str(model), config_path=None, knows=[more])
     info = read_model_info(model)
     assert info.mirrored_second_looks == MOST_LOOKS
@@ -83,7 +85,7 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
     assert info.calibration.fitted_on["set"] == "set"
     assert info.familiarity is not None
     assert info.familiarity.fitted_on["knows"] == ["more"]
-    assert 8 < info.familiarity.fitted_on["pictures"] <= 16
+    assert 8 < info.familiarity.fitted_on["pictures"] <= 8 + 3
     assert _looks(model) == [False, True]
 
 

@@ -138,13 +138,12 @@ def test_what_cannot_be_recovered_is_said_and_can_be_declined(
 
 
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("what", "command", "told"),
     [
-        (["/nowhere/python"], "could not be started"),
-        (["/bin/sh", "-c", "kill -9 $$"], "was ended from outside"),
+        ("looking", ["/nowhere/python"], "could not be started"),
+        ("recovering", ["/bin/sh", "-c", "kill -9 $$"], "was ended from outside"),
     ],
 )
-@pytest.mark.parametrize("what", ["looking", "recovering"])
 def test_a_process_that_says_nothing_is_no_word_against_the_session_and_can_be_tried_again(
     desk: RecoveryDesk,
     strip: OfferStrip,

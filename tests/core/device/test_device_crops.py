@@ -20,10 +20,10 @@ from tests.core.device.device_set import TIP, generator, masks_of, picture_of, t
 
 @pytest.mark.parametrize("size", [(192, 256), (384, 384)])
 def test_crops_keep_picture_labels_and_ends_together(frames: DeviceFrames, size: tuple[int, int]) -> None:
-    numbers = torch.arange(4).repeat(16)
+    numbers = torch.arange(4).repeat(6)
     images, masks, ends = random_crops(frames, numbers, size, generator())
-    assert images.shape == (64, 3, *size)
-    assert masks.shape == (64, 2, *size)
+    assert images.shape == (24, 3, *size)
+    assert masks.shape == (24, 2, *size)
     assert torch.equal(images, images.round())
     vessel, robot, unsure = told_by_colour(images)
     plain = images[:, 2] == 120  # what lies beyond the frame is one colour of it, without labels
@@ -40,7 +40,7 @@ def test_crops_keep_picture_labels_and_ends_together(frames: DeviceFrames, size:
             near = (rows - y) ** 2 + (columns - x) ** 2 < 10**2
             assert 0.2 < float(mask[near].mean()) < 0.6, "half a robot of 8 px in a disc of 20"
             assert mask[round(y), round(x)] == 1
-    assert seen > 15
+    assert seen > 5
 
 
 def test_crops_are_turned_and_scaled(frames: DeviceFrames) -> None:
@@ -120,7 +120,7 @@ def test_a_random_pixel_lies_in_the_mask() -> None:
 
 
 def test_looks_are_pictures_and_leave_the_originals(frames: DeviceFrames) -> None:
-    images, _ = frames.whole(torch.arange(4).repeat(3))
+    images, _ = frames.whole(torch.arange(4))
     before = images.clone()
     changed = random_looks(images, generator())
     assert torch.equal(images, before)
@@ -128,7 +128,7 @@ def test_looks_are_pictures_and_leave_the_originals(frames: DeviceFrames) -> Non
     assert changed.max() <= 255
     assert torch.equal(changed, changed.round())
     unlike = (changed - images).abs().mean(dim=(1, 2, 3))
-    assert (unlike > 1).sum() > 7
+    assert (unlike > 1).sum() > 2
     assert torch.equal(changed, random_looks(images, generator()))
 
 
@@ -179,7 +179,7 @@ def test_training_on_a_device_learns_and_tells_its_crops_what_was_lost(frames: D
             told.append(lost)
             super().note(lost)
 
-    plan = TrainingPlan(steps=60, batch=4, crop=(96, 96), look_share=0.0, clutter_share=0.0, focus_share=0.5, warmup_steps=4)
+    plan = TrainingPlan(steps=60, batch=4, crop=(64, 64), look_share=0.0, clutter_share=0.0, focus_share=0.5, warmup_steps=4)
     reports: list[Progress] = []
     torch.manual_seed(0)
     network = DualUNet(UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2))

@@ -66,16 +66,16 @@ def test_a_tip_and_a_wall_that_are_wrong_are_shown_as_often(frames: DeviceFrames
     robot, vessel = windows._wrong(torch.zeros(2, dtype=torch.long), 1)
     assert vessel[0].sum() > 3 * robot[0].sum() > 300
     assert not vessel[1].any()
-    centers = torch.cat([windows._centers(torch.zeros(24, dtype=torch.long), 24) for _ in range(2)])
+    centers = windows._centers(torch.zeros(24, dtype=torch.long), 24)
     beside = (centers[:, 1] < 182).float()
     assert 0.3 < float(beside.mean()) < 0.75, "the wall is much larger than the tip"
 
 
 @pytest.mark.parametrize("focus", [0.0, 0.5])
 def test_windows_keep_picture_labels_and_ends_together(frames: DeviceFrames, focus: float) -> None:
-    plan = TrainingPlan(batch=64, look_share=0.0, end_weight=4, focus_share=focus)
+    plan = TrainingPlan(batch=24, look_share=0.0, end_weight=4, focus_share=focus)
     planes, labels = next(iter(DeviceWindows(frames, *_seen(frames), plan)))
-    assert planes.shape == (64, 5, WINDOW_PX, WINDOW_PX)
+    assert planes.shape == (24, 5, WINDOW_PX, WINDOW_PX)
     vessel, robot, unsure = told_by_colour(planes)
     assert not unsure.any(), "no window is scaled or slanted"
     assert torch.equal(labels[:, 0] > 0, vessel)
@@ -91,18 +91,18 @@ def test_windows_keep_picture_labels_and_ends_together(frames: DeviceFrames, foc
             assert mask[row, column] == 1
             around = mask[max(0, row - 10) : row + 11, max(0, column - 10) : column + 11]
             assert 0 < float(around.mean()) < 0.5, "a robot ends here"
-    assert (told.values > 250).sum() > 30
+    assert (told.values > 250).sum() > 10
 
 
 def test_half_of_the_windows_come_with_what_was_seen_in_the_end(frames: DeviceFrames) -> None:
-    plan = TrainingPlan(batch=64, look_share=0.0)
+    plan = TrainingPlan(batch=24, look_share=0.0)
     windows, network = DeviceWindows(frames, *_seen(frames), plan), _Says(0.0)
     windows.watch(network)
     planes, labels = next(iter(windows))
-    assert network.asked == 32
+    assert network.asked == 12
     half = (planes[:, 3] > 125) & (planes[:, 3] < 130)
     looked = half.flatten(1).any(dim=1)
-    assert looked.sum() == 32
+    assert looked.sum() == 12
     shares = half[looked].float().mean(dim=(1, 2))
     assert (shares > 0.5).all()
     assert (shares < 1).any(), "it was a window a bit beside"
