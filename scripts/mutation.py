@@ -117,18 +117,24 @@ class Mutant:
 
 def mutants(module: str, source: str) -> Iterator[Mutant]:
     """All mutants of a module's source. Each parses; none is the source."""
-    tree = ast.parse(source)
+    statements = ast.parse(source).body
+    texts = [ast.unparse(statement) for statement in statements]
     lines = source.splitlines()
-    found = [(node, change, new, lines[getattr(node, "lineno", 0) - 1].strip()) for node, change, new in _changes_in(tree)]
-    alike = Counter((line, change) for _, change, _, line in found)
-    for node, change, new, line in found:
+    found = [
+        (place, node, change, new, lines[getattr(node, "lineno", 0) - 1].strip())
+        for place, statement in enumerate(statements)
+        for node, change, new in _changes_in(statement)
+    ]
+    alike = Counter((line, change) for _, _, change, _, line in found)
+    for place, node, change, new, line in found:
         part = f" of {ast.unparse(node).splitlines()[0]}" if alike[line, change] > 1 else ""
-        changed = ast.unparse(_Swap(node, new).visit(tree))
-        _Swap(new, node).visit(tree)
-        yield Mutant(module, getattr(node, "lineno", 0), line, change + part, changed)
+        changed = ast.unparse(_Swap(node, new).visit(statements[place]))
+        _Swap(new, node).visit(statements[place])
+        whole = "\n".join([*texts[:place], changed, *texts[place + 1 :]])
+        yield Mutant(module, getattr(node, "lineno", 0), line, change + part, whole)
 
 
-def _changes_in(tree: ast.Module) -> Iterator[tuple[ast.AST, str, ast.AST]]:
+def _changes_in(tree: ast.stmt) -> Iterator[tuple[ast.AST, str, ast.AST]]:
     harmless = {id(word.value) for word in ast.walk(tree) if isinstance(word, ast.keyword) and word.arg in HARMLESS}
     for node in ast.walk(tree):
         if id(node) not in harmless:

@@ -31,7 +31,7 @@ from hardware.twin.synth import SynthPlan, write_set
 def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A set in which every other true angle is far off, so that there are wrong answers to learn from."""
     out = tmp_path_factory.mktemp("calibrate") / "set"
-    write_set(SynthPlan(out, 8, 77, (320, 240)))
+    write_set(SynthPlan(out, 6, 77, (320, 240)))
     rows = [json.loads(line) for line in (out / "truth.jsonl").read_text().splitlines()]
     for row in rows[::2]:
         if row["theta_deg"] is not None:
@@ -85,7 +85,7 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
     assert info.calibration.fitted_on["set"] == "set"
     assert info.familiarity is not None
     assert info.familiarity.fitted_on["knows"] == ["more"]
-    assert 8 < info.familiarity.fitted_on["pictures"] <= 8 + 3
+    assert 6 < info.familiarity.fitted_on["pictures"] <= 6 + 3
     assert _looks(model) == [False, True]
 
 
@@ -111,10 +111,10 @@ def test_eight_bit_copies_are_made_anew_with_the_calibration(frames: Path, model
 def test_what_cannot_be_enough_is_said_before_the_work(
     frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch, looked_at: list[object]
 ) -> None:
-    with pytest.raises(CalibrationError, match=r"^8 frames: a calibration needs 20 right and 20 wrong answers; give it more"):
+    with pytest.raises(CalibrationError, match=r"^6 frames: a calibration needs 20 right and 20 wrong answers; give it more"):
         run_calibrate(frames, model=str(model), config_path=None, knows=[frames])
     monkeypatch.setattr(fitting, "_LEAST", 1)
-    with pytest.raises(knowing.FamiliarityError, match=r"^16 pictures; 40 are needed; give it more"):
+    with pytest.raises(knowing.FamiliarityError, match=r"^12 pictures; 40 are needed; give it more"):
         run_calibrate(frames, model=str(model), config_path=None, knows=[frames])
     assert not looked_at
 
