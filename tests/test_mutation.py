@@ -71,6 +71,7 @@ def test_a_test_that_fails_as_it_is_finds_nothing(
     (tmp_path / "tests" / "core" / "test_red.py").write_text("def test_red():\n    assert False\n")
     (tmp_path / "tests" / "core" / "test_green.py").write_text("def test_green():\n    pass\n")
     monkeypatch.setattr(mutation, "LONG_TESTS", ("test_green.py",))
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)  # what is asked of all tests, a report's file say, is not asked of these
     monkeypatch.setattr(mutation, "TESTS", {"gate": ("test_red.py", "test_missing.py")})
     monkeypatch.setattr(mutation, "copy_project", lambda _folder: tmp_path)
     assert mutation.main(["gate"]) == 2

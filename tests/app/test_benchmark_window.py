@@ -21,10 +21,10 @@ from core.types import Frame, Scene, Tick
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("seconds", [5, pytest.param(12, marks=pytest.mark.slow)])
-def test_it_runs_the_window_and_ends_by_itself(seconds: int) -> None:
+@pytest.mark.slow
+def test_it_runs_the_window_and_ends_by_itself() -> None:
     done = subprocess.run(
-        [sys.executable, "main.py", "benchmark", "--window", str(seconds), "--json"],
+        [sys.executable, "main.py", "benchmark", "--window", "12", "--json"],
         cwd=ROOT,
         env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
         capture_output=True,
@@ -36,8 +36,7 @@ def test_it_runs_the_window_and_ends_by_itself(seconds: int) -> None:
     found = json.loads(done.stdout)
     found = found.get("window", found)
     assert found["shown_fps"] > 0.0
-    if seconds > benchmark_window._WARM_UP_S:
-        assert found["bus_cycle_p99_ms"] >= 20.0, "50 Hz is 20 ms, and the slowest of a hundred cycles no faster"
+    assert found["bus_cycle_p99_ms"] >= 20.0, "50 Hz is 20 ms, and the slowest of a hundred cycles no faster"
     assert found["gui_max_block_ms"] == found["gui_longer_blocks"][-1]["ms"]
     assert found["capture_to_screen_ms"]["p50"] > 0.0
 

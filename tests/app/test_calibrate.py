@@ -62,6 +62,7 @@ def _looks(model: Path, **how: bool) -> list[bool]:
     return often
 
 
+@pytest.mark.slow
 def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
     frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -79,6 +79,7 @@ def near(model: Path, frames: Path) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_the_second_look_is_trained_used_and_carried_along(near: Path, frames: Path, tmp_path: Path) -> None:
     few = ("--data", frames, "--steps", 1, "--batch", 1, "--threads", 1)
     assert read_model_info(near / "second_look").training["steps_done"] == 1
