@@ -43,10 +43,10 @@ lint: packages  ## ruff and mypy only
 translations: setup  ## renew the texts of resources/translations from the code, and make the .qm files
 	@$(PY) scripts/translations.py
 
-setup: packages  ## make or renew .venv; returns at once when it is up to date
+setup:  ## make or renew .venv; returns at once when it is up to date
 	@PYTHON='$(PYTHON)' bash scripts/set_up.sh
 
-packages:
+packages: # beside `setup` it is done once: whoever comes second waits
 	@PYTHON='$(PYTHON)' bash scripts/set_up.sh packages
 
 install: setup  ## put it into your desktop's menu, and the command lumenpilot into ~/.local/bin

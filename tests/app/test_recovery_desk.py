@@ -137,11 +137,16 @@ def test_what_cannot_be_recovered_is_said_and_can_be_declined(
     assert Declined(tmp_path / "state" / "declined.json").names() == {session.name}
 
 
+_NOWHERE, _KILLED = ["/nowhere/python"], ["/bin/sh", "-c", "kill -9 $$"]
+
+
 @pytest.mark.parametrize(
     ("what", "command", "told"),
     [
-        ("looking", ["/nowhere/python"], "could not be started"),
-        ("recovering", ["/bin/sh", "-c", "kill -9 $$"], "was ended from outside"),
+        ("looking", _NOWHERE, "could not be started"),
+        ("recovering", _KILLED, "was ended from outside"),
+        pytest.param("looking", _KILLED, "was ended from outside", marks=pytest.mark.slow),
+        pytest.param("recovering", _NOWHERE, "could not be started", marks=pytest.mark.slow),
     ],
 )
 def test_a_process_that_says_nothing_is_no_word_against_the_session_and_can_be_tried_again(

@@ -172,7 +172,7 @@ def _contrast(picture: Picture, without: Picture) -> float:
 @pytest.mark.parametrize("family", [*LOOK_FAMILIES, *RARE_FAMILIES])
 def test_every_family_shows_the_robot_it_labels(family: str) -> None:
     contrasts = []
-    for seed in range(6):
+    for seed in range(8):
         appearance = replace(random_appearance(seed, family), noise=0.0, jpeg_quality=0)
         renderer = Renderer(PHANTOM, appearance, (320, 240), seed)
         contrasts.append(_contrast(renderer.render(_robot()), renderer.render(None)))
@@ -182,7 +182,7 @@ def test_every_family_shows_the_robot_it_labels(family: str) -> None:
 
 @pytest.mark.parametrize("family", [*LOOK_FAMILIES, *RARE_FAMILIES])
 def test_every_family_shows_the_vessel_it_labels(family: str) -> None:
-    for seed in range(4):
+    for seed in range(6):
         appearance = replace(random_appearance(seed, family), noise=0.0, jpeg_quality=0, cables=0, labels=0, objects=0, dust=0)
         picture = Renderer(PHANTOM, appearance, (320, 240), seed).render(None)
         mask = picture.vessel.astype(np.uint8)

@@ -191,9 +191,17 @@ def test_learning_the_steering_again_and_again_pulls_no_wire() -> None:
         assert _tendon_mm(twin) == pytest.approx([0.0] * 4, abs=0.02)
 
 
+_UNSEEN, _LOST = HeadNotSeen("the robot's head is not seen"), DeviceError("webcam is lost")
+
+
 @pytest.mark.parametrize(
     ("looks", "error"),
-    [(1, DeviceError("webcam is lost")), (2, HeadNotSeen("the robot's head is not seen")), (5, DeviceError("webcam is lost"))],
+    [
+        (1, _LOST),
+        (2, _UNSEEN),
+        (5, _LOST),
+        *(pytest.param(*rest, marks=pytest.mark.slow) for rest in ((1, _UNSEEN), (2, _LOST), (5, _UNSEEN))),
+    ],
 )
 def test_a_step_that_loses_sight_leaves_nothing_turned(looks: int, error: Exception) -> None:
     """Otherwise a retry would go on from there."""
