@@ -117,6 +117,8 @@ class _TruthRow(BaseModel):
     theta_signed_deg: _Number | None = None
     head_xy: tuple[_Number, _Number] | None = None
     tail_xy: tuple[_Number, _Number] | None = None
+    c_head_px: _Number | None = None
+    c_tail_px: _Number | None = None
 
     @field_validator("state")
     @classmethod

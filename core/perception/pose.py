@@ -73,6 +73,28 @@ def classify(
     return PoseState.B if d_head < d_tail + favour_px else PoseState.C
 
 
+def room_px(c_head_px: float, c_tail_px: float, theta_deg: float, config: PoseConfig, length_px: float) -> float:
+    """How far head and tail may each lie aside, at least, before the pose has another state; 0 at a threshold.
+
+    Two distances that differ by less than they can be measured to make a state a toss-up, for a person, too.
+
+    Parameters
+    ----------
+    c_head_px, c_tail_px, theta_deg, config : as ``classify`` has them, without a current state.
+    length_px : from tail to head, by which theta turns as they move.
+    """
+    d_head, d_tail = abs(c_head_px), abs(c_tail_px)
+    aside, allowed = (math.sin(math.radians(min(angle, 90.0))) for angle in (theta_deg, config.theta_allow_deg))
+    beyond_px = 0.5 * length_px * (aside - allowed)  # they move against each other, each by half of it
+    to_ideal_px = max(max(d_head, d_tail) - config.d_allow_px, beyond_px)
+    if to_ideal_px < 0.0:
+        return -to_ideal_px
+    to_crossing_px = min(d_head, d_tail)
+    if c_head_px * c_tail_px < 0.0:
+        return min(to_ideal_px, to_crossing_px)
+    return min(to_ideal_px, to_crossing_px, 0.5 * abs(d_head - d_tail))
+
+
 class StateFilter:
     """Steadies the state of a stream: a hysteresis on every threshold and a dwell time, so that the badge does not chatter.
 

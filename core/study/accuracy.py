@@ -10,15 +10,20 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.config import QualityConfig
+from core.config import PoseConfig, QualityConfig, VectorConfig
 from core.learning.dataset import UNMEASURED, DatasetError, Sample
 from core.perception.pipeline import Pipeline
+from core.perception.pose import room_px
 from core.study.classification import kappa
 from core.types import Frame, Image, Mask, Point, Reason, Scene
 
 WRONG_DEG, WRONG_PX = 10.0, 15.0
 """An answer is wrong whose theta or whose head is off by more."""
+TOSS_UP_PX = 0.25
+"""Where the true head and tail would have another state so near beside, nobody can tell which one it is."""
 _CONFIDENT_FROM = QualityConfig().confident_from
+_STATES, _LENGTH_PX = PoseConfig(), VectorConfig().robot_length_px
+"""By which the truth has its states."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +46,8 @@ class FrameScore:
     evidence: tuple[float, ...] | None = None
     is_measured: bool = True
     """False: nobody has told whether there is a pose, or which, so that no answer is right or wrong."""
+    true_room_px: float | None = None
+    """How far the true pose is from another state (``room_px``); None where its distances are not told."""
 
 
 class TrueMasks:
@@ -85,6 +92,10 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
         head_error = float(np.hypot(scene.path.head[0] - true_head[0], scene.path.head[1] - true_head[1]))
         # Signed and wrapped: a robot that points left by as much as it should point right is wrong, and would be steered wrongly.
         theta_error = (pose.theta_signed_deg - float(theta_signed) + 180.0) % 360.0 - 180.0
+    distances = truth.get("c_head_px"), truth.get("c_tail_px")
+    room = None
+    if theta is not None and None not in distances:
+        room = room_px(float(distances[0]), float(distances[1]), float(theta), _STATES, _LENGTH_PX)
     return FrameScore(
         stem=stem,
         vessel_dice=dice(found_vessel, vessel),
@@ -101,6 +112,7 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
         confidence=pose.confidence if pose is not None else 0.0,
         evidence=scene.evidence,
         is_measured=truth.get("reason") != UNMEASURED,
+        true_room_px=room,
     )
 
 
@@ -154,10 +166,12 @@ def summarise(scores: Sequence[FrameScore], confident_from: float = _CONFIDENT_F
     """Sums over frames: "expected" are those whose truth has a pose, "empty" those without any robot, "poseless" the rest.
 
     Of frames that nobody has measured only the masks count. "Wrong" is an answer beyond ``WRONG_DEG`` or ``WRONG_PX``, "confident"
-    one that is at least as sure as `confident_from`.
+    one that is at least as sure as `confident_from`. A "toss-up" is a state to which another one is nearer than ``TOSS_UP_PX``.
     """
     expected = [s for s in scores if s.expected]
     pairs = [(s.true_state, s.state) for s in expected if s.true_state is not None and s.state is not None]
+    told = [s for s in expected if s.state is not None and s.true_room_px is not None]
+    clear = [s for s in told if (s.true_room_px or 0.0) >= TOSS_UP_PX]
     thetas = [(s.true_theta_deg, s.theta_deg) for s in expected if s.theta_deg is not None and s.true_theta_deg is not None]
     robots = [s.robot_dice for s in scores if s.robot_dice is not None]
     empty = [s for s in scores if s.robot_dice is None and s.is_measured]
@@ -179,6 +193,8 @@ def summarise(scores: Sequence[FrameScore], confident_from: float = _CONFIDENT_F
         "theta_pearson": _pearson(thetas),
         "state_agreement": sum(a == b for a, b in pairs) / len(pairs) if pairs else None,
         "state_kappa": kappa([str(a) for a, _ in pairs], [str(b) for _, b in pairs]),
+        "state_toss_up_share": 1.0 - len(clear) / len(told) if told else None,
+        "state_agreement_but_toss_ups": sum(s.state == s.true_state for s in clear) / len(clear) if clear else None,
         "answered_and_wrong_share": sum(map(_is_wrong, expected)) / len(pairs) if pairs else None,
         "confident_share": len(confident) / len(expected) if expected else None,
         "confident_and_wrong_share": sum(map(_is_wrong, confident)) / len(confident) if confident else None,

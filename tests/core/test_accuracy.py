@@ -169,6 +169,21 @@ def test_sums_by_hand() -> None:
     assert sums["theta_pearson"] == pytest.approx(float(np.corrcoef([9, 23, 60], [10, 20, 40])[0, 1]))
 
 
+def test_states_that_nobody_can_tell_are_told_apart() -> None:
+    far, near = TRUTH | {"c_head_px": 12.0, "c_tail_px": 4.0}, TRUTH | {"c_head_px": 12.0, "c_tail_px": 11.9}
+    scores = [
+        score_frame("a", scene(), VESSEL, ROBOT, far),
+        score_frame("b", scene(), VESSEL, ROBOT, far | {"state": "D"}),
+        score_frame("c", scene(), VESSEL, ROBOT, near | {"state": "B"}),
+        score_frame("d", scene(), VESSEL, ROBOT, TRUTH),  # nobody has told its distances
+    ]
+    assert [s.true_room_px for s in scores] == [pytest.approx(v) for v in (4.0, 4.0, 0.05)] + [None]
+    sums = summarise(scores)
+    assert (sums["state_agreement"], sums["state_agreement_but_toss_ups"]) == (2 / 4, 1 / 2)
+    assert sums["state_toss_up_share"] == pytest.approx(1 / 3)
+    assert summarise(scores[-1:])["state_toss_up_share"] is summarise(scores[2:])["state_agreement_but_toss_ups"] is None
+
+
 def test_confident_answers_are_told_apart() -> None:
     far = {"head_error_px": 30.0, "true_theta_deg": 8.0}
     scores = [score(confidence=c, **more) for c, more in ((0.9, {}), (0.7, far), (0.5, {}), (0.49, far))]

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.config import PoseConfig
-from core.perception.pose import StateFilter, classify, measure, signed_distance
+from core.perception.pose import StateFilter, classify, measure, room_px, signed_distance
 from core.types import Pose, PoseState, Vector
 
 A, B, C, D = PoseState.A, PoseState.B, PoseState.C, PoseState.D
@@ -72,6 +72,39 @@ def test_distance_does_not_depend_on_the_vessel_vectors_length(length: float) ->
 )
 def test_states_in_the_order_a_d_b_c(c_head: float, c_tail: float, theta: float, state: PoseState) -> None:
     assert classify(c_head, c_tail, theta, CONFIG) is state
+
+
+@pytest.mark.parametrize(
+    ("c_head", "c_tail", "theta", "room"),
+    [
+        (3.0, 2.0, 1.0, 3.0),  # A, the head 3 px below its limit
+        (3.0, -3.0, 9.0, 20.0 * (math.sin(math.radians(10)) - math.sin(math.radians(9)))),  # A, the angle near its limit
+        (9.0, 10.0, 1.0, 0.5),  # B: half a pixel each makes them equal
+        (8.0, 1.0, 10.1, 1.0),  # C, and D where the tail crosses
+        (6.5, 2.0, 6.5, 0.5),  # C, A where the head is nearer
+        (-8.0, 0.25, 12.0, 0.25),  # D
+        (9.0, 9.0, 0.0, 0.0),
+    ],
+)
+def test_the_room_to_another_state_by_hand(c_head: float, c_tail: float, theta: float, room: float) -> None:
+    assert room_px(c_head, c_tail, theta, CONFIG, 40.0) == pytest.approx(room)
+    assert room_px(-c_head, -c_tail, theta, CONFIG, 40.0) == pytest.approx(room)
+
+
+@given(
+    c_head=st.floats(-19.0, 19.0),
+    c_tail=st.floats(-19.0, 19.0),
+    head_share=st.floats(-1.0, 1.0),
+    tail_share=st.floats(-1.0, 1.0),
+)
+def test_within_the_room_the_state_stays(c_head: float, c_tail: float, head_share: float, tail_share: float) -> None:
+    def theta(head: float, tail: float) -> float:
+        return math.degrees(math.asin(min(1.0, abs(head - tail) / 40.0)))
+
+    room = 0.999 * room_px(c_head, c_tail, theta(c_head, c_tail), CONFIG, 40.0)
+    moved = c_head + head_share * room, c_tail + tail_share * room
+    state = classify(c_head, c_tail, theta(c_head, c_tail), CONFIG)
+    assert room < 1e-6 or classify(*moved, theta(*moved), CONFIG) is state
 
 
 @given(
