@@ -101,7 +101,7 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
 def _labelled(folder: Path) -> tuple[list[Sample], dict[str, dict[str, Any]]]:
     from core.learning.dataset import POSE_KEYS, DatasetError, find_labelled
 
-    samples, truth = find_labelled(folder, (*POSE_KEYS, "tail_xy"))
+    samples, truth = find_labelled(folder, POSE_KEYS)
     if all(truth[sample.stem].get("state") is None for sample in samples):
         raise DatasetError(f"{folder}: no frame of truth.jsonl has a pose; nothing can be compared")
     return samples, truth

@@ -11,7 +11,7 @@ from pathlib import Path
 from app.annotate_exchange import EXPORTS, export_annotations, import_annotations, join_annotations, salvage_annotations
 from app.annotate_options import AnnotateOptions
 from app.annotate_queue import queue_of
-from app.annotate_sources import asked_files, default_store, listed_images, of_rater, own_name, tell_problems
+from app.annotate_sources import asked_files, asked_rater, default_store, listed_images, of_rater, tell_problems
 from app.language import tr
 from core.config import Config, choose_model, load_config
 from core.perception.compiled import loops
@@ -67,10 +67,10 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     from app.application import check_display, make_application, run_until_closed
 
     check_display()
+    rater = asked_rater(options.study)
     files = asked_files(paths, options.frames)
     with AnnotationStore(store_path) as store:
         images = listed_images(files, store)
-        rater = options.study.rater or own_name()
         items = queue_of(store, images, rater, options.study, config)
         loops.load()  # drawing uses them, and may not wait
         application = make_application(own_config().window)
@@ -96,18 +96,19 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
 def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
     from app.annotate_evaluation import groups_of
     from core.study.annotation_measures import measured_alike
-    from core.study.annotation_report import agreement_report, choose_study, rater_notes, write_measures
+    from core.study.annotation_report import agreement_report, choose_study, group_notes, rater_notes, write_measures
 
     with AnnotationStore(store_path, read_only=True) as store:
         annotations = choose_study(store.annotations(), options.study.asked, str(store_path))
         images = store.images()
         annotations, notes = measured_alike(of_rater(annotations, options.study.rater), images, config.perception)
         names = {sha256: image.name for sha256, image in images.items()}
-        tell_problems([*store.problems, *rater_notes(annotations), *notes])
+        answered = {one.key.sha256 for one in annotations}  # what nobody has answered says nothing of who is alike
+        paths = {sha256: store_path.parent / name for sha256, name in names.items() if sha256 in answered}
+        places = groups_of(list(paths.values()))
+        groups = {sha256: places[path] for sha256, path in paths.items()}
+        tell_problems([*store.problems, *rater_notes(annotations), *group_notes(annotations, groups), *notes])
     study = annotations[0].key.study
-    paths = {sha256: store_path.parent / name for sha256, name in names.items()}
-    places = groups_of(list(paths.values()))
-    groups = {sha256: places[path] for sha256, path in paths.items()}
     report = {"study": study} | agreement_report(annotations, names, options.study.seed or 0, groups)
     if options.out is not None:
         try:

@@ -106,7 +106,9 @@ def raters_agreement(done: Sequence[StoredAnnotation], images: Sequence[FoundIma
     raters = {one.key.rater for one in done}
     if len(raters) < 2 and all(one.key.repeat == 1 for one in done):
         return None
-    places = groups_of([image.path for image in images])
-    groups = {image.sha256: places[image.path] for image in images}
+    answered = {one.key.sha256 for one in done}
+    here = {image.sha256: image.path for image in images if image.sha256 in answered}  # others say nothing of who is alike
+    places = groups_of(list(here.values()))
+    groups = {sha256: places[path] for sha256, path in here.items()}
     report = agreement_report(done, {image.sha256: name_as_text(image.path.name) for image in images}, seed, groups)
     return {"study": done[0].key.study} | report

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 from app.annotate_options import AnnotateOptions
-from app.annotate_sources import FRAMES, asked_files, listed_images, of_rater, own_name, read_annotated, tell_problems
+from app.annotate_sources import FRAMES, asked_files, asked_rater, listed_images, of_rater, read_annotated, tell_problems
 from core.config import Config
 from core.study.annotation_records import ItemKey
 from core.study.annotation_store import AnnotationStore
-from core.study.annotations import Annotation, AnnotationError, View, measure_lines
+from core.study.annotations import AnnotationError, View, measure_lines
 
 EXPORTS = ("dataset", "csv", "coco")
 
@@ -23,15 +24,23 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
     Raises AnnotationError, and KeyboardInterrupt after an interrupted table was written.
     """
     from core.study.annotation_export import export_coco, export_training_set
+    from core.study.annotation_report import finished
     from core.study.evaluation import write_measurements
 
     assert options.out is not None
     annotations, images = read_annotated(store_path, paths, options.frames or FRAMES)
-    if options.study.asked is not None:
-        annotations = [one for one in annotations if one.key.study == options.study.asked]
+    asked, everybodys = options.study.asked, annotations
+    if asked is not None:
+        annotations = [one for one in everybodys if one.key.study == asked]
     annotations = of_rater(annotations, options.study.rater)
     if options.export == "dataset":
-        count, problems = export_training_set(annotations, images, options.out)
+        if asked and not annotations:
+            raise AnnotationError(f"{store_path}: nobody has answered in study {asked!r}")
+        # A study is blind, so that masks are drawn outside it: its angles and states are chosen, not its masks.
+        drawn, measured = annotations, None
+        if asked is not None:
+            drawn, measured = of_rater(everybodys, options.study.rater), finished(annotations)
+        count, problems = export_training_set(drawn, images, options.out, measured=measured)
         tell_problems(problems)
         sys.stderr.write(f"{count} frames with both masks in {options.out}: train --data {options.out}\n")
     elif options.export == "coco":
@@ -42,6 +51,8 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 
         if options.out.exists():
             raise AnnotationError(f"{options.out}: is there already; choose another --out")
+        if not os.access(options.out.absolute().parent, os.W_OK):  # before all images are perceived
+            raise AnnotationError(f"{options.out}: cannot be written (no folder there that can be); choose another --out")
         done, notes = fitted_alike(annotations, images, config, options.study.asked, str(store_path))
         tell_problems(notes)
         rows, _, _, missed = compared_rows(done, images, config)
@@ -64,8 +75,8 @@ def import_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         raise AnnotationError(f"{options.imports[0]}: no .json file in it")
     if not any(source.is_file() for source in sources):  # before an annotation file is made for them
         raise AnnotationError(f"{sources[0]}: no such file; nothing was imported")
+    rater = asked_rater(options.study)
     files = asked_files(paths, options.frames)
-    rater = options.study.rater or own_name()
     counts: Counter[str] = Counter()
     with AnnotationStore(store_path) as store:
         images = listed_images(files, store)
@@ -74,7 +85,7 @@ def import_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         for one in imported:
             key = ItemKey(one.image.sha256, options.study.name, rater)
             history = store.history(key)
-            old = existing.get(key, Annotation())
+            old = existing.get(key, history.current)  # whose record is damaged, his journal still has
             content = merged(old, one.content)
             entry = history.edit(f"import {one.source.name}", content)
             if entry is None or content == old:
@@ -83,6 +94,7 @@ def import_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
             store.save(key, View.AS_IS, entry, content, measure_lines(content, one.image.record.size, config.perception), 0.0)
             existing[key] = content
             counts[one.image.sha256] += 1
+        problems += store.problems
     tell_problems(problems)
     if not counts:
         raise AnnotationError("nothing was imported")

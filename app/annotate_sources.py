@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from app.annotate_options import StudyOptions
 from app.long_work import progress_bar
 from app.sources import expand, is_video
 from app.taken_frames import evenly, evenly_over, take_frames, taken_of
@@ -125,6 +126,16 @@ def of_rater(annotations: list[StoredAnnotation], rater: str | None) -> list[Sto
         known = ", ".join(sorted({one.key.rater for one in annotations})) or "nobody"
         raise AnnotationError(f"--rater {rater}: has annotated nothing here; who has: {known}")
     return own
+
+
+def asked_rater(options: StudyOptions) -> str:
+    """Who annotates. Raises AnnotationError for a name that no file can hold."""
+    rater = options.rater or own_name()
+    try:
+        rater.encode()
+    except UnicodeEncodeError:
+        raise AnnotationError(f"--rater {rater!a}: is no UTF-8; give the name in plain letters") from None
+    return rater
 
 
 def own_name() -> str:

@@ -106,7 +106,7 @@ def _fill_masks(
     area = Path()
     area.setFillRule(Qt.FillRule.WindingFill)
     for mask in annotation.masks:
-        if mask.target is target:
+        if mask.target is target and not (mask.is_hole and area.isEmpty()):  # a hole in nothing, as older files may have it
             # Outlines run one way round and holes the other, so that pieces join and holes stay open without costly unions.
             points = mask.points if (_area(mask.points) > 0) is not mask.is_hole else mask.points[::-1]
             area.addPolygon(QPolygonF([_at(to_screen, point) for point in points]))

@@ -92,10 +92,9 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
         head_error = float(np.hypot(scene.path.head[0] - true_head[0], scene.path.head[1] - true_head[1]))
         # Signed and wrapped: a robot that points left by as much as it should point right is wrong, and would be steered wrongly.
         theta_error = (pose.theta_signed_deg - float(theta_signed) + 180.0) % 360.0 - 180.0
-    distances = truth.get("c_head_px"), truth.get("c_tail_px")
-    room = None
-    if theta is not None and None not in distances:
-        room = room_px(float(distances[0]), float(distances[1]), float(theta), _STATES, _LENGTH_PX)
+    c_head, c_tail, room = truth.get("c_head_px"), truth.get("c_tail_px"), None
+    if theta is not None and c_head is not None and c_tail is not None:
+        room = room_px(float(c_head), float(c_tail), float(theta), _STATES, _LENGTH_PX)
     return FrameScore(
         stem=stem,
         vessel_dice=dice(found_vessel, vessel),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,14 +36,28 @@ def line_of(annotation: Annotation, line: int) -> Line:
 
 
 def with_line(annotation: Annotation, line: int, points: Line) -> Annotation:
-    """The annotation with other points on a line. A drawn line takes "can't tell" back; a polygon of fewer than three is gone."""
+    """The annotation with other points on a line. A drawn line takes "can't tell" back; a polygon of fewer than three is gone, and
+    with an outline the holes in it."""
     if line == ROBOT:
         return replace(annotation, robot=points, cannot_tell=False)
     if line == VESSEL:
         return replace(annotation, vessel=points, cannot_tell=False)
     masks: list[MaskPolygon] = list(annotation.masks)
-    masks[line : line + 1] = [replace(masks[line], points=points)] if len(points) >= 3 else []
+    if len(points) >= 3:
+        masks[line] = replace(masks[line], points=points)
+    else:
+        doomed = {line} if masks[line].is_hole else {line, *_holes_of(masks, line)}
+        masks = [mask for place, mask in enumerate(masks) if place not in doomed]
     return replace(annotation, masks=tuple(masks))
+
+
+def _holes_of(masks: Sequence[MaskPolygon], outline: int) -> Iterator[int]:
+    """Places of the holes in an outline: those that follow it, before the next outline of the same mask."""
+    for place in range(outline + 1, len(masks)):
+        if masks[place].target is masks[outline].target:
+            if not masks[place].is_hole:
+                return
+            yield place
 
 
 def put(annotation: Annotation, line: int, place: int, point: Point) -> Annotation:

@@ -31,8 +31,8 @@ def mask_source(annotations: Iterable[StoredAnnotation]) -> dict[str, StoredAnno
     best: dict[str, tuple[int, str]] = {}
     chosen: dict[str, StoredAnnotation] = {}
     for one in annotations:
-        worth = len({mask.target for mask in one.content.masks}), one.changed_utc
-        if one.content.masks and worth >= best.get(one.key.sha256, worth):
+        worth = len(one.content.drawn), one.changed_utc
+        if one.content.drawn and worth >= best.get(one.key.sha256, worth):
             best[one.key.sha256], chosen[one.key.sha256] = worth, one
     return chosen
 
@@ -42,8 +42,15 @@ def export_training_set(
     images: Sequence[FoundImage],
     out: Path,
     go_on: Callable[[], bool] = lambda: True,
+    *,
+    measured: Sequence[StoredAnnotation] | None = None,
 ) -> tuple[int, list[str]]:
     """Write ``images/``, ``masks/`` and ``truth.jsonl`` as ``train --data`` and ``evaluate`` read them.
+
+    Parameters
+    ----------
+    annotations : whose masks count, of whatever study.
+    measured : finished answers of one study, whose angles and states go along; None: those among `annotations`.
 
     Returns
     -------
@@ -63,14 +70,14 @@ def export_training_set(
     problems = [f"image {sha256[:12]}: is not among the given images; left out" for sha256 in sources if sha256 not in here]
     complete: dict[str, StoredAnnotation] = {}
     for sha256, one in sources.items():
-        lacking = [target for target in MaskTarget if not any(mask.target is target for mask in one.content.masks)]
+        lacking = [target for target in MaskTarget if target not in one.content.drawn]
         if sha256 in here and lacking:
             problems.append(f"{here[sha256].path.name}: has no {lacking[0].value} mask; left out")
         elif sha256 in here:
             complete[sha256] = one
     if not complete:
         raise AnnotationError("no image has both a vessel and a robot mask; draw them, or take the model's over, in annotate")
-    measured = finished([one for one in annotations if one.key.sha256 in complete])
+    measured = [one for one in (finished(annotations) if measured is None else measured) if one.key.sha256 in complete]
     if len(studies := studies_of(measured)) > 1:
         raise AnnotationError(f"the images were measured in several studies ({', '.join(studies)}); choose one with --study NAME")
     # By the method's own lengths, as the truth of every other set is.

@@ -204,6 +204,5 @@ def _target(where: str, label: Any, problems: list[str]) -> MaskTarget | None:
 
 def merged(old: Annotation, new: Annotation) -> Annotation:
     """The imported parts put into what is there: only where there was nothing, so that no work by hand is lost."""
-    drawn = {mask.target for mask in old.masks}
-    masks = old.masks + tuple(mask for mask in new.masks if mask.target not in drawn)
+    masks = old.masks + tuple(mask for mask in new.masks if mask.target not in old.drawn)
     return replace(old, robot=old.robot or new.robot, vessel=old.vessel or new.vessel, masks=masks)

@@ -18,7 +18,7 @@ from core.study.agreement import LIMITS_SD, icc_absolute, repeat_metrics, within
 from core.study.annotation_persons import raters_alike
 from core.study.annotation_records import StoredAnnotation
 from core.study.annotations import AnnotationError, Status, status_of
-from core.study.bootstrap import Floats, members
+from core.study.bootstrap import Floats, are_too_few, members, too_few_words
 from core.study.classification import kappa
 from core.study.evaluation import Measurement
 from core.types import PoseState
@@ -227,6 +227,13 @@ def rater_notes(annotations: Iterable[StoredAnnotation]) -> list[str]:
     """Names of raters that may be one person's."""
     raters = {one.key.rater for one in annotations}
     return [f"The {line}: figures between raters count them so." for line in raters_alike(raters)]
+
+
+def group_notes(annotations: Iterable[StoredAnnotation], groups: Mapping[str, str | None]) -> list[str]:
+    """Why ``agreement_report`` has no intervals, where their images' `groups` (by SHA-256) are too few."""
+    of_images = [groups.get(sha256) for sha256 in dict.fromkeys(one.key.sha256 for one in annotations)]
+    known = {group for group in of_images if group is not None}
+    return [too_few_words("intervals between measures", len(known))] if are_too_few(members(of_images)) else []
 
 
 def second_measure_notes(annotations: Iterable[StoredAnnotation]) -> list[str]:

@@ -66,6 +66,11 @@ class Annotation:
     masks: tuple[MaskPolygon, ...] = ()
     note: str = ""
 
+    @property
+    def drawn(self) -> frozenset[MaskTarget]:
+        """Of what there is a mask: a hole alone is none."""
+        return frozenset(mask.target for mask in self.masks if not mask.is_hole)
+
     def to_json(self) -> str:
         """One line of JSON; ``annotation_from_json`` reads it."""
         content = {

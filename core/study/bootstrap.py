@@ -76,6 +76,14 @@ def are_too_few(group: NDArray[np.int64] | None) -> bool:
     return group is not None and len(np.unique(group)) < MIN_GROUPS
 
 
+def too_few_words(what: str, groups: int) -> str:
+    """Why there are none of these intervals, in one sentence: of so many groups that are known."""
+    return (
+        f"No {what}: the images are of {groups} group{'s' if groups != 1 else ''} (sessions or phantoms), "
+        f"and images of one are alike; intervals need {MIN_GROUPS} groups."
+    )
+
+
 def bootstrap_rows(
     statistics: Callable[..., Mapping[str, Floats]],
     columns: tuple[Floats, ...],

@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.study.agreement import RANGE_DEG, angle_metrics, repeat_metrics
-from core.study.bootstrap import MIN_GROUPS, are_too_few, members
+from core.study.bootstrap import are_too_few, members, too_few_words
 from core.study.classification import state_metrics
 from core.study.measure_notes import missing_notes, other_side_notes
 from core.study.table_headings import places
 from core.types import PoseState
 
 _FULL_TURN_DEG = 360.0
+_MOST_DIGITS = 6
+"""Of how many measures an angle is the mean."""
 
 
 class EvaluationError(UserError):
@@ -138,7 +140,7 @@ def _measurement(where: str, cells: list[str], place: dict[str, int], separator:
             return None
         try:
             plain = text[name].removesuffix("°").replace("\N{MINUS SIGN}", "-")
-            value = float(plain if separator == "," else plain.replace(",", "."))
+            value = float(plain if separator == "," else plain.replace(",", ".")) if "_" not in plain else math.nan
         except ValueError:
             value = math.nan
         if not abs(value) <= _FULL_TURN_DEG:
@@ -154,8 +156,8 @@ def _measurement(where: str, cells: list[str], place: dict[str, int], separator:
 
     def count(name: str) -> int:
         said = text.get(name) or "1"
-        if not said.isdecimal() or int(said) < 1:
-            raise EvaluationError(f"{where}: {name} is {said!r}; must be of how many measures the angle is the mean, 1 or more")
+        if not said.isdecimal() or len(said) > _MOST_DIGITS or int(said) < 1:
+            raise EvaluationError(f"{where}: {name} is {said[:20]!r}; must be of how many measures the angle is the mean, 1 or more")
         return int(said)
 
     return Measurement(
@@ -252,10 +254,7 @@ def _interval_notes(without: Mapping[str, Sequence[Measurement]]) -> list[str]:
     if not without:
         return []
     known = max(len({row.group for row in rows if row.group is not None}) for rows in without.values())
-    return [
-        f"No intervals of {_listed([_OF[name] for name in without])}: the images are of {known} "
-        f"group{'s' if known != 1 else ''} (sessions or phantoms), and images of one are alike; intervals need {MIN_GROUPS} groups."
-    ]
+    return [too_few_words(f"intervals of {_listed([_OF[name] for name in without])}", known)]
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 from core.study.annotation_export import export_training_set, mask_source
 from core.study.annotation_images import FoundImage
 from core.study.annotation_records import StoredAnnotation
+from core.study.annotation_report import finished, studies_of
 from core.study.annotations import AnnotationError, MaskTarget
 
 FEWEST = 6
@@ -42,7 +43,7 @@ def split_own_frames(
     """Write both sets below `out`: a fifth of the images, two at least, is held out.
 
     These are neighbours in the order of the images' names: pictures of one video or session are alike, and one between two that are
-    learnt from would tell of its neighbours only.
+    learnt from would tell of its neighbours only. Angles and states go along where they are of one study; masks are what is learnt.
 
     Raises
     ------
@@ -59,19 +60,18 @@ def split_own_frames(
     count = max(_FEWEST_HELD_OUT, len(complete) // _ONE_IN)
     begin = (len(complete) - count) // 2
     held_out = set(complete[begin : begin + count])
+    measured = finished(annotations)
+    measured = measured if len(studies_of(measured)) < 2 else []
     counts, problems = {}, []
     for name in ("train", "held_out"):
         wanted = held_out if name == "held_out" else {image.sha256 for image in images} - held_out
         chosen = [one for one in annotations if one.key.sha256 in wanted]
-        counts[name], found = export_training_set(chosen, [image for image in images if image.sha256 in wanted], out / name, go_on)
+        here_of = [image for image in images if image.sha256 in wanted]
+        counts[name], found = export_training_set(chosen, here_of, out / name, go_on, measured=measured)
         problems += found
     return OwnFrames(out / "train", out / "held_out", counts["train"], counts["held_out"], tuple(problems))
 
 
 def _complete(annotations: Sequence[StoredAnnotation]) -> list[str]:
     """SHA-256 of the images whose masks that count are there for both targets."""
-    return [
-        sha256
-        for sha256, one in mask_source(annotations).items()
-        if all(any(mask.target is target for mask in one.content.masks) for target in MaskTarget)
-    ]
+    return [sha256 for sha256, one in mask_source(annotations).items() if one.content.drawn.issuperset(MaskTarget)]

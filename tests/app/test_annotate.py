@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import shutil
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -150,6 +152,66 @@ def test_annotations_become_a_training_set_a_coco_file_and_come_back(folder: Pat
         assert [(one.key.rater, len(one.content.masks)) for one in store.annotations()] == [("eve", 2)] * 3
     with pytest.raises(UserError, match="nothing was imported"):
         run(folder, imports=(tmp_path / "coco.json",), store=other, study=StudyOptions(rater="eve"))
+
+
+def test_a_training_set_has_the_angles_of_one_study_and_masks_from_anywhere(folder: Path, tmp_path: Path) -> None:
+    """A study is blind, so that masks are drawn outside it: with --study they were left out, and said not to be there."""
+    annotate(folder, raters=("ann",))
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        images, _ = find_images(sorted(folder.glob("*.png")), store)
+        for image in images:
+            content = Annotation(((250.0, 180.0), (300.0, 180.0)), ((200.0, 200.0), (400.0, 200.0)), PoseState.C)
+            measured = measure_lines(content, image.record.size, Config().perception)
+            entry = History().edit("draw", content)
+            assert entry is not None
+            store.save(ItemKey(image.sha256, "first", "ann"), View.AS_IS, entry, content, measured, 9.0)
+    with pytest.raises(UserError, match="several studies"):
+        run(folder, export="dataset", out=tmp_path / "any")
+    run(folder, export="dataset", out=tmp_path / "first", study=StudyOptions("first"))
+    samples, truth = find_labelled(tmp_path / "first")
+    assert [truth[sample.stem]["theta_deg"] for sample in samples] == pytest.approx([0.0] * 3, abs=1e-6)
+    run(folder, export="dataset", out=tmp_path / "outside", study=StudyOptions(""))
+    assert find_labelled(tmp_path / "outside")[1]["0"]["theta_deg"] > 5.0
+    with pytest.raises(UserError, match="nobody has answered in study 'fisrt'"):
+        run(folder, export="dataset", out=tmp_path / "misspelt", study=StudyOptions("fisrt"))
+
+
+def test_pictures_that_nobody_answered_say_nothing_of_the_groups(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A look at another folder took all intervals away, and nothing said why."""
+    annotate(folder)
+    elsewhere = folder / "elsewhere"
+    elsewhere.mkdir()
+    write_png(elsewhere / "other.png", np.full((480, 640, 3), 90, np.uint8))
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        find_images([elsewhere / "other.png"], store)
+    assert run(folder, report=True, as_json=True) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out)["pairs"][0]["angle"]["ci95"]["mean_difference_deg"] is not None
+    assert "No intervals" not in told.err
+
+
+def test_an_import_goes_on_from_the_journal_where_the_answer_itself_is_damaged(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The imported mask took the place of the lines that were in force."""
+    annotate(folder, raters=("ann",))
+    coco, bare = tmp_path / "coco.json", tmp_path / "bare.sqlite"
+    run(folder, export="coco", out=coco)
+    with AnnotationStore(bare) as store:
+        image = find_images([folder / "0.png"], store)[0][0]
+        lines = Annotation(((250.0, 180.0), (300.0, 190.0)), ((200.0, 200.0), (400.0, 200.0)), PoseState.C)
+        entry = History().edit("draw", lines)
+        assert entry is not None
+        measured = measure_lines(lines, image.record.size, Config().perception)
+        store.save(ItemKey(image.sha256, "", "ann"), View.AS_IS, entry, lines, measured, 9.0)
+    with closing(sqlite3.connect(bare)) as database:
+        database.execute("UPDATE annotations SET content = replace(content, '300.0', '333.0')")
+        database.commit()
+    run(folder, imports=(coco,), store=bare, study=StudyOptions(rater="ann"))
+    assert "damaged" in capsys.readouterr().err
+    with AnnotationStore(bare, read_only=True) as store:
+        (one,) = [a for a in store.annotations() if a.key.sha256 == image.sha256]
+    assert (one.content.robot, one.content.state, len(one.content.masks)) == (lines.robot, PoseState.C, 2)
 
 
 def test_one_rater_alone_is_exported_and_reported(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -400,6 +462,7 @@ def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
         ({"joins": (Path("a.sqlite"),), "study": StudyOptions(rater="ben")}, "--join takes all raters of a file"),
         ({"joins": (Path("a.sqlite"),), "report": True}, "give one of them"),
         ({"names": ("user=ben",)}, "give --join FILE, too"),
+        ({"study": StudyOptions("first", rater="b\udcff")}, r"--rater 'b\\udcff': is no UTF-8; give the name in plain letters"),
     ],
 )
 def test_wrong_calls_end_in_one_line(folder: Path, options: dict[str, object], message: str) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from core.learning.dataset import find_labelled, write_png
-from core.study.annotation_edits import ROBOT, VESSEL, Touch, line_of, move, put, remove, touched
+from core.study.annotation_edits import ROBOT, VESSEL, Touch, line_of, move, put, remove, touched, with_line
 from core.study.annotation_export import export_coco, export_training_set, run_lengths
 from core.study.annotation_images import FoundImage
 from core.study.annotation_import import merged, read_files
@@ -279,6 +279,24 @@ def test_edits_of_points() -> None:
     assert len(line_of(remove(drawn, 0, 3), 0)) == 3
     assert remove(remove(drawn, 0, 3), 0, 0).masks == (), "two points are no outline"
     assert not put(Annotation(cannot_tell=True), ROBOT, 0, (1.0, 1.0)).cannot_tell
+
+
+def test_with_an_outline_its_holes_go() -> None:
+    """They stayed, were shown as masks, and a robot's mask of nothing was exported."""
+    hole = MaskPolygon(MaskTarget.ROBOT, ((28.0, 19.0), (32.0, 19.0), (32.0, 21.0)), is_hole=True)
+    in_vessel = MaskPolygon(MaskTarget.VESSEL, hole.points, is_hole=True)
+    drawn = with_masks(ROBOT_BOX, hole, VESSEL_BOX, in_vessel, hole, ROBOT_BOX, hole)
+    assert with_line(drawn, 0, ()).masks == (VESSEL_BOX, in_vessel, ROBOT_BOX, hole), "up to the next outline of the same mask"
+    assert with_line(drawn, 1, ()).masks == (ROBOT_BOX, VESSEL_BOX, in_vessel, hole, ROBOT_BOX, hole), "a hole goes alone"
+    assert remove(drawn, 0, 1).masks[1:] == drawn.masks[1:], "an outline with a point less is one still"
+
+
+def test_a_hole_alone_is_no_mask(image: FoundImage, tmp_path: Path) -> None:
+    lone = replace(ROBOT_BOX, is_hole=True)
+    assert with_masks(VESSEL_BOX, lone).drawn == {MaskTarget.VESSEL}
+    with pytest.raises(AnnotationError, match="no image has both a vessel and a robot mask"):
+        export_training_set([stored(with_masks(VESSEL_BOX, lone))], [image], tmp_path / "set")
+    assert merged(Annotation(masks=(lone,)), Annotation(masks=(ROBOT_BOX,))).masks == (lone, ROBOT_BOX)
 
 
 def test_what_a_place_touches() -> None:

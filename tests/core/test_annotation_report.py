@@ -13,6 +13,7 @@ from core.study.annotation_records import ItemKey, StoredAnnotation
 from core.study.annotation_report import (
     agreement_report,
     choose_study,
+    group_notes,
     manual_measurements,
     rater_notes,
     second_measure_notes,
@@ -213,3 +214,12 @@ def test_second_measures_of_two_kinds_are_told(cannot_tell: bool) -> None:
         assert notes[0].startswith("The second manual measure is a rater's later one on 1 images and another rater's on 1;")
         rows = {row.image: row.counts for row in manual_measurements([*done, answer("b", "bob", 1, 11.0, PoseState.B)], {})}
         assert rows["b"] == rows["a"], "the same columns hold both kinds"
+
+
+def test_too_few_groups_for_intervals_are_told() -> None:
+    answers = [answer(str(k), rater, 1, 10.0 + k, PoseState.B) for k in range(12) for rater in ("ann", "ben")]
+    assert group_notes(answers, {str(k): str(k % 2) for k in range(12)}) == [
+        "No intervals between measures: the images are of 2 groups (sessions or phantoms), and images of one are alike; "
+        "intervals need 10 groups."
+    ]
+    assert group_notes(answers, {str(k): str(k) for k in range(12)}) == group_notes(answers, {}) == []

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.learning.dataset import find_samples
+from core.learning.dataset import UNMEASURED, find_samples, read_truth
 from core.learning.held_out import dice, measure_held_out
 from core.perception.engines import padded
 from core.perception.unet import DualUNet, UNetShape
@@ -18,7 +18,7 @@ from core.study.annotation_records import StoredAnnotation
 from core.study.annotation_store import AnnotationStore
 from core.study.annotations import AnnotationError
 from core.study.own_frames import FEWEST, split_own_frames
-from tests.app.annotated import annotate_masks
+from tests.app.annotated import annotate_masks, measure
 
 
 def read(store_path: Path) -> tuple[Sequence[StoredAnnotation], list[FoundImage]]:
@@ -46,6 +46,21 @@ def test_too_few_masks_are_refused_with_what_is_missing(tmp_path: Path) -> None:
     with pytest.raises(AnnotationError, match=r"1 image has both"):
         split_own_frames(annotations, images[1:2], tmp_path / "sets")
     assert not (tmp_path / "sets").exists()
+
+
+def test_answers_of_several_studies_keep_nobody_from_training(tmp_path: Path) -> None:
+    """Training learns masks; that a picture was also measured in a study was said to stand in its way."""
+    path = annotate_masks(tmp_path / "images", FEWEST)
+    pictures = sorted(path.parent.glob("*.png"))
+    measure(path, pictures, [3.0] * FEWEST, study="first")
+    annotations, images = read(path)
+    frames = split_own_frames(annotations, images, tmp_path / "of one")
+    assert {row["state"] for row in read_truth(frames.held_out).values()} == {"C"}
+    measure(path, pictures[:1], [9.0], study="second")
+    annotations, images = read(path)
+    frames = split_own_frames(annotations, images, tmp_path / "of two")
+    assert (frames.train_count, frames.held_out_count) == (FEWEST - 2, 2)
+    assert {row["reason"] for row in read_truth(frames.held_out).values()} == {UNMEASURED}
 
 
 def test_a_folder_in_use_is_left_alone(tmp_path: Path) -> None:
