@@ -96,7 +96,7 @@ def _old_text(path: Path, seen: str | None) -> tuple[str, str]:
     try:
         text = data.decode("utf-8-sig")
         tomllib.loads(text)
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):
         return "", _kept(path, "was no TOML")
     note = _kept(path, "was changed meanwhile") if seen is not None and text != seen else ""
     return text, note
@@ -113,7 +113,7 @@ def _says(text: str, config: Config, unknown: set[str]) -> bool:
     """Whether the text, read back, means `config` and still has its unknown keys."""
     try:
         data, problems = usable_part(tomllib.loads(text))
-    except tomllib.TOMLDecodeError:
+    except ValueError:
         return False
     return load_config(overrides=data) == config and set(problems) == unknown
 

@@ -49,7 +49,7 @@ def read_settings(path: Path, *, may_move: bool = True) -> SettingsFile:
         return SettingsFile(path, {}, None)
     except OSError as error:
         return SettingsFile(path, {}, None, (f"{path}: cannot be read ({error.strerror}); the defaults are used",))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # not TOMLDecodeError alone: a number of 5000 digits is none
         why = f"is no TOML ({_first_line(error)})"
         return SettingsFile(path, {}, None, (_move_aside(path, why) if may_move else f"{path}: {why}; the defaults are used",))
     data, problems = usable_part(data)

@@ -29,6 +29,7 @@ from core.control.hand import AT_REST, Hand, Jog
 from core.control.health import Beat, FrameLate, GateReport, ModelReport, Part, ServosBusy, deadman_down
 from core.control.inbox import Inbox, Inputs, Seen
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Hindrance, Latched, Mode, SupervisorState
+from core.control.owed_release import OwedRelease
 from core.control.policies import Policy
 from core.control.servo_requests import ServoRequests
 from core.control.supervisor import hindrances, supervise
@@ -71,6 +72,7 @@ class Pilot:
         self._robot, self._policy, self._config, self._clock = robot, policy, config, clock
         self._inbox = Inbox(config.safety, [model])
         self._requests = ServoRequests(robot, self._inbox.post)
+        self._release = OwedRelease(is_wanted=config.servos.torque_off_on_stop)
         self._reports = FrameReports(config.policy.pursuit)
         self._state = _start_of(left_over, clock())
         self._permitted: Source | None = None
@@ -243,6 +245,7 @@ class Pilot:
         if decision.mode is Mode.STOPPED and before.mode is not Mode.STOPPED:
             self._requests.stopped()
             self._robot.stop()
+        self._let_go(decision, is_new=before.mode is not Mode.STOPPED or Act.STOP in inputs.events, now_s=now_s)
         if self._halted:
             decision = replace(decision, permitted=None)
         was_refused = any(refused.act is Act.HAND_OVER for refused in decision.refused)
@@ -292,6 +295,10 @@ class Pilot:
         elif (report := self._robot.report()) is not None:
             events.append(report)
             has_let_go = has_let_go or report.torque_off
+        if (owed := self._release.fault(is_lost=self._is_bus_lost(self._view.active))) is not None:
+            events.append(owed)
+        if has_let_go or self._state.health.servos_ready:
+            self._release.paid()
         if has_let_go:
             self._teller.tell([(Note.TORQUE_OFF, "")], now_s)
         if self._requests.busy:
@@ -309,6 +316,18 @@ class Pilot:
         if self._has_arrived(inputs.seen, now_s):
             events.append(Act.TAKE_BACK)
             self._teller.tell([(Note.REACHED, "")], now_s)
+
+    def _is_bus_lost(self, active: Sequence[Fault]) -> bool:
+        """Whether the bus process is gone, or hangs."""
+        return self._robot.failure is not None or any(fault.cause is Cause.BUS_DEAD for fault in active)
+
+    def _let_go(self, decision: Decision, *, is_new: bool, now_s: float) -> None:
+        """Pay what a stop owes where no bus process does."""
+        if decision.mode is Mode.STOPPED and is_new:
+            self._release.stopped()
+        is_lost, is_busy = self._is_bus_lost(decision.active), bool(self._requests.busy)
+        if self._release.is_due(decision.mode, now_s, is_lost=is_lost, is_busy=is_busy):
+            self._requests.torque_off()
 
     def _has_arrived(self, seen: Seen | None, now_s: float) -> bool:
         """The program drove to the destination and has rested there for a moment."""

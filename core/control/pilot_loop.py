@@ -10,14 +10,9 @@ from typing import Protocol
 
 from core.control.faults import Cause, Fault
 from core.control.pilot import PERIOD_S
+from core.host_sleep import SLEPT_S, slept_s
 
-_SLEPT_S = 0.5
 _log = logging.getLogger(__name__)
-
-
-def slept_s() -> float:
-    """Seconds of sleep since the start: the monotonic clock, by which all ages are told, stands still meanwhile."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
 class Turns(Protocol):
@@ -52,7 +47,7 @@ class PilotLoop:
         before_s = self._asleep_s()
         try:
             while not self._closing.wait(max(0.0, due_s - time.monotonic())):
-                if (now_s := self._asleep_s()) - before_s > _SLEPT_S:
+                if (now_s := self._asleep_s()) - before_s > SLEPT_S:
                     self._pilot.report(Fault(Cause.CLOCK, f"the computer slept for {now_s - before_s:.0f} s"))
                 before_s = now_s
                 self._pilot.tick()

@@ -157,7 +157,9 @@ def _measurement(where: str, cells: list[str], place: dict[str, int], separator:
     def count(name: str) -> int:
         said = text.get(name) or "1"
         if not said.isdecimal() or len(said) > _MOST_DIGITS or int(said) < 1:
-            raise EvaluationError(f"{where}: {name} is {said[:20]!r}; must be of how many measures the angle is the mean, 1 or more")
+            raise EvaluationError(
+                f"{where}: {name} is {said[:20]!r}; must be of how many measures the angle is the mean, 1 or more"
+            )
         return int(said)
 
     return Measurement(

@@ -190,12 +190,13 @@ class ServoBus:
 
         Takes 3 ms at 1 Mbps, and at most 80 ms when servos are silent.
         """
-        self._turn += 1
         length = BLOCK_BYTES + self._turn % (TAG_BYTES + 1)
         # Those that were silent come last, where they cannot silence others.
         ids = sorted(self._misses, key=lambda servo_id: self._silences[servo_id])
         answer = self._line.group_read(ids, indirect_data(self.config.model), length)
         now = time.monotonic()
+        if answer.data or any(miss is not Miss.WAITING for miss in answer.missed.values()):
+            self._turn += 1  # of what was really asked: else the next request would look like the one before
         readings: list[ServoReading] = []
         for joint in self._joints:
             if joint.id in answer.data:

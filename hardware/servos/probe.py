@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from core.control.faults import Cause, Fault
+from core.host_sleep import SLEPT_S, slept_s
 from core.safety_config import SafetyConfig
 from core.servo_config import JOINT_NAMES, JointConfig, JointName, ServosConfig
 from core.types import Command
@@ -230,12 +231,13 @@ class Hiccups:
 
     The operator who started the procedure has asked for all its motions, one after the other. A line that was silent or a machine
     that was busy for a moment is tried again, three times at most, after a full check; STOP, a jam, a strain or a hardware error
-    never is.
+    never is, and nothing after the computer has slept, which is a moment to all clocks but one.
     """
 
     def __init__(self, robot: ServoRobot, stop: StopSwitch, who: str) -> None:
         self._robot, self._stop, self._who = robot, stop, who
         self._count = 0
+        self._slept_s = slept_s()
 
     def settle(self, status: BusStatus) -> None:
         """Return when the servos are armed, again or still; raise ProbeFailed, ServoError or Stopped when they are not to be."""
@@ -246,6 +248,8 @@ class Hiccups:
 
     def _again(self, fault: Fault) -> None:
         self._count += 1
+        if slept_s() - self._slept_s > SLEPT_S:
+            raise ProbeFailed(f"{self._who} was stopped, as the computer slept: look at the robot, then try again")
         if fault.cause not in _OF_THE_LINE or self._count > _HICCUPS:
             why = f"{fault.cause}: {fault.detail}".rstrip(": ")
             raise ProbeFailed(f"{self._who} was stopped ({why}): find the cause, then try again")

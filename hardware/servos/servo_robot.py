@@ -165,16 +165,20 @@ class ServoRobot:
     def torque_off(self) -> None:
         """Disarm and switch all torque off, which releases the tension of the wires.
 
-        Where the bus process is gone a new one does it, and ends. Servos obey also where a missing one keeps the robot from being
-        connected.
+        Where the bus process is gone or hangs, a new one does it, and ends. Servos obey also where a missing one keeps the robot
+        from being connected.
 
         Raises
         ------
         TorqueStillOn
         """
         if (failure := self.failure) is None:
-            self._connected().request("torque off", _REQUEST_S)
-            return
+            link = self._connected()
+            try:
+                link.request("torque off", _REQUEST_S)
+                return
+            except BusProcessLost as error:
+                failure = str(error)
         self._not_connected = failure  # and stays so: this process is not the one that drives
         self._disconnect()
         link = BusLink(self._servos, self._safety)

@@ -114,6 +114,7 @@ def test_limits_that_contradict_each_other_are_refused(section: type[BaseModel],
         ('[perception.pose]\nd_allow_px = "6"', "d_allow_px: must be .* got '6'"),
         ("[perception.tracking]\nwindow_px = 33", "window_px: must be .*a multiple of 32, got 33"),
         ("x = " + "[" * 5000 + "]" * 5000, "not valid TOML: nested too deeply"),
+        ("x = " + "9" * 5000, "not valid TOML"),
     ],
 )
 def test_a_wrong_type_and_a_hidden_rule_are_said(tmp_path: Path, text: str, said: str) -> None:

@@ -30,6 +30,7 @@ def asides(folder: Path) -> list[Path]:
 
 WIDE = config_with(perception__pose__d_allow_px=9.0)
 DEEP = b"a = " + b"[" * 5000 + b"]" * 5000
+LONG = b"a = " + b"9" * 5000
 
 
 # ---- texts
@@ -190,7 +191,7 @@ def test_what_somebody_else_wrote_meanwhile_is_kept_aside(tmp_path: Path) -> Non
     assert write_settings(path, BASE, seen=path.read_text(encoding="utf-8")) == ""
 
 
-@pytest.mark.parametrize("data", [b"\xff\xfe[broken", DEEP])
+@pytest.mark.parametrize("data", [b"\xff\xfe[broken", DEEP, LONG])
 def test_a_file_that_became_no_toml_meanwhile_is_kept_aside(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "settings.toml"
     path.write_bytes(data)
@@ -207,7 +208,7 @@ def test_a_missing_file_is_empty(tmp_path: Path) -> None:
     assert (file.config, file.text, file.problems) == (BASE, None, ())
 
 
-@pytest.mark.parametrize("data", [b"[perception\n", b"\xff\xfe\x00", b"a = 1\na = 2\n", DEEP])
+@pytest.mark.parametrize("data", [b"[perception\n", b"\xff\xfe\x00", b"a = 1\na = 2\n", DEEP, LONG])
 def test_a_broken_file_is_set_aside_with_a_message(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "settings.toml"
     path.write_bytes(data)

@@ -563,6 +563,70 @@ def test_a_torque_off_needs_not_all_servos_to_connect(bench: Bench) -> None:
     assert Note.TORQUE_OFF not in bench.alerts()
 
 
+def _letting_go(bench: Bench) -> bool:
+    return any(fault.cause is Cause.TORQUE_ON for fault in bench.pilot.view.active)
+
+
+def _lose_the_bus(bench: Bench) -> None:
+    def connect() -> None:
+        raise DeviceError("the servo port is not there")
+
+    bench.robot.connect = connect  # type: ignore[method-assign]
+    bench.robot.failure = "the servo bus process ended (killed by SIGKILL)"
+
+
+@pytest.mark.parametrize("is_wanted", [True, False])
+def test_a_stop_lets_go_also_where_the_bus_process_is_gone(is_wanted: bool) -> None:
+    """The debt lived in the process that was gone: all servos went on pulling, and nobody was told."""
+    config = Config()
+    bench = Bench(config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": is_wanted})}))
+    bench.on()
+    _lose_the_bus(bench)
+    bench.turn(2)
+    assert not _letting_go(bench), "nobody has pressed STOP"
+    bench.pilot.ask(Act.STOP)
+    bench.turn(2)
+    assert _letting_go(bench) is is_wanted
+    bench.done().turn(3)
+    assert bench.robot.calls.count("torque off") == int(is_wanted)
+    assert (Note.TORQUE_OFF in bench.alerts()) is is_wanted
+    assert not _letting_go(bench)
+    bench.seconds(11.0).done()
+    assert bench.robot.calls.count("torque off") == int(is_wanted), "once is enough"
+    bench.pilot.close()
+
+
+def test_what_a_stop_owes_is_tried_until_the_operator_has_seen_it() -> None:
+    config = Config()
+    bench = Bench(config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": True})}))
+    plain = bench.robot.torque_off
+
+    def in_vain() -> None:
+        plain()
+        raise DeviceError("torque of up is not proven to be off: cut the servos' power")
+
+    bench.on()
+    _lose_the_bus(bench)
+    bench.robot.torque_off = in_vain  # type: ignore[method-assign]
+    bench.pilot.ask(Act.STOP)
+    bench.turn(3).done().seconds(9.0).done()
+    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (1, True)
+    bench.seconds(1.5).done()
+    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (2, True)
+    bench.pilot.ask(Act.STOP)
+    bench.turn(2).done()
+    assert bench.robot.calls.count("torque off") == 3, "another STOP need not wait"
+    bench.turn().pilot.ask(Act.ACKNOWLEDGE)
+    bench.turn().done().seconds(11.0).done()
+    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (3, True), "still not proven"
+    bench.robot.torque_off, bench.robot.failure = plain, None  # type: ignore[method-assign]
+    bench.turn().pilot.ask(Act.ACKNOWLEDGE)
+    bench.turn().on()
+    assert bench.pilot.view.servos_on
+    assert not _letting_go(bench), "the operator has switched them on"
+    bench.pilot.close()
+
+
 def test_what_became_of_a_torque_off_is_told(bench: Bench) -> None:
     bench.on()
     bench.alerts()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import threading
 
 from core.control.faults import Cause, Fault
-from core.control.pilot_loop import PilotLoop, slept_s
+from core.control.pilot_loop import PilotLoop
+from core.host_sleep import slept_s
 
 
 class Turned:

@@ -236,6 +236,7 @@ BROKEN = (
     ('name = "b"', "made_utc: Field required"),
     ("\x00", "no TOML"),
     ("a = " + "[" * 5000 + "]" * 5000, "no TOML"),
+    ("a = " + "9" * 5000, "no TOML"),
 )
 
 

@@ -307,6 +307,16 @@ def test_stop_switches_the_torque_off_when_that_is_the_policy(servos: SoftServoB
         robot.close()
 
 
+@pytest.mark.slow  # what hangs is waited for, and then for its end
+def test_a_bus_process_that_hangs_keeps_no_torque_on(armed: ServoRobot, servos: SoftServoBus) -> None:
+    """Asked and asked again it could not answer, and the port was its own: only opening the rig anew got out of it."""
+    assert armed._link is not None
+    os.kill(armed._link.pid, signal.SIGSTOP)
+    armed.torque_off()
+    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    assert armed.failure is not None, "this process is not the one that drives"
+
+
 @pytest.mark.parametrize("comes_back", [True, False])
 def test_a_torque_off_that_is_owed_is_paid_when_the_application_closes(
     servos: SoftServoBus, comes_back: bool, caplog: pytest.LogCaptureFixture

@@ -246,6 +246,19 @@ def test_no_bytes_on_the_line_make_a_group_read_fail(heard: bytes) -> None:
     assert not line._port.is_using
 
 
+def test_requests_that_follow_each_other_ask_for_different_lengths(twin: SoftServoBus, bus: ServoBus) -> None:
+    """Two reads in between for which nobody was asked made the next request look like the one before; its late answers passed."""
+    bus.read()
+    line = bus._line
+    line._quiet_until = {joint.id: math.inf for joint in CONFIG.joints}
+    for _ in range(2):
+        assert all(isinstance(reading, MissingServo) for reading in bus.read())
+    line._quiet_until.clear()
+    bus.read()
+    *_, before, last = [p.parameters[2:4] for p in twin.log if p.instruction == Instruction.SYNC_READ]
+    assert before != last
+
+
 def test_a_goal_with_a_header_arrives_and_is_read_back(twin: SoftServoBus, bus: ServoBus) -> None:
     """-131073 ticks are FF FF FD FF in the packet to the servo, and FF FF FD in its answer."""
     twin.stir(1, lambda servo: servo.turn(-131_073 - servo.table["present_position"]))

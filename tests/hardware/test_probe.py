@@ -117,6 +117,21 @@ def test_a_line_that_hiccups_is_tried_again(servos: SoftServoBus) -> None:
         assert probe.position_mm == pytest.approx(-1.0, abs=0.05)
 
 
+def test_nothing_moves_again_by_itself_after_the_computer_has_slept(servos: SoftServoBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that is seen of a sleep is a watchdog that tripped, and that passed for a busy moment."""
+    slept = [0.0]
+    monkeypatch.setattr("hardware.servos.probe.slept_s", lambda: slept[0])
+    with (
+        pytest.raises(ProbeFailed, match="as the computer slept: look at the robot, then try again"),
+        ServoProbe.opened(_config(servos), SAFETY, LIMITS, StopSwitch()) as probe,
+    ):
+        slept[0] = 60.0
+        servos.faults.mute(4)
+        threading.Timer(0.4, lambda: servos.faults.mute(4, False)).start()
+        probe.move_to(-1.0)
+    assert servos.positions_mm()[2] > -0.9
+
+
 # ---- who is there
 
 
