@@ -19,6 +19,8 @@ from core.session.rows import light_tick
 from core.types import Masks, Point, Points, Scene, Skeletons, Tick
 
 _KEPT = 24
+_KEPT_BYTES = 192_000_000
+"""Of pictures: 24 of 1920 x 1080, 7 of 3840 x 2160."""
 _AHEAD = 6
 _FAR_PX, _FAR_SCALE, _FAST_MM_S = 1e5, 1e3, 1e3
 _NO_GEOMETRY: dict[str, Any] = dict.fromkeys(("path", "vessel_graph", "route", "centerline", "robot_vector", "vessel_vector"))
@@ -56,6 +58,7 @@ class DecodeThread(QThread):
         self._stopping = False
         self.replayed: Callable[[int], Scene | None] | None = None
         self._kept: OrderedDict[int, Decoded] = OrderedDict()
+        self._kept_bytes = 0
 
     def ask_again(self) -> None:
         """The same once more."""
@@ -104,7 +107,7 @@ class DecodeThread(QThread):
             shown = replace(shown, other=_drawable(other) if other is not None else None)
         if self._newest.put(shown):
             self.decoded.emit()
-        for k in range(1, _AHEAD + 1 if step else 0):
+        for k in range(1, self._ahead(shown) + 1 if step else 0):
             ahead = place + k * step
             with self._changed:
                 if self._wanted is not None or self._stopping:
@@ -122,9 +125,19 @@ class DecodeThread(QThread):
             row = tick = None
         found = Decoded(place, row, drawable(light_tick(tick)) if tick is not None else None)
         self._kept[place] = found
-        while len(self._kept) > _KEPT:
-            self._kept.popitem(last=False)
+        self._kept_bytes += _size(found)
+        while len(self._kept) > _KEPT or (self._kept_bytes > _KEPT_BYTES and len(self._kept) > 1):
+            self._kept_bytes -= _size(self._kept.popitem(last=False)[1])
         return found
+
+    @staticmethod
+    def _ahead(shown: Decoded) -> int:
+        """How many may be read ahead, so that what is shown, and the one before it, are still kept."""
+        return min(_AHEAD, max(1, _KEPT_BYTES // max(1, _size(shown)) - 2))
+
+
+def _size(decoded: Decoded) -> int:
+    return decoded.tick.frame.image.nbytes if decoded.tick is not None else 0
 
 
 def drawable(tick: Tick) -> Tick:

@@ -18,7 +18,7 @@ from app.sources import is_video
 from core.images import ImageError, read_image
 from core.learning.dataset import write_png
 from core.session.session_video import Take, is_of_session, session_video, times_of
-from core.session.video_in import decoded, open_video, upright
+from core.session.video_in import NoPictures, decoded, open_video, pictures_of, upright
 from core.study.annotations import AnnotationError
 from core.types import Image
 
@@ -179,9 +179,10 @@ def _session_opened(video: Path) -> Iterator[tuple[int, Take]]:
 @contextmanager
 def _video_opened(video: Path) -> Iterator[tuple[int, Take]]:
     with open_video(video) as container:
-        if not container.streams.video:
-            raise AnnotationError(f"{video}: has no video in it")
-        stream = container.streams.video[0]
+        try:
+            stream = pictures_of(container)
+        except NoPictures as error:
+            raise AnnotationError(f"{video}: {error}") from None
         times = sorted({packet.pts for packet in container.demux(stream) if packet.pts is not None})
         yield len(times), lambda index: _decoded(container, stream, times[index]) if index < len(times) else None
 

@@ -14,6 +14,8 @@ from app.widgets.quiet_combo import name_list
 from app.widgets.time_field import TimeField
 
 _BUTTON = 34
+_LONGEST_MS = 2**31 - 1
+"""A damaged row may be of another month; sliders end here."""
 _STYLE = """
 QPushButton { padding: 3px 6px; }
 QPushButton#play { background: @PLAYBACK; color: @INK; font-weight: 700; font-size: 16px; }
@@ -94,12 +96,13 @@ class PlayerBar(QWidget):
         """How long the session is, as far as it is known."""
         for field in (self.slider, self.position):
             with QSignalBlocker(field):
-                field.setRange(0, max(0, duration_ms))
+                field.setRange(0, min(max(0, duration_ms), _LONGEST_MS))
         self._rows = rows
         self.length.setText(tr("of {time}", time=clock_text(duration_ms / 1000)))
 
     def show_position(self, time_ms: int, place: int) -> None:
         """Where playing is. A number that is being typed stays."""
+        time_ms = min(time_ms, _LONGEST_MS)
         with QSignalBlocker(self.slider):
             self.slider.setValue(time_ms)
         if not self.position.hasFocus():

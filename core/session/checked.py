@@ -15,6 +15,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 MAX_POINTS = 20_000
 _MAX_TEXT = 20_000
+_LONGEST_S = 1e9
 
 
 class Damaged(ValueError):
@@ -54,6 +55,14 @@ def number(value: Any, name: str) -> float:
     return number
 
 
+def moment(value: Any, name: str) -> float:
+    """Seconds of a monotonic clock: no computer has run for thirty years."""
+    seconds = number(value, name)
+    if abs(seconds) > _LONGEST_S:
+        raise Damaged(f"{name}: no time of a clock")
+    return seconds
+
+
 def maybe_number(value: Any, name: str) -> float | None:
     return None if value is None else number(value, name)
 
@@ -74,7 +83,8 @@ def flag(value: Any, name: str) -> bool:
 def text(value: Any, name: str) -> str:
     if type(value) is not str or len(value) > _MAX_TEXT:
         raise Damaged(f"{name}: not a text")
-    return value
+    # Half a character, which JSON may name, is none, and brings down who draws or writes it.
+    return value if value.isascii() else value.encode("utf-8", "backslashreplace").decode()
 
 
 def choice(kind: type[Choice], value: Any, name: str) -> Choice:

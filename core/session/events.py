@@ -11,7 +11,7 @@ from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.gate_checks import Source
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Mode
-from core.session.checked import finite, finite_tree, group, number, text
+from core.session.checked import finite, finite_tree, group, moment, text
 from core.types import Point
 
 
@@ -121,4 +121,4 @@ def event_from_json(record: dict[str, Any]) -> Event:
     kind, said = text(record.get("kind"), "kind"), text(record.get("text", ""), "text")
     if kind not in set(EventKind):
         kind, said = EventKind.NOTE, f"{kind[:_LONGEST_KIND]}: {said}"
-    return Event(number(record.get("time_s"), "time_s"), EventKind(kind), said, group(record.get("data", {}), "data"))
+    return Event(moment(record.get("time_s"), "time_s"), EventKind(kind), said, group(record.get("data", {}), "data"))

@@ -14,6 +14,7 @@ from datetime import UTC, datetime
 from io import FileIO
 from pathlib import Path
 
+from core.names import name_as_text
 from core.record_config import RecordConfig
 from core.session.events import Event, EventKind, as_added_later, event_to_json
 from core.session.lines import sealed
@@ -42,7 +43,13 @@ class LineFile:
     def __init__(self, path: Path) -> None:
         self._file = path.open("xb", buffering=0)
         self._end = 0
-        fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._file.close()
+            raise
+        except OSError:
+            pass  # a drive without locks
 
     def write(self, line: str) -> int:
         """Append a line; returns its bytes. Raises OSError."""
@@ -116,7 +123,8 @@ def add_event(session: Path, event: Event) -> Event:
         raise SessionError(f"{session}: is being recorded; stop the recording first")
     try:
         with path.open("a+b", buffering=0) as file:
-            fcntl.flock(file.fileno(), fcntl.LOCK_EX)
+            with contextlib.suppress(OSError):  # a drive without locks
+                fcntl.flock(file.fileno(), fcntl.LOCK_EX)
             end = file.seek(0, os.SEEK_END)
             if end:
                 # a last line that was cut must not swallow the new one
@@ -249,7 +257,7 @@ class SessionFiles:
         # before the manifest says that all is well, all must be on the disk
         _sync_files(self.folder, all_videos=True)
         self.counts.dropped = dropped
-        changes = {"closed": not problem, "ended": ended, "ended_utc": datetime.now(UTC), "counts": self.counts}
+        changes = {"closed": not problem, "ended": name_as_text(ended), "ended_utc": datetime.now(UTC), "counts": self.counts}
         try:
             write_manifest(self.folder, self._manifest.model_copy(update=changes))
         except OSError as error:

@@ -17,6 +17,7 @@ from core.session.checked import (
     group,
     items,
     maybe_number,
+    moment,
     number,
     numbers,
     point,
@@ -97,7 +98,7 @@ class RecordedRow:
 def row_from_json(record: Row) -> RecordedRow:
     """Raises Damaged, which names the value. A word of a later version damages nothing."""
     record, unknown = without_later_words(record)
-    index, captured_s = count(record.get("index"), "index"), number(record.get("captured_s"), "captured_s")
+    index, captured_s = count(record.get("index"), "index"), moment(record.get("captured_s"), "captured_s")
     return RecordedRow(
         row=count(record.get("row"), "row"),
         index=index,

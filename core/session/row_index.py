@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.control.modes import Mode
-from core.session.checked import Damaged, count, maybe_number, number, text
+from core.session.checked import Damaged, count, maybe_number, moment, text
 from core.session.lines import Line, is_sealed, lines_of, parse_line
 from core.session.packet_check import PictureRow
 from core.types import PoseState
@@ -182,7 +182,7 @@ def columns_of(record: dict[str, Any]) -> Columns:
         raise Damaged("state or mode: not a text")
     return (
         count(record.get("row"), "row"),
-        number(record.get("captured_s"), "captured_s"),
+        moment(record.get("captured_s"), "captured_s"),
         count(record.get("video"), "video"),
         count(record.get("pts_ms"), "pts_ms"),
         float("nan") if theta is None else theta,

@@ -111,11 +111,15 @@ class FrameEncoder:
             self._container.close()
 
 
+_MOST_BITS_S = 2**30 - 1
+"""Twice that is the largest number that the encoder takes."""
+
+
 def _options(size: tuple[int, int], config: RecordConfig) -> dict[str, str]:
     common = {"preset": "ultrafast", "tune": "zerolatency", "g": str(GOP_FRAMES), "forced-idr": "1"}
     if config.codec == "lossless":
         return common | {"qp": "0"}
-    rate = max(200_000, round(config.max_mbit_s * 1e6 * size[0] * size[1] / (640 * 480)))
+    rate = min(max(200_000, round(config.max_mbit_s * 1e6 * size[0] * size[1] / (640 * 480))), _MOST_BITS_S)
     return common | {"crf": str(config.quality_crf), "maxrate": str(rate), "bufsize": str(2 * rate)}
 
 

@@ -1,21 +1,30 @@
-"""Opens videos to read, and gives their pictures as a person sees them: none that a decoder invented, upright, in square pixels."""
+"""Opens videos to read, and gives their pictures as a person sees them: none that a decoder invented, in order, upright, in square
+pixels."""
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
-from heapq import heappop, heappush
+from heapq import heapify, heappop, heappush
 from pathlib import Path
 
 import av
 import av.error
 import numpy as np
 from av.container import InputContainer
+from av.sidedata.sidedata import SideData
 
 from core.session.video import media_name
 from core.types import Image
 
 _SQUARE = 0.005
+_MOST_ASPECT = 4.0
+"""No camera's pixels are so much wider than high, or higher than wide: what a file says beyond that is damaged."""
+
+
+class NoPictures(ValueError):
+    """The file is a container, but nothing can be decoded from it; the message says why."""
 
 
 def open_video(path: Path) -> InputContainer:
@@ -24,6 +33,16 @@ def open_video(path: Path) -> InputContainer:
     Titles and tags are decoded when it is opened; a flipped bit in one of them must not cost the pictures.
     """
     return av.open(media_name(path), metadata_errors="replace")
+
+
+def pictures_of(container: InputContainer) -> av.VideoStream:
+    """The stream that is looked at: the first video. Raises NoPictures."""
+    if not container.streams.video:
+        raise NoPictures("has no video in it")
+    stream = container.streams.video[0]
+    if getattr(stream, "codec_context", None) is None:  # FFmpeg has no decoder for it
+        raise NoPictures("has a video of a kind that cannot be decoded here")
+    return stream
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +60,12 @@ def decoded(container: InputContainer, stream: av.VideoStream) -> Iterator[av.Vi
     itself cannot be read on.
     """
     is_whole, waiting = True, list[int]()
+    # An AVI knows no times: its packets are counted, in the order in which they are decoded, not shown.
+    is_counted = container.format.name == "avi"
     # Of other codecs packets may rightly give no picture.
-    gives_all = stream.codec_context.name == "h264"
+    gives_all = stream.codec_context.name == "h264" and not is_counted
     for packet in container.demux(stream):
-        if gives_all and packet.pts is not None and packet.size and not packet.is_discard:
+        if (gives_all or is_counted) and packet.pts is not None and packet.size and not packet.is_discard:
             heappush(waiting, packet.pts)
         try:
             frames = packet.decode()
@@ -56,21 +77,38 @@ def decoded(container: InputContainer, stream: av.VideoStream) -> Iterator[av.Vi
                 yield Damaged(packet.pts)
             continue
         for frame in frames:
-            while waiting and frame.pts is not None and waiting[0] < frame.pts:
+            if is_counted:
+                if frame.key_frame and not is_whole and frame.pts is not None:  # some before it gave no picture
+                    waiting = [pts for pts in waiting if pts >= frame.pts]
+                    heapify(waiting)
+                frame.pts = heappop(waiting) if waiting else frame.pts
+            while gives_all and waiting and frame.pts is not None and waiting[0] < frame.pts:
                 is_whole = False
                 yield Damaged(heappop(waiting))
-            if waiting and waiting[0] == frame.pts:
+            if gives_all and waiting and waiting[0] == frame.pts:
                 heappop(waiting)
             is_whole = (is_whole or frame.key_frame) and not frame.is_corrupt
             yield frame if is_whole else Damaged(frame.pts)
-    yield from (Damaged(pts) for pts in sorted(waiting))
+    yield from (Damaged(pts) for pts in sorted(waiting) if gives_all)
 
 
 def upright(frame: av.VideoFrame, stream: av.VideoStream | None = None) -> Image:
-    """RGB uint8 (H, W, 3) of a frame as players show it: turned as the file says, its pixels made square as its stream says."""
+    """RGB uint8 (H, W, 3) of a frame as players show it: turned or mirrored as the file says, its pixels made square as its stream
+    says."""
     aspect = float((stream.sample_aspect_ratio if stream is not None else None) or 1.0)
-    if abs(aspect - 1.0) > _SQUARE:
+    if abs(aspect - 1.0) > _SQUARE and 1.0 / _MOST_ASPECT <= aspect <= _MOST_ASPECT:
         frame = frame.reformat(width=max(1, round(frame.width * aspect)), height=frame.height, format="rgb24")
     image = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
     turns = round(frame.rotation / 90) % 4  # to the left
+    if _is_mirrored(frame):  # what it says of the turn is of the picture as it would be without that
+        return np.ascontiguousarray(np.rot90(image, -turns)[::-1])
     return np.ascontiguousarray(np.rot90(image, turns)) if turns else image
+
+
+def _is_mirrored(frame: av.VideoFrame) -> bool:
+    """Whether the file shows it as in a mirror: the determinant of its display matrix, 3x3 numbers in 16.16 bits, says so."""
+    matrix = frame.side_data.get("DISPLAYMATRIX")
+    if not isinstance(matrix, SideData):
+        return False
+    across_x, across_y, _, down_x, down_y = struct.unpack_from("=5i", bytes(matrix))
+    return bool(across_x * down_y - across_y * down_x < 0)

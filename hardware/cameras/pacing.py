@@ -20,7 +20,7 @@ class Pacer(Generic[F]):
         self._pending: tuple[F, float] | None = None
 
     def next(self, decode: Callable[[], tuple[F, float]], timeout_s: float) -> tuple[F, float] | None:
-        """The next frame and when it was shown (monotonic); None when it is due later than in `timeout_s`: then it is kept.
+        """The next frame and when it was due (monotonic); None when that is later than in `timeout_s`: then it is kept.
 
         `decode` gives the next frame and its seconds from the first one on.
         """
@@ -43,4 +43,4 @@ class Pacer(Generic[F]):
                 # Decoding is slower than the recording: it is played as fast as it goes, instead of never.
                 self._start_s += late_s
             time.sleep(max(-late_s, 0.0))
-            return frame, time.monotonic()
+            return frame, self._start_s + at_s

@@ -10,7 +10,7 @@ import av.error
 import numpy as np
 
 from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream
-from core.session.video_in import Damaged, decoded, open_video, upright
+from core.session.video_in import Damaged, NoPictures, decoded, open_video, pictures_of, upright
 from core.types import Frame, Image
 from hardware.cameras.pacing import Pacer
 
@@ -24,7 +24,7 @@ class VideoFile:
     With `paced` the frames come at the speed of the recording and late ones are skipped, as from a camera, and damaged ones are
     lost; without, every frame is given, and for a damaged one DamagedPicture raised, after which the next may be read. A video that
     decodes slower than it was recorded is played slower. ``captured_s`` is the presentation time from the first frame on, in the
-    clock of the first read when paced.
+    clock of the first read when paced, whenever a frame is handed out.
     """
 
     def __init__(self, path: Path, *, paced: bool = True) -> None:
@@ -53,10 +53,11 @@ class VideoFile:
             container = open_video(self._path)
         except (av.error.FFmpegError, OSError) as error:
             raise DeviceError(f"{self._path}: cannot be read as a video ({error.strerror or error})") from None
-        if not container.streams.video:
+        try:
+            stream = pictures_of(container)
+        except NoPictures as error:
             container.close()
-            raise DeviceError(f"{self._path}: has no video in it")
-        stream = container.streams.video[0]
+            raise DeviceError(f"{self._path}: {error}") from None
         stream.thread_type = "SLICE"  # with a thread for each frame nobody could say which one is damaged
         self._container, self._frames = container, decoded(container, stream)
 

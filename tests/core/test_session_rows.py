@@ -140,6 +140,7 @@ def test_a_light_tick_keeps_what_is_recorded() -> None:
         ("captured_s", None, "captured_s"),
         ("captured_s", "12", "captured_s"),
         ("captured_s", True, "captured_s"),
+        ("captured_s", 1e12, "captured_s"),
         ("index", -1, "index"),
         ("index", 1.5, "index"),
         ("index", 2**70, "index"),
@@ -217,10 +218,17 @@ def test_an_event_comes_back() -> None:
     assert event_from_json(json.loads(json.dumps(event_to_json(event), allow_nan=False))) == event
 
 
-@pytest.mark.parametrize(("time_s", "kind"), [(None, "note"), ("x", "note"), (1.0, 3), (1.0, None)])
+@pytest.mark.parametrize(("time_s", "kind"), [(None, "note"), ("x", "note"), (1e18, "note"), (1.0, 3), (1.0, None)])
 def test_a_damaged_event_is_named(time_s: object, kind: object) -> None:
     with pytest.raises(Damaged):
         event_from_json({"time_s": time_s, "kind": kind})
+
+
+def test_half_a_character_in_a_text_brings_nobody_down() -> None:
+    """It is none that could be drawn or written: an export of such a row ended the program."""
+    event = event_from_json(json.loads('{"time_s": 1.0, "kind": "note", "text": "kink \\ud800 \\u00b0"}'))
+    assert event.text == "kink \\ud800 \N{DEGREE SIGN}"
+    assert event.text.encode()
 
 
 def test_words_of_a_later_version_cost_what_they_belong_to_and_no_row() -> None:

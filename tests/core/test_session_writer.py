@@ -24,7 +24,7 @@ from core.control.faults import Cause, Fault
 from core.control.modes import Mode
 from core.session import files as session_files
 from core.session import writer as session_writer
-from core.session.events import EventKind, event_of_target
+from core.session.events import Event, EventKind, event_of_target
 from core.session.files import SessionFiles, is_being_written
 from core.session.manifest import About, read_manifest, write_manifest
 from core.session.reader import SessionReader
@@ -831,6 +831,28 @@ def test_an_unexpected_failure_ends_the_recorder_visibly(tmp_path: Path, caplog:
     session = writer.status().folder
     assert session is not None
     assert read_manifest(session).closed
+
+
+def test_a_reason_with_a_name_that_is_no_utf8_still_ends_the_session(tmp_path: Path) -> None:
+    """The manifest could not hold the folder's name, stayed open, and the recorder went on saying that it records."""
+    files = SessionFiles(tmp_path, ABOUT, QUICK, first_s=1000.0, now_s=1000.0)
+    assert files.close("disk full in /data/b\udcfc", 0) == ""
+    manifest = read_manifest(files.folder)
+    assert (manifest.closed, manifest.ended) == (True, "disk full in /data/b\\xfc")
+
+
+def test_a_drive_without_locks_can_be_recorded_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_locks(_file: int, _kind: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(session_files.fcntl, "flock", no_locks)
+    session = record(tmp_path, ticks(3))
+    assert read_manifest(session).closed
+    assert session_files.add_event(session, Event(1000.0, EventKind.NOTE, "kink")).text == "kink"
+
+
+def test_the_largest_pictures_at_the_largest_rate_have_an_encoder() -> None:
+    FrameEncoder((4096, 3072), QUICK.model_copy(update={"max_mbit_s": 100.0, "codec": "lossy"})).close()
 
 
 def test_pictures_without_a_size_have_no_encoder() -> None:
