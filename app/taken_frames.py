@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from glob import escape
@@ -18,7 +19,7 @@ from app.sources import is_video
 from core.images import ImageError, read_image
 from core.learning.dataset import write_png
 from core.session.session_video import Take, is_of_session, session_video, times_of
-from core.session.video_in import NoPictures, decoded, open_video, pictures_of, upright
+from core.session.video_in import NoPictures, decoded, is_avi, open_video, pictures_of, upright
 from core.study.annotations import AnnotationError
 from core.types import Image
 
@@ -184,7 +185,29 @@ def _video_opened(video: Path) -> Iterator[tuple[int, Take]]:
         except NoPictures as error:
             raise AnnotationError(f"{video}: {error}") from None
         times = sorted({packet.pts for packet in container.demux(stream) if packet.pts is not None})
-        yield len(times), lambda index: _decoded(container, stream, times[index]) if index < len(times) else None
+        if is_avi(container):
+            yield len(times), _FromTheStart(container, stream)
+        else:
+            yield len(times), lambda index: _decoded(container, stream, times[index]) if index < len(times) else None
+
+
+class _FromTheStart:
+    """The picture at a place among all, where times and seeking are not to be trusted: read one after the other."""
+
+    def __init__(self, container: av.container.InputContainer, stream: av.VideoStream) -> None:
+        self._container, self._stream = container, stream
+        self._next = math.inf
+
+    def __call__(self, index: int) -> Image | None:
+        if index < self._next:
+            self._container.seek(0, stream=self._stream, backward=True)
+            self._pictures, self._next = decoded(self._container, self._stream), 0
+        with suppress(av.error.FFmpegError):  # the file cannot be read on
+            for picture in self._pictures:
+                self._next += 1
+                if self._next == index + 1:
+                    return upright(picture, self._stream) if isinstance(picture, av.VideoFrame) else None
+        return None
 
 
 def _decoded(container: av.container.InputContainer, stream: av.VideoStream, pts: int) -> Image | None:

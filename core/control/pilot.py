@@ -26,7 +26,7 @@ from core.control.frame_watch import FrameArrived, RouteState
 from core.control.gate_checks import Rejection, RejectReason, Source
 from core.control.guarded_robot import GuardedRobot, SentMotion
 from core.control.hand import AT_REST, Hand, Jog
-from core.control.health import Beat, FrameLate, GateReport, ModelReport, Part, ServosBusy, deadman_down
+from core.control.health import Beat, FrameLate, GateReport, ModelReport, Part, ServosBusy, ServosChecked, deadman_down
 from core.control.inbox import Inbox, Inputs, Seen
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Hindrance, Latched, Mode, SupervisorState
 from core.control.owed_release import OwedRelease
@@ -95,6 +95,7 @@ class Pilot:
         self._view = DriveView(clock(), mode=self._state.mode, latched=left_over.fault if left_over is not None else None)
         if left_over is not None and left_over.stopped:
             self._requests.stopped()
+            self._release.stopped()
             robot.stop()  # pressed while this one was being opened, it has reached no servo yet
 
     # ---- from the window's thread
@@ -114,6 +115,7 @@ class Pilot:
         """Check the servos and switch their torque on. Refused, with an alert, unless in ADVISORY with nothing to acknowledge and
         nothing under way; tells whether it was not. So do the next three."""
         if is_free := self._may_request():
+            self._release.switching_on()
             self._requests.switch_on()
         return is_free
 
@@ -132,7 +134,7 @@ class Pilot:
     def torque_off(self) -> bool:
         """Let the wires go slack; also while a fault waits to be acknowledged, and after whatever is under way."""
         if is_free := self._may_request(although_latched=True, although_busy=True):
-            self._requests.torque_off()
+            self._requests.torque_off(is_lost=self._is_bus_lost(self.view.active))
         return is_free
 
     def halt(self) -> None:
@@ -265,7 +267,12 @@ class Pilot:
         return view
 
     def close(self) -> None:
-        """Let nobody drive, and hold the robot. A request that is under way ends when the robot is closed."""
+        """Let nobody drive, and hold the robot. A request that is under way ends when the robot is closed; what a stop owes is
+        paid before, also one that no turn has heard any more."""
+        if self._stop_asked:
+            self._release.stopped()
+        if self._release.is_owed:
+            self._requests.torque_off(is_lost=self._is_bus_lost(self.view.active))
         self._requests.close()
         self._robot.hold()
         self._robot.beat(None)
@@ -295,12 +302,13 @@ class Pilot:
         elif (report := self._robot.report()) is not None:
             events.append(report)
             has_let_go = has_let_go or report.torque_off
+        if has_let_go:
+            self._release.off()
+            self._teller.tell([(Note.TORQUE_OFF, "")], now_s)
+        if any(isinstance(event, ServosChecked) and not event.problems for event in events):
+            self._release.switched_on()
         if (owed := self._release.fault(is_lost=self._is_bus_lost(self._view.active))) is not None:
             events.append(owed)
-        if has_let_go or self._state.health.servos_ready:
-            self._release.paid()
-        if has_let_go:
-            self._teller.tell([(Note.TORQUE_OFF, "")], now_s)
         if self._requests.busy:
             self._busy_s = now_s
             events.append(ServosBusy())
@@ -326,8 +334,8 @@ class Pilot:
         if decision.mode is Mode.STOPPED and is_new:
             self._release.stopped()
         is_lost, is_busy = self._is_bus_lost(decision.active), bool(self._requests.busy)
-        if self._release.is_due(decision.mode, now_s, is_lost=is_lost, is_busy=is_busy):
-            self._requests.torque_off()
+        if self._release.is_due(now_s, is_lost=is_lost, is_busy=is_busy):
+            self._requests.torque_off(is_lost=True)
 
     def _has_arrived(self, seen: Seen | None, now_s: float) -> bool:
         """The program drove to the destination and has rested there for a moment."""

@@ -36,7 +36,7 @@ class ServoRequests:
         self._lock = threading.Lock()
         self._stops = 0
         self._offs = self._offs_done = 0
-        self._blocked = self._let_go = False
+        self._blocked = self._let_go = self._is_letting_go = False
         self._waiting: list[str] = []
 
     @property
@@ -77,17 +77,21 @@ class ServoRequests:
         """Restart a servo, which clears its hardware error."""
         self._request(f"restarting servo {servo_id}", lambda: self._off_and(lambda: self._robot.reboot(servo_id)))
 
-    def torque_off(self) -> None:
-        """Let the wires go slack, at once after what is under way; servos that are being switched on are not."""
+    def torque_off(self, *, is_lost: bool = False) -> None:
+        """Let the wires go slack, at once after what is under way; servos that are being switched on are not. `is_lost`: nothing is
+        heard from their bus, and nobody need wait for its hold."""
         with self._lock:
             self._offs += 1
             asked = self._offs
-        self._request("switching the torque off", lambda: self._switch_off(asked))
+        self._request("switching the torque off", lambda: self._switch_off(asked, is_lost=is_lost))
 
     def close(self) -> None:
-        """Let nothing more begin but a torque-off that waits. What is under way ends by itself when the robot is closed."""
+        """Let nothing more begin but a torque-off that waits; one that is under way is waited for. All else that is ends by itself
+        when the robot is closed."""
         self.stopped()
-        self._worker.shutdown(wait=False, cancel_futures=True)
+        with self._lock:
+            is_letting_go = self._is_letting_go
+        self._worker.shutdown(wait=is_letting_go, cancel_futures=True)
         with self._lock:
             owes_off = self._offs_done < self._offs
         if owes_off:
@@ -137,15 +141,21 @@ class ServoRequests:
             self._offs_done = max(self._offs_done, asked[1])  # what was asked for before is over, whatever became of it
         self._post(ServosChecked())
 
-    def _switch_off(self, asked: int) -> None:
+    def _switch_off(self, asked: int, *, is_lost: bool) -> None:
         """Also where the bus process is gone, and where not all servos are there to connect: no reason to let the others pull."""
-        self._post(ServosOff())
-        with contextlib.suppress(DeviceError):  # nor is a hold that fails
-            if self._robot.failure is not None:
-                self._robot.connect()
-            else:
-                self._robot.disarm()
-        self._robot.torque_off()
+        with self._lock:
+            self._is_letting_go = True
+        try:
+            self._post(ServosOff())
+            with contextlib.suppress(DeviceError):  # nor is a hold that fails
+                if self._robot.failure is not None:
+                    self._robot.connect()
+                elif not is_lost:
+                    self._robot.disarm()
+            self._robot.torque_off()
+        finally:
+            with self._lock:
+                self._is_letting_go = False
         with self._lock:
             self._offs_done = asked
             self._let_go = self._let_go or self._robot.failure is not None  # no report tells it

@@ -9,6 +9,7 @@ import os
 import secrets
 import shutil
 import threading
+import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from io import FileIO
@@ -28,20 +29,25 @@ from core.session.manifest import (
     Origin,
     SessionError,
     new_manifest,
+    read_manifest,
     write_manifest,
 )
 from core.session.ring import EncodedFrame
 from core.session.video import FrameEncoder, VideoError, VideoTrack
 
+_STILL_S = 10.0
+
 
 class LineFile:
     """A file of JSON lines, each handed to the system at once. A line that cannot be written whole is taken back.
 
-    The lock on it lasts as long as this process: it tells a session that is being recorded from one that was cut.
+    The lock on it lasts as long as this process: it tells a session that is being recorded from one that was cut. A drive without
+    locks knows only when it was last written to.
     """
 
     def __init__(self, path: Path) -> None:
-        self._file = path.open("xb", buffering=0)
+        # Appended to: a note that somebody else adds meanwhile, where no lock forbids it, is not written over.
+        self._file = FileIO(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666), "wb")
         self._end = 0
         try:
             fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -79,6 +85,14 @@ def is_being_written(folder: Path) -> bool:
     except BlockingIOError:
         return True
     except OSError:
+        return _has_just_grown(folder)
+
+
+def _has_just_grown(folder: Path) -> bool:
+    """Whether a session that has not ended was written to in the last seconds: all that can be told on a drive without locks."""
+    try:
+        return time.time() - (folder / FRAMES).stat().st_mtime < _STILL_S and not read_manifest(folder).closed
+    except (OSError, SessionError):
         return False
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
-from heapq import heapify, heappop, heappush
+from heapq import heappop, heappush
 from pathlib import Path
 
 import av
@@ -45,6 +45,11 @@ def pictures_of(container: InputContainer) -> av.VideoStream:
     return stream
 
 
+def is_avi(container: InputContainer) -> bool:
+    """Whether nothing in the file says when a picture is shown."""
+    return container.format.name == "avi"
+
+
 @dataclass(frozen=True, slots=True)
 class Damaged:
     """In the place of a picture that is damaged, or builds on such a one; ``pts`` as a frame has it, None: not known."""
@@ -60,36 +65,38 @@ def decoded(container: InputContainer, stream: av.VideoStream) -> Iterator[av.Vi
     itself cannot be read on.
     """
     is_whole, waiting = True, list[int]()
-    # An AVI knows no times: its packets are counted, in the order in which they are decoded, not shown.
-    is_counted = container.format.name == "avi"
+    broken_pts: int | None = None
     # Of other codecs packets may rightly give no picture.
-    gives_all = stream.codec_context.name == "h264" and not is_counted
+    gives_all = stream.codec_context.name == "h264"
+    # An AVI knows no times: packets of H.264 are counted there in the order in which they are decoded, not shown.
+    is_counted = gives_all and is_avi(container)
     for packet in container.demux(stream):
-        if (gives_all or is_counted) and packet.pts is not None and packet.size and not packet.is_discard:
+        if gives_all and packet.pts is not None and packet.size and not packet.is_discard:
             heappush(waiting, packet.pts)
         try:
             frames = packet.decode()
         except EOFError:
             return
         except av.error.FFmpegError:
-            is_whole = False
+            is_whole, broken_pts = False, packet.pts
             if not gives_all:
                 yield Damaged(packet.pts)
             continue
         for frame in frames:
+            # One that had gone in before the damage, and comes out after it, says nothing of what follows.
+            stands_alone = frame.key_frame and (broken_pts is None or frame.pts is None or frame.pts > broken_pts)
             if is_counted:
-                if frame.key_frame and not is_whole and frame.pts is not None:  # some before it gave no picture
-                    waiting = [pts for pts in waiting if pts >= frame.pts]
-                    heapify(waiting)
+                while frame.key_frame and waiting and frame.pts is not None and waiting[0] < frame.pts:
+                    yield Damaged(heappop(waiting))
                 frame.pts = heappop(waiting) if waiting else frame.pts
-            while gives_all and waiting and frame.pts is not None and waiting[0] < frame.pts:
+            while waiting and frame.pts is not None and waiting[0] < frame.pts:
                 is_whole = False
                 yield Damaged(heappop(waiting))
-            if gives_all and waiting and waiting[0] == frame.pts:
+            if waiting and waiting[0] == frame.pts:
                 heappop(waiting)
-            is_whole = (is_whole or frame.key_frame) and not frame.is_corrupt
+            is_whole = (is_whole or stands_alone) and not frame.is_corrupt
             yield frame if is_whole else Damaged(frame.pts)
-    yield from (Damaged(pts) for pts in sorted(waiting) if gives_all)
+    yield from (Damaged(pts) for pts in sorted(waiting))
 
 
 def upright(frame: av.VideoFrame, stream: av.VideoStream | None = None) -> Image:

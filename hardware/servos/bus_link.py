@@ -23,7 +23,7 @@ from hardware.servos.errors import BusProcessLost, ServoError
 
 STOP = b"S"
 _log = logging.getLogger(__name__)
-_END_S = 5.0
+END_S = 5.0
 """Longer than a torque-off that is owed is tried at the end."""
 _MESSAGE_BYTES = 65_536
 
@@ -155,12 +155,12 @@ class BusLink:
 
     def _gone(self) -> str:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(_END_S)
+            self._process.wait(END_S)
         self._drain()
         return self.failure or "the servo bus process does not talk any more: connect the robot again"
 
-    def close(self) -> None:
-        """Let the process hold the servos and end; kill it when it does not. May be called twice."""
+    def close(self, patience_s: float = END_S) -> None:
+        """Let the process hold the servos and end; kill it when it does not in so long. May be called twice."""
         with self._lock:
             if self._closed:
                 return
@@ -169,7 +169,7 @@ class BusLink:
                 self._socket.send(b'{"id": 0, "do": "end"}')  # a forked child of ours may keep the pipe open
             os.close(self._line)
         try:
-            self._process.wait(_END_S)
+            self._process.wait(patience_s)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()

@@ -18,7 +18,7 @@ from core.safety_config import SafetyConfig
 from core.servo_config import JointConfig, JointName, ServosConfig
 from core.types import Command, RobotStatus
 from hardware.servos.bus_guard import report_of
-from hardware.servos.bus_link import BusLink
+from hardware.servos.bus_link import END_S, BusLink
 from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order, Sent
 from hardware.servos.bus_start import BusProcess
 from hardware.servos.errors import BusProcessLost, NotReady, ServoError
@@ -26,6 +26,8 @@ from hardware.servos.status_block import ServoReading, ServoState
 from hardware.servos.units import wire_force_mn
 
 _OPEN_S, _ARM_S, _REQUEST_S, _LET_GO_S = 20.0, 10.0, 5.0, 10.0
+_HUNG_S = 0.2
+"""For the end of a bus process that has just left a request unanswered."""
 
 
 class ServoRobot:
@@ -62,7 +64,7 @@ class ServoRobot:
         self._servos, self._safety = servos, safety
         self._name = name
         self._truth, self._on_close, self._kept_zero = truth, on_close, kept_zero
-        self._lock = threading.Lock()
+        self._lock, self._letting_go = threading.Lock(), threading.Lock()
         self._loading = process
         self._link: BusLink | None = None
         self._closes = 0
@@ -179,13 +181,14 @@ class ServoRobot:
                 return
             except BusProcessLost as error:
                 failure = str(error)
-        self._not_connected = failure  # and stays so: this process is not the one that drives
-        self._disconnect()
-        link = BusLink(self._servos, self._safety)
-        try:
-            link.request("torque off", _LET_GO_S)
-        finally:
-            link.close()
+        with self._letting_go:  # one that has the port is enough
+            self._not_connected = failure  # and stays so: this process is not the one that drives
+            self._disconnect(_HUNG_S)
+            link = BusLink(self._servos, self._safety)
+            try:
+                link.request("torque off", _LET_GO_S)
+            finally:
+                link.close()
 
     def beat(self, permitted: Source | None) -> None:
         """A sign of life of the application, with what its supervisor says: whose orders may be followed (None: nobody's)."""
@@ -330,10 +333,10 @@ class ServoRobot:
         if on_close is not None:
             on_close()
 
-    def _disconnect(self) -> None:
+    def _disconnect(self, patience_s: float = END_S) -> None:
         link, self._link = self._link, None
         if link is not None:
-            link.close()
+            link.close(patience_s)
 
     def _connected(self) -> BusLink:
         link = self._link

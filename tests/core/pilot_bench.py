@@ -9,6 +9,7 @@ import numpy as np
 
 from core.config import Config
 from core.control.bus_watch import BusReport
+from core.control.drive_view import LeftOver
 from core.control.gate_checks import Rejection, Source
 from core.control.guarded_robot import SentMotion
 from core.control.hand import AT_REST
@@ -145,14 +146,15 @@ def scene_at(index: int, captured_s: float, *, left_px: float = 200.0, route: bo
 class Bench:
     """Turns the pilot with a frame every second turn; `scene` changes what is understood."""
 
-    def __init__(self, config: Config | None = None) -> None:
+    def __init__(self, config: Config | None = None, left_over: LeftOver | None = None) -> None:
         self.now_s, self.index = 100.0, 0
         self.robot, self.policy = Robot(), Policy()
         self.scene: Callable[[Scene], Scene] = lambda scene: scene
         self.held = False
         self.jog = AT_REST
         self.seeing = True
-        self.pilot = Pilot(self.robot, self.policy, config or Config(), ModelReport(True), clock=lambda: self.now_s)
+        config = config or Config()
+        self.pilot = Pilot(self.robot, self.policy, config, ModelReport(True), clock=lambda: self.now_s, left_over=left_over)
         self.shown: Advice | None = None
 
     def turn(self, count: int = 1) -> Bench:

@@ -596,9 +596,17 @@ def test_a_stop_lets_go_also_where_the_bus_process_is_gone(is_wanted: bool) -> N
     bench.pilot.close()
 
 
-def test_what_a_stop_owes_is_tried_until_the_operator_has_seen_it() -> None:
+@pytest.fixture
+def slackening() -> Iterator[Bench]:
+    """A bench whose STOP also switches the torque off."""
     config = Config()
     bench = Bench(config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": True})}))
+    yield bench
+    bench.pilot.close()
+
+
+def test_what_a_stop_owes_is_tried_until_the_servos_have_let_go_or_are_switched_on(slackening: Bench) -> None:
+    bench = slackening
     plain = bench.robot.torque_off
 
     def in_vain() -> None:
@@ -618,12 +626,72 @@ def test_what_a_stop_owes_is_tried_until_the_operator_has_seen_it() -> None:
     assert bench.robot.calls.count("torque off") == 3, "another STOP need not wait"
     bench.turn().pilot.ask(Act.ACKNOWLEDGE)
     bench.turn().done().seconds(11.0).done()
-    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (3, True), "still not proven"
-    bench.robot.torque_off, bench.robot.failure = plain, None  # type: ignore[method-assign]
+    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (4, True), "still not proven"
+    bench.robot.failure = None
     bench.turn().pilot.ask(Act.ACKNOWLEDGE)
     bench.turn().on()
+    view = bench.pilot.view
+    assert (view.servos_on, view.latched, view.permitted) == (True, None, Source.OPERATOR), "the operator has switched them on"
+    bench.seconds(11.0).done()
+    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (4, False)
+
+
+def test_a_stop_that_the_bus_process_has_paid_is_owed_no_more(slackening: Bench) -> None:
+    """It may pay before the pilot's turn hears of the STOP, and of a second press it takes no notice."""
+    bench = slackening
+    bench.on()
+    bench.pilot.ask(Act.STOP)
+    bench.robot.bus = replace(WELL, torque_off=True)
+    bench.turn()
+    bench.robot.bus = WELL
+    bench.turn().pilot.ask(Act.STOP)
+    bench.turn(3)
+    bench.robot.failure = "the servo bus process ended"
+    bench.turn(3).done()
+    assert not _letting_go(bench)
+    assert "torque off" not in bench.robot.calls
+    bench.robot.failure = None
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.turn().on()
     assert bench.pilot.view.servos_on
-    assert not _letting_go(bench), "the operator has switched them on"
+    _lose_the_bus(bench)
+    bench.pilot.ask(Act.STOP)
+    bench.turn(3).done().turn()
+    assert "torque off" in bench.robot.calls, "it was on in between"
+
+
+def test_what_a_stop_owes_is_paid_at_the_end(slackening: Bench) -> None:
+    """Pressed when nothing is heard from the bus any more, but nobody knows it yet: no turn has heard of it before the end."""
+    slackening.on()
+    slackening.pilot.ask(Act.STOP)
+    slackening.pilot.close()
+    assert slackening.robot.calls.count("torque off") == 1
+
+
+def test_a_torque_off_that_is_under_way_at_the_end_is_waited_for_and_not_done_twice(slackening: Bench) -> None:
+    entered, go_on = threading.Event(), threading.Event()
+    plain = slackening.robot.torque_off
+
+    def slow() -> None:
+        entered.set()
+        go_on.wait(5.0)
+        plain()
+
+    slackening.robot.torque_off = slow  # type: ignore[method-assign]
+    slackening.seconds(0.2).pilot.torque_off()
+    assert entered.wait(5.0)
+    threading.Timer(0.1, go_on.set).start()
+    slackening.pilot.close()
+    assert slackening.robot.calls.count("torque off") == 1
+
+
+def test_a_stop_that_was_taken_over_from_the_rig_before_is_owed_too() -> None:
+    config = Config()
+    config = config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": True})})
+    bench = Bench(config, LeftOver(Fault(Cause.STOP_PRESSED), True))
+    _lose_the_bus(bench)
+    bench.turn(3).done().turn()
+    assert "torque off" in bench.robot.calls
     bench.pilot.close()
 
 

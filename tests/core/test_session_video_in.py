@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from app.taken_frames import take_frames
-from core.devices import DeviceError, EndOfStream
+from core.devices import DamagedPicture, DeviceError, EndOfStream
 from core.images import read_image
 from core.session.video_in import open_video, upright
 from core.study.annotations import AnnotationError
@@ -65,6 +65,19 @@ def greys(path: Path) -> list[tuple[float, int]]:
         video.close()
 
 
+def film_of_greys(path: Path, codec: str, frames: int = 30, **options: str) -> Path:
+    """A longer one, without a corner."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=10, options=options)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.codec_context.qmin = stream.codec_context.qmax = 2
+        for index in range(frames):
+            image = np.full((48, 64, 3), 10 + 8 * index, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode(None))
+    return path
+
+
 @pytest.mark.parametrize(("codec", "between"), [("libx264", "3"), ("libx264", "0"), ("mpeg4", "2")])
 def test_an_avi_gives_its_pictures_in_order_and_none_is_damaged(codec: str, between: str, tmp_path: Path) -> None:
     """It counts its packets as they are decoded: with pictures that are made from later ones nearly all were called damaged."""
@@ -73,10 +86,50 @@ def test_an_avi_gives_its_pictures_in_order_and_none_is_damaged(codec: str, betw
     assert [grey for _, grey in found] == pytest.approx([10 + 15 * index for index in range(12)], abs=4)
 
 
-def test_pictures_are_taken_of_an_avi_by_their_place(tmp_path: Path) -> None:
-    path = film(tmp_path / "film.avi", bf="3", g="4")
-    taken = take_frames(path, lambda count: range(0, count, 5), lambda _problems: None)
-    assert [int(read_image(picture)[20:, 20:].mean()) for picture in taken] == pytest.approx([10, 85, 160], abs=4)
+@pytest.mark.parametrize(
+    ("codec", "more"), [("libx264", {"flags": "-cgop", "x264-params": "open-gop=1"}), ("libx264", {}), ("mpeg4", {})]
+)
+def test_every_picture_is_taken_of_an_avi_and_none_is_a_neighbours(codec: str, more: dict[str, str], tmp_path: Path) -> None:
+    path = film_of_greys(tmp_path / "film.avi", codec, bf="2", g="6", **more)
+    problems: list[str] = []
+    taken = take_frames(path, range, problems.extend)
+    assert [int(read_image(picture).mean()) for picture in taken] == pytest.approx([10 + 8 * index for index in range(30)], abs=3)
+    assert problems == []
+
+
+def damage(path: Path, place: int) -> None:
+    """Nothing but zeros in one packet."""
+    with av.open(str(path)) as container:
+        packet = [packet for packet in container.demux(video=0) if packet.size][place]
+        content, position = bytes(packet), packet.pos
+    assert position is not None
+    data = path.read_bytes()
+    begin = data.index(content, position)
+    path.write_bytes(data[:begin] + bytes(len(content)) + data[begin + len(content) :])
+
+
+@pytest.mark.parametrize("place", [7, 11, 12, 13, 20])
+def test_damage_in_an_avi_loses_no_count_and_moves_no_whole_picture(place: int, tmp_path: Path) -> None:
+    """The packets that gave no picture were passed over, and all that followed came too early."""
+    path = film_of_greys(tmp_path / "film.avi", "libx264", bf="2", g="6")
+    damage(path, place)
+    whole: list[tuple[float, float]] = []
+    damaged, video = 0, VideoFile(path, paced=False)
+    video.open()
+    while True:
+        try:
+            frame = video.read(1.0)
+        except DamagedPicture:
+            damaged += 1
+            continue
+        except EndOfStream:
+            break
+        assert frame is not None
+        whole.append((frame.captured_s, float(frame.image.mean())))
+    video.close()
+    assert len(whole) + damaged == 30
+    assert 1 <= damaged <= 12
+    assert [grey for _, grey in whole] == pytest.approx([10 + 80 * time_s for time_s, _ in whole], abs=3)
 
 
 def test_a_video_that_nothing_here_can_decode_is_one_clear_line(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from core.session import files as session_files
 from core.session import writer as session_writer
 from core.session.events import Event, EventKind, event_of_target
 from core.session.files import SessionFiles, is_being_written
-from core.session.manifest import About, read_manifest, write_manifest
+from core.session.manifest import About, SessionError, read_manifest, write_manifest
 from core.session.reader import SessionReader
 from core.session.record_status import faults_between
 from core.session.ring import EncodedFrame, Ring
@@ -846,8 +846,16 @@ def test_a_drive_without_locks_can_be_recorded_on(tmp_path: Path, monkeypatch: p
         raise OSError(errno.ENOLCK, "No locks available")
 
     monkeypatch.setattr(session_files.fcntl, "flock", no_locks)
+    files = SessionFiles(tmp_path / "under way", ABOUT, QUICK, first_s=1000.0, now_s=1000.0)
+    assert is_being_written(files.folder), "it has just been written to"
+    with pytest.raises(SessionError, match="is being recorded"):
+        session_files.add_event(files.folder, Event(1000.0, EventKind.NOTE, "kink"))
+    os.utime(files.folder / session_files.FRAMES, (0.0, 0.0))
+    assert not is_being_written(files.folder), "it was cut"
+    assert files.close("the end", 0) == ""
     session = record(tmp_path, ticks(3))
     assert read_manifest(session).closed
+    assert not is_being_written(session)
     assert session_files.add_event(session, Event(1000.0, EventKind.NOTE, "kink")).text == "kink"
 
 
