@@ -91,9 +91,11 @@ def run_ablation(plan: Plan, *, as_json: bool) -> None:
             seed=plan.seed,
         )
     result["interrupted"] = interrupted
-    _show(result, as_json, plan.out)
-    if plan.out is not None and frames:
-        _write_frames(plan.out / "ablation_frames.csv", frames)
+    try:
+        _tell(result, as_json)
+    finally:  # neither costs the other
+        if plan.out is not None:
+            _write(result, frames, plan.out)
     if interrupted:
         raise KeyboardInterrupt
 
@@ -202,7 +204,7 @@ def _described(
     return {"frames": len(scores[0]), "expected": len(expected), "drawn": drawn, "rows": rows}
 
 
-def _show(result: dict[str, Any], as_json: bool, out: Path | None) -> None:
+def _tell(result: dict[str, Any], as_json: bool) -> None:
     if as_json:
         sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
     else:
@@ -211,13 +213,16 @@ def _show(result: dict[str, Any], as_json: bool, out: Path | None) -> None:
             console.print(value_table(result), difference_table(result))
         if result.get("stream"):
             console.print(stream_table(result["stream"]))
-    if out is None:
-        return
+
+
+def _write(result: dict[str, Any], frames: list[dict[str, Any]], out: Path) -> None:
     try:
         (out / "ablation.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         (out / "ablation.md").write_text(markdown(result), encoding="utf-8")
     except OSError as error:
         raise AblationError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
+    if frames:
+        _write_frames(out / "ablation_frames.csv", frames)
 
 
 def _write_frames(path: Path, rows: list[dict[str, Any]]) -> None:

@@ -9,6 +9,7 @@ from functools import partial
 from PySide6.QtCore import QEvent, QObject
 from PySide6.QtWidgets import QMessageBox
 
+from app import theme
 from app.annotation_desk import AnnotationDesk
 from app.annotation_tool import Tool
 from app.annotator_menus import add_annotator_menus
@@ -36,6 +37,7 @@ class AnnotatorWindow(WindowFrame):
 
     def __init__(self, desk: AnnotationDesk, who: str) -> None:
         super().__init__()
+        self.setMinimumWidth(theme.MIN_WIDE_PX)
         self._desk = desk
         desk.setParent(self)
         self._training: TrainingDialog | None = None

@@ -233,12 +233,14 @@ def run_accuracy(
         without = [] if true_masks else trained_without(model_folder(config.perception.segmentation.model))
         figures |= summarise_looks(scores, looks, without, confident_from)
     part = f", interrupted after {len(scores)} of {len(samples)} frames" if interrupted else ""
-    _print(figures, as_json, f"accuracy on {folder}{part}")
+    try:
+        _print(figures, as_json, f"accuracy on {folder}{part}")
+    finally:  # neither costs the other
+        if store and not interrupted:
+            described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
+            write_figures(model_folder(config.perception.segmentation.model), described | figures)
     if interrupted:
         raise KeyboardInterrupt
-    if store:
-        described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
-        write_figures(model_folder(config.perception.segmentation.model), described | figures)
 
 
 def _print(result: dict[str, Any], as_json: bool, title: str) -> None:

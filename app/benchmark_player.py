@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import signal
 import tempfile
 import time
 from collections.abc import Callable
@@ -38,7 +39,10 @@ def measure_player(config: Config, minutes: float) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="lumenpilot_benchmark_") as parent:
         child = multiprocessing.get_context("spawn").Process(target=_make_session, args=(config, minutes, parent))
         child.start()
-        child.join()
+        try:
+            child.join()
+        finally:
+            child.terminate()  # nothing runs any more unless it was interrupted
         if child.exitcode:
             raise UserError(f"{parent}: the session could not be made (exit code {child.exitcode}); is the disk full?")
         (folder,) = Path(parent).iterdir()
@@ -47,6 +51,7 @@ def measure_player(config: Config, minutes: float) -> dict[str, Any]:
 
 
 def _make_session(config: Config, minutes: float, parent: str) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
     from core.perception.pipeline import open_pipeline
     from core.session.files import SessionFiles
     from core.session.manifest import about_rig

@@ -18,7 +18,7 @@ from core.config import Config, TwinConfig
 from core.perception.pipeline import Pipeline, open_pipeline
 from core.session.manifest import about_rig
 from core.session.writer import SessionWriter
-from core.study.bootstrap import RESAMPLES
+from core.study.bootstrap import MIN_GROUPS, RESAMPLES
 from core.types import Frame, Image, Tick
 
 FRAMES_PER_SECOND = 30.0
@@ -109,11 +109,13 @@ def _stream(pipeline: Pipeline, images: Sequence[Image], count: int, first: int,
 
 
 def _slowdown(without: list[list[float]], recorded: list[list[float]]) -> dict[str, Any]:
-    """Ratio of the medians, with a percentile bootstrap over the blocks, drawn in pairs."""
+    """Ratio of the medians, with a percentile bootstrap over the blocks, drawn in pairs; None as interval of too few."""
     plain, beside = np.array(without), np.array(recorded)
+    ratio = float(np.median(beside) / np.median(plain))
+    if len(plain) < MIN_GROUPS:
+        return {"slowdown": round(ratio, 3), "slowdown_ci95": None}
     rng = np.random.default_rng(0)
     draws = rng.integers(0, len(plain), (RESAMPLES, len(plain)))
     ratios = np.median(beside[draws].reshape(RESAMPLES, -1), axis=1) / np.median(plain[draws].reshape(RESAMPLES, -1), axis=1)
     low, high = np.percentile(ratios, (2.5, 97.5))
-    ratio = float(np.median(beside) / np.median(plain))
     return {"slowdown": round(ratio, 3), "slowdown_ci95": [round(float(low), 3), round(float(high), 3)]}

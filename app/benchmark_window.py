@@ -28,7 +28,7 @@ class _Readings:
     first_shown_s: float | None = None
     dropped: int = 0
     blocks: list[tuple[float, float, str]] = field(default_factory=list)
-    bus_p99_ms: float = 0.0
+    bus_p99_ms: float | None = None
     latency_ms: list[float] = field(default_factory=list)
     servo_ms: list[float] = field(default_factory=list)
     memory_mb: list[tuple[float, float]] = field(default_factory=list)
@@ -87,7 +87,7 @@ class WindowWatch(QObject):
         if block_ms > max((ms for _, ms, _ in seen.blocks), default=0.0):
             seen.blocks.append((at_s, block_ms, view.mode.value if view is not None else ""))
         if bus is not None and at_s >= _WARM_UP_S:
-            seen.bus_p99_ms = max(seen.bus_p99_ms, bus.times.period_p99_ms)
+            seen.bus_p99_ms = max(seen.bus_p99_ms or 0.0, bus.times.period_p99_ms)
         seen.memory_mb.append((at_s, self._process.memory_info().rss / 2**20))
 
     def end(self) -> None:
@@ -114,7 +114,7 @@ class WindowWatch(QObject):
             "capture_to_screen_ms": quantiles(seen.latency_ms),
             "capture_to_servo_ms": quantiles(seen.servo_ms) if seen.servo_ms else None,
             "driven_by_program_s": round(self._operator.driven_s, 1),
-            "bus_cycle_p99_ms": round(seen.bus_p99_ms, 1),
+            "bus_cycle_p99_ms": round(seen.bus_p99_ms, 1) if seen.bus_p99_ms is not None else None,
             "gui_max_block_ms": round(seen.blocks[-1][1], 1) if seen.blocks else 0.0,
             "gui_longer_blocks": [{"at_s": round(at_s, 1), "ms": round(ms, 1), "mode": mode} for at_s, ms, mode in seen.blocks],
             "memory_mb": {"after_10_s": round(steady[0][1], 1), "end": round(steady[-1][1], 1)},

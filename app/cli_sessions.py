@@ -45,7 +45,7 @@ def replay(
     diff: Annotated[bool, typer.Option("--diff", help="also the frames that changed most")] = False,
     out: Annotated[
         Path | None,
-        typer.Option(help="folder for replay.json, frames.jsonl and the figure as SVG and PDF; of several sessions a folder each"),
+        typer.Option(help="folder for replay.json, changes.jsonl and the figure as SVG and PDF; of several sessions a folder each"),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, max=256, help="processes, which share the sessions")] = 1,
     scheduler: SchedulerOption = None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import logging
+import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -22,6 +23,9 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
+_PORT = re.compile(r":\d{1,5}/?$")
+
+
 class ClusterError(UserError):
     """The cluster cannot be used; the message says what to do."""
 
@@ -34,6 +38,8 @@ def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequen
     ClusterError
         No scheduler answers, it has no workers, or a worker cannot run this code or has other code.
     """
+    if not _PORT.search(address):  # of this the client makes its own error, and waits for it as for an answer
+        raise ClusterError(f"--scheduler {address}: says no port; give it as HOST:PORT, as the scheduler tells it")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
     distributed = importlib.import_module("distributed")  # a second that only who asks for it pays
     try:

@@ -12,6 +12,7 @@ from core.config_schema import Effect, schema
 from core.control.alerts import ALERTS
 from core.control.faults import Cause
 from core.control.gate_checks import RejectReason
+from core.control.joint_limits import Limit
 from core.control.modes import Hindrance
 from core.types import Reason
 
@@ -391,12 +392,18 @@ TEMPLATES = (
     "webcam {camera} is not there; webcams: {paths}: plug it in, or set camera.device",
     "the camera's picture is {kind} {shape}, not 8-bit RGB: set its colour format",
     "{path}: cannot be read as a video ({why})",
-    "{path}: has no video in it",
     "the bench twin stopped ({why}): start the rig again (F5)",
     "the bench twin cannot be started ({why}): free memory, then try again",
     "driving stopped by an unexpected {kind}: {why}; start the rig again",
     "{what} failed ({kind}: {why}): start the rig again",
     "servo {a}: {miss}, {b} times: check its supply and cable, and that no two servos have the same id",
+    "no answer",
+    "damaged answer",
+    "a late answer may still come",
+    "no answer, behind two silent servos",
+    # names of rigs
+    "a rig's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit",
+    "a rig cannot be called {name}: choose another name",
     # the settings file
     "{path}: cannot be read ({why}); the defaults are used",
     "{path}: {why}; the defaults are used",
@@ -419,6 +426,8 @@ TEMPLATES = (
 
 
 COMPOSED = (
+    "{path}: has no video in it",
+    "{path}: has a video of a kind that cannot be decoded here",
     "{path}: {key}: unknown key, kept but not used",
     "above {a} and at most {rest}",
     "above {a} and below {rest}",
@@ -430,12 +439,12 @@ COMPOSED = (
     "at most {rest}",
     "below {rest}",
 )
-"""Ranges of settings and a line about their file, which the core puts together from parts."""
+"""Lines about files and ranges of settings, which the core puts together from parts."""
 
 
 def texts_of_tables() -> Iterator[str]:
     """Texts that stand in tables of the core: reasons, every alert, every setting with its section and when it acts."""
-    for words in (Reason, Cause, Hindrance, RejectReason, Effect):
+    for words in (Reason, Cause, Hindrance, RejectReason, Limit, Effect):
         yield from words
     for spec in ALERTS.values():
         yield from (spec.text, spec.what_to_do)

@@ -32,10 +32,13 @@ def run_faults(only: list[int], out: Path | None, *, quick: bool, as_json: bool)
         results = list(_with_progress(cases, live=not quick, as_json=as_json))
     finally:
         logging.disable(logging.NOTSET)
-    if not as_json:
-        sys.stdout.write(f"{summary_of(results)}\n")
-    if out is not None and results:
-        write_whole(out, page_of(results, live=not quick).encode())
+    try:
+        if not as_json:
+            sys.stdout.write(f"{summary_of(results)}\n")
+            sys.stdout.flush()
+    finally:  # neither costs the other
+        if out is not None and results:
+            write_whole(out, page_of(results, live=not quick).encode())
     if len(results) < len(cases):
         raise KeyboardInterrupt
     return 0 if all(result.seen.ok for result in results) else 1

@@ -10,6 +10,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtGui import QKeyEvent
 
+from app import theme
 from app.decode_thread import Decoded, DecodeThread
 from app.known_session import KnownSession
 from app.language import tr
@@ -43,6 +44,7 @@ class PlayerWindow(WindowFrame):
 
     def __init__(self, reader: SessionReader, config: Config, against: Path | None = None) -> None:
         super().__init__()
+        self.setMinimumWidth(theme.MIN_WIDE_PX)
         self._reader = reader
         self._clock = PlayClock()
         self._jump_kind = JumpKind.STATE

@@ -15,10 +15,12 @@ from app.perceive_command import _make_folder
 from app.replay_session import MOST_SHOWN, ReplayOptions, change_to_json, replay_session
 from core.errors import UserError
 from core.names import name_as_text, name_of
+from core.session.manifest import FRAMES, MANIFEST
 from core.session.reader import check_is_session
 from core.study.replay import Change
 
-_WRITTEN = ("replay.json", "frames.jsonl", "replay.svg", "replay.pdf")
+_FRAMES = "changes.jsonl"
+_WRITTEN = ("replay.json", _FRAMES, "replay.svg", "replay.pdf")
 """What ``--out`` gets."""
 
 
@@ -58,6 +60,8 @@ def _watched(count: int) -> Iterator[Callable[[], bool]]:
 
 def prepare_out(out: Path) -> None:
     """Make the folder; raises UserError where it is a session, or cannot be written."""
+    if (out / "replay.json").is_file() and not (out / MANIFEST).exists():
+        (out / FRAMES).unlink(missing_ok=True)  # what earlier versions wrote there made the folder look like a session
     check_no_session(out, "--out")
     _make_folder(out)
 
@@ -69,7 +73,7 @@ def write_replay(out: Path, name: str, changes: Sequence[Change], result: dict[s
 
     try:
         (out / "replay.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        with (out / "frames.jsonl").open("w", encoding="utf-8") as file:
+        with (out / _FRAMES).open("w", encoding="utf-8") as file:
             file.writelines(json.dumps(change_to_json(change), allow_nan=False) + "\n" for change in changes)
         figure = draw_replay(changes, result["states"]["matrix"], name)
         for ending in (".svg", ".pdf"):

@@ -24,10 +24,12 @@ def run_soak(hours: float, seed: int, out: Path | None, *, true_masks: bool, as_
     seconds = 3600.0 * hours
     with _SampleFile(out) as file:
         summary = _soak(seconds, seed, file, true_masks=true_masks)
-        # Told first: what cannot be written must not cost what hours have shown.
-        sys.stdout.write((json.dumps(summary) if as_json else _text(summary)) + "\n")
-        sys.stdout.flush()
-        file.add({"summary": summary})
+        # What cannot be told or written must not cost what hours have shown.
+        try:
+            sys.stdout.write((json.dumps(summary) if as_json else _text(summary)) + "\n")
+            sys.stdout.flush()
+        finally:
+            file.add({"summary": summary})
     if summary["interrupted"]:
         raise KeyboardInterrupt
     if summary["ok"] and file.problem:

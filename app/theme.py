@@ -17,6 +17,7 @@ from app import palette
 from core.config import RESOURCES
 
 MIN_WINDOW = (1100, 660)  # fits a screen of 720 lines with title bar and task bar
+MIN_WIDE_PX = 1272  # of windows with one long row of controls: fits a screen of 1280 columns
 START_WINDOW = (1600, 900)
 _FRAME = (8, 40)  # room for the title bar and borders that the desktop adds
 GAP = 10

@@ -61,8 +61,8 @@ def _one_thread_each() -> Iterator[None]:
 
 def _start_worker() -> None:
     """Ctrl-C is the parent's business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     import cv2
 
     cv2.setNumThreads(1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QLabel, QWidget
 
@@ -9,6 +11,7 @@ from app import theme
 from app.language import tr_text
 
 _SHOWN_MS = 6000
+_AFTER = re.compile(r"[/_-]")
 
 
 class Toast(QLabel):
@@ -35,7 +38,7 @@ class Toast(QLabel):
             self,
             f"background: @RAISED; color: @TEXT; border: 1px solid {edge}; border-radius: 8px; padding: 8px 16px; font-size: 14px;",
         )
-        self.setText(text)
+        self.setText(_AFTER.sub("\\g<0>\N{ZERO WIDTH SPACE}", text))  # where a long name of a file may be broken
         self.setAccessibleName(text)
         self._place()
         self.show()

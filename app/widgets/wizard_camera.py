@@ -152,7 +152,7 @@ class CameraPage(WizardPage):
         try:
             check_rig_name(self.rig_name)
         except ValueError as error:
-            text = str(error)
+            text = tr_text(str(error))
             return f"{text[0].upper()}{text[1:]}."
         return ""
 

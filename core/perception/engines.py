@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
+import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -72,9 +73,26 @@ def _core() -> Any:
     """
     # Importing openvino reports itself over the network; with its telemetry package blocked it takes a silent stub instead.
     sys.modules["openvino_telemetry"] = None  # type: ignore[assignment]
-    import openvino
+    with _interrupts_kept():
+        import openvino
 
     return openvino.Core()
+
+
+@contextlib.contextmanager
+def _interrupts_kept() -> Iterator[None]:
+    """Ctrl-C is heard afterwards: in the middle of such an import it is swallowed, or leaves half a module."""
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
+        yield
+        return
+    came: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _frame: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 class OpenVinoSegmenter:

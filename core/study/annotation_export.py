@@ -98,7 +98,8 @@ def export_training_set(
         rows = [json.dumps(row, allow_nan=False) for row in _truth_rows(measured, complete, here, stems)]
         (out / "truth.jsonl").write_text("\n".join(rows) + "\n", encoding="utf-8")
     except OSError as error:
-        raise AnnotationError(f"{error.filename or out}: cannot be written ({error.strerror}); choose another --out") from None
+        where = error.filename2 or error.filename or out  # a copy that fails names first what was to be copied
+        raise AnnotationError(f"{where}: cannot be written ({error.strerror}); choose another --out") from None
     return len(complete), problems
 
 

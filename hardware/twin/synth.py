@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -248,16 +249,25 @@ def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, o
     elif missing:
         # Spawned, not forked: physics and OpenCV own threads that a fork would cut off.
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
+        others = set(multiprocessing.active_children())
+        with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
             jobs = [pool.submit(_write_episode, plan, episode) for episode in missing]
             try:
                 for job in as_completed(jobs):
                     on_progress(job.result())
             finally:
-                # Nothing is left to cancel unless it was interrupted or an episode failed.
+                # Nothing is left to cancel or to end unless it was interrupted or an episode failed.
                 pool.shutdown(wait=False, cancel_futures=True)
+                for worker in set(multiprocessing.active_children()) - others:
+                    worker.terminate()
     rows = [_episode_file(plan, episode).read_bytes() for episode in range(plan.episodes)]
     write_whole(plan.out / "truth.jsonl", b"".join(rows))
+
+
+def _start_worker() -> None:
+    """Ctrl-C is the parent's business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
 
 
 def _prepare(plan: SynthPlan) -> None:

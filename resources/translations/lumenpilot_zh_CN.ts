@@ -2347,11 +2347,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
-        <source>{path}: has no video in it</source>
-        <translation>{path}：其中没有视频</translation>
-    </message>
-    <message>
-        <location filename="../../app/core_texts.py"/>
         <source>the bench twin stopped ({why}): start the rig again (F5)</source>
         <translation>数字孪生台架停止（{why}）：请重新启动装置 (F5)</translation>
     </message>
@@ -2374,6 +2369,31 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>servo {a}: {miss}, {b} times: check its supply and cable, and that no two servos have the same id</source>
         <translation>舵机 {a}：{miss}，{b} 次：检查其供电和线缆，并确认没有两个舵机的 id 相同</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>damaged answer</source>
+        <translation>应答损坏</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>a late answer may still come</source>
+        <translation>迟到的应答仍可能到来</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>no answer, behind two silent servos</source>
+        <translation>无应答，排在两个无应答的舵机之后</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>a rig's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit</source>
+        <translation>台架名称由 1 至 60 个字母、数字或 - _ . ( ) + 组成，并以字母或数字开头</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>a rig cannot be called {name}: choose another name</source>
+        <translation>台架不能叫 {name}：请换一个名称</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -2454,6 +2474,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/core_texts.py"/>
         <source>take the algorithm's {what} mask</source>
         <translation>采用算法的{what}掩膜</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: has no video in it</source>
+        <translation>{path}：其中没有视频</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>{path}: has a video of a kind that cannot be decoded here</source>
+        <translation>{path}：其中的视频格式在此无法解码</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>
@@ -8676,6 +8706,41 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/core_texts.py"/>
         <source>joint is not where it was sent</source>
         <translation>关节不在指令位置</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>bumpless start</source>
+        <translation>无扰起步</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>end of the envelope</source>
+        <translation>行程终点</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>near the end of the envelope</source>
+        <translation>接近行程终点</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>speed</source>
+        <translation>速度</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>acceleration</source>
+        <translation>加速度</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>step from the measured position</source>
+        <translation>与实测位置的步长</translation>
+    </message>
+    <message>
+        <location filename="../../app/core_texts.py"/>
+        <source>the other servo of the same catheter</source>
+        <translation>同一导管的另一个舵机</translation>
     </message>
     <message>
         <location filename="../../app/core_texts.py"/>

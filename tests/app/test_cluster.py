@@ -163,8 +163,13 @@ def test_a_worker_of_another_version_is_refused(address: str, tmp_path: Path, mo
 
 def test_no_scheduler_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "_TIMEOUT", "200ms")
-    for nowhere in ("tcp://127.0.0.1:9", "no such name", ""):
-        with pytest.raises(ClusterError, match="no Dask scheduler answers there") as caught:
+    for nowhere, said in (
+        ("tcp://127.0.0.1:9", "no Dask scheduler answers there"),
+        ("no such name", "says no port; give it as HOST:PORT"),
+        ("localhost", "says no port"),
+        ("", "says no port"),
+    ):
+        with pytest.raises(ClusterError, match=said) as caught:
             list(over_cluster(nowhere, abs, [1]))
         assert "\n" not in str(caught.value)
 

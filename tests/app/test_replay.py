@@ -89,7 +89,7 @@ def test_all_files_tell_the_same(replayed: tuple[dict[str, object], Path]) -> No
     assert all(second["captured_s"] > first["captured_s"] for first, second in zip(lines, lines[1:], strict=False))
     assert lines[0].keys() >= {"frame", "head_xy", "robot_path_xy", "theta_signed_deg", "state", "reason", "latency_ms"}
     assert json.loads((out / "out" / "replay.json").read_text()) == result
-    frames = [json.loads(line) for line in (out / "out" / "frames.jsonl").read_text().splitlines()]
+    frames = [json.loads(line) for line in (out / "out" / "changes.jsonl").read_text().splitlines()]
     assert [frame["after"]["theta_signed_deg"] for frame in frames] == [line["theta_signed_deg"] for line in lines]
     assert (out / "out" / "replay.svg").read_text().startswith("<?xml")
     assert (out / "out" / "replay.pdf").read_bytes().startswith(b"%PDF")
@@ -159,7 +159,7 @@ def test_lost_pictures_are_counted_and_the_rest_goes_on(tmp_path: Path, capsys: 
     run_replay(options(session), out, as_json=True)
     told = json.loads(capsys.readouterr().out)
     assert told["frames"] == 2
-    frames = [json.loads(line) for line in (out / "frames.jsonl").read_text().splitlines()]
+    frames = [json.loads(line) for line in (out / "changes.jsonl").read_text().splitlines()]
     assert [frame["row"] for frame in frames] == [0, 2], "as in the session, so that other tables of it can be joined"
     assert any("line 2" in problem for problem in told["problems"])
 

@@ -91,7 +91,7 @@ def test_each_has_its_files(told: tuple[list[dict[str, Any]], Path, str]) -> Non
     for result in (golden, small):
         own = out / Path(result["session"]).name
         assert json.loads((own / "replay.json").read_text()) == result
-        assert len((own / "frames.jsonl").read_text().splitlines()) == result["frames"]
+        assert len((own / "changes.jsonl").read_text().splitlines()) == result["frames"]
         assert (own / "replay.svg").is_file()
 
 
