@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import errno
+import io
 import json
 import os
 import shutil
@@ -30,6 +32,20 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def done(frames: Path) -> subprocess.CompletedProcess[str]:
     return run("ablation", frames, "--true-masks", "--json", "--out", frames.parent / "out")
+
+
+class _Full(io.StringIO):
+    def write(self, _text: str) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_results_outlive_a_broken_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing was written to --out where nothing could be told."""
+    monkeypatch.setattr(command, "measure_streams", lambda *_args, **_more: (None, False))
+    monkeypatch.setattr("sys.stdout", _Full())
+    with pytest.raises(OSError, match="No space left"):
+        run_ablation(Plan(None, out=tmp_path, sequence=1, seed=7, true_masks=True), as_json=True)
+    assert json.loads((tmp_path / "ablation.json").read_text())["seed"] == 7
 
 
 def test_json_is_one_object_with_a_row_for_each_step_on_and_off(done: subprocess.CompletedProcess[str]) -> None:

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from statistics import median
 
 import pytest
 
-from app.replay_command import run_replay
+from app.replay_command import prepare_out, run_replay
 from app.replay_figure import draw_replay
 from app.replay_session import ReplayOptions, change_to_json, model_note, replay_config, replay_frames
 from app.replayed import Replayed
@@ -25,7 +26,7 @@ from core.config import Config, RigConfig
 from core.errors import UserError
 from core.names import name_of
 from core.session.manifest import MANIFEST, read_manifest
-from core.session.reader import SessionReader
+from core.session.reader import SessionReader, check_is_session
 from core.study.replay import Change, Seen
 from core.study.replay_tally import Tally
 from core.types import Frame, Point, PoseState, Reason, Refusal, Scene
@@ -93,6 +94,25 @@ def test_all_files_tell_the_same(replayed: tuple[dict[str, object], Path]) -> No
     assert [frame["after"]["theta_signed_deg"] for frame in frames] == [line["theta_signed_deg"] for line in lines]
     assert (out / "out" / "replay.svg").read_text().startswith("<?xml")
     assert (out / "out" / "replay.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_what_a_replay_has_written_may_be_written_over_and_is_no_session(
+    replayed: tuple[dict[str, object], Path], tmp_path: Path
+) -> None:
+    """Its frames had the name of a session's: the same command was refused the second time."""
+    again = Path(shutil.copytree(replayed[1] / "out", tmp_path / "again"))
+    prepare_out(again)
+    with pytest.raises(UserError):
+        check_is_session(again)
+    (again / "frames.jsonl").write_text("{}\n")  # as earlier versions called it
+    prepare_out(again)
+    with pytest.raises(UserError):
+        check_is_session(again)
+    session = Path(shutil.copytree(GOLDEN, tmp_path / "session"))
+    (session / "replay.json").write_text("{}\n")
+    with pytest.raises(UserError, match="is a recorded session"):
+        prepare_out(session)
+    assert (session / "frames.jsonl").is_file()
 
 
 def options(session: Path, **changes: object) -> ReplayOptions:
