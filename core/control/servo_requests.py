@@ -6,7 +6,7 @@ import contextlib
 import logging
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 
 from core.control.guarded_robot import GuardedRobot
 from core.control.health import ServosChecked, ServosOff
@@ -36,7 +36,8 @@ class ServoRequests:
         self._lock = threading.Lock()
         self._stops = 0
         self._offs = self._offs_done = 0
-        self._blocked = self._let_go = self._is_letting_go = False
+        self._blocked = self._let_go = False
+        self._letting_go: Future[None] | None = None
         self._waiting: list[str] = []
 
     @property
@@ -83,15 +84,15 @@ class ServoRequests:
         with self._lock:
             self._offs += 1
             asked = self._offs
-        self._request("switching the torque off", lambda: self._switch_off(asked, is_lost=is_lost))
+        self._letting_go = self._request("switching the torque off", lambda: self._switch_off(asked, is_lost=is_lost))
 
     def close(self) -> None:
         """Let nothing more begin but a torque-off that waits; one that is under way is waited for. All else that is ends by itself
         when the robot is closed."""
         self.stopped()
-        with self._lock:
-            is_letting_go = self._is_letting_go
-        self._worker.shutdown(wait=is_letting_go, cancel_futures=True)
+        self._worker.shutdown(wait=False, cancel_futures=True)
+        if self._letting_go is not None and not self._letting_go.cancelled():
+            wait([self._letting_go])
         with self._lock:
             owes_off = self._offs_done < self._offs
         if owes_off:
@@ -100,7 +101,7 @@ class ServoRequests:
             except DeviceError as error:
                 _log.error("the torque is not proven to be off: %s", error)
 
-    def _request(self, what: str, do: Callable[[], None]) -> None:
+    def _request(self, what: str, do: Callable[[], None]) -> Future[None] | None:
         def run() -> None:
             try:
                 do()
@@ -115,9 +116,10 @@ class ServoRequests:
         with self._lock:
             self._waiting.append(what)
         try:
-            self._worker.submit(run)
+            return self._worker.submit(run)
         except RuntimeError:  # closed already
             self._ended(what)
+            return None
 
     def _ended(self, what: str) -> None:
         with self._lock:
@@ -143,19 +145,13 @@ class ServoRequests:
 
     def _switch_off(self, asked: int, *, is_lost: bool) -> None:
         """Also where the bus process is gone, and where not all servos are there to connect: no reason to let the others pull."""
-        with self._lock:
-            self._is_letting_go = True
-        try:
-            self._post(ServosOff())
-            with contextlib.suppress(DeviceError):  # nor is a hold that fails
-                if self._robot.failure is not None:
-                    self._robot.connect()
-                elif not is_lost:
-                    self._robot.disarm()
-            self._robot.torque_off()
-        finally:
-            with self._lock:
-                self._is_letting_go = False
+        self._post(ServosOff())
+        with contextlib.suppress(DeviceError):  # nor is a hold that fails
+            if self._robot.failure is not None:
+                self._robot.connect()
+            elif not is_lost:
+                self._robot.disarm()
+        self._robot.torque_off()
         with self._lock:
             self._offs_done = asked
             self._let_go = self._let_go or self._robot.failure is not None  # no report tells it
