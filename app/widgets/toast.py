@@ -25,6 +25,7 @@ class Toast(QLabel):
         self.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._lift_px = 0
+        self._message = ""
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.timeout.connect(self.hide)
@@ -38,12 +39,17 @@ class Toast(QLabel):
             self,
             f"background: @RAISED; color: @TEXT; border: 1px solid {edge}; border-radius: 8px; padding: 8px 16px; font-size: 14px;",
         )
+        self._message = text
         self.setText(_AFTER.sub("\\g<0>\N{ZERO WIDTH SPACE}", text))  # where a long name of a file may be broken
         self.setAccessibleName(text)
         self._place()
         self.show()
         self.raise_()
         self._timer.start(_SHOWN_MS)
+
+    def text(self) -> str:
+        """The message as it was said."""
+        return self._message
 
     def lift(self, height_px: int) -> None:
         """Stay so far above the lower edge, where something else lies."""
