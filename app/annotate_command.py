@@ -94,7 +94,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
 
 
 def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
-    from app.annotate_evaluation import groups_of
+    from app.annotate_evaluation import groups_of_answered
     from core.study.annotation_measures import measured_alike
     from core.study.annotation_report import agreement_report, choose_study, group_notes, rater_notes, write_measures
 
@@ -103,10 +103,7 @@ def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
         images = store.images()
         annotations, notes = measured_alike(of_rater(annotations, options.study.rater), images, config.perception)
         names = {sha256: image.name for sha256, image in images.items()}
-        answered = {one.key.sha256 for one in annotations}  # what nobody has answered says nothing of who is alike
-        paths = {sha256: store_path.parent / name for sha256, name in names.items() if sha256 in answered}
-        places = groups_of(list(paths.values()))
-        groups = {sha256: places[path] for sha256, path in paths.items()}
+        groups = groups_of_answered(annotations, {sha256: store_path.parent / name for sha256, name in names.items()})
         tell_problems([*store.problems, *rater_notes(annotations), *group_notes(annotations, groups), *notes])
     study = annotations[0].key.study
     report = {"study": study} | agreement_report(annotations, names, options.study.seed or 0, groups)

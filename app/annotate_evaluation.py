@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -92,6 +92,13 @@ def groups_of(pictures: Sequence[Path]) -> dict[Path, str | None]:
     return {path: names[recordings[path.parent] or path.parent] for path in pictures}
 
 
+def groups_of_answered(answers: Iterable[StoredAnnotation], paths: Mapping[str, Path]) -> dict[str, str | None]:
+    """The group of each picture with one of these answers, by SHA-256: what nobody has answered says nothing of who is alike."""
+    answered = {one.key.sha256 for one in answers} & paths.keys()
+    places = groups_of([paths[sha256] for sha256 in answered])
+    return {sha256: places[paths[sha256]] for sha256 in answered}
+
+
 def _names_of(folders: set[Path]) -> dict[Path, str]:
     """Each folder from the one on that they have in common: sessions may all be called alike inside."""
     common = Path(os.path.commonpath([folder.absolute() for folder in folders]))
@@ -106,9 +113,6 @@ def raters_agreement(done: Sequence[StoredAnnotation], images: Sequence[FoundIma
     raters = {one.key.rater for one in done}
     if len(raters) < 2 and all(one.key.repeat == 1 for one in done):
         return None
-    answered = {one.key.sha256 for one in done}
-    here = {image.sha256: image.path for image in images if image.sha256 in answered}  # others say nothing of who is alike
-    places = groups_of(list(here.values()))
-    groups = {sha256: places[path] for sha256, path in here.items()}
+    groups = groups_of_answered(done, {image.sha256: image.path for image in images})
     report = agreement_report(done, {image.sha256: name_as_text(image.path.name) for image in images}, seed, groups)
     return {"study": done[0].key.study} | report

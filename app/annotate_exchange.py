@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from app.annotate_options import AnnotateOptions
 from app.annotate_sources import FRAMES, asked_files, asked_rater, listed_images, of_rater, read_annotated, tell_problems
+from app.outputs import check_can_write
 from core.config import Config
 from core.study.annotation_records import ItemKey
 from core.study.annotation_store import AnnotationStore
@@ -51,8 +51,7 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 
         if options.out.exists():
             raise AnnotationError(f"{options.out}: is there already; choose another --out")
-        if not os.access(options.out.absolute().parent, os.W_OK):  # before all images are perceived
-            raise AnnotationError(f"{options.out}: cannot be written (no folder there that can be); choose another --out")
+        check_can_write(options.out, "--out")
         done, notes = fitted_alike(annotations, images, config, options.study.asked, str(store_path))
         tell_problems(notes)
         rows, _, _, missed = compared_rows(done, images, config)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import signal
 import tempfile
 import time
 from collections.abc import Callable
@@ -19,6 +18,7 @@ from app.benchmark_command import quantiles
 from app.benchmark_recording import FRAMES_PER_SECOND, one_way_and_back
 from core.config import Config
 from core.errors import UserError
+from core.parent_process import begin_as_worker
 
 _CYCLE = 300
 """Frames that are perceived and encoded; the session repeats them, which takes seconds and not the hour."""
@@ -51,7 +51,7 @@ def measure_player(config: Config, minutes: float) -> dict[str, Any]:
 
 
 def _make_session(config: Config, minutes: float, parent: str) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
+    begin_as_worker()
     from core.perception.pipeline import open_pipeline
     from core.session.files import SessionFiles
     from core.session.manifest import about_rig

@@ -13,19 +13,20 @@ from pathlib import Path
 from app.faults.registry import COUNT, CampaignError, FaultCase, Result, all_cases, run_case, tidy
 from app.faults.report import line_of, page_of, summary_of, to_json
 from app.long_work import Interrupt, progress_bar
+from app.outputs import check_can_write
 from core.whole_file import write_whole
 
 
 def run_faults(only: list[int], out: Path | None, *, quick: bool, as_json: bool) -> int:
     """Run the campaign, or the faults that are named; returns 0 when all went as listed, 1 when not.
 
-    Raises CampaignError, and KeyboardInterrupt once the results so far are told.
+    Raises UserError, and KeyboardInterrupt once the results so far are told.
     """
     cases = _chosen(only, quick=quick)
     if out is not None and len(cases) < COUNT:
         raise CampaignError("--out writes the whole list: leave --only and --quick out")
     if out is not None:
-        _check_can_write(out)
+        check_can_write(out, "--out")
     os.environ["QT_QPA_PLATFORM"] = "offscreen"  # windows are opened and closed; nobody shall see them
     logging.disable(logging.CRITICAL)  # what is logged of injected faults is what is looked for anyway
     try:
@@ -42,17 +43,6 @@ def run_faults(only: list[int], out: Path | None, *, quick: bool, as_json: bool)
     if len(results) < len(cases):
         raise KeyboardInterrupt
     return 0 if all(result.seen.ok for result in results) else 1
-
-
-def _check_can_write(out: Path) -> None:
-    """Now, and not after the whole campaign; a file that is not there yet is not made before there is something to write."""
-    try:
-        is_new = not out.exists()
-        out.open("a").close()
-        if is_new:
-            out.unlink()
-    except OSError as error:
-        raise CampaignError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
 
 
 def _chosen(only: list[int], *, quick: bool) -> list[FaultCase]:

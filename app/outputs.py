@@ -30,6 +30,20 @@ def check_apart(output: Path, others: Iterable[Path], option: str, writer: str) 
         raise UserError(f"{output}: is written by {writer}, too; choose another file for {option}")
 
 
+def check_can_write(output: Path, option: str) -> None:
+    """Raise UserError when the file `output`, given by `option`, cannot be written: now, and not after long work.
+
+    One that is not there yet is not made before there is something to write.
+    """
+    try:
+        is_new = not output.exists()
+        output.open("a").close()
+        if is_new:
+            output.unlink()
+    except OSError as error:
+        raise UserError(f"{output}: cannot be written ({error.strerror}); choose another {option}") from None
+
+
 def check_no_session(folder: Path, option: str) -> None:
     """Raise UserError when `folder`, given by `option`, is a recorded session, whose files must stay as they are."""
     if any((folder / name).is_file() for name in (MANIFEST, FRAMES, EVENTS)) or any(folder.glob("video_*.mkv")):

@@ -19,8 +19,8 @@ from core.session.manifest import FRAMES, MANIFEST
 from core.session.reader import check_is_session
 from core.study.replay import Change
 
-_FRAMES = "changes.jsonl"
-_WRITTEN = ("replay.json", _FRAMES, "replay.svg", "replay.pdf")
+_CHANGES = "changes.jsonl"
+_WRITTEN = ("replay.json", _CHANGES, "replay.svg", "replay.pdf")
 """What ``--out`` gets."""
 
 
@@ -73,7 +73,7 @@ def write_replay(out: Path, name: str, changes: Sequence[Change], result: dict[s
 
     try:
         (out / "replay.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        with (out / _FRAMES).open("w", encoding="utf-8") as file:
+        with (out / _CHANGES).open("w", encoding="utf-8") as file:
             file.writelines(json.dumps(change_to_json(change), allow_nan=False) + "\n" for change in changes)
         figure = draw_replay(changes, result["states"]["matrix"], name)
         for ending in (".svg", ".pdf"):

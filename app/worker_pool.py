@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -12,7 +11,7 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 from core.errors import UserError
-from core.parent_process import end_with_parent
+from core.parent_process import begin_as_worker
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -60,9 +59,7 @@ def _one_thread_each() -> Iterator[None]:
 
 
 def _start_worker() -> None:
-    """Ctrl-C is the parent's business."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    begin_as_worker()  # before an import that takes its time
     import cv2
 
     cv2.setNumThreads(1)
-    end_with_parent()

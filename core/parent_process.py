@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
+
+
+def begin_as_worker() -> None:
+    """What every worker does first: Ctrl-C, which reaches it too, is its parent's business, and it ends with that."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
 
 
 def end_with_parent() -> None:

@@ -271,7 +271,7 @@ class Pilot:
         paid before, also one that no turn has heard any more."""
         if self._stop_asked:
             self._release.stopped()
-        if self._release.is_owed:
+        if self._release.is_owed and not self._requests.is_letting_go:
             self._requests.torque_off(is_lost=self._is_bus_lost(self.view.active))
         self._requests.close()
         self._robot.hold()
@@ -307,7 +307,7 @@ class Pilot:
             self._teller.tell([(Note.TORQUE_OFF, "")], now_s)
         if any(isinstance(event, ServosChecked) and not event.problems for event in events):
             self._release.switched_on()
-        if (owed := self._release.fault(is_lost=self._is_bus_lost(self._view.active))) is not None:
+        if self._release.is_owed and (owed := self._release.fault(is_lost=self._is_bus_lost(self._view.active))) is not None:
             events.append(owed)
         if self._requests.busy:
             self._busy_s = now_s
@@ -333,8 +333,9 @@ class Pilot:
         """Pay what a stop owes where no bus process does."""
         if decision.mode is Mode.STOPPED and is_new:
             self._release.stopped()
-        is_lost, is_busy = self._is_bus_lost(decision.active), bool(self._requests.busy)
-        if self._release.is_due(now_s, is_lost=is_lost, is_busy=is_busy):
+        if not self._release.is_owed:
+            return
+        if self._release.is_due(now_s, is_lost=self._is_bus_lost(decision.active), is_busy=bool(self._requests.busy)):
             self._requests.torque_off(is_lost=True)
 
     def _has_arrived(self, seen: Seen | None, now_s: float) -> bool:

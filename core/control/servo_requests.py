@@ -37,7 +37,7 @@ class ServoRequests:
         self._stops = 0
         self._offs = self._offs_done = 0
         self._blocked = self._let_go = False
-        self._letting_go: Future[None] | None = None
+        self._releases: list[Future[None]] = []
         self._waiting: list[str] = []
 
     @property
@@ -45,6 +45,11 @@ class ServoRequests:
         """What is being done; "" for nothing."""
         with self._lock:
             return self._waiting[0] if self._waiting else ""
+
+    @property
+    def is_letting_go(self) -> bool:
+        """Whether a torque-off is under way, or waits."""
+        return any(not release.done() for release in self._releases)
 
     def take_let_go(self) -> bool:
         """Whether the torque went off since the last call, of all servos of a robot that is not connected and reports nothing."""
@@ -84,15 +89,15 @@ class ServoRequests:
         with self._lock:
             self._offs += 1
             asked = self._offs
-        self._letting_go = self._request("switching the torque off", lambda: self._switch_off(asked, is_lost=is_lost))
+        release = self._request("switching the torque off", lambda: self._switch_off(asked, is_lost=is_lost))
+        self._releases = [one for one in (*self._releases, release) if one is not None and not one.done()]
 
     def close(self) -> None:
         """Let nothing more begin but a torque-off that waits; one that is under way is waited for. All else that is ends by itself
         when the robot is closed."""
         self.stopped()
         self._worker.shutdown(wait=False, cancel_futures=True)
-        if self._letting_go is not None and not self._letting_go.cancelled():
-            wait([self._letting_go])
+        wait([release for release in self._releases if not release.cancelled()])
         with self._lock:
             owes_off = self._offs_done < self._offs
         if owes_off:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -24,7 +23,7 @@ import numpy as np
 from core.config import PerceptionConfig
 from core.errors import UserError
 from core.learning.dataset import mask_png, png
-from core.parent_process import end_with_parent
+from core.parent_process import begin_as_worker
 from core.types import Points
 from core.whole_file import is_aside, sweep_unfinished, write_whole
 from hardware.twin.appearance import Appearance, make_view
@@ -250,7 +249,7 @@ def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, o
         # Spawned, not forked: physics and OpenCV own threads that a fork would cut off.
         context = multiprocessing.get_context("spawn")
         others = set(multiprocessing.active_children())
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
+        with ProcessPoolExecutor(workers, mp_context=context, initializer=begin_as_worker) as pool:
             jobs = [pool.submit(_write_episode, plan, episode) for episode in missing]
             try:
                 for job in as_completed(jobs):
@@ -262,12 +261,6 @@ def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, o
                     worker.terminate()
     rows = [_episode_file(plan, episode).read_bytes() for episode in range(plan.episodes)]
     write_whole(plan.out / "truth.jsonl", b"".join(rows))
-
-
-def _start_worker() -> None:
-    """Ctrl-C is the parent's business."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent()
 
 
 def _prepare(plan: SynthPlan) -> None:

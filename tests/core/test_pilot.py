@@ -668,7 +668,8 @@ def test_what_a_stop_owes_is_paid_at_the_end(slackening: Bench) -> None:
     assert slackening.robot.calls.count("torque off") == 1
 
 
-def test_a_torque_off_that_is_under_way_at_the_end_is_waited_for_and_not_done_twice(slackening: Bench) -> None:
+@pytest.mark.parametrize("is_stopped", [False, True])
+def test_a_torque_off_that_is_under_way_at_the_end_is_waited_for_and_not_done_twice(slackening: Bench, is_stopped: bool) -> None:
     entered, go_on = threading.Event(), threading.Event()
     plain = slackening.robot.torque_off
 
@@ -680,6 +681,8 @@ def test_a_torque_off_that_is_under_way_at_the_end_is_waited_for_and_not_done_tw
     slackening.robot.torque_off = slow  # type: ignore[method-assign]
     slackening.seconds(0.2).pilot.torque_off()
     assert entered.wait(5.0)
+    if is_stopped:  # and owes one, too
+        slackening.pilot.ask(Act.STOP)
     threading.Timer(0.1, go_on.set).start()
     slackening.pilot.close()
     assert slackening.robot.calls.count("torque off") == 1
