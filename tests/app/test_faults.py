@@ -13,6 +13,7 @@ import pytest
 from app.faults.registry import COUNT, CampaignError, FaultCase, Kit, Result, Seen, all_cases, fault, run_case
 from app.faults.report import page_of, to_json
 from app.faults_command import run_faults
+from core.errors import UserError
 from core.session.recording import Recording
 
 CASES = {case.number: case for case in all_cases()}
@@ -100,7 +101,7 @@ def test_what_ctrl_c_itself_may_have_broken_is_not_told(
 
 
 def test_a_page_that_cannot_be_written_is_told_before_the_campaign(tmp_path: Path) -> None:
-    with pytest.raises(CampaignError, match="choose another --out"):
+    with pytest.raises(UserError, match="choose another --out"):
         run_faults([], tmp_path / "no folder" / "f.md", quick=False, as_json=False)
 
 
