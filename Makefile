@@ -32,7 +32,7 @@ damage: setup  ## 50 kills of a recording, 100 of saves, 2600 damaged files: wha
 	LUMENPILOT_KILLS=100 $(PY) -m pytest --timeout 3600 tests/core/test_annotation_store.py -k kill_9
 
 mutation: setup  ## does a test fail for every small change of gate and supervisor? (a quarter to half an hour)
-	@$(PY) scripts/mutation.py $(ARGS)
+	@$(PY) -m tools.mutation $(ARGS)
 
 lint: packages  ## ruff and mypy only
 	@failed=
@@ -41,7 +41,7 @@ lint: packages  ## ruff and mypy only
 	[[ -z $$failed ]]
 
 translations: setup  ## renew the texts of resources/translations from the code, and make the .qm files
-	@$(PY) scripts/translations.py
+	@$(PY) -m tools.translations
 
 setup:  ## make or renew .venv; returns at once when it is up to date
 	@PYTHON='$(PYTHON)' bash scripts/set_up.sh

@@ -1,5 +1,7 @@
 """LumenPilot: hands over to the command line."""
 
+from __future__ import annotations
+
 import os
 import sys
 

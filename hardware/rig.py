@@ -9,18 +9,18 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from core.calibration_config import ZeroConfig
-from core.config import Config, RigConfig
-from core.control.guarded_robot import GuardedRobot
+from core.config.calibration import ZeroConfig
+from core.config.models import Config, RigConfig
+from core.config.rig_file import calibration_of
+from core.control.robot import GuardedRobot
 from core.devices import Camera, DeviceError
-from core.rig_file import calibration_of
 from core.types import RobotStatus
-from hardware.cameras.straightened import StraightenedCamera
+from hardware.cameras.undistorted import UndistortedCamera
 
 if TYPE_CHECKING:
-    from hardware.servos.bus_start import BusProcess
+    from hardware.servos.bus_ipc import BusProcess
     from hardware.servos.servo_robot import ServoRobot
-    from hardware.twin.ahead import Ahead
+    from hardware.twin.process import PrestartedProcesses
     from hardware.twin.world import TwinWorld
 
 
@@ -65,11 +65,11 @@ def kind_of(rig: RigConfig) -> RigKind:
     return RigKind.LIVE if rig.camera in {"realsense", "webcam"} and rig.source is None else RigKind.PLAYBACK
 
 
-def start_ahead(config: Config) -> Ahead | None:
+def start_ahead(config: Config) -> PrestartedProcesses | None:
     """Start what a rig loads for seconds, for ``open_rig`` to take over; None where there is nothing, or it cannot be started."""
     if not _has_own_process(config):
         return None
-    from hardware.twin.ahead import start_twin
+    from hardware.twin.process import start_twin
 
     try:
         return start_twin()
@@ -77,7 +77,7 @@ def start_ahead(config: Config) -> Ahead | None:
         return None
 
 
-def open_rig(config: Config, ahead: Ahead | None = None) -> Rig:
+def open_rig(config: Config, ahead: PrestartedProcesses | None = None) -> Rig:
     """Open camera and robot; what was opened is closed again when the rest fails. Pictures come straightened by the rig's lens.
 
     `ahead` is what ``start_ahead`` gave, perhaps for another rig than this one.
@@ -102,7 +102,7 @@ def open_rig(config: Config, ahead: Ahead | None = None) -> Rig:
             rig = _open_live(config, calibration.zero if calibration is not None else None)
     if calibration is None or calibration.lens is None:
         return rig
-    return replace(rig, camera=StraightenedCamera(rig.camera, calibration.lens))
+    return replace(rig, camera=UndistortedCamera(rig.camera, calibration.lens))
 
 
 def _open_playback(config: Config) -> Rig:
@@ -112,15 +112,15 @@ def _open_playback(config: Config) -> Rig:
     source = Path(config.rig.source)
     camera: Camera
     if config.rig.camera == "realsense":
-        from hardware.cameras.realsense_recording import RealSenseRecording
+        from hardware.cameras.realsense import RealSenseRecording
 
         camera = RealSenseRecording(source)
     elif config.rig.camera == "video_file":
-        from hardware.cameras.video_file import VideoFile
+        from hardware.cameras.files import VideoFile
 
         camera = VideoFile(source)
     elif config.rig.camera == "image_folder":
-        from hardware.cameras.image_folder import ImageFolder
+        from hardware.cameras.files import ImageFolder
 
         camera = ImageFolder(source, watch=config.rig.watch_folder)
     else:
@@ -172,7 +172,7 @@ def _has_own_process(config: Config) -> bool:
     return is_driven_twin and config.twin.own_process and config.servos.driver == "dynamixel" and config.servos.port is None
 
 
-def _open_twin(config: Config, ahead: Ahead | None) -> Rig:
+def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
     if config.rig.robot == "servos":
         raise DeviceError(
             f'rig {config.rig.name}: the twin has servos of its own: set rig.robot = "twin", or rig.camera to a real one'
@@ -181,8 +181,7 @@ def _open_twin(config: Config, ahead: Ahead | None) -> Rig:
         raise DeviceError(f"rig {config.rig.name} has servos of its own: leave servos.port ({config.servos.port}) out")
     if _has_own_process(config):
         return _open_remote_twin(config, ahead)
-    from hardware.twin.camera import TwinCamera
-    from hardware.twin.world import TwinWorld
+    from hardware.twin.world import TwinCamera, TwinWorld
 
     try:
         world = TwinWorld(config.twin, perception=config.perception)
@@ -204,17 +203,16 @@ def _open_twin(config: Config, ahead: Ahead | None) -> Rig:
 
 
 def _direct_robot(config: Config, world: TwinWorld) -> GuardedRobot:
-    from hardware.twin.direct_robot import DirectRobot
+    from hardware.twin.world import DirectRobot
 
     robot = DirectRobot(world.robot, config.safety)
     robot.connect()
     return robot
 
 
-def _open_remote_twin(config: Config, ahead: Ahead | None) -> Rig:
+def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
     """The twin and its seven software servos in a process of their own."""
-    from hardware.twin.ahead import start_twin
-    from hardware.twin.remote_twin import RemoteCamera, RemoteTwin
+    from hardware.twin.process import RemoteCamera, RemoteTwin, start_twin
 
     loading = ahead or start_twin()
     with ExitStack() as undo:
@@ -228,8 +226,8 @@ def _open_remote_twin(config: Config, ahead: Ahead | None) -> Rig:
 
 def _servo_robot(config: Config, world: TwinWorld) -> ServoRobot:
     """The twin's robot moved by seven software servos in this process."""
-    from hardware.twin.servo_bus import SoftServoBus
-    from hardware.twin.servo_joints import drive_world, wired
+    from hardware.twin.process import drive_world, wired
+    from hardware.twin.servos.bus import SoftServoBus
 
     try:
         wiring = wired(config.twin, config.servos)

@@ -8,10 +8,9 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import palette, theme
-from app.language import tr, tr_text
-from app.tool_tips import tip
-from app.wording import advice_headline
+from app.ui import theme
+from app.ui.i18n import tr, tr_text
+from app.ui.texts import advice_headline, tip
 from core.types import Advice, PoseState, Speed
 
 _CHEVRONS = {Speed.STOP: 0, Speed.SLOWEST: 1, Speed.SLOW: 2, Speed.MODERATE: 3, Speed.FAST: 4}
@@ -69,8 +68,8 @@ class AdviceLine(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.setPen(QPen(QColor(palette.LINE), 1))
-        painter.setBrush(QColor(palette.PANEL))
+        painter.setPen(QPen(QColor(theme.LINE), 1))
+        painter.setBrush(QColor(theme.PANEL))
         painter.drawRoundedRect(frame, theme.RADIUS, theme.RADIUS)
         if self._advice is None:
             self._paint_nothing(painter, frame)
@@ -79,12 +78,12 @@ class AdviceLine(QWidget):
         painter.end()
 
     def _paint_nothing(self, painter: QPainter, frame: QRectF) -> None:
-        painter.setPen(QColor(palette.TEXT_FAINT))
+        painter.setPen(QColor(theme.TEXT_FAINT))
         painter.setFont(theme.semi_bold(20))
         painter.drawText(frame.adjusted(20, 0, -20, 0), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self.text)
 
     def _paint_advice(self, painter: QPainter, frame: QRectF, advice: Advice) -> None:
-        accent = palette.STATE_COLOUR[self._state]
+        accent = theme.STATE_COLOUR[self._state]
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(accent))
         painter.drawRoundedRect(QRectF(frame.left(), frame.top(), 6, frame.height()), 3, 3)
@@ -93,11 +92,11 @@ class AdviceLine(QWidget):
         left = frame.left() + 168
         width = frame.right() - left - 16
         headline = advice_headline(advice)
-        painter.setPen(QColor(palette.TEXT))
+        painter.setPen(QColor(theme.TEXT))
         painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), headline, int(width)))
         place = Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft
         painter.drawText(QRectF(left, frame.top() + 6, width, 34), place, headline)
-        painter.setPen(QColor(palette.FAULT if self._is_unsure else palette.TEXT_DIM))
+        painter.setPen(QColor(theme.FAULT if self._is_unsure else theme.TEXT_DIM))
         why_font = theme.font(15)
         painter.setFont(why_font)
         why = theme.elide(why_font, self._why(advice), int(width))
@@ -121,11 +120,11 @@ def _paint_arrow(painter: QPainter, middle: QPointF, size: float, turn_deg: floa
 def _paint_chevrons(painter: QPainter, left_middle: QPointF, count: int, backwards: bool) -> None:
     """Four chevrons, `count` of them lit, that point back where the advice is to retract; a square where it is to stop."""
     if count == 0:
-        painter.setBrush(QColor(palette.TEXT))
+        painter.setBrush(QColor(theme.TEXT))
         painter.drawRect(QRectF(left_middle.x() + 20, left_middle.y() - 11, 22, 22))
         return
     for k in range(max(_CHEVRONS.values())):
-        pen = QPen(QColor(palette.TEXT if k < count else palette.LINE), 4.0)
+        pen = QPen(QColor(theme.TEXT if k < count else theme.LINE), 4.0)
         pen.setCapStyle(Qt.PenCapStyle.RoundCap)
         pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
         painter.setPen(pen)

@@ -1,13 +1,17 @@
-"""What happened, newest first."""
+"""What happened, newest first.
+
+What happened, as a list for Qt's views, newest first.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from enum import Enum
 
-from PySide6.QtCore import QPoint, QRectF, QSize, Qt, Slot
+from PySide6.QtCore import QAbstractListModel, QModelIndex, QObject, QPersistentModelIndex, QPoint, QRectF, QSize, Qt, Slot
 from PySide6.QtGui import QColor, QFontMetrics, QGuiApplication, QPainter, QPen, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -21,11 +25,124 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app import palette, theme
-from app.event_model import MOST_ROWS, EventKind, EventModel, Index, LoggedEvent
-from app.language import tr, tr_text
-from app.widgets.quiet_combo import QuietCombo
-from app.widgets.scroll_keys import ScrolledList
+from app.ui import theme
+from app.ui.i18n import mark, tr, tr_text
+from app.widgets.basics import QuietCombo, ScrolledList
+
+MOST_ROWS = 2000
+Index = QModelIndex | QPersistentModelIndex
+
+
+@dataclass(frozen=True, slots=True)
+class KindLook:
+    """Word and colour (its role in the palette) of a kind of event, and how the filter calls all of them."""
+
+    word: str
+    role: str
+    plural: str
+
+    @property
+    def colour(self) -> str:
+        """In the scheme in use."""
+        return theme.of(self.role)
+
+
+class LogKind(Enum):
+    """What an event is about. GATE: a command that was clamped or rejected."""
+
+    MODE = KindLook(mark("mode"), "SKY", mark("Modes"))
+    ALERT = KindLook(mark("alert"), "VERMILLION", mark("Alerts"))
+    GATE = KindLook(mark("gate"), "YELLOW", mark("Gate: clamped and rejected"))
+    OPERATOR = KindLook(mark("operator"), "TEXT", mark("Operator"))
+    TARGET = KindLook(mark("target"), "TARGET", mark("Targets"))
+    NOTE = KindLook(mark("note"), "TEXT_FAINT", mark("Notes"))
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedEvent:
+    """An event that came ``times`` times in a row, last at ``at``."""
+
+    at: datetime
+    kind: LogKind
+    text: str
+    times: int = 1
+
+    @property
+    def line(self) -> str:
+        """As it is copied."""
+        times = f" \N{MULTIPLICATION SIGN}{self.times}" if self.times > 1 else ""
+        return f"{self.at:%H:%M:%S}  {tr(self.kind.value.word):<8}  {self.text}{times}"
+
+
+class EventModel(QAbstractListModel):
+    """All events, and those that the filter lets through, both newest first."""
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._all: deque[LoggedEvent] = deque()
+        self._kind: LogKind | None = None
+        self.shown: list[LoggedEvent] = []
+
+    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default, never changed
+        return 0 if parent.isValid() else len(self.shown)
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        if not index.isValid() or index.row() >= len(self.shown):
+            return None
+        event = self.shown[index.row()]
+        if role == Qt.ItemDataRole.UserRole:
+            return event
+        if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole):
+            return event.line
+        return event.text if role == Qt.ItemDataRole.ToolTipRole else None
+
+    def add(self, event: LoggedEvent) -> bool:
+        """Put `event` in front; the oldest one goes when there are too many. False when the filter keeps it back."""
+        self._all.appendleft(event)
+        passes = self._passes(event)
+        if passes:
+            self.beginInsertRows(QModelIndex(), 0, 0)
+            self.shown.insert(0, event)
+            self.endInsertRows()
+        if len(self._all) > MOST_ROWS:
+            oldest = self._all.pop()
+            if self.shown and self.shown[-1] is oldest:
+                last = len(self.shown) - 1
+                self.beginRemoveRows(QModelIndex(), last, last)
+                self.shown.pop()
+                self.endRemoveRows()
+        return passes
+
+    def add_all(self, events: deque[LoggedEvent]) -> None:
+        """Many at once, oldest first."""
+        self.beginResetModel()
+        self._all.extendleft(events)
+        while len(self._all) > MOST_ROWS:
+            self._all.pop()
+        self._filter()
+        self.endResetModel()
+
+    def replace_newest(self, event: LoggedEvent) -> None:
+        if not self._all:
+            return
+        self._all[0] = event
+        if self.shown and self._passes(event):
+            self.shown[0] = event
+            first = self.index(0)
+            self.dataChanged.emit(first, first)
+
+    def show_kind(self, kind: LogKind | None) -> None:
+        self.beginResetModel()
+        self._kind = kind
+        self._filter()
+        self.endResetModel()
+
+    def _filter(self) -> None:
+        self.shown = [event for event in self._all if self._passes(event)]
+
+    def _passes(self, event: LoggedEvent) -> bool:
+        return self._kind is None or event.kind is self._kind
+
 
 SAME_WITHIN = timedelta(seconds=2.0)
 _ROW_HEIGHT = 24
@@ -46,7 +163,7 @@ class EventLog(QWidget):
         self._filter = QuietCombo(tr("Kind of events shown"))
         self._filter.setToolTip(tr("Which events are listed"))
         self._filter.addItem(tr("Everything"), None)
-        for kind in EventKind:
+        for kind in LogKind:
             self._filter.addItem(tr(kind.value.plural), kind)
         self._filter.activated.connect(self._on_filter)
         label = QLabel(tr("Show"))
@@ -68,7 +185,7 @@ class EventLog(QWidget):
         self._take_in()
         return [event.line for event in self._model.shown]
 
-    def add(self, kind: EventKind, text: str) -> None:
+    def add(self, kind: LogKind, text: str) -> None:
         """Something happened now; a repetition of the newest event within two seconds raises its count instead."""
         now, newest = self._now(), self._newest
         event = LoggedEvent(now, kind, tr_text(" ".join(text.split())))
@@ -86,7 +203,7 @@ class EventLog(QWidget):
         self._take_in()
         self._put(event, is_same)
 
-    def show_kind(self, kind: EventKind | None) -> None:
+    def show_kind(self, kind: LogKind | None) -> None:
         """Show one kind only; None shows everything."""
         self._filter.setCurrentIndex(self._filter.findData(kind))
         self._on_filter()
@@ -163,17 +280,17 @@ class _EventPainter(QStyledItemDelegate):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         room = QRectF(option.rect).adjusted(6, 0, -6, 0)  # type: ignore[attr-defined]
         if option.state & QStyle.StateFlag.State_MouseOver:  # type: ignore[attr-defined]
-            painter.fillRect(option.rect, QColor(palette.RAISED))  # type: ignore[attr-defined]
+            painter.fillRect(option.rect, QColor(theme.RAISED))  # type: ignore[attr-defined]
         small, look = theme.font(theme.Size.LABEL), event.kind.value
         centre = Qt.AlignmentFlag.AlignVCenter
         painter.setFont(small)
-        painter.setPen(QColor(palette.TEXT_FAINT))
+        painter.setPen(QColor(theme.TEXT_FAINT))
         painter.drawText(room, centre, f"{event.at:%H:%M:%S}")
         room.adjust(QFontMetrics(small).horizontalAdvance("00:00:00") + 10, 0, 0, 0)
         painter.setPen(QPen(Qt.PenStyle.NoPen))
         painter.setBrush(QColor(look.colour))
         painter.drawRoundedRect(QRectF(room.left(), room.center().y() - 4, 8, 8), 2, 2)
-        painter.setPen(QColor(palette.TEXT_DIM))
+        painter.setPen(QColor(theme.TEXT_DIM))
         painter.drawText(room.adjusted(14, 0, 0, 0), centre, tr(look.word))
         room.adjust(14 + QFontMetrics(small).horizontalAdvance(tr("operator")) + 10, 0, 0, 0)
         if event.times > 1:
@@ -182,6 +299,6 @@ class _EventPainter(QStyledItemDelegate):
             room.adjust(0, 0, -QFontMetrics(small).horizontalAdvance(times) - 8, 0)
         text_font = theme.font(13)
         painter.setFont(text_font)
-        painter.setPen(QColor(palette.TEXT))
+        painter.setPen(QColor(theme.TEXT))
         painter.drawText(room, centre, theme.elide(text_font, event.text, int(room.width())))
         painter.restore()

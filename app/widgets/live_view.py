@@ -1,27 +1,179 @@
-"""The live picture with its overlays; a click sets the target."""
+"""The live picture with its overlays; a click sets the target.
+
+A magnifying glass over the robot's head, in a corner of the live view: 40-px vectors are too small for two metres.
+
+Marks over a picture that Qt paints alone.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt, QTimer, Signal
-from PySide6.QtGui import QImage, QPainter, QResizeEvent, QTransform
-from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPaintEvent, QPen, QPicture, QResizeEvent, QTransform
+from PySide6.QtWidgets import QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from app import palette
-from app.language import tr
-from app.pace import Pace
-from app.palette import ON_PICTURE
-from app.scene_shapes import scene_shapes
-from app.widgets.head_loupe import HeadLoupe
-from app.widgets.marks_label import MarksLabel
-from app.widgets.overlays import Layer, Marks, Overlay
-from app.wording import target_note
-from core.control.ghost import predict
-from core.policy_config import PursuitConfig
+from app.ui import theme
+from app.ui.i18n import tr
+from app.ui.texts import target_note
+from app.ui.theme import ON_PICTURE
+from app.ui.workers import Pace
+from app.widgets.scene_overlay import Layer, LoupeCorner, Marks, Overlay, scene_shapes
+from app.widgets.scene_painter import on_screen
+from core.config.models import PursuitConfig
+from core.control.clearance import predict
 from core.types import Advice, Frame, Image, Point, Points, Scene
+
+
+class MarksLabel(QLabel):
+    """Records marks as drawing commands, and lets Qt paint them.
+
+    Painting takes milliseconds, recording a fraction of that; while Python paints, the interpreter is locked for the threads of
+    perception and control, while Qt paints, it is free.
+    """
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+
+    def record(self, marks: Marks, to_label: QTransform, label_px: int, glass: QPainterPath | None = None) -> None:
+        """Show `marks` drawn with `to_label` (source pixels to the label's), cut to `glass` when there is one."""
+        commands = QPicture()
+        painter = QPainter(commands)
+        if glass is not None:
+            painter.setClipPath(glass)
+        marks.draw(painter, to_label, QRectF(self.rect()), label_px, tags=glass is None)
+        painter.end()
+        commands.setBoundingRect(self.rect())  # else the label would put its first mark into its corner
+        self.setPicture(commands)
+
+
+_SPAN_PX = 110.0
+_SHARE_OF_VIEW = 0.36
+_ASPECT = 0.75
+_LOUPE_LABEL_PX = (11, 16)
+_WIDTH_PER_LABEL_PX = 13  # two labels have room beside each other
+_CORNERS = ((1, 0), (0, 0), (1, 1), (0, 1))
+
+
+class HeadLoupe(QWidget):
+    """Shows about 110 working pixels around the head with the same marks as the live view.
+
+    ``clicked`` carries the place that was clicked in it, in source pixels: what it hides of the picture is not meant. It stays in
+    a corner in which it hides little, and leaves it when the head comes near.
+    """
+
+    clicked = Signal(float, float)
+
+    def __init__(self, parent: QWidget, marks: Marks) -> None:
+        super().__init__(parent)
+        self._parent = parent
+        self._marks = marks
+        self._image: QImage | None = None
+        self._pixels: Image | None = None
+        self._to_widget = QTransform()
+        self._corner = LoupeCorner()
+        self._drawn = MarksLabel(self)
+        self._drawn.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.setAccessibleName(tr("Magnified head"))
+        self.hide()
+
+    def show_head(
+        self, image: Image, scene: Scene, head_in_view: QPointF, to_view: QTransform, covers: Sequence[QRectF] = ()
+    ) -> None:
+        """Magnify the surroundings of the head.
+
+        `head_in_view` is where it is on the parent widget, `to_view` leads there; `covers` are what lies over the loupe.
+        """
+        middle = _middle(scene)
+        if middle is None:
+            self.hide()
+            return
+        self._place(head_in_view, to_view, covers)
+        span = _SPAN_PX / scene.scale
+        zoom = self.width() / span
+        left, top = middle[0] + 0.5 - span / 2, middle[1] + 0.5 - self.height() / zoom / 2
+        self._cut(image, left, top, span, self.height() / zoom)
+        self._to_widget = QTransform(zoom, 0.0, 0.0, zoom, -left * zoom, -top * zoom)
+        self._drawn.setGeometry(self.rect())
+        least, most = _LOUPE_LABEL_PX
+        label_px = max(least, min(self.width() // _WIDTH_PER_LABEL_PX, most))
+        self._drawn.record(self._marks, self._to_widget, label_px, self._glass(3.0))
+        self.show()
+        self.update()
+
+    def _cut(self, image: Image, left: float, top: float, width: float, height: float) -> None:
+        """Keep a copy of the part that is visible, with its place in the source."""
+        x0, y0 = max(0, int(left) - 1), max(0, int(top) - 1)
+        x1, y1 = min(image.shape[1], int(left + width) + 2), min(image.shape[0], int(top + height) + 2)
+        part = np.ascontiguousarray(image[y0 : max(y1, y0 + 1), x0 : max(x1, x0 + 1)])
+        self._pixels = np.asarray(cv2.cvtColor(part, cv2.COLOR_RGB2BGRA), np.uint8)
+        rows, columns = part.shape[:2]
+        self._image = QImage(self._pixels.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32)
+        self._image.setOffset(QPointF(x0, y0).toPoint())
+
+    def _place(self, head: QPointF, to_view: QTransform, covers: Sequence[QRectF]) -> None:
+        room = self._parent.rect()
+        width = int(_SHARE_OF_VIEW * min(room.width(), room.height() / _ASPECT))
+        corners = [self._rect(k, (width, int(width * _ASPECT))) for k in range(len(_CORNERS))]
+        places, weights = self._marks.places()
+        corner = self._corner.choose(corners, head, on_screen(places, to_view), weights, covers)
+        self.setGeometry(corners[corner].toRect())
+
+    def _rect(self, corner: int, size: tuple[int, int]) -> QRectF:
+        right, bottom = _CORNERS[corner]
+        room = self._parent.rect()
+        return QRectF(
+            room.width() - size[0] - 10 if right else 10, room.height() - size[1] - 10 if bottom else 10, size[0], size[1]
+        )
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() is not Qt.MouseButton.LeftButton:
+            super().mousePressEvent(event)
+            return
+        place = self._to_widget.inverted()[0].map(event.position())
+        self.clicked.emit(place.x() - 0.5, place.y() - 0.5)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """One place is meant, and the first half has told it."""
+        event.accept()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        if self._image is None:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        glass = self._glass(1.0)
+        painter.fillPath(glass, QColor(ON_PICTURE.INK))
+        painter.save()
+        painter.setClipPath(glass)
+        painter.setWorldTransform(self._to_widget)
+        painter.drawImage(self._image.offset(), self._image)
+        painter.restore()
+        painter.setPen(QPen(QColor(ON_PICTURE.TEXT), 2))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawPath(glass)
+        painter.end()
+
+    def _glass(self, inset: float) -> QPainterPath:
+        glass = QPainterPath()
+        glass.addRoundedRect(QRectF(self.rect()).adjusted(inset, inset, -inset, -inset), theme.RADIUS, theme.RADIUS)
+        return glass
+
+
+def _middle(scene: Scene) -> Point | None:
+    """Between both vectors, or the head when there is no pose; source pixels."""
+    if scene.robot_vector is not None and scene.vessel_vector is not None:
+        (ax, ay), (bx, by) = scene.robot_vector.center, scene.vessel_vector.center
+        return scene.to_source(((ax + bx) / 2, (ay + by) / 2))
+    return scene.to_source(scene.path.head) if scene.path is not None else None
+
 
 _VESSEL, _ROBOT, _VESSEL_SKELETON, _ROBOT_SKELETON = 1, 2, 4, 8
 _ZOOM_MAX = 12.0
@@ -308,7 +460,7 @@ def _label_colours() -> NDArray[np.uint32]:
             (_VESSEL, ON_PICTURE.VESSEL, 0.24),
         ):
             if bits & bit:
-                red, green, blue = (round(part * alpha) for part in palette.rgb(name))
+                red, green, blue = (round(part * alpha) for part in theme.rgb(name))
                 table[bits] = round(255 * alpha) << 24 | red << 16 | green << 8 | blue
                 break
     return table

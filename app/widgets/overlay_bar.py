@@ -6,10 +6,10 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
-from app import palette, theme
-from app.language import tr
-from app.palette import ON_PICTURE
-from app.widgets.overlays import Layer
+from app.ui import theme
+from app.ui.i18n import tr
+from app.ui.theme import ON_PICTURE
+from app.widgets.scene_overlay import Layer
 
 _SEEN = 3.0
 _HEIGHT, _NARROW, _GAP = 30, 54, 5
@@ -116,22 +116,22 @@ class _Chip(QAbstractButton):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         on = self.isChecked()
         frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        edge = palette.SKY if self.hasFocus() else palette.TEXT_FAINT if self.underMouse() else palette.LINE
+        edge = theme.SKY if self.hasFocus() else theme.TEXT_FAINT if self.underMouse() else theme.LINE
         painter.setPen(QPen(QColor(edge), 1))
-        painter.setBrush(QColor(palette.RAISED) if on else QColor(palette.WINDOW))
+        painter.setBrush(QColor(theme.RAISED) if on else QColor(theme.WINDOW))
         painter.drawRoundedRect(frame, 6, 6)
-        painter.setPen(QColor(palette.TEXT_DIM if on else palette.TEXT_FAINT))
+        painter.setPen(QColor(theme.TEXT_DIM if on else theme.TEXT_FAINT))
         painter.setFont(theme.semi_bold(11))
         painter.drawText(QRectF(8, 0, 10, self.height()), Qt.AlignmentFlag.AlignCenter, self._layer.value.key)
         text_font = theme.font(12)
         left = 22.0
         if self.width() >= self.sizeHint().width():  # no room for the colour in a narrow window
-            is_lost = palette.contrast(_SWATCH[self._layer], palette.RAISED) < _SEEN  # a pale colour on a light chip
-            painter.setPen(QPen(QColor(palette.TEXT_FAINT if is_lost else _SWATCH[self._layer]), 1.5))
+            is_lost = theme.contrast(_SWATCH[self._layer], theme.RAISED) < _SEEN  # a pale colour on a light chip
+            painter.setPen(QPen(QColor(theme.TEXT_FAINT if is_lost else _SWATCH[self._layer]), 1.5))
             painter.setBrush(QColor(_SWATCH[self._layer]) if on else Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(QRectF(left, self.height() / 2 - 4, 8, 8), 2, 2)
             left = 35.0
-        painter.setPen(QColor(palette.TEXT if on else palette.TEXT_FAINT))
+        painter.setPen(QColor(theme.TEXT if on else theme.TEXT_FAINT))
         width = self.width() - left - 4
         fitted = theme.fitted(text_font, self.text(), int(width), 10)
         painter.setFont(fitted)

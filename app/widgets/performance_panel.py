@@ -10,10 +10,10 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import palette, theme
-from app.language import tr, tr_text
-from app.pace import Pace
-from app.tool_tips import tip
+from app.ui import theme
+from app.ui.i18n import tr, tr_text
+from app.ui.texts import tip
+from app.ui.workers import Pace
 from core.types import Tick
 
 _SAMPLES = 300
@@ -83,13 +83,13 @@ class PerformancePanel(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(palette.PANEL))
+        painter.fillRect(self.rect(), QColor(theme.PANEL))
         width = self.width() / 4
         for k, (name, value, is_bad) in enumerate(self._heads):
-            painter.setPen(QColor(palette.FAULT if is_bad else palette.TEXT))
+            painter.setPen(QColor(theme.FAULT if is_bad else theme.TEXT))
             painter.setFont(theme.bold(18))
             painter.drawText(QRectF(k * width, 0, width, 22), Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, value)
-            painter.setPen(QColor(palette.TEXT_FAINT))
+            painter.setPen(QColor(theme.TEXT_FAINT))
             painter.setFont(theme.font(11))
             painter.drawText(QRectF(k * width, 22, width, 14), Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, name)
         self._paint_table(painter, 40.0)
@@ -105,7 +105,7 @@ class PerformancePanel(QWidget):
             y = top + k * height
             is_total = name == "total"
             painter.setFont(theme.semi_bold(12) if is_total else theme.font(12))
-            painter.setPen(QColor(palette.TEXT if is_total else palette.TEXT_FAINT if k == 0 else palette.TEXT_DIM))
+            painter.setPen(QColor(theme.TEXT if is_total else theme.TEXT_FAINT if k == 0 else theme.TEXT_DIM))
             painter.drawText(QRectF(0, y, self.width() - 110, height), left, tr_text(name))
             painter.drawText(QRectF(self.width() - 110, y, 52, height), right, half)
             painter.drawText(QRectF(self.width() - 56, y, 56, height), right, most)

@@ -8,10 +8,10 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSpinBox, QWidget
 
-from app.language import tr, tr_text
-from app.menus import MenuEntry
-from app.tool_tips import tip
-from app.widgets.quiet_combo import QuietCombo
+from app.ui.actions import MenuEntry
+from app.ui.i18n import tr, tr_text
+from app.ui.texts import tip
+from app.widgets.basics import QuietCombo
 
 _RANDOM = "random"
 _SEED_MAX = 999_999

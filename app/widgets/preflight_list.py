@@ -6,12 +6,11 @@ from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
-from app import palette, theme
-from app.language import mark, tr, tr_text
-from app.preflight_desk import Finding, Preflight, PreflightDesk
-from app.widgets.enter_key import takes_enter
-from app.widgets.signs import Sign, paint_sign
-from hardware.driving_checks import Level
+from app.operator.preflight import Preflight, PreflightFinding, PreflightModel
+from app.ui import theme
+from app.ui.i18n import mark, tr, tr_text
+from app.widgets.basics import Sign, paint_sign, takes_enter
+from hardware.preflight.preflight import Level
 
 _SIZE = QSize(780, 560)
 _LEAST_PX, _ABOVE_PX, _TITLE_PX = 300, 8, 40
@@ -36,7 +35,7 @@ class _Badge(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         sign, role, word = _LOOK[self._level]
-        colour = QColor(getattr(palette, role))
+        colour = QColor(getattr(theme, role))
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if sign is None:
@@ -58,11 +57,11 @@ class PreflightList(QDialog):
 
     arm_asked = Signal()
 
-    def __init__(self, desk: PreflightDesk, parent: QWidget | None = None, kept_clear: QWidget | None = None) -> None:
+    def __init__(self, desk: PreflightModel, parent: QWidget | None = None, kept_clear: QWidget | None = None) -> None:
         super().__init__(parent)
         self._desk = desk
         self._kept_clear = kept_clear
-        self._shown: tuple[Finding, ...] = ()
+        self._shown: tuple[PreflightFinding, ...] = ()
         self.setWindowTitle(tr("Before driving"))
         self.setModal(False)
         self.resize(_SIZE)

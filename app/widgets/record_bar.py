@@ -6,9 +6,9 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import palette, theme
-from app.language import tr, tr_text
-from core.session.record_status import RecordStatus
+from app.ui import theme
+from app.ui.i18n import tr, tr_text
+from core.session.writer import RecordStatus
 
 _SIZE = QSize(196, 34)
 
@@ -78,21 +78,21 @@ class RecordBar(QWidget):
         frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         is_bad = bool(self._status.problem)
         is_on = self._status.recording or self._status.armed
-        edge = palette.VERMILLION if is_on or is_bad else palette.LINE
+        edge = theme.VERMILLION if is_on or is_bad else theme.LINE
         painter.setPen(QPen(QColor(edge), 1.5))
-        painter.setBrush(QColor(palette.RAISED if self._status.recording else palette.PANEL))
+        painter.setBrush(QColor(theme.RAISED if self._status.recording else theme.PANEL))
         painter.drawRoundedRect(frame, 6, 6)
-        painter.setPen(QPen(QColor(palette.VERMILLION), 1.5))
-        painter.setBrush(QColor(palette.VERMILLION) if self._status.recording else Qt.BrushStyle.NoBrush)
+        painter.setPen(QPen(QColor(theme.VERMILLION), 1.5))
+        painter.setBrush(QColor(theme.VERMILLION) if self._status.recording else Qt.BrushStyle.NoBrush)
         painter.drawEllipse(QRectF(frame.left() + 12, frame.center().y() - 6, 12, 12))
         first, second = self._lines
         left = frame.left() + 34
         painter.setFont(theme.semi_bold(13))
-        painter.setPen(QColor(palette.TEXT))
+        painter.setPen(QColor(theme.TEXT))
         width = painter.fontMetrics().horizontalAdvance(first)
         painter.drawText(QRectF(left, frame.top(), frame.width(), frame.height()), Qt.AlignmentFlag.AlignVCenter, first)
         painter.setFont(theme.font(12))
-        painter.setPen(QColor(palette.VERMILLION if is_bad or self._status.dropped else palette.TEXT_DIM))
+        painter.setPen(QColor(theme.VERMILLION if is_bad or self._status.dropped else theme.TEXT_DIM))
         room = QRectF(left + width + 10, frame.top(), frame.right() - left - width - 16, frame.height())
         painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, theme.elide(painter.font(), second, int(room.width())))
         painter.end()

@@ -1,37 +1,628 @@
-"""The seven servos: what each reports, the balance of the tendon pairs, the bus itself, and what can be done about them."""
+"""What the servo table says, as texts with a tone: a bus status becomes seven rows, two tendon pairs and one line. No Qt here.
+
+Texts with a tone, which tables of the operator window are made of. No Qt here.
+
+The seven servos: what each reports, the balance of the tendon pairs, the bus itself, and what can be done about them.
+
+The cells of the servo table as a Qt model, and the view that paints them.
+
+Whether the wires of each tendon pair are as tight as they should be.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, IntEnum
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPoint, Qt, Signal, Slot
-from PySide6.QtGui import QHideEvent
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QObject,
+    QPersistentModelIndex,
+    QPoint,
+    QPointF,
+    QRectF,
+    QSize,
+    Qt,
+    Signal,
+    Slot,
+)
+from PySide6.QtGui import QColor, QHideEvent, QPainter, QPaintEvent, QPen, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import (
+    QAbstractItemView,
     QHBoxLayout,
+    QHeaderView,
     QLabel,
     QMenu,
     QPushButton,
+    QSizePolicy,
     QStackedLayout,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
     QVBoxLayout,
     QWidget,
 )
 
-from app import theme
-from app.cells import TONE_ROLE, Cell, Tone
-from app.language import tr, tr_text
-from app.pace import Pace
-from app.servo_cells import SILENT_AFTER_S, bus_line, pair_balances, servo_rows
-from app.widgets.question_strip import BUTTON_STYLE, QuestionStrip
-from app.widgets.servo_model import ServoModel, ServoView
-from app.widgets.tendon_balance import TendonBalance
-from core.safety_config import SafetyConfig
-from core.servo_config import JointConfig, JointName, ServosConfig
+from app.ui import theme
+from app.ui.i18n import mark, tr, tr_text
+from app.ui.texts import tip
+from app.ui.workers import Pace
+from app.widgets.messages import BUTTON_STYLE, QuestionStrip
+from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.types import RobotStatus
+from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState, wire_force_mn
 
 if TYPE_CHECKING:
-    from hardware.servos.bus_messages import BusStatus
+    from hardware.servos.bus_ipc import BusStatus
+
+
+NONE = "\N{EN DASH}"
+
+
+class Tone(IntEnum):
+    """How a text is meant. What warns also carries a sign: colour alone says nothing to some."""
+
+    FAINT = 0
+    PLAIN = 1
+    WARN = 2
+    BAD = 3
+
+
+SIGN = {Tone.FAINT: "", Tone.PLAIN: "", Tone.WARN: "!", Tone.BAD: "!!"}
+TONE_ROLE = {Tone.FAINT: "TEXT_FAINT", Tone.PLAIN: "TEXT", Tone.WARN: "ORANGE", Tone.BAD: "FAULT"}
+"""Colours, as roles of the palette."""
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """Where a joint is within its envelope, in shares 0..1 from its low to its high end; beyond 0..1 it is outside."""
+
+    at: float
+    goal: float | None
+    low_warn: float
+    high_warn: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    text: str
+    tone: Tone = Tone.PLAIN
+    tip: str = ""
+    track: Track | None = None
+
+
+Row = tuple[Cell, ...]
+
+
+def number(value: float, digits: int) -> str:
+    """No minus before a zero, and a real minus sign."""
+    value = round(value, digits) + 0.0
+    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+SILENT_AFTER_S = 1.0
+"""What the bus said longer ago is not true any more."""
+_CYCLE_P99_LIMIT_MS = 30.0
+_LONG_TRAVEL_MM = 50.0
+_TRACK_STEPS = 200.0
+
+
+class Column(Enum):
+    """The columns in order: heading and explanation."""
+
+    JOINT = (mark("Joint"), mark("Joint, and id of its servo on the bus"))
+    POSITION = (
+        mark("Position mm"),
+        mark("Where the joint is, and where that is within its envelope; darker ends: there it is slowed down"),
+    )
+    GOAL = (mark("Goal mm"), mark("The goal that the servo has taken"))
+    CURRENT = ("mA", mark("Motor current in mA"))
+    TEMPERATURE = ("°C", mark("Temperature of the servo in °C"))
+    VOLTAGE = ("V", mark("Supply voltage at the servo in V"))
+    TORQUE = (mark("Torque"), mark("Whether the motor holds"))
+    ZERO = (mark("Zero"), mark("Whether the joint has been zeroed since the servo was switched on"))
+    ERROR = (mark("Error"), mark("What the servo reports, or that it does not answer"))
+
+
+_ERROR_WORDS = {
+    HardwareError.OVERLOAD: (mark("overload"), mark("overload: the motor was pulled too hard for too long; free the wire")),
+    HardwareError.OVERHEATING: (mark("overheating"), mark("overheating: let the servo cool down")),
+    HardwareError.INPUT_VOLTAGE: (mark("input voltage"), mark("input voltage out of range: check the power supply")),
+    HardwareError.ELECTRICAL_SHOCK: (
+        mark("electric shock"),
+        mark("electric shock on the circuit, or too little power for the motor"),
+    ),
+    HardwareError.ENCODER: (mark("encoder"), mark("encoder: the servo does not know where it is; have it repaired")),
+}
+
+
+def error_words(error: HardwareError) -> str:
+    """The error bits as a few words, worst first; empty when there is none."""
+    words = [tr(short) for flag, (short, _) in _ERROR_WORDS.items() if error & flag]
+    rest = int(error) & ~sum(int(flag) for flag in _ERROR_WORDS)
+    return ", ".join(words + ([tr("error {number}", number=rest)] if rest else []))
+
+
+def servo_rows(status: BusStatus | None, servos: ServosConfig, safety: SafetyConfig) -> tuple[Row, ...]:
+    """Seven rows in the order of the joints, each with a cell for every column; dashes where nothing is known."""
+    readings: tuple[ServoReading | None, ...] = status.servos if status is not None and status.servos else (None,) * 7
+    zeroed: tuple[bool | None, ...] = status.zeroed if status is not None and status.servos else (None,) * 7
+    armed = status is not None and status.armed
+    rows = []
+    for joint, reading, is_zeroed in zip(servos.joints, readings, zeroed, strict=True):
+        if isinstance(reading, ServoState):
+            rows.append(_known(joint, reading, bool(is_zeroed), armed, servos, safety))
+        else:
+            rows.append(_unknown(joint, reading))
+    return tuple(rows)
+
+
+def known_joints(status: BusStatus | None, now_s: float) -> tuple[bool, ...]:
+    """Of which joints it is known where they are: those that are zeroed, and whose servo has answered lately.
+
+    Without a bus it is known of all: such a robot tells it itself. `now_s` is monotonic, as ``BusStatus.time_s`` is.
+    """
+    if status is None:
+        return (True,) * 7
+    if not status.servos or now_s - status.time_s > SILENT_AFTER_S:
+        return (False,) * 7
+    return tuple(zeroed and isinstance(reading, ServoState) for reading, zeroed in zip(status.servos, status.zeroed, strict=True))
+
+
+def status_by_servos(status: BusStatus | None) -> RobotStatus | None:
+    """Where the robot is by its servos alone, for while no picture brings its status along; None when not all of them answer.
+
+    What it says of a joint that is not zeroed is nothing that is known: see ``known_joints``.
+    """
+    states = [reading for reading in status.servos if isinstance(reading, ServoState)] if status is not None else []
+    if status is None or len(states) != len(JOINT_NAMES):
+        return None
+    right, left, up, down, advance, first, second = (state.position_mm or 0.0 for state in states)
+    return RobotStatus(status.time_s, advance, (first + second) / 2.0, (right, left, up, down), (0.0,) * 4)
+
+
+def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, servos: ServosConfig, safety: SafetyConfig) -> Row:
+    hot, warm = servos.max_temperature_c, servos.max_temperature_c - safety.temperature_warn_margin_c
+    low, sags = servos.min_voltage_v, servos.min_voltage_v + safety.voltage_warn_margin_v
+    heat = Tone.BAD if state.temperature_c >= hot else Tone.WARN if state.temperature_c >= warm else Tone.PLAIN
+    volts = Tone.BAD if state.voltage_v <= low else Tone.WARN if state.voltage_v <= sags else Tone.PLAIN
+    most_ma = servos.max_current_ma
+    strain = Tone.BAD if state.current_ma is not None and abs(state.current_ma) > most_ma else Tone.PLAIN
+    error = _error(state)
+    name = Cell(_name(joint), max(Tone.PLAIN, heat, volts, error.tone))
+    return (
+        name,
+        _position(joint, state),
+        Cell(_mm(joint, state.goal_mm), Tone.FAINT if not armed else Tone.PLAIN),
+        Cell(NONE)
+        if state.current_ma is None
+        else _signed_cell(number(state.current_ma, 0), strain, tr("limit {most:g} mA for half a second", most=most_ma)),
+        _signed_cell(f"{state.temperature_c:.0f}", heat, tr("warning from {warm:g} °C, limit {hot:g} °C", warm=warm, hot=hot)),
+        _signed_cell(f"{state.voltage_v:.1f}", volts, tr("warning from {sags:g} V, limit {low:g} V", sags=sags, low=low)),
+        Cell(tr("on"), Tone.PLAIN) if state.torque else _signed_cell(tr("off"), Tone.BAD if armed else Tone.FAINT),
+        Cell(tr("yes"), Tone.PLAIN)
+        if zeroed
+        else _signed_cell(tr("no"), Tone.WARN, tr("zero the joint, with slack wires, before arming")),
+        error,
+    )
+
+
+def _unknown(joint: JointConfig, reading: MissingServo | None) -> Row:
+    blank = (Cell(NONE, Tone.FAINT),) * (len(Column) - 2)
+    if reading is None:
+        return (Cell(_name(joint), Tone.FAINT), *blank, Cell(NONE, Tone.FAINT))
+    short = tr("restarted") if reading.restarted else tr("silent")
+    tip = (
+        tr("the servo restarted: zero its joint again")
+        if reading.restarted
+        else tr("{reason}, {misses} times in a row", reason=tr_text(reading.reason), misses=reading.misses)
+    )
+    return (Cell(_name(joint), Tone.BAD), *blank, Cell(short, Tone.BAD, tip))
+
+
+def _position(joint: JointConfig, state: ServoState) -> Cell:
+    at = state.position_mm
+    if at is None:
+        return Cell(NONE, Tone.FAINT, tr("not known before the joint is zeroed"))
+    span = joint.high_mm - joint.low_mm
+    margin = joint.warn_margin_mm
+    if not joint.low_mm <= at <= joint.high_mm:
+        tone = Tone.BAD
+    else:
+        tone = Tone.WARN if not joint.low_mm + margin <= at <= joint.high_mm - margin else Tone.PLAIN
+
+    def share(mm: float) -> float:
+        return round((mm - joint.low_mm) / span * _TRACK_STEPS) / _TRACK_STEPS
+
+    track = Track(
+        share(at),
+        None if state.goal_mm is None else share(state.goal_mm),
+        share(joint.low_mm + margin),
+        share(joint.high_mm - margin),
+    )
+    tip = tr(
+        "envelope {low_mm:g} to {high_mm:g} mm, slow within {margin:g} mm of its ends",
+        low_mm=joint.low_mm,
+        high_mm=joint.high_mm,
+        margin=margin,
+    )
+    return Cell(SIGN[tone] + _mm(joint, at), tone, tip, track)
+
+
+def _error(state: ServoState) -> Cell:
+    if state.error:
+        tips = [tr(long) for flag, (_, long) in _ERROR_WORDS.items() if state.error & flag]
+        return Cell(error_words(state.error), Tone.BAD, "\n".join(tips) or tr("see the servo's manual: hardware error status"))
+    if state.watchdog_tripped:
+        return Cell(tr("bus watchdog"), Tone.BAD, tr("nobody talked to the servo: arm again"))
+    return Cell(tr("none"), Tone.FAINT)
+
+
+def _signed_cell(text: str, tone: Tone, tip: str = "") -> Cell:
+    return Cell(SIGN[tone] + text, tone, tip)
+
+
+def _name(joint: JointConfig) -> str:
+    return f"{tr_text(joint.name).replace('_', ' ')} \N{MIDDLE DOT} {joint.id}"
+
+
+def _mm(joint: JointConfig, value_mm: float | None) -> str:
+    """Hundredths for a tendon, tenths for a feed: so much can be read, and matters."""
+    return NONE if value_mm is None else number(value_mm, 1 if joint.high_mm - joint.low_mm > _LONG_TRAVEL_MM else 2)
+
+
+@dataclass(frozen=True, slots=True)
+class PairBalance:
+    """Two wires that pull against each other. ``sum_mm`` of their pulls should be ``wanted_mm``, twice the pretension.
+
+    None: not known. ``forces_n`` of the wires is told by the motors' currents, friction included.
+    """
+
+    names: tuple[JointName, JointName]
+    wanted_mm: float
+    sum_mm: float | None = None
+    forces_n: tuple[float, float] | None = None
+    tone: Tone = Tone.FAINT
+
+    @property
+    def share(self) -> float | None:
+        """Excess over what is wanted: -1 no tension left, 0 as wanted, 1 twice as much."""
+        if self.sum_mm is None:
+            return None
+        return (self.sum_mm - self.wanted_mm) / max(self.wanted_mm, 0.1)
+
+    @property
+    def word(self) -> str:
+        if self.sum_mm is None or self.tone < Tone.WARN:
+            return ""
+        return tr("slack") if self.sum_mm < self.wanted_mm else tr("too tight")
+
+
+def pair_balances(status: BusStatus | None, servos: ServosConfig) -> tuple[PairBalance, PairBalance]:
+    """Right and left, up and down. Before arming nothing is pretensioned, so slack wires are no warning then."""
+    first, second = (_balance(status, servos, place) for place in (0, 2))
+    return first, second
+
+
+def _balance(status: BusStatus | None, servos: ServosConfig, place: int) -> PairBalance:
+    joints = servos.joints[place : place + 2]
+    balance = PairBalance((joints[0].name, joints[1].name), 2.0 * servos.pretension_mm)
+    states = [state for state in (status.servos[place : place + 2] if status is not None else ()) if isinstance(state, ServoState)]
+    if status is None or len(states) < 2 or states[0].position_mm is None or states[1].position_mm is None:
+        return balance
+    one, other = (state.current_ma for state in states)
+    forces = None
+    if one is not None and other is not None:
+        forces = wire_force_mn(joints[0], one) / 1000.0, wire_force_mn(joints[1], other) / 1000.0
+    known = PairBalance(balance.names, balance.wanted_mm, states[0].position_mm + states[1].position_mm, forces, Tone.PLAIN)
+    share = known.share or 0.0
+    tone = Tone.PLAIN
+    if status.armed and abs(share) > 0.5:
+        tone = Tone.BAD if abs(share) >= 1.0 else Tone.WARN
+    elif not status.armed:
+        tone = Tone.FAINT
+    return PairBalance(known.names, known.wanted_mm, known.sum_mm, known.forces_n, tone)
+
+
+def bus_line(status: BusStatus | None, silence_s: float | None = None) -> Cell:
+    """Phase, timing and counts of the bus in one line; `silence_s` is how long ago it was heard, when that is too long."""
+    if status is None:
+        return Cell(tr("no servo bus: nothing is known about the servos"), Tone.FAINT)
+    if silence_s is not None:
+        return Cell(tr("!! nothing heard from the servo bus for {seconds:.0f} s", seconds=silence_s), Tone.BAD)
+    slow = status.times.period_p99_ms > _CYCLE_P99_LIMIT_MS
+    timing = tr(
+        "cycle {half:.1f} ms, {sign}p99 {most:.1f} ms",
+        half=status.times.period_p50_ms,
+        sign="! " if slow else "",
+        most=status.times.period_p99_ms,
+    )
+    parts = [
+        tr("bus {phase}", phase=tr_text(status.phase.value)),
+        timing if status.times.period_p50_ms > 0.0 else tr("cycle not measured yet"),
+        tr("bad packets {count}", count=status.bad_packets),
+        tr("clamps {count}", count=status.clamp_count),
+    ]
+    whole = f"  {chr(0xB7)}  ".join(parts)
+    tip = f"{whole}\n" + tr("cycle: half of the periods of the last ten seconds were shorter than the first, 99 % than p99")
+    if broken := [
+        f"{tr_text(r.name).replace('_', ' ')} {error_words(r.error)}"
+        for r in status.servos
+        if isinstance(r, ServoState) and r.error
+    ]:
+        return Cell(f"!! {'; '.join(broken)}", Tone.BAD, tip)  # for which a narrow table has no room
+    return Cell(whole, Tone.WARN if slow else Tone.PLAIN, tip)
+
+
+_COLUMNS = tuple(Column)
+_LEFT = {Column.JOINT, Column.ERROR}
+_WIDTHS = {
+    Column.JOINT: (70, 0.10), Column.POSITION: (78, 0.25), Column.GOAL: (52, 0.07), Column.CURRENT: (42, 0.05),
+    Column.TEMPERATURE: (34, 0.05), Column.VOLTAGE: (40, 0.05), Column.TORQUE: (42, 0.04), Column.ZERO: (32, 0.04),
+    Column.ERROR: (56, 0.35),
+}  # fmt: skip
+"""Least width in px, and share of what is left."""
+_HEADER, _ROW = 19, (15, 34)
+_STYLE = """
+QTableView { background: @PANEL; border: none; }
+QHeaderView::section { background: @PANEL; color: @TEXT_FAINT; border: none;
+    border-bottom: 1px solid @LINE; font-size: 11px; padding: 0 3px; }
+"""
+_PAD, _GAP = 3.0, 6.0
+"""The words of the last column stand clear of those before, which end at its edge."""
+_NUMBER_PX = 48.0
+
+_Index = QModelIndex | QPersistentModelIndex
+
+
+class ServoModel(QAbstractTableModel):
+    """Seven rows of cells; only cells that changed are announced, so only they are painted again."""
+
+    def __init__(self, rows: tuple[Row, ...], parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._rows = rows
+
+    def show_rows(self, rows: tuple[Row, ...]) -> None:
+        """Replace the cells; the number of rows stays."""
+        old, self._rows = self._rows, rows
+        for row, (before, after) in enumerate(zip(old, rows, strict=True)):
+            for column, (was, now) in enumerate(zip(before, after, strict=True)):
+                if was != now:
+                    index = self.index(row, column)
+                    self.dataChanged.emit(index, index)
+
+    def cell(self, row: int, column: Column) -> Cell:
+        return self._rows[row][_COLUMNS.index(column)]
+
+    def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
+        return 0 if parent.isValid() else len(self._rows)
+
+    def columnCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
+        return 0 if parent.isValid() else len(_COLUMNS)
+
+    def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        cell = self._rows[index.row()][index.column()]
+        if role == Qt.ItemDataRole.DisplayRole:
+            return cell.text
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return cell.tip or None
+        if role == Qt.ItemDataRole.AccessibleTextRole:
+            return f"{tr(_COLUMNS[index.column()].value[0])} {cell.text}"
+        if role == Qt.ItemDataRole.UserRole:
+            return cell
+        return None
+
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        if orientation == Qt.Orientation.Horizontal:
+            heading, meaning = (tr(text) for text in _COLUMNS[section].value)
+            if role == Qt.ItemDataRole.DisplayRole:
+                return f"  {heading}" if _COLUMNS[section] is Column.ERROR else heading
+            if role == Qt.ItemDataRole.ToolTipRole:
+                return meaning
+            if role == Qt.ItemDataRole.TextAlignmentRole:
+                side = Qt.AlignmentFlag.AlignLeft if _COLUMNS[section] in _LEFT else Qt.AlignmentFlag.AlignRight
+                return side | Qt.AlignmentFlag.AlignVCenter
+        return None
+
+
+class ServoView(QTableView):
+    """All seven rows and all columns, whatever the size; no scroll bars, no keyboard focus."""
+
+    def __init__(self, model: ServoModel) -> None:
+        super().__init__()
+        self.setModel(model)
+        self.setItemDelegate(ServoDelegate(self))
+        theme.set_sheet(self, _STYLE)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setShowGrid(False)
+        self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.verticalHeader().hide()
+        self.verticalHeader().setMinimumSectionSize(_ROW[0])
+        header = self.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        header.setSectionsClickable(False)
+        header.setMinimumSectionSize(20)
+        header.setFixedHeight(_HEADER)
+        header.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.setMinimumHeight(_HEADER + 7 * _ROW[0])
+        self.setAccessibleName(tr("Servos"))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        spare = max(0, self.width() - sum(least for least, _ in _WIDTHS.values()))
+        widths = [least + int(share * spare) for least, share in _WIDTHS.values()]
+        widths[-1] += max(0, self.width() - sum(widths))
+        for place, width in enumerate(widths):
+            self.setColumnWidth(place, width)
+        self.verticalHeader().setDefaultSectionSize(max(_ROW[0], min(_ROW[1], (self.height() - _HEADER) // 7)))
+
+
+class ServoDelegate(QStyledItemDelegate):
+    """Numbers to the right, words to the left, the position with a bar of its envelope; what is wrong is tinted."""
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
+        cell = index.data(Qt.ItemDataRole.UserRole)
+        if not isinstance(cell, Cell):
+            return
+        column = _COLUMNS[index.column()]
+        box = QRectF(option.rect)  # type: ignore[attr-defined]
+        painter.save()
+        if index.row() % 2:
+            painter.fillRect(box, theme.colour(theme.RAISED, 0.45))
+        if cell.tone >= Tone.WARN:
+            painter.fillRect(box.adjusted(1, 0, -1, 0), theme.colour(theme.of(TONE_ROLE[cell.tone]), 0.16))
+        size = 14 if box.height() >= 26 else 13 if box.height() >= 21 else 12
+        text_font = theme.semi_bold(size) if column is Column.JOINT or cell.tone >= Tone.WARN else theme.font(size)
+        inside = box.adjusted(_PAD + (_GAP if column is Column.ERROR else 0), 0, -_PAD, 0)
+        if cell.track is not None:
+            _paint_track(painter, inside.adjusted(2, 0, -_NUMBER_PX, 0), cell.track, cell.tone)
+        painter.setFont(theme.fitted(text_font, cell.text, int(inside.width()), 9))
+        painter.setPen(QColor(theme.of(TONE_ROLE[cell.tone])))
+        side = Qt.AlignmentFlag.AlignLeft if column in _LEFT else Qt.AlignmentFlag.AlignRight
+        painter.drawText(inside, side | Qt.AlignmentFlag.AlignVCenter, theme.elide(painter.font(), cell.text, int(inside.width())))
+        painter.restore()
+
+
+def _paint_track(painter: QPainter, box: QRectF, track: Track, tone: Tone) -> None:
+    """The envelope as a strip with darker ends; a line at the goal, a block at the joint."""
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    strip = QRectF(box.left(), box.center().y() - 3.5, box.width(), 7.0)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(theme.colour(theme.ORANGE, 0.40))
+    painter.drawRect(strip)
+    painter.setBrush(QColor(theme.LINE))
+    low, high = (strip.left() + share * strip.width() for share in (track.low_warn, track.high_warn))
+    painter.drawRect(QRectF(low, strip.top(), high - low, strip.height()))
+
+    def x(share: float) -> float:
+        return strip.left() + max(0.0, min(1.0, share)) * strip.width()
+
+    if track.goal is not None:
+        painter.setPen(QPen(QColor(theme.TEXT_DIM), 1.5))
+        painter.drawLine(QPointF(x(track.goal), strip.top() - 3), QPointF(x(track.goal), strip.bottom() + 3))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(theme.of("SKY" if tone < Tone.WARN else TONE_ROLE[tone])))
+    painter.drawRect(QRectF(x(track.at) - 2.5, strip.top() - 1, 5.0, strip.height() + 2))
+
+
+_HEIGHT = 33
+_ROLE = {**TONE_ROLE, Tone.PLAIN: "ALLOWED"}
+_RANGE = 1.25
+
+
+class TendonBalance(QWidget):
+    """Two bars that grow from the middle: to the left when a pair of wires hangs slack, to the right when it is too tight.
+
+    Half a pair's pretension off is worth a warning; the marks show where that begins.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._pairs: tuple[PairBalance, ...] = ()
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self.setFixedHeight(_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(tr("Balance of the tendon pairs"))
+        self.setToolTip(tip("tendon_balance"))
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """What is said of each pair, in full."""
+        return tuple(f"{_title(pair)}: {_sum(pair)}{_word(pair)}{_forces(pair)}" for pair in self._pairs)
+
+    def sizeHint(self) -> QSize:
+        return QSize(440, _HEIGHT)
+
+    def show_pairs(self, pairs: tuple[PairBalance, ...]) -> None:
+        if pairs != self._pairs:
+            self._pairs = pairs
+            self.setAccessibleDescription("; ".join(self.texts))
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(theme.PANEL))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        width = (self.width() - 16.0) / 2
+        for k, pair in enumerate(self._pairs):
+            _paint_pair(painter, QRectF(k * (width + 16.0), 0, width, self.height()), pair)
+        painter.end()
+
+
+def _title(pair: PairBalance) -> str:
+    return f"{tr_text(pair.names[0])} + {tr_text(pair.names[1])}"
+
+
+def _total(pair: PairBalance) -> str:
+    return NONE if pair.sum_mm is None else number(pair.sum_mm, 2)
+
+
+def _sum(pair: PairBalance) -> str:
+    return tr("{total} of {wanted_mm:.2f} mm", total=_total(pair), wanted_mm=pair.wanted_mm)
+
+
+def _word(pair: PairBalance) -> str:
+    return f", {pair.word}" if pair.word else ""
+
+
+def _forces(pair: PairBalance) -> str:
+    if pair.forces_n is None:
+        return ""
+    one, other = (number(force, 1 if abs(force) < 100.0 else 0) for force in pair.forces_n)
+    return f", {one} / {other} N"
+
+
+def _paint_pair(painter: QPainter, box: QRectF, pair: PairBalance) -> None:
+    text_box = QRectF(box.left(), box.top(), box.width(), 16)
+    name = theme.of(_ROLE[pair.tone])
+    warns = pair.tone >= Tone.WARN
+    title = f"! {_title(pair)} {pair.word}:" if warns else f"{_title(pair)} "
+    right = _forces(pair).removeprefix(", ")
+    painter.setFont(theme.semi_bold(12) if warns else theme.font(12))
+    painter.setPen(QColor(name if warns else theme.TEXT_DIM))
+    advance = painter.fontMetrics().horizontalAdvance
+    choices = (f"{title} {_sum(pair)}", f"{title} {_total(pair)} mm")
+    left = next((text for text in choices if advance(text) + advance(right) + 8 <= text_box.width()), choices[-1])
+    if advance(left) + advance(right) + 8 > text_box.width():
+        right = ""
+    painter.drawText(text_box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, left)
+    painter.setPen(QColor(theme.TEXT_DIM))
+    painter.setFont(theme.font(12))
+    painter.drawText(text_box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, right)
+    track = QRectF(box.left(), box.top() + 20, box.width(), 8)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(theme.RAISED))
+    painter.drawRoundedRect(track, 3, 3)
+    _paint_bar(painter, track, pair.share, name)
+
+
+def _paint_bar(painter: QPainter, track: QRectF, share: float | None, name: str) -> None:
+    middle, half = track.center().x(), track.width() / 2 / _RANGE
+    painter.setPen(QPen(QColor(theme.TEXT_FAINT), 1))
+    for share_at in (-0.5, 0.5):
+        painter.drawLine(QPointF(middle + share_at * half, track.top() - 1), QPointF(middle + share_at * half, track.bottom() + 1))
+    if share is not None:
+        end = middle + half * max(-_RANGE, min(_RANGE, share))
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(name))
+        painter.drawRect(QRectF(min(middle, end), track.top() + 1, abs(end - middle), track.height() - 2))
+        if abs(share) > _RANGE:
+            inward = -7 if share > 0 else 7
+            tip = QPointF(end, track.center().y())
+            painter.setBrush(QColor(theme.TEXT))
+            painter.drawPolygon(QPolygonF([tip, tip + QPointF(inward, -5), tip + QPointF(inward, 5)]))
+    painter.setPen(QPen(QColor(theme.TEXT), 2))
+    painter.drawLine(QPointF(middle, track.top() - 3), QPointF(middle, track.bottom() + 3))
+
 
 _SHOW_EVERY_S = 0.2
 _LINE_ROLE = {**TONE_ROLE, Tone.PLAIN: "TEXT_DIM"}

@@ -8,8 +8,8 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetrics, QPainter, QPainterPath, QPaintEvent, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import palette, theme
-from app.language import mark, tr
+from app.ui import theme
+from app.ui.i18n import mark, tr
 from hardware.rig import RigKind
 
 
@@ -25,7 +25,7 @@ class BannerText:
     @property
     def colour(self) -> str:
         """In the scheme in use."""
-        return palette.of(self.role)
+        return theme.of(self.role)
 
 
 BANNERS = {
@@ -72,11 +72,11 @@ class SimBanner(QWidget):
         painter.setFont(_word_font())
         plate = QRectF(0, 0, self._plate_width(), self.height())
         self._paint_plate(painter, plate)
-        painter.setPen(QColor(palette.INK))
+        painter.setPen(QColor(theme.INK))
         painter.drawText(plate.adjusted(24, 0, -22, 0), Qt.AlignmentFlag.AlignCenter, tr(self._text.word))
         note_font = theme.font(theme.Size.BODY)
         painter.setFont(note_font)
-        painter.setPen(QColor(palette.TEXT_DIM))
+        painter.setPen(QColor(theme.TEXT_DIM))
         left = plate.right() + 14
         note = theme.elide(note_font, tr(self._text.note), int(self.width() - left))
         painter.drawText(QRectF(left, 0, self.width() - left, self.height()), Qt.AlignmentFlag.AlignVCenter, note)
@@ -93,7 +93,7 @@ class SimBanner(QWidget):
         painter.setClipPath(clip)
         painter.fillRect(plate, QColor(self._text.colour))
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(theme.colour(palette.INK, 0.85))
+        painter.setBrush(theme.colour(theme.INK, 0.85))
         height = plate.height()
         for left in (plate.left() - 14, plate.left() + 2, plate.right() - 22, plate.right() - 6):
             corners = [(left + 14, 0.0), (left + 22, 0.0), (left + 8, height), (left, height)]

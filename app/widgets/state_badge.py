@@ -9,12 +9,11 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import palette, theme
-from app.language import tr, tr_text
-from app.state_shapes import LETTER_DROP, LETTER_HEIGHT, state_outline
-from app.tool_tips import tip
-from app.wording import REASON_TEXT, STATE_TITLE, refusal_line, why_line
-from core.config import PoseConfig
+from app.ui import theme
+from app.ui.i18n import tr, tr_text
+from app.ui.texts import REASON_TEXT, STATE_TITLE, refusal_line, tip, why_line
+from app.widgets.scene_overlay import LETTER_DROP, LETTER_HEIGHT, state_outline
+from core.config.models import PoseConfig
 from core.types import PoseState, Scene
 
 _HEIGHT = 104
@@ -117,7 +116,7 @@ class StateBadge(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(palette.PANEL))
+        painter.fillRect(self.rect(), QColor(theme.PANEL))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         side = self.height() - 4.0
         box = QRectF(2.0, 2.0, side, side)
@@ -125,10 +124,10 @@ class StateBadge(QWidget):
         left = box.right() + 18
         width = self.width() - left - 2
         room = width - self._paint_sureness(painter, QRectF(left, 2, width, 36))
-        painter.setPen(QColor(palette.TEXT))
+        painter.setPen(QColor(theme.TEXT))
         painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), self._title, int(room)))
         painter.drawText(QRectF(left, 2, room, 36), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self._title)
-        painter.setPen(QColor(palette.TEXT_DIM))
+        painter.setPen(QColor(theme.TEXT_DIM))
         place = QRectF(left, 42, width, self.height() - 42)
         painter.setFont(_wrapped_font(self._why, place))
         painter.drawText(place, _WRAPPED, self._why)
@@ -140,7 +139,7 @@ class StateBadge(QWidget):
             return 0.0
         font = theme.bold() if self._is_unsure else theme.font()
         painter.setFont(font)
-        painter.setPen(QColor(palette.FAULT if self._is_unsure else palette.TEXT_DIM))
+        painter.setPen(QColor(theme.FAULT if self._is_unsure else theme.TEXT_DIM))
         painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, self._sureness)
         return QFontMetricsF(font).horizontalAdvance(self._sureness) + theme.GAP
 
@@ -156,7 +155,7 @@ def _wrapped_font(text: str, place: QRectF) -> QFont:
 
 def paint_state(painter: QPainter, box: QRectF, state: PoseState | None, *, filled: bool = True) -> None:
     """The state's shape and letter inside `box`; not `filled`, only its outline, as of a state that is not sure."""
-    name = palette.STATE_COLOUR[state]
+    name = theme.STATE_COLOUR[state]
     side, middle = box.height(), box.center()
     outline = QPolygonF([middle + QPointF(x, y) * (side / 2) for x, y in state_outline(state).tolist()])
     if state is None:
@@ -169,7 +168,7 @@ def paint_state(painter: QPainter, box: QRectF, state: PoseState | None, *, fill
         painter.setPen(theme.edge_of(name))
         painter.setBrush(QColor(name))
     painter.drawPolygon(outline)
-    painter.setPen(QColor(palette.TEXT_DIM if state is None else palette.STATE_INK if filled else palette.TEXT))
+    painter.setPen(QColor(theme.TEXT_DIM if state is None else theme.STATE_INK if filled else theme.TEXT))
     painter.setFont(theme.bold(max(9, round(side * LETTER_HEIGHT[state]))))
     letter = state.value if state is not None else "\N{EN DASH}"
     painter.drawText(box.translated(0, side * LETTER_DROP.get(state, 0.0)), Qt.AlignmentFlag.AlignCenter, letter)

@@ -8,9 +8,8 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app import palette, theme
-from app.tool_tips import tip
-from app.wording import side, signed_degrees
+from app.ui import theme
+from app.ui.texts import side, signed_degrees, tip
 from core.types import Pose
 
 _OVERFLOW_DEG = 22.0
@@ -83,7 +82,7 @@ class ThetaGauge(QWidget):
         if self._scale is None or self._scale.size() != size:
             self._scale = QPixmap(size)
             self._scale.setDevicePixelRatio(self.devicePixelRatioF())
-            self._scale.fill(QColor(palette.PANEL))
+            self._scale.fill(QColor(theme.PANEL))
             painter = QPainter(self._scale)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             self._paint_scale(painter, hub, radius)
@@ -92,15 +91,15 @@ class ThetaGauge(QWidget):
 
     def _paint_scale(self, painter: QPainter, hub: QPointF, radius: float) -> None:
         rim = QRectF(hub.x() - radius, hub.y() - radius, 2 * radius, 2 * radius)
-        self._paint_arc(painter, rim, -90, 90, QPen(QColor(palette.LINE), 8))
+        self._paint_arc(painter, rim, -90, 90, QPen(QColor(theme.LINE), 8))
         for low in (-180, 90):
-            self._paint_arc(painter, rim, low, low + 90, QPen(theme.colour(palette.LINE, 0.55), 8))
-        self._paint_arc(painter, rim, -self._allow_deg, self._allow_deg, QPen(QColor(palette.ALLOWED), 8))
+            self._paint_arc(painter, rim, low, low + 90, QPen(theme.colour(theme.LINE, 0.55), 8))
+        self._paint_arc(painter, rim, -self._allow_deg, self._allow_deg, QPen(QColor(theme.ALLOWED), 8))
         painter.setFont(theme.font(theme.Size.LABEL))
         for degrees in range(-90, 91, 15):
             major = degrees % 45 == 0
             inner = _on_dial(hub, radius - (12 if major else 8), degrees)
-            painter.setPen(QPen(QColor(palette.TEXT_DIM if major else palette.TEXT_FAINT), 1.6 if major else 1.0))
+            painter.setPen(QPen(QColor(theme.TEXT_DIM if major else theme.TEXT_FAINT), 1.6 if major else 1.0))
             painter.drawLine(inner, _on_dial(hub, radius - 4, degrees))
             if major:
                 self._paint_label(painter, _on_dial(hub, radius + 15, degrees), f"{abs(degrees)}")
@@ -117,7 +116,7 @@ class ThetaGauge(QWidget):
 
     @staticmethod
     def _paint_label(painter: QPainter, middle: QPointF, text: str) -> None:
-        painter.setPen(QColor(palette.TEXT_DIM))
+        painter.setPen(QColor(theme.TEXT_DIM))
         painter.drawText(QRectF(middle.x() - 20, middle.y() - 10, 40, 20), Qt.AlignmentFlag.AlignCenter, text)
 
     @staticmethod
@@ -125,20 +124,20 @@ class ThetaGauge(QWidget):
         tip = _on_dial(hub, radius - 2, theta_deg)
         direction = (tip - hub) * (1.0 / max(radius - 2, 1.0))
         across = QPointF(-direction.y(), direction.x())
-        painter.setPen(QPen(QColor(palette.PANEL), 1.5))
-        painter.setBrush(QColor(palette.THETA))
+        painter.setPen(QPen(QColor(theme.PANEL), 1.5))
+        painter.setBrush(QColor(theme.THETA))
         painter.drawPolygon(QPolygonF([tip, hub + across * 6, hub - direction * 12, hub - across * 6]))
-        painter.setBrush(QColor(palette.TEXT))
+        painter.setBrush(QColor(theme.TEXT))
         painter.drawEllipse(hub, 4.0, 4.0)
 
     def _paint_number(self, painter: QPainter, hub: QPointF, radius: float) -> None:
         shown = self._number is not None
-        painter.setPen(QColor(palette.TEXT if shown else palette.TEXT_FAINT))
+        painter.setPen(QColor(theme.TEXT if shown else theme.TEXT_FAINT))
         painter.setFont(theme.bold(theme.Size.NUMBER if radius >= _SMALL_PX else 26))
         painter.drawText(QRectF(hub.x() - 90, hub.y() + 10, 180, 34), Qt.AlignmentFlag.AlignCenter, self.text)
         painter.setFont(theme.semi_bold(13))
         for sign in (-1.0, 1.0):
-            painter.setPen(QColor(palette.TEXT if side(sign) == self.direction else palette.TEXT_FAINT))
+            painter.setPen(QColor(theme.TEXT if side(sign) == self.direction else theme.TEXT_FAINT))
             box = QRectF(hub.x() + sign * radius * 0.56 - 30, hub.y() - 20, 60, 20)
             if radius < _SMALL_PX:  # on so small a dial they would lie on ticks and needle: beside the number
                 box = QRectF(hub.x() + sign * 84 - 30, hub.y() + 17, 60, 20)

@@ -9,8 +9,8 @@ from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, QSize, Qt, QT
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen, QRegion
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QHBoxLayout, QLabel, QPushButton, QTabWidget, QVBoxLayout, QWidget
 
-from app import palette, theme
-from app.language import tr
+from app.ui import theme
+from app.ui.i18n import tr
 
 _CARD_WIDTH = 380
 _MARGIN, _AROUND, _CORNER = 14, 5, 9.0
@@ -231,8 +231,8 @@ class _Shade(QWidget):
         lit = QPainterPath()
         if self.light.isValid():
             lit.addRoundedRect(QRectF(self.light), _CORNER, _CORNER)
-        painter.fillPath(dark.subtracted(lit), theme.colour(palette.ON_PICTURE.INK, _SHADE))
-        painter.setPen(QPen(QColor(palette.ON_PICTURE.SKY), 2.5))
+        painter.fillPath(dark.subtracted(lit), theme.colour(theme.ON_PICTURE.INK, _SHADE))
+        painter.setPen(QPen(QColor(theme.ON_PICTURE.SKY), 2.5))
         painter.drawPath(lit)
         painter.end()
 
@@ -295,8 +295,8 @@ class _TourCard(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(palette.SKY), 1.5))
-        painter.setBrush(QColor(palette.PANEL))
+        painter.setPen(QPen(QColor(theme.SKY), 1.5))
+        painter.setBrush(QColor(theme.PANEL))
         painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 11, 11)
         painter.end()
 

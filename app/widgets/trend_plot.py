@@ -8,11 +8,11 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPen, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
-from app import palette, theme
-from app.language import tr
-from app.pace import Pace
-from app.tool_tips import tip
-from core.config import PoseConfig
+from app.ui import theme
+from app.ui.i18n import tr
+from app.ui.texts import tip
+from app.ui.workers import Pace
+from core.config.models import PoseConfig
 from core.types import PoseState, Scene
 
 SPAN_S = 30.0
@@ -66,9 +66,9 @@ class TrendPlot(QWidget):
 
     def follow_theme(self) -> None:
         """Ground, axes, curves and bands in the colours of the scheme."""
-        self._view.setBackground(palette.PANEL)
+        self._view.setBackground(theme.PANEL)
         solid = Qt.PenStyle.SolidLine
-        looks = ((palette.THETA, solid), (palette.D_HEAD, solid), (palette.D_TAIL, Qt.PenStyle.DotLine))
+        looks = ((theme.THETA, solid), (theme.D_HEAD, solid), (theme.D_TAIL, Qt.PenStyle.DotLine))
         for curve, (name, style) in zip(self._curves, looks, strict=True):
             pen = QPen(QColor(name), 1.5, style)
             pen.setCosmetic(True)
@@ -148,8 +148,8 @@ def _add_box(view: pg.GraphicsLayoutWidget, row: int) -> pg.ViewBox:
 
 
 def _colour_axis(axis: pg.AxisItem) -> None:
-    axis.setPen(QPen(QColor(palette.LINE)))
-    axis.setTextPen(QPen(QColor(palette.TEXT_DIM)))
+    axis.setPen(QPen(QColor(theme.LINE)))
+    axis.setTextPen(QPen(QColor(theme.TEXT_DIM)))
 
 
 def _add_axis(view: pg.GraphicsLayoutWidget, row: int, side: str, box: pg.ViewBox) -> pg.AxisItem:
@@ -182,7 +182,7 @@ class _Chart:
 
     def take_colours(self) -> None:
         _colour_axis(self._axis)
-        self._band.setBrush(theme.colour(palette.ALLOWED, 0.16))
+        self._band.setBrush(theme.colour(theme.ALLOWED, 0.16))
 
     def set_allowed(self, allowed: float) -> None:
         self._band.setRegion((-allowed if self._is_signed else 0.0, allowed))
@@ -233,7 +233,7 @@ class _StateBand:
 
     def take_colours(self) -> None:
         _colour_axis(self._axis)
-        colours = [theme.colour(palette.LINE, 0.6)] + [QColor(palette.STATE_COLOUR[state]) for state in PoseState]
+        colours = [theme.colour(theme.LINE, 0.6)] + [QColor(theme.STATE_COLOUR[state]) for state in PoseState]
         self._table = np.array([[c.red(), c.green(), c.blue(), c.alpha()] for c in colours], np.uint8)
         self._paint()
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
 
 from core.control.faults import REACTION, Cause, Reaction
-from core.control.gate_checks import RejectReason
+from core.control.gate import RejectReason
 from core.control.modes import Hindrance
 
 

@@ -10,8 +10,7 @@ from typing import Protocol
 
 from core.control.faults import Cause, Fault
 from core.control.frame_reports import is_picture
-from core.control.pilot import Pilot
-from core.control.pilot_loop import PilotLoop
+from core.control.pilot import Pilot, PilotLoop
 from core.devices import Camera, CameraLost, DeviceError, EndOfStream, Robot
 from core.types import Advice, Frame, Point, Reason, Refusal, RobotStatus, Scene, Tick
 

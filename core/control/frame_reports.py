@@ -1,17 +1,116 @@
-"""What the supervisor wants to know of each turn of perception, made from frame and scene."""
+"""What the supervisor wants to know of each turn of perception, made from frame and scene.
+
+Has the camera been moved since the rig was opened? The fixed parts of the picture tell: they are where they were, or not.
+
+Corners of the first picture are the landmarks. They are looked for again by optical flow, there and back, so that one which is
+covered now does not count. The robot, a hand or a reflection changes some of them; a moved, turned or zoomed camera moves most. So
+the drift is the median of their ways. Grey levels are taken against their surroundings: a lamp that is dimmed is no move.
+"""
 
 from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.control.frame_watch import FrameReport, RouteState
-from core.control.landmarks import Landmarks
-from core.control.way import look_ahead
-from core.policy_config import PursuitConfig
+from core.config.models import PursuitConfig
+from core.control.health import FrameReport, RouteState
+from core.control.pursuit import look_ahead
 from core.types import Advice, Frame, Image, Point, Reason, Scene
+
+_EVERY_S = 0.4
+"""A look takes some 6 ms; a camera is not knocked over more often."""
+_WIDTH_PX = 320
+_MOST, _LEAST = 48, 8
+_APART_PX = 10
+_CORNER = 0.08
+_WINDOW_PX, _PYRAMID = 21, 4
+_BACK_PX = 1.0
+"""Traced there and back, a landmark that was really found comes out where it began."""
+_SMOOTH_PX, _AROUND_PX = 1.2, 12.0
+_LEAST_CONTRAST = 6.0
+_GONE_LOOKS = 3
+"""So often in a row another scene must be seen before it counts: a hand that passes has structure, too."""
+
+_Grey = NDArray[np.uint8]
+_Corners = NDArray[np.float32]
+
+
+class Landmarks:
+    """Remembers the first picture with structure in it; two or three times a second the newest one is compared with it."""
+
+    def __init__(self) -> None:
+        self._size: tuple[int, int] | None = None
+        self._first: _Grey | None = None
+        self._corners: _Corners = np.zeros((0, 1, 2), np.float32)
+        self._looked_s = -math.inf
+        self._drift_px: float | None = None
+        self._gone = 0
+
+    def drift_px(self, image: Image, captured_s: float, scale: float) -> float | None:
+        """How far the landmarks have moved, in working px.
+
+        None while there are none, or the picture is covered or dark; infinite when it shows something else than at the beginning.
+
+        Parameters
+        ----------
+        image : RGB (H, W, 3); another size than the first one's is another camera, and begins anew.
+        captured_s : monotonic.
+        scale : working px per source px.
+        """
+        size = image.shape[1], image.shape[0]
+        if size != self._size:
+            self._size, self._first, self._looked_s, self._drift_px = size, None, -math.inf, None
+        # a time that is no number never looks, one that went back does
+        if 0.0 <= captured_s - self._looked_s < _EVERY_S or not math.isfinite(captured_s):
+            return self._drift_px
+        self._looked_s = captured_s
+        grey = _structure(image)
+        if self._first is None:
+            self._begin(grey)
+            return None
+        small_px = _way(self._first, grey, self._corners)
+        self._gone = self._gone + 1 if small_px is None and 2 * len(_corners_of(grey)) >= len(self._corners) else 0
+        if small_px is not None:
+            self._drift_px = small_px * (size[0] / grey.shape[1]) * scale
+        else:
+            self._drift_px = math.inf if self._gone >= _GONE_LOOKS else None
+        return self._drift_px
+
+    def _begin(self, grey: _Grey) -> None:
+        found = _corners_of(grey)
+        if len(found) >= _LEAST:
+            self._first, self._corners = grey, found
+
+
+def _corners_of(grey: _Grey) -> _Corners:
+    found = cv2.goodFeaturesToTrack(grey, _MOST, _CORNER, _APART_PX)
+    return np.zeros((0, 1, 2), np.float32) if found is None else np.asarray(found, np.float32)
+
+
+def _structure(image: Image) -> _Grey:
+    """A small grey picture of local contrast: what is brighter or darker than its surroundings, however bright those are."""
+    height, width = image.shape[:2]
+    small = cv2.resize(image, (_WIDTH_PX, max(1, round(height * _WIDTH_PX / width))), interpolation=cv2.INTER_AREA)
+    grey = cv2.GaussianBlur(cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32), (0, 0), _SMOOTH_PX)
+    against = grey - cv2.GaussianBlur(grey, (0, 0), _AROUND_PX)
+    contrast = cv2.sqrt(cv2.GaussianBlur(against * against, (0, 0), _AROUND_PX))
+    return np.asarray(np.clip(128.0 + 50.0 * against / (contrast + _LEAST_CONTRAST), 0, 255), np.uint8)
+
+
+def _way(first: _Grey, now: _Grey, corners: _Corners) -> float | None:
+    """The median way of the landmarks that are found, in px of these pictures; None when fewer than half of them are."""
+    window = (_WINDOW_PX, _WINDOW_PX)
+    there, found, _ = cv2.calcOpticalFlowPyrLK(first, now, corners, np.empty_like(corners), winSize=window, maxLevel=_PYRAMID)
+    back, returned, _ = cv2.calcOpticalFlowPyrLK(now, first, there, np.empty_like(corners), winSize=window, maxLevel=_PYRAMID)
+    astray_px = np.linalg.norm((back - corners)[:, 0], axis=1)
+    good = (found[:, 0] == 1) & (returned[:, 0] == 1) & (astray_px <= _BACK_PX)
+    if np.count_nonzero(good) < max(_LEAST, len(corners) // 3):
+        return None
+    return float(np.median(np.linalg.norm((there - corners)[good, 0], axis=1)))
+
 
 _SAMPLE = 16
 _NOTHING_SEEN = frozenset({Reason.BLACK, Reason.WHITE, Reason.UNREADABLE})

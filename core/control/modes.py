@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from core.control.faults import Cause, Fault
-from core.control.gate_checks import Source
+from core.control.gate import Source
 from core.control.health import Health, Report
 
 
@@ -58,7 +58,7 @@ ARMED_MODES = DRIVING_MODES | {Mode.ARMED}
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class RequestRefused:
     """A request that was not granted, and all its reasons at once."""
 
     act: Act
@@ -106,4 +106,4 @@ class Decision:
     latched: Fault | None
     active: tuple[Fault, ...]
     raised: tuple[Fault, ...]
-    refused: tuple[Refused, ...]
+    refused: tuple[RequestRefused, ...]

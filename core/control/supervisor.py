@@ -21,16 +21,33 @@ import math
 from collections.abc import Collection, Sequence, Set
 from dataclasses import replace
 
-from core.control.deadman import DeadmanReport
+from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import AREA, CAUSES, REACTION, RECHECK, Area, Cause, Fault, Reaction, worst
-from core.control.frame_watch import RouteState
-from core.control.gate_checks import Source
-from core.control.health import Health, Report, deadman_down, deadman_held, disarmed, driving_faults, faults_now, take
-from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Latched, Mode, Refused, SupervisorState
-from core.safety_config import SafetyConfig
-from core.servo_config import ServosConfig
-
-__all__ = ["Act", "Decision", "Event", "Hindrance", "Latched", "Mode", "Refused", "SupervisorState", "supervise"]
+from core.control.gate import Source
+from core.control.health import (
+    DeadmanReport,
+    Health,
+    Report,
+    RouteState,
+    deadman_down,
+    deadman_held,
+    disarmed,
+    driving_faults,
+    faults_now,
+    take,
+)
+from core.control.modes import (
+    ARMED_MODES,
+    DRIVING_MODES,
+    Act,
+    Decision,
+    Event,
+    Hindrance,
+    Latched,
+    Mode,
+    RequestRefused,
+    SupervisorState,
+)
 
 
 def supervise(
@@ -59,7 +76,7 @@ def supervise(
     state = _react(replace(state, health=health, active=(*stop, *clock, *active)), in_use, now_s, safety)
     refused = []
     if Act.ACKNOWLEDGE in acts and state.latched is not None:
-        refused.append(Refused(Act.ACKNOWLEDGE, (state.latched.fault.cause,)))
+        refused.append(RequestRefused(Act.ACKNOWLEDGE, (state.latched.fault.cause,)))
     state, denied = _obey(state, acts, now_s, safety)
     return state, _decide(state, before, (*refused, *denied), now_s, safety)
 
@@ -170,7 +187,7 @@ def _hold_expired(state: SupervisorState, now_s: float, safety: SafetyConfig) ->
 
 def _obey(
     state: SupervisorState, acts: Set[Act], now_s: float, safety: SafetyConfig
-) -> tuple[SupervisorState, tuple[Refused, ...]]:
+) -> tuple[SupervisorState, tuple[RequestRefused, ...]]:
     """The state after the operator's requests, and those that were refused."""
     refused = []
     if Act.INPUT in acts:
@@ -181,7 +198,7 @@ def _obey(
     ):
         if act in acts:
             if reasons := against(state, now_s, safety):
-                refused.append(Refused(act, reasons))
+                refused.append(RequestRefused(act, reasons))
             else:
                 state = replace(state, mode=mode, resumed_s=None)
     if state.mode in DRIVING_MODES and not acts.isdisjoint({Act.INPUT, Act.TAKE_BACK}):
@@ -244,7 +261,7 @@ def hindrances(
 
 
 def _decide(
-    state: SupervisorState, before: Collection[Fault], refused: tuple[Refused, ...], now_s: float, safety: SafetyConfig
+    state: SupervisorState, before: Collection[Fault], refused: tuple[RequestRefused, ...], now_s: float, safety: SafetyConfig
 ) -> Decision:
     known = {fault.cause for fault in before}
     blank = [fault for fault in state.active if _holds(fault) and AREA[fault.cause] in {Area.CAMERA, Area.PERCEPTION}]

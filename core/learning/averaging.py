@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from core.learning.model_file import SECOND_LOOK, ModelError, load_network, second_look_of, trained_without
-from core.learning.model_writing import save_model
+from core.learning.model_writer import save_model
+from core.perception.model_file import SECOND_LOOK, ModelError, load_network, second_look_of, trained_without
 
 if TYPE_CHECKING:
     from core.perception.unet import DualUNet

@@ -1,22 +1,204 @@
 """The piece of the vessel's centerline beside the robot's head, and the route along the vessel graph (METHOD section 5).
 
 Lengths are in the graph's own unit: pixels in perception, and the same functions serve analytic graphs in any unit.
+
+Which edges of the vessel graph a head may belong to: those near it within its own lumen.
+
+The operator's route: the shortest way along the vessel graph to a destination. Lengths are in the graph's own unit.
 """
 
 from __future__ import annotations
 
+import heapq
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from core.config import VectorConfig
-from core.perception import polyline
-from core.perception.feet import feet_of
-from core.perception.lumen import foot, is_walled_off
-from core.perception.route import incidence_of, plan_route
+from core import geometry
+from core.config.models import VectorConfig
+from core.perception.vectors import foot, is_walled_off
 from core.perception.vessel_graph import build_graph
 from core.types import Centerline, Mask, Point, Points, Route, VesselGraph
+
+REACH_RADII = 1.5
+"""Vessels farther from the head than this many of their radii are not looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeProjection:
+    """The place on an edge nearest to the head within its lumen: its distance, its arc-length position, the radius there."""
+
+    distance: float
+    edge: int
+    position: float
+    radius: float
+
+
+def feet_of(graph: VesselGraph, head: Point, half_length: float, vessel: Mask | None) -> list[EdgeProjection]:
+    """The edges that the head may belong to, in the graph's order.
+
+    Parameters
+    ----------
+    graph, head : in the graph's unit; in pixels where there is a mask.
+    half_length : of the piece of centerline that is wanted; a radius below a quarter of it counts as that.
+    vessel : mask (h, w), or None: then nobody can tell what lies beyond a wall. What does is left aside, unless everything does.
+    """
+    plain = []
+    for index, edge in enumerate(graph.edges):
+        if len(edge.points) >= 2:
+            along = geometry.arc_length(edge.points)
+            distance, position, place = geometry.nearest(edge.points, head, along)
+            radius = float(np.interp(position, along, edge.radius))
+            plain.append((EdgeProjection(distance, index, position, max(radius, 0.25 * half_length)), place, distance <= radius))
+    plain.sort(key=lambda one: (one[0].distance, one[0].edge))
+    found: list[EdgeProjection] = []
+    for near, place, is_inside in plain:
+        if found and not _is_in_reach(near, found):
+            continue
+        if vessel is None or is_inside or not is_walled_off(head, place, vessel):
+            found.append(near)
+        elif (within := foot(graph.edges[near.edge].points, head, vessel)) is not None:
+            edge = graph.edges[near.edge]
+            radius = float(np.interp(within[1], geometry.arc_length(edge.points), edge.radius))
+            found.append(EdgeProjection(within[0], near.edge, within[1], max(radius, 0.25 * half_length)))
+    found = found or [near for near, *_ in plain]
+    return sorted((one for one in found if _is_in_reach(one, found)), key=lambda one: one.edge)
+
+
+def _is_in_reach(one: EdgeProjection, found: list[EdgeProjection]) -> bool:
+    first = min(found, key=lambda near: (near.distance, near.edge))
+    return one.distance <= max(first.distance + 0.25 * first.radius, REACH_RADII * one.radius)
+
+
+OFF_VESSEL_PX = 15.0
+"""A click so far beside the lumen is still taken for one on the vessel."""
+
+
+def route_or_reason(graph: VesselGraph, start: Point, target: Point, vessel: Mask | None = None) -> Route | str:
+    """The route, or in plain words why there is none: the target is beside the vessel, or no vessel that was found leads there."""
+    there = _lumen(graph, target)
+    if there is None:
+        return "no vessel was found"
+    beside_px, *_ = there
+    if beside_px > OFF_VESSEL_PX:
+        return f"the target is {beside_px:.0f} px beside the vessel"
+    return plan_route(graph, start, target, vessel) or "no vessel that was found leads there"
+
+
+def plan_route(graph: VesselGraph, start: Point, target: Point, vessel: Mask | None = None) -> Route | None:
+    """The shortest way along the graph from the place beside `start` to the one beside `target`, in the vessel that this lies in.
+
+    With the vessel's mask (h, w), in pixels, no wall lies between `start` and the place beside it.
+
+    Returns
+    -------
+    The route, or None when the graph is empty or has no way between the two places.
+    """
+    here, there = _place(graph, start, vessel), _lumen(graph, target)
+    if here is None or there is None:
+        return None
+    (edge, position), (_, last_edge, last_position) = here, there
+    lengths = [float(geometry.arc_length(e.points)[-1]) for e in graph.edges]
+    reached, came_by = distances(graph, lengths, edge, position)
+    last = graph.edges[last_edge]
+    ways: list[tuple[float, int | None]] = [
+        (reached[last.start] + last_position, last.start),
+        (reached[last.end] + lengths[last_edge] - last_position, last.end),
+    ]
+    if edge == last_edge:
+        ways.append((abs(last_position - position), None))
+    length, node = min(ways, key=lambda way: way[0])
+    if not np.isfinite(length):
+        return None
+    if node is None:
+        low, high = sorted((position, last_position))
+        points = geometry.cut(last.points, low, high)
+        return Route(points if position <= last_position else points[::-1], length, target)
+    by_start = node == last.start and reached[last.start] + last_position == length
+    pieces = [geometry.cut(last.points, 0.0, last_position) if by_start else geometry.cut(last.points, last_position, np.inf)[::-1]]
+    node = go_back(graph, came_by, node, pieces)
+    first = graph.edges[edge]
+    leaves_by_end = node == first.end and (node != first.start or 2.0 * position > lengths[edge])
+    pieces.append(geometry.cut(first.points, position, np.inf) if leaves_by_end else geometry.cut(first.points, 0, position)[::-1])
+    return Route(joined(pieces[::-1]), length, target)
+
+
+def _place(graph: VesselGraph, point: Point, vessel: Mask | None) -> tuple[int, float] | None:
+    """The edge nearest to a point and the arc-length position on it; beyond a wall only where nothing lies before it."""
+    lines = [(index, edge.points) for index, edge in enumerate(graph.edges) if len(edge.points) > 1]
+    nearest = [(*geometry.nearest(points, point), index) for index, points in lines]
+    if not nearest:
+        return None
+    _, position, place, index = min(nearest, key=lambda found: (found[0], found[1]))
+    if vessel is not None and is_walled_off(point, place, vessel):
+        feet = [(found[0], found[1], index) for index, points in lines if (found := foot(points, point, vessel)) is not None]
+        if feet:
+            _, position, index = min(feet)
+    return index, position
+
+
+def _lumen(graph: VesselGraph, point: Point) -> tuple[float, int, float] | None:
+    """The vessel that a point lies in, or nearest to: how far outside its lumen (negative: inside), its edge, the position on it.
+
+    By the walls, not by the centerlines: inside a wide vessel the centerline of a narrow one may be nearer.
+    """
+    found = []
+    for index, edge in enumerate(graph.edges):
+        if len(edge.points) > 1:
+            along = geometry.arc_length(edge.points)
+            distance, position, _ = geometry.nearest(edge.points, point, along)
+            found.append((distance - float(np.interp(position, along, edge.radius)), distance, index, position))
+    if not found:
+        return None
+    outside, _, index, position = min(found)
+    return outside, index, position
+
+
+def distances(graph: VesselGraph, lengths: list[float], edge: int, position: float) -> tuple[list[float], list[int | None]]:
+    """Dijkstra from a place on an edge: each node's distance, and the edge it is reached by (None: straight from the place)."""
+    reached = [np.inf] * len(graph.nodes)
+    came_by: list[int | None] = [None] * len(graph.nodes)
+    incidence = incidence_of(graph)
+    first = graph.edges[edge]
+    queue: list[tuple[float, int, int]] = [(position, first.start, -1), (lengths[edge] - position, first.end, -1)]
+    heapq.heapify(queue)
+    while queue:
+        distance, node, via = heapq.heappop(queue)
+        if distance >= reached[node]:
+            continue
+        reached[node], came_by[node] = distance, via if via >= 0 else None
+        for index, starts in incidence[node]:
+            following = graph.edges[index].end if starts else graph.edges[index].start
+            if distance + lengths[index] < reached[following]:
+                heapq.heappush(queue, (distance + lengths[index], following, index))
+    return reached, came_by
+
+
+def go_back(graph: VesselGraph, came_by: list[int | None], node: int, pieces: list[Points]) -> int:
+    """Add to `pieces` the edges by which a node was reached, the last one first, each in the direction of travel; returns the node
+    that was reached straight from the place."""
+    while (via := came_by[node]) is not None:
+        edge = graph.edges[via]
+        pieces.append(edge.points if edge.end == node else edge.points[::-1])
+        node = edge.start if edge.end == node else edge.end
+    return node
+
+
+def joined(pieces: list[Points]) -> Points:
+    """Lines one after the other as one (N, 2), without the points that stand twice."""
+    points = np.concatenate(pieces)
+    return np.asarray(points[np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])])
+
+
+def incidence_of(graph: VesselGraph) -> list[list[tuple[int, bool]]]:
+    """For each node the edges that touch it, as (edge, whether the edge starts here)."""
+    touching: list[list[tuple[int, bool]]] = [[] for _ in range(len(graph.nodes))]
+    for index, edge in enumerate(graph.edges):
+        touching[edge.start].append((index, True))
+        touching[edge.end].append((index, False))
+    return touching
+
 
 __all__ = ["build_graph", "centerline_at", "find", "plan_route", "window_at"]
 
@@ -152,8 +334,8 @@ def centerline_at(
                 if used_behind & used_ahead:
                     continue
                 line = np.concatenate([back[:0:-1], onward])
-                along = polyline.arc_length(line)
-                place = polyline.nearest(line, head, along)
+                along = geometry.arc_length(line)
+                place = geometry.nearest(line, head, along)
                 if vessel is not None and place[0] < near.distance - SAME_COST and is_walled_off(head, place[2], vessel):
                     place = near.distance, float(along[len(back) - 1]), (float(onward[0, 0]), float(onward[0, 1]))
                 candidate = _candidate(line, along, place, near.radius, scale, head, direction, half_length_px, ahead, forks)
@@ -179,12 +361,12 @@ def _walks(
     sides would meet on it.
     """
     first = graph.edges[edge]
-    along = polyline.arc_length(first.points)
+    along = geometry.arc_length(first.points)
     total = float(along[-1])
     if onward:
-        line, node = polyline.cut(first.points, position, min(position + reach, total), along), first.end
+        line, node = geometry.cut(first.points, position, min(position + reach, total), along), first.end
     else:
-        line, node = polyline.cut(first.points, max(position - reach, 0.0), position, along)[::-1], first.start
+        line, node = geometry.cut(first.points, max(position - reach, 0.0), position, along)[::-1], first.start
     comes_back = total >= 2.0 * reach
     walks = []
     left = reach - (total - position if onward else position)
@@ -198,8 +380,8 @@ def _walks(
         for index, starts in options:
             following = graph.edges[index]
             points = following.points if starts else following.points[::-1]
-            along = polyline.arc_length(points)
-            joined = np.concatenate([line, polyline.cut(points, 0.0, left, along)])
+            along = geometry.arc_length(points)
+            joined = np.concatenate([line, geometry.cut(points, 0.0, left, along)])
             pending.append((joined, following.end if starts else following.start, left - float(along[-1]), used | {index}))
     return walks
 
@@ -220,9 +402,9 @@ def _route_ahead(
     if place is None:
         return None
     distance, position, _ = place
-    ahead = polyline.cut(route.points, position, position + 2.0 * half_length)
+    ahead = geometry.cut(route.points, position, position + 2.0 * half_length)
     near = distance <= max(1.5 * radius, 0.5 * half_length)
-    if not near or float(polyline.arc_length(ahead)[-1]) <= MIN_PIECE_SHARE * half_length:
+    if not near or float(geometry.arc_length(ahead)[-1]) <= MIN_PIECE_SHARE * half_length:
         return None
     return _Ahead(ahead, _goes_back(ahead, direction, half_length, forks))
 
@@ -240,7 +422,7 @@ def _candidate(
     forks: list[Points],
 ) -> _Candidate | None:
     distance, position, nearest = place
-    piece = polyline.cut(line, position - half_length, position + half_length, along)
+    piece = geometry.cut(line, position - half_length, position + half_length, along)
     before, after = min(position, half_length), min(float(along[-1]) - position, half_length)
     length = before + after
     if length < MIN_PIECE_SHARE * 2.0 * half_length:
@@ -261,7 +443,7 @@ def _candidate(
     cost += WALL_WEIGHT * max(0.0, distance / radius - 1.0)
     off_route = 0.0
     if ahead is not None:
-        forward = polyline.cut(piece, before, length)
+        forward = geometry.cut(piece, before, length)
         backs_out = _goes_back(forward, direction, half_length, forks)
         off_route = 1.0 if backs_out else _off_route(forward, ahead.points, scale)
     return _Candidate(piece, nearest, radius, cost + ROUTE_WEIGHT * off_route, off_route, distance <= radius)
@@ -269,12 +451,12 @@ def _candidate(
 
 def _goes_back(way: Points, direction: NDArray[np.float64], half_length: float, forks: list[Points]) -> bool:
     """Whether a way from the head leads to a fork that lies behind the robot, as to the other branch of one that it has passed."""
-    along = polyline.arc_length(way)
-    met = (polyline.nearest(way, (float(x), float(y)), along) for x, y in forks)
+    along = geometry.arc_length(way)
+    met = (geometry.nearest(way, (float(x), float(y)), along) for x, y in forks)
     first = min((position for distance, position, _ in met if distance <= FORK_SHARE * half_length), default=0.0)
     # All of the way there is behind: one round a bend of the robot's own vessel is not.
     return first > 0.0 and all(
-        float((polyline.cut(way, 0.0, share * first, along)[-1] - way[0]) @ direction) < 0.0 for share in (0.5, 1.0)
+        float((geometry.cut(way, 0.0, share * first, along)[-1] - way[0]) @ direction) < 0.0 for share in (0.5, 1.0)
     )
 
 
@@ -297,8 +479,8 @@ def _off_route(forward: Points, ahead: Points, radius: float) -> float:
     """How far the forward half of a piece leaves the route, 0 (on it) to 1 (more than half a lumen radius off)."""
     if len(forward) < 2:
         return 0.0
-    probes = polyline.resample(forward, float(polyline.arc_length(forward)[-1]) / 4.0)
-    gaps = [polyline.nearest(ahead, (float(x), float(y)))[0] for x, y in probes]
+    probes = geometry.resample(forward, float(geometry.arc_length(forward)[-1]) / 4.0)
+    gaps = [geometry.nearest(ahead, (float(x), float(y)))[0] for x, y in probes]
     return float(np.mean(np.minimum(1.0, (np.array(gaps) / (0.5 * radius)) ** 2)))
 
 

@@ -11,22 +11,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.config import PathConfig, PerceptionConfig
-from core.perception import gaps, masks, quality, robot_path, skeleton, steadiness
+from core.config.models import PathConfig, PerceptionConfig
+from core.perception import quality, robot_path, segmentation, skeleton
 from core.perception.centerline import find as find_centerline
+from core.perception.centerline import route_or_reason
 from core.perception.compiled import loops
-from core.perception.engines import open_second_look, open_segmenter
-from core.perception.evidence import Calibration, collect
-from core.perception.familiarity import Familiarity
-from core.perception.glance import Background, look
-from core.perception.past import Before, Past
+from core.perception.inference import open_second_look, open_segmenter
+from core.perception.out_of_distribution import OutOfDistributionReference
 from core.perception.pose import StateFilter, measure
-from core.perception.route import route_or_reason
-from core.perception.route_memory import RouteMemory
-from core.perception.second_look import MOST_LOOKS, SecondLook
+from core.perception.quality import ConfidenceCalibration, collect
+from core.perception.roi import Background, VesselAverage, look
 from core.perception.segmentation import Recognised, Segmenter, Turned, recognise, robot_beside, to_working
-from core.perception.standing_vessel import StandingVessel
-from core.perception.tracking import check_in_view, check_jump, recall, remember
+from core.perception.tip_refinement import MOST_LOOKS, TipRefinement
+from core.perception.tracking import PreviousFrame, RouteMemory, StreamState, check_in_view, check_jump, recall, remember
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.perception.vessel_graph import build_graph
 from core.types import Frame, Image, Mask, Masks, Point, Reason, Refusal, Scene, Skeletons, VesselGraph, Window
@@ -62,9 +59,9 @@ class Sight:
     """
 
     segment: Segmenter
-    calibration: Calibration | None = None
+    calibration: ConfidenceCalibration | None = None
     swings: bool = False
-    familiarity: Familiarity | None = None
+    familiarity: OutOfDistributionReference | None = None
     all_orientations: bool = False
 
 
@@ -86,10 +83,10 @@ class Pipeline:
         self,
         segmenter: Segmenter,
         config: PerceptionConfig,
-        calibration: Calibration | None = None,
+        calibration: ConfidenceCalibration | None = None,
         single: Sight | None = None,
         glance: Sight | None = None,
-        familiarity: Familiarity | None = None,
+        familiarity: OutOfDistributionReference | None = None,
         *,
         swings: bool = False,
     ) -> None:
@@ -100,7 +97,7 @@ class Pipeline:
         self._glance = glance if config.tracking.window_px else None
         self._config = config
         self._states = StateFilter(config.pose)
-        self._past = Past(config.tracking)
+        self._past = StreamState(config.tracking)
         self._shape: tuple[int, ...] | None = None
 
     @property
@@ -137,9 +134,9 @@ class Pipeline:
         if self._glance is not None:
             glance = self._glance.segment
             robot_beside(glance, np.zeros((window, window), np.float32), np.zeros((window, window, 3), np.uint8))
-            if isinstance(glance, SecondLook):
+            if isinstance(glance, TipRefinement):
                 glance.warm_up_beside()
-        if isinstance(segment, SecondLook):
+        if isinstance(segment, TipRefinement):
             segment.warm_up()
 
     def reset(self) -> None:
@@ -181,7 +178,9 @@ class Pipeline:
             past.glances.remember(scene)
         return watch.finish(replace(scene, pose=self._states.update(scene.pose, scene.captured_s)))
 
-    def _perceive(self, frame: Frame, target: Point | None, watch: _Stopwatch, sight: Sight, past: Past | None = None) -> Scene:
+    def _perceive(
+        self, frame: Frame, target: Point | None, watch: _Stopwatch, sight: Sight, past: StreamState | None = None
+    ) -> Scene:
         config = self._config
         height, width = frame.image.shape[:2]
         with watch.stage("prepare"):
@@ -201,21 +200,21 @@ class Pipeline:
         unlike = self._check_kind(scene, past)
         if scene.refusal is not None:
             return replace(scene, refusal=quality.hinted(scene.refusal, unlike))
-        before = past.recall(frame.captured_s) if past is not None else Before()
+        before = past.recall(frame.captured_s) if past is not None else PreviousFrame()
         scene = self._locate(scene, image, target, watch, before, past.routes if past is not None else None)
         if scene.refusal is None and unlike is not None:
             # What was found is kept: it is what somebody who teaches the model this rig begins with.
             scene = replace(scene, refusal=unlike)
         return scene if scene.refusal is not None else self._judge(scene, image, target, watch, sight, before)
 
-    def _check_kind(self, scene: Scene, past: Past | None) -> Refusal | None:
+    def _check_kind(self, scene: Scene, past: StreamState | None) -> Refusal | None:
         """Whether the picture is of a kind that the model does not know. A stream remembers; a window tells nothing of it."""
         refusal = quality.check_kind(scene.novelty, self._config.quality, refused_before=past is not None and past.unlike)
         if past is not None and scene.novelty is not None:
             past.unlike = refusal is not None
         return refusal
 
-    def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch, past: Past | None) -> Scene:
+    def _see_all(self, scene: Scene, image: Image, sight: Sight, watch: _Stopwatch, past: StreamState | None) -> Scene:
         """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
         turns = past is not None and self._glance is not None and not self._glance.all_orientations
         standing = past.next_look() if past is not None and turns else None
@@ -229,7 +228,7 @@ class Pipeline:
         with watch.stage("masks"):
             if standing is not None and past is not None:
                 vessel_probability = standing.add(vessel_probability, robot_probability, past.glances.cells, past.glances.noise)
-            found = masks.clean(vessel_probability, robot_probability, self._config)
+            found = segmentation.clean(vessel_probability, robot_probability, self._config)
             if past is not None:
                 found = replace(found, robot=past.lookalikes.without(found.robot, image, scene.captured_s))
             known = sight.familiarity
@@ -247,7 +246,7 @@ class Pipeline:
         with watch.stage("skeletons"):
             skeletons = skeleton.thin_masks(found, config)
         with watch.stage("gaps"):
-            skeletons = gaps.repair(skeletons, config.gaps)
+            skeletons = skeleton.repair(skeletons, config.gaps)
         with watch.stage("graph"):
             # Walls are looked for at 0.5, the mask ends where the user has said.
             below = np.float32(0.5 - config.segmentation.vessel_threshold)
@@ -256,7 +255,13 @@ class Pipeline:
         return replace(scene, skeletons=skeletons, vessel_graph=graph, refusal=quality.check_graph(graph, config.vectors))
 
     def _see_window(
-        self, scene: Scene, image: Image, chosen: tuple[Background, Window], sight: Sight, watch: _Stopwatch, past: Past | None
+        self,
+        scene: Scene,
+        image: Image,
+        chosen: tuple[Background, Window],
+        sight: Sight,
+        watch: _Stopwatch,
+        past: StreamState | None,
     ) -> Scene:
         """The same, with only the robot in the window seen anew."""
         config, (known, window) = self._config, chosen
@@ -265,7 +270,7 @@ class Pipeline:
         if (broken := quality.check_finite(robot_probability)) is not None:
             return _unseen(replace(scene, window=window), known.vessel_probability, robot_probability, broken)
         with watch.stage("masks"):
-            robot = masks.clean_robot(robot_probability, config)
+            robot = segmentation.clean_robot(robot_probability, config)
             robot = past.lookalikes.without(robot, image, scene.captured_s, window) if past is not None else robot
             found = Masks(known.vessel, robot, known.vessel_probability, robot_probability)
         scene = replace(scene, window=window, masks=found, refusal=quality.check_masks(found))
@@ -274,7 +279,7 @@ class Pipeline:
         with watch.stage("skeletons"):
             skeletons = Skeletons(vessel=known.vessel_skeleton, robot=skeleton.thin_robot(robot, config))
         with watch.stage("gaps"):
-            skeletons = gaps.repair(skeletons, config.gaps)
+            skeletons = skeleton.repair(skeletons, config.gaps)
         return replace(scene, skeletons=skeletons, vessel_graph=known.graph)
 
     def _locate(
@@ -283,7 +288,7 @@ class Pipeline:
         image: Image,
         target: Point | None,
         watch: _Stopwatch,
-        before: Before,
+        before: PreviousFrame,
         routes: RouteMemory | None = None,
     ) -> Scene:
         """The robot's path, the way to the target, the centerline's piece and both vectors, or why one of them is not to be had."""
@@ -323,7 +328,9 @@ class Pipeline:
                 refusal = Refusal(Reason.NO_VESSEL, "the centerline beside the head has no direction")
             return replace(scene, centerline=centerline, vessel_vector=vessel_vector, refusal=refusal)
 
-    def _judge(self, scene: Scene, image: Image, target: Point | None, watch: _Stopwatch, sight: Sight, before: Before) -> Scene:
+    def _judge(
+        self, scene: Scene, image: Image, target: Point | None, watch: _Stopwatch, sight: Sight, before: PreviousFrame
+    ) -> Scene:
         """The pose of what was located, with its evidence and confidence, or the quality gate's word against it."""
         config, found, path, centerline = self._config, scene.masks, scene.path, scene.centerline
         robot, vessel = scene.robot_vector, scene.vessel_vector
@@ -342,10 +349,10 @@ class Pipeline:
         if sight.swings:
             with watch.stage("steadiness"):
                 others = [
-                    self._answer(scene, image, target, masks.clean(*shifted, config), before)
-                    for shifted in steadiness.neighbours(believed)
+                    self._answer(scene, image, target, segmentation.clean(*shifted, config), before)
+                    for shifted in quality.neighbours(believed)
                 ]
-                theta, head = steadiness.swings((path.head, pose.theta_signed_deg), others)
+                theta, head = quality.swings((path.head, pose.theta_signed_deg), others)
                 evidence = replace(evidence, theta_swing=theta, head_swing=head)
         scene = replace(scene, evidence=evidence.values())
         if sight.calibration is not None:
@@ -357,7 +364,9 @@ class Pipeline:
             return replace(scene, refusal=refusal)
         return replace(scene, pose=replace(pose, confidence=confidence))
 
-    def _answer(self, scene: Scene, image: Image, target: Point | None, found: Masks, before: Before) -> steadiness.Answer | None:
+    def _answer(
+        self, scene: Scene, image: Image, target: Point | None, found: Masks, before: PreviousFrame
+    ) -> quality.Answer | None:
         """Head and signed theta of the same frame with other masks; None for a refusal."""
         watch = _Stopwatch()
         bare = Scene(scene.frame_index, scene.captured_s, scene.source_size, scene.scale, scale_xy=scene.scale_xy)
@@ -369,7 +378,7 @@ class Pipeline:
         return bare.path.head, measure(bare.robot_vector, bare.vessel_vector, self._config.pose).theta_signed_deg
 
 
-def _recognise_turned(segmenter: Segmenter, image: Image, standing: StandingVessel) -> Recognised:
+def _recognise_turned(segmenter: Segmenter, image: Image, standing: VesselAverage) -> Recognised:
     """``recognise`` in the orientation whose turn it is."""
     vessel, robot, signature = recognise(segmenter, [standing.turned(image)])[0]
     return standing.upright(vessel), standing.upright(robot), signature
@@ -431,7 +440,7 @@ def open_sights(config: PerceptionConfig, *, recalibrating: bool = False) -> tup
             looks = MOST_LOOKS
         else:
             looks = info.mirrored_second_looks if info.calibration_mirrored is not None else 1
-        plain, turned = SecondLook(plain, near), SecondLook(turned, Turned(near), looks=looks)
+        plain, turned = TipRefinement(plain, near), TipRefinement(turned, Turned(near), looks=looks)
     surest = info.calibration_mirrored or info.calibration
     swings = recalibrating or (surest is not None and surest.needs_swings)
     known = info.familiarity if not recalibrating else None

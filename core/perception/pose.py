@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from core.config import PoseConfig
+from core.config.models import PoseConfig
 from core.types import Point, Pose, PoseState, Vector
 
 

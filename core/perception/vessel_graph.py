@@ -1,23 +1,171 @@
-"""The vessel's skeleton as a graph of smooth, sub-pixel centerlines with the lumen's radius along them (METHOD section 2)."""
+"""The vessel's skeleton as a graph of smooth, sub-pixel centerlines with the lumen's radius along them (METHOD section 2).
+
+A vessel of which the picture's border cuts off one side: where its middle is, as far as the other side tells.
+
+Ends of vessels: thinning turns the last radius or two of a skeleton towards a corner, and stops short of the image's border.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from core.config import CleaningConfig
-from core.perception import bundle, pixel_graph, polyline
-from core.perception.border_cuts import by_wall_in_view
-from core.perception.bundle import Bundle
+from core import geometry
+from core.config.models import CleaningConfig
+from core.geometry import Bundle
+from core.perception import skeleton as pixel_graph
 from core.perception.compiled import loops
-from core.perception.junctions import are_together, rebuild
-from core.perception.lumen import RadiusMap
-from core.perception.openings import Arm
-from core.perception.vessel_ends import led_on
+from core.perception.junctions import Arm, are_together, rebuild
+from core.perception.vectors import RadiusMap
 from core.types import GraphEdge, Mask, Points, VesselGraph
+
+WIDTH_RADII = 4.0
+"""A width that was seen so many radii away is believed by a third (1/e): a vessel that the picture cuts lengthwise may taper."""
+ALONG = 0.87
+"""Cosine of the angle to the border up to which a vessel is cut lengthwise. One that runs out of the picture lacks a wall for a
+short way only: its end is led anew (``vessel_ends``), and until there the map tells more than a skeleton that turns aside."""
+END_RADII = 1.5
+"""So near to its ends a line runs into a corner, or through a junction's opening, where no width is the vessel's."""
+MAP_PX = 2.0
+MAP_SHARE = 0.03
+"""The map of distances is not farther off than this and a share of the radius: steps from pixel to pixel are no straight way."""
+
+
+def by_wall_in_view(
+    lines: Bundle, step_px: float, normal: Points, reach: NDArray[np.float64], shift: NDArray[np.float64], shape: tuple[int, ...]
+) -> NDArray[np.float64]:
+    """`shift` (N,) by the map of distances, but where the image's border cuts off one side of the vessel by what is seen of it.
+
+    Beyond the border the map goes on as if there were no wall, and would draw the line out of the picture. Where the border is
+    nearer than the wall, `reach` (N,), the middle is as far from the wall that is seen as it is where both are; where that is
+    nowhere to be seen on a line, the middle of what is in the picture is all that is known.
+
+    Parameters
+    ----------
+    lines, step_px : places in the lumen, and how far they are from each other along a line.
+    normal : unit vectors (N, 2) across the lines.
+    reach : distance to the nearest wall (N,).
+    shift : by how much each point lies beside the middle of the map (N,), along the normals.
+    shape : of the picture, (h, w).
+    """
+    nearest, limit = _to_nearest_border(lines.points, shape), (1.0 + MAP_SHARE) * reach + MAP_PX
+    near = np.flatnonzero(nearest < limit)  # mostly the ends of some vessels, or nothing at all
+    if not len(near):
+        return shift
+    ahead, behind = (_to_border(lines.points[near], sign * normal[near], shape) for sign in (1.0, -1.0))
+    across = np.minimum(ahead, behind)
+    found = (across < limit[near]) & (nearest[near] >= ALONG * across)
+    if not found.any():
+        return shift
+    cut = near[found]
+    is_cut = np.zeros(len(lines.points), np.bool_)
+    is_cut[cut] = True
+    is_plain = ~is_cut & (step_px * _to_ends(lines) > END_RADII * reach)
+    half = lines.split(np.where(is_plain, reach + np.abs(shift), np.nan))
+    known, away = np.concatenate([_from_the_nearest(values) for values in half], axis=1)
+    belief = np.exp(-step_px * away[cut] / (WIDTH_RADII * reach[cut]))
+    towards = np.clip(belief * (known[cut] - reach[cut]), -reach[cut], across[found])
+    moved = shift.copy()
+    moved[cut] = np.where(ahead[found] < behind[found], towards, -towards)
+    return moved
+
+
+def _to_border(points: Points, direction: Points, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """How far it is from places in the picture (N, 2) along unit vectors (N, 2) to its border: to the last pixels' centres."""
+    limit = np.array([shape[1] - 1.0, shape[0] - 1.0])
+    room = np.where(direction > 0.0, limit - points, points)
+    return np.asarray(np.maximum((room / np.maximum(np.abs(direction), 1e-9)).min(axis=1), 0.0))
+
+
+def _to_nearest_border(points: Points, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """How far it is from places in the picture (N, 2) to its nearest side, to the last pixels' centres."""
+    return np.asarray(np.minimum(points, (shape[1] - 1.0, shape[0] - 1.0) - points).min(axis=1))
+
+
+def _to_ends(lines: Bundle) -> NDArray[np.int64]:
+    """How many points each point (N,) is away from the nearer end of its line."""
+    counts = np.diff(lines.starts)
+    place = np.arange(len(lines.points)) - np.repeat(lines.starts[:-1], counts)
+    return np.asarray(np.minimum(place, np.repeat(counts, counts) - 1 - place), np.int64)
+
+
+def _from_the_nearest(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The values (N,) of a line, NaN where they are not known, filled up from the places around, and how many points away that is.
+
+    Shape (2, N). Of a line where nothing is known the values are 0, infinitely far away.
+    """
+    places, known = np.arange(len(values)), np.flatnonzero(np.isfinite(values))
+    if not len(known):
+        return np.stack([np.zeros(len(values)), np.full(len(values), np.inf)])
+    following = np.searchsorted(known, places)
+    before, after = known[np.maximum(following - 1, 0)], known[np.minimum(following, len(known) - 1)]
+    return np.stack([np.interp(places, known, values[known]), np.minimum(np.abs(places - before), np.abs(places - after))])
+
+
+TRIM_RADII = 1.5
+BORDER_RADII = 1.2
+"""Where the image cuts a vessel off at a slant, the skeleton runs into the sharp corner this near to the border."""
+HEADING_PX = 24.0
+"""A vessel's direction and bend at its end are taken over this length, and at least a radius."""
+REACH_RADII = 3.0
+"""An end this near to the image's border goes on to it."""
+WALL_SEARCH_PX = 8
+VESSEL_ENDS_WIDTH_SHARE = 0.15
+"""What is narrower or wider than the vessel by more than this (and a pixel) is its end, or a branch's opening."""
+LEAST_POINTS = 3
+STIFFNESS = 0.15
+"""How hard it is for walls to turn and to bend a line, in points of it."""
+
+
+def led_on(points: Points, radius_px: float, vessel: Mask) -> Points:
+    """A centerline without the last part, which thinning has turned aside, and in its place one that runs between the walls there.
+
+    It ends as far out as the skeleton did, or goes on to the image's border.
+
+    Parameters
+    ----------
+    points : the centerline (N, 2), the end in question last.
+    radius_px : the lumen's radius at this end.
+    vessel : the vessel's mask (h, w).
+    """
+    limit = np.array([vessel.shape[1] - 1.0, vessel.shape[0] - 1.0])
+    kept = points[: len(points) - min(_hook(points, radius_px, limit), 2 * len(points) // 3)]
+    lost_px = math.dist(points[-1].tolist(), kept[-1].tolist())
+    onward = geometry.continued(kept, max(REACH_RADII * radius_px, 1.5 * lost_px) + 1.0, max(radius_px, HEADING_PX))
+    # Walls are looked for as far as the mask is known to reach.
+    onward = loops.openings.end_between_walls(
+        onward, radius_px, lost_px, round(STEP_PX), vessel, WALL_SEARCH_PX, VESSEL_ENDS_WIDTH_SHARE, LEAST_POINTS, STIFFNESS
+    )
+    way_out = _way_out(onward, limit)
+    reach = lost_px if way_out is None or way_out > max(REACH_RADII * radius_px, lost_px) else way_out
+    if reach < 0.5:
+        return kept
+    return np.concatenate([kept[:-1], geometry.resample(geometry.cut(onward, 0.0, reach), STEP_PX)])
+
+
+def _hook(points: Points, radius_px: float, limit: NDArray[np.float64]) -> int:
+    """How many of the last points thinning may have turned aside."""
+    count = round(TRIM_RADII * radius_px / STEP_PX)
+    if float(np.minimum(points[-1], limit - points[-1]).min()) < 1.5 * radius_px:
+        to_side = np.minimum(points, limit - points)
+        clear = np.minimum(to_side[::-1, 0], to_side[::-1, 1]) >= BORDER_RADII * radius_px
+        count = max(count, int(clear.argmax()))
+    return count
+
+
+def _way_out(onward: Points, limit: NDArray[np.float64]) -> float | None:
+    """How far a line of points, 1 px apart, runs up to the image's last row or column of pixels; None: it does not get there."""
+    beyond = np.maximum(-onward, onward - limit).max(axis=1)
+    first = int((beyond >= 0.0).argmax())
+    if beyond[first] < 0.0:
+        return None
+    before = beyond[first - 1] if first else beyond[first] - 1.0
+    return max(0.0, float(first - beyond[first] / (beyond[first] - before)))
+
 
 MAX_CHAINS = 200
 """A vessel tree with all its spurs has some twenty to fifty chains of pixels; a skeleton of more is a mesh of noise."""
@@ -90,7 +238,7 @@ def _lead_on_ends(lines: list[_Line], nodes: Points, mask: Mask) -> None:
     for line, side, node in (*starts, *ends):
         if len(line.points) >= 4:
             # In the corner where the skeleton ends the radius would be nearly nothing.
-            radius_px = polyline.median(line.radius[::side][-RADIUS_POINTS:])
+            radius_px = geometry.median(line.radius[::side][-RADIUS_POINTS:])
             points = led_on(line.points[::side], radius_px, mask)
             line.points, nodes[node] = points[::side], points[-1]
 
@@ -199,7 +347,7 @@ def _without_spurs(lines: list[_Line], degrees: NDArray[np.int64], radius_at: ND
         ends = (line.start, line.end) if degrees[line.start] == 1 else (line.end, line.start)
         tip, root = ends
         if degrees[tip] == 1 and degrees[root] >= 3:
-            length = float(polyline.arc_length(line.points)[-1])
+            length = float(geometry.arc_length(line.points)[-1])
             if length < SPUR_RADII * radius_at[root]:
                 spurs.setdefault(root, []).append((length, index))
     doomed: set[int] = set()
@@ -238,19 +386,19 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
     the picture), and then between both walls, to a fraction of a pixel. Where one of these is not to be seen, beside an opening,
     the first result stays.
     """
-    even = bundle.smooth(
-        bundle.resample(Bundle.of([line.points for line in lines]), STEP_PX), SMOOTHING_PX / STEP_PX, keeps_bends=True
+    even = geometry.smooth_bundle(
+        geometry.resample_bundle(Bundle.of([line.points for line in lines]), STEP_PX), SMOOTHING_PX / STEP_PX, keeps_bends=True
     )
     # A line's ends stay in their nodes, and one of two points has no others.
     inner = np.ones(len(even.points), np.bool_)
     inner[even.starts[:-1]] = inner[even.starts[1:] - 1] = False
-    normal = bundle.normals(even)
+    normal = geometry.bundle_normals(even)
     reach = radius.at(even.points)
     probe = 0.5 * reach[:, None] * normal
     wider, narrower = np.split(radius.at(np.concatenate([even.points + probe, even.points - probe])), 2)
     shift = by_wall_in_view(even, STEP_PX, normal, reach, 0.5 * (wider - narrower), level.shape)
     centred = _moved(even, normal, np.where(inner, shift, 0.0))
-    normal = bundle.normals(centred)
+    normal = geometry.bundle_normals(centred)
     shift, half_width = _between_walls(centred, normal, radius.at(centred.points), level)
     centred = _moved(centred, normal, np.where(inner, shift, 0.0))
     for line, *values in zip(lines, *map(centred.split, (centred.points, radius.at(centred.points), half_width)), strict=True):
@@ -274,4 +422,4 @@ def _between_walls(
 def _moved(lines: Bundle, normal: Points, shift: NDArray[np.float64]) -> Bundle:
     """All points moved across their lines, and these smoothed."""
     moved = Bundle(lines.points + shift[:, None] * normal, lines.starts)
-    return bundle.smooth(moved, SMOOTHING_PX / STEP_PX, keeps_bends=True)
+    return geometry.smooth_bundle(moved, SMOOTHING_PX / STEP_PX, keeps_bends=True)

@@ -1,4 +1,12 @@
-"""The files of one session while it is written. No thread of its own but the one that forces what is written to the disk."""
+"""The last seconds, encoded, in memory: what "save the last 30 s" writes out. Bounded in time and in bytes.
+
+The files of one session while it is written. No thread of its own but the one that forces what is written to the disk.
+
+JSON lines out of files that nobody trusts: each line is a checked object, or it is named and skipped.
+
+Every line that the recorder writes ends with the CRC-32 of what is before it: without it a flipped bit in a digit would pass as a
+measurement. A line without one (made by hand) is taken as it is.
+"""
 
 from __future__ import annotations
 
@@ -6,34 +14,207 @@ import contextlib
 import fcntl
 import json
 import os
+import re
 import secrets
 import shutil
 import threading
 import time
+import zlib
+from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from io import FileIO
 from pathlib import Path
+from typing import Any, NoReturn
 
-from core.names import name_as_text
-from core.record_config import RecordConfig
-from core.session.events import Event, EventKind, as_added_later, event_to_json
-from core.session.lines import sealed
+from core.config.models import RecordConfig
+from core.files import name_as_text
+from core.session.format import InvalidRecord
 from core.session.manifest import (
     EVENTS,
     FRAMES,
     PREFIX,
     About,
     Counts,
+    Event,
+    EventKind,
     Manifest,
     Origin,
     SessionError,
+    as_added_later,
+    event_to_json,
     new_manifest,
     read_manifest,
     write_manifest,
 )
-from core.session.ring import EncodedFrame
-from core.session.video import FrameEncoder, VideoError, VideoTrack
+from core.session.video import FrameEncoder, Packet, VideoError, VideoTrack
+
+_MAX_EVENTS = 2000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EncodedFrame:
+    """A frame ready to be written: its packet, the encoder that made it, and its row's JSON without its place in a session.
+
+    ``dropped`` counts the frames that the recorder dropped before it, ever.
+    """
+
+    captured_s: float
+    packet: Packet
+    encoder: FrameEncoder
+    row: str
+    dropped: int = 0
+
+    @property
+    def nbytes(self) -> int:
+        return len(self.packet.data) + len(self.row)
+
+
+class Ring:
+    """Keeps frames and events. What it holds always begins at a key picture, so it may reach up to a second further back."""
+
+    def __init__(self, seconds: float, max_bytes: int) -> None:
+        self._seconds = seconds
+        self._max_bytes = max_bytes
+        self._groups: deque[list[EncodedFrame]] = deque()
+        self._events: deque[Event] = deque()
+        self._target: Event | None = None
+        self._bytes = 0
+
+    @property
+    def seconds(self) -> float:
+        """How much it holds now."""
+        if not self._groups:
+            return 0.0
+        return max(0.0, self._groups[-1][-1].captured_s - self._groups[0][0].captured_s)
+
+    @property
+    def nbytes(self) -> int:
+        return self._bytes
+
+    def add(self, frame: EncodedFrame) -> None:
+        """Take a frame in and let the oldest go. Frames before the first key picture are not kept."""
+        if frame.packet.is_key:
+            self._groups.append([])
+        if not self._groups:
+            return
+        self._groups[-1].append(frame)
+        self._bytes += frame.nbytes
+        while len(self._groups) > 1 and (self._is_old(frame.captured_s) or self._bytes > self._max_bytes):
+            self._bytes -= sum(old.nbytes for old in self._groups.popleft())
+
+    def _is_old(self, now_s: float) -> bool:
+        """Is the oldest group not needed, since the next one reaches back far enough? A clock that went back ages everything."""
+        age_s = now_s - self._groups[1][0].captured_s
+        return age_s >= self._seconds or age_s < 0.0
+
+    def add_event(self, event: Event) -> None:
+        """Take it in and let the oldest go; the destination among these stays in force."""
+        self._events.append(event)
+        while len(self._events) > _MAX_EVENTS:
+            old = self._events.popleft()
+            if old.kind is EventKind.TARGET:
+                self._target = old
+
+    def content(self) -> tuple[list[EncodedFrame], list[Event]]:
+        """A copy: the frames in order, and the events since the first of them, with the destination that was chosen before."""
+        frames = [frame for group in self._groups for frame in group]
+        if not frames:
+            return [], []
+        first_s = frames[0].captured_s
+        chosen = [] if self._target is None else [self._target]
+        chosen += [event for event in self._events if event.kind is EventKind.TARGET and event.time_s < first_s]
+        before = [replace(event, time_s=first_s) for event in chosen[-1:] if event.data]
+        return frames, before + [event for event in self._events if event.time_s >= first_s]
+
+    def clear(self) -> None:
+        self._groups.clear()
+        self._events.clear()
+        self._target = None
+        self._bytes = 0
+
+
+MAX_LINE_BYTES = 4_000_000
+_CHUNK = 1 << 20
+_SEAL = re.compile(rb',"crc":"([0-9a-f]{8})"}')
+_SEAL_BYTES = 18
+
+
+@dataclass(frozen=True, slots=True)
+class FileLine:
+    """A line of a file: its number from 1, where it begins, and its bytes without the line break; None when it is too long.
+
+    ``is_cut`` tells that the file ends within it.
+    """
+
+    number: int
+    offset: int
+    data: bytes | None
+    is_cut: bool
+
+
+def sealed(line: str) -> str:
+    """A JSON object as one line, with its checksum as last key."""
+    return f'{line[:-1]},"crc":"{zlib.crc32(line[:-1].encode()):08x}"}}'
+
+
+def is_sealed(line: FileLine) -> bool:
+    """Does it carry a checksum, and the right one? Then it is what the recorder wrote."""
+    seal = _seal(line.data) if line.data is not None else None
+    return line.data is not None and seal is not None and seal == zlib.crc32(line.data[:-_SEAL_BYTES])
+
+
+def _seal(data: bytes) -> int | None:
+    found = _SEAL.fullmatch(data[-_SEAL_BYTES:])
+    return int(found[1], 16) if found is not None else None
+
+
+def parse_line(line: FileLine) -> dict[str, Any]:
+    """The object in it. Raises Damaged: cut, checksum wrong, no JSON, NaN, nested too deeply, no object."""
+    if line.data is None:
+        raise InvalidRecord(f"longer than {MAX_LINE_BYTES} bytes")
+    return parse(line.data, is_cut=line.is_cut)
+
+
+def parse(data: bytes, *, is_cut: bool = False) -> dict[str, Any]:
+    """Like `parse_line`, of bytes."""
+    seal = _seal(data)
+    if seal is not None and seal != zlib.crc32(data[:-_SEAL_BYTES]):
+        raise InvalidRecord("checksum wrong")
+    try:
+        record = json.loads(data, parse_constant=_refuse)
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, InvalidRecord):
+            raise
+        if is_cut:
+            raise InvalidRecord("cut off") from None
+        raise InvalidRecord("nested too deeply" if isinstance(error, RecursionError) else "not valid JSON") from None
+    if type(record) is not dict:
+        raise InvalidRecord("not an object")
+    return record
+
+
+def _refuse(name: str) -> NoReturn:
+    raise InvalidRecord(f"{name} is no number")
+
+
+def lines_of(path: Path) -> Iterator[FileLine]:
+    """All lines that are not blank, in order, whatever is in the file; never more than a few MB in memory. Raises OSError."""
+    number, offset = 1, 0
+    with path.open("rb") as file:
+        while data := file.readline(MAX_LINE_BYTES):
+            size = len(data)
+            is_long = False
+            while not data.endswith(b"\n") and (more := file.readline(_CHUNK)):
+                data, is_long = more, True
+                size += len(more)
+            is_cut = not data.endswith(b"\n")
+            data = data.removesuffix(b"\n")
+            if is_long or data.strip():
+                yield FileLine(number, offset, None if is_long else data, is_cut)
+            number, offset = number + 1, offset + size
+
 
 _STILL_S = 10.0
 

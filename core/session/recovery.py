@@ -13,30 +13,26 @@ from pathlib import Path
 
 import numpy as np
 
-from core.names import name_as_text
-from core.session.checked import Damaged, count
-from core.session.events import EventKind, event_from_json, was_added_later
-from core.session.files import alone_in, is_being_written
-from core.session.lines import Line, is_sealed, lines_of, parse_line
+from core.files import name_as_text, sync_folder
+from core.session.files import FileLine, alone_in, is_being_written, is_sealed, lines_of, parse_line
+from core.session.format import InvalidRecord, count, row_from_json
 from core.session.manifest import (
     EVENTS,
     FRAMES,
     PREFIX,
     RECOVERED,
     Counts,
+    EventKind,
     Loss,
     Manifest,
     SessionError,
+    event_from_json,
     read_manifest,
+    was_added_later,
     write_manifest,
 )
-from core.session.pictures import packet_times, video_number
-from core.session.reader import check_is_session
-from core.session.recorded import row_from_json
-from core.session.remux import Expected, remux
-from core.session.row_index import columns_of, quick_columns
-from core.session.video import VideoError
-from core.whole_file import sync_folder
+from core.session.reader import check_is_session, columns_of, packet_times, quick_columns, video_number
+from core.session.video import Expected, VideoError, remux
 
 _PROBLEMS_KEPT = 50
 
@@ -106,7 +102,7 @@ class _Salvage:
     rows: list[int] = field(default_factory=list)
     places: list[tuple[int, int, float]] = field(default_factory=list)
     expected: dict[int, list[Expected]] = field(default_factory=dict)
-    last_row: Line | None = None
+    last_row: FileLine | None = None
     events: int = 0
     dropped: int = 0
     last_event_s: float | None = None
@@ -114,7 +110,7 @@ class _Salvage:
     videos: int = 0
 
 
-_Take = Callable[[Line, _Salvage], None]
+_Take = Callable[[FileLine, _Salvage], None]
 OnBytes = Callable[[int], None]
 
 
@@ -208,7 +204,7 @@ def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Reco
         manifest = manifest.model_copy(update={"started_monotonic_s": found.places[0][2]})
     loss = _loss(session, manifest, found)
     if found.last_row is not None:  # a session that was cut has no count in its manifest
-        with contextlib.suppress(Damaged):
+        with contextlib.suppress(InvalidRecord):
             found.dropped = max(found.dropped, count(parse_line(found.last_row).get("dropped_rows", 0), "dropped_rows"))
     counts = Counts(frames=len(found.rows), events=found.events, videos=found.videos)
     counts.dropped = max(found.dropped, manifest.counts.dropped)
@@ -235,13 +231,13 @@ def _copy_lines(source: Path, target: Path, found: _Salvage, take: _Take, on_byt
             on_bytes(len(line.data or b""))
             try:
                 take(line, found)
-            except Damaged as error:
+            except InvalidRecord as error:
                 found.problems.append(f"{source.name}: line {line.number}: {error}; left out")
             else:
                 output.write((line.data or b"") + b"\n")
 
 
-def _readable(source: Path, found: _Salvage) -> Iterator[Line]:
+def _readable(source: Path, found: _Salvage) -> Iterator[FileLine]:
     """The lines until the file ends or the disk gives no more of it. Raises OSError for what may be read another time."""
     try:
         yield from lines_of(source)
@@ -253,7 +249,7 @@ def _readable(source: Path, found: _Salvage) -> Iterator[Line]:
         found.problems.append(f"{source.name}: cannot be read further ({error.strerror})")
 
 
-def _take_row(line: Line, found: _Salvage) -> None:
+def _take_row(line: FileLine, found: _Salvage) -> None:
     columns = quick_columns(line)
     if columns is None:
         record = parse_line(line)
@@ -263,13 +259,13 @@ def _take_row(line: Line, found: _Salvage) -> None:
     row, captured_s, video, pts_ms, *_, crc = columns
     found.last_row = line
     if found.rows and row <= found.rows[-1]:
-        raise Damaged(f"row {row} after row {found.rows[-1]}")
+        raise InvalidRecord(f"row {row} after row {found.rows[-1]}")
     found.rows.append(row)
     found.places.append((video, pts_ms, captured_s))
     found.expected.setdefault(video, []).append(Expected(row, pts_ms, crc if crc >= 0 else None))
 
 
-def _take_event(line: Line, found: _Salvage) -> None:
+def _take_event(line: FileLine, found: _Salvage) -> None:
     event = event_from_json(parse_line(line))
     if was_added_later(event):
         return  # kept, but neither counted nor a sign of how long was recorded

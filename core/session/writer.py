@@ -1,27 +1,468 @@
-"""The recorder: takes ticks without ever making their sender wait, and writes sessions in a thread of its own."""
+"""The recorder: takes ticks without ever making their sender wait, and writes sessions in a thread of its own.
+
+What the recorder's thread does: encode once, keep the last seconds, write the session. Not to be called from other threads.
+
+Writes what the ring held as a session, in a thread of its own: a slow disk must not hold up the session that may be running.
+
+How a recording is going: one frozen picture of it for the window, and what the disk allows.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import json
 import logging
 import math
+import shutil
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from core.control.drive_view import DriveView
-from core.record_config import RecordConfig, sessions_folder
-from core.session.events import Event, EventKind
-from core.session.manifest import About, SessionError
-from core.session.record_status import RecordStatus, StatusBoard, look_at_disk
-from core.session.recording import Picture, Recording
-from core.session.rows import light_tick
-from core.session.video import VideoError
-from core.types import Tick
+from core.config.models import RecordConfig, sessions_folder
+from core.control.faults import Cause, Fault
+from core.control.pilot import DriveView
+from core.session.files import EncodedFrame, Ring, SessionFiles
+from core.session.format import light_tick, row_of
+from core.session.manifest import About, Event, EventKind, SessionError, events_between
+from core.session.video import FrameEncoder, VideoError
+from core.types import Frame, Tick
+
+STOPPED = "recording stopped: "
+"""Before a problem that has ended a session."""
+_MB = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class RecordStatus:
+    """What the record bar shows.
+
+    Attributes
+    ----------
+    armed : a session begins with the next picture.
+    recording : a session is being written to `folder` (afterwards: the last one).
+    elapsed_s, frames, bytes : of that session.
+    dropped : frames that the recorder could not take since the session's start, because its queue was full.
+    disk_free : bytes; None before the first look.
+    warning : disk nearly full, in plain words.
+    problem : why the recording stopped, or could not start; empty when all is well. The next start clears it.
+    is_disk_full : the disk is why.
+    problems : how often there was one: the same twice is told twice.
+    notice : the last thing to say of "save the last seconds" that went wrong; `notices` counts them.
+    ring_s : how much "save the last seconds" would give now.
+    saving : the last seconds are being written.
+    saved : the newest session that was completed, by stop or from the ring.
+    """
+
+    armed: bool = False
+    recording: bool = False
+    folder: Path | None = None
+    elapsed_s: float = 0.0
+    frames: int = 0
+    bytes: int = 0
+    dropped: int = 0
+    disk_free: int | None = None
+    warning: str = ""
+    problem: str = ""
+    is_disk_full: bool = False
+    problems: int = 0
+    notice: str = ""
+    notices: int = 0
+    ring_s: float = 0.0
+    saving: bool = False
+    saved: Path | None = None
+
+
+def faults_between(before: RecordStatus, now: RecordStatus) -> list[Fault]:
+    """What the pilot must tell the operator of the recorder, from one look to the next."""
+    faults = []
+    if now.problem and now.problems != before.problems:
+        faults.append(Fault(Cause.DISK_FULL if now.is_disk_full else Cause.RECORDING_STOPPED, now.problem))
+    elif now.warning:
+        faults.append(Fault(Cause.DISK_LOW, now.warning))
+    if now.dropped > before.dropped:
+        faults.append(Fault(Cause.RECORDER_BEHIND, f"{now.dropped} frames"))
+    return faults
+
+
+class StatusBoard:
+    """Where the threads of the recorder write what has changed."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._status = RecordStatus()
+
+    def show(self, **changes: Any) -> None:
+        with self._lock:
+            self._status = replace(self._status, **changes)
+
+    def fail(self, problem: str, *, is_disk_full: bool = False) -> None:
+        """The recording stopped, or could not start."""
+        with self._lock:
+            count = self._status.problems + 1
+            self._status = replace(self._status, problem=problem, is_disk_full=is_disk_full, problems=count)
+
+    def notice(self, text: str) -> None:
+        """Something to say that stops no recording."""
+        with self._lock:
+            self._status = replace(self._status, notice=text, notices=self._status.notices + 1)
+
+    @property
+    def status(self) -> RecordStatus:
+        with self._lock:
+            return self._status
+
+
+@dataclass(frozen=True, slots=True)
+class Disk:
+    """What is free (bytes); `warning` and `full` are lines to show, empty when there is room."""
+
+    free: int
+    warning: str
+    full: str
+
+
+def look_at_disk(folder: Path, config: RecordConfig) -> Disk | None:
+    """The disk of a folder that may not be there yet; None when it cannot be told."""
+    try:
+        there = next(parent for parent in (folder, *folder.parents) if parent.exists())
+        total, _, free = shutil.disk_usage(there)
+    except (OSError, StopIteration):
+        return None
+    is_low = free < config.warn_free_mb * _MB or free < config.warn_free_share * total
+    left = f"{free / _MB:,.0f}"
+    warning = f"disk nearly full: {left} MB left" if is_low else ""
+    full = f"disk full ({left} MB left in {folder})" if free < config.stop_free_mb * _MB else ""
+    return Disk(free, warning, full)
+
+
+class RingSaver:
+    """One saving at a time; how it went is on the board."""
+
+    def __init__(self, parent: Path, config: RecordConfig, board: StatusBoard) -> None:
+        self._parent = parent
+        self._config = config
+        self._board = board
+        self._thread: threading.Thread | None = None
+
+    def save(self, about: About, frames: list[EncodedFrame], events: list[Event], now_s: float) -> None:
+        """Start to write; `now_s` is the frames' clock now."""
+        if not frames:
+            self._board.notice("nothing to save: no frames in memory yet")
+        elif self._thread is not None and self._thread.is_alive():
+            self._board.notice("the last seconds are still being saved")
+        else:
+            self._board.show(saving=True)
+            arguments = (about, frames, events, now_s)
+            self._thread = threading.Thread(target=self._write, args=arguments, name="ring saver", daemon=True)
+            self._thread.start()
+
+    def finish(self, within_s: float) -> bool:
+        """Wait for it; False when the disk has not answered in time."""
+        if self._thread is not None:
+            self._thread.join(within_s)
+        return self._thread is None or not self._thread.is_alive()
+
+    def _write(self, about: About, frames: list[EncodedFrame], events: list[Event], now_s: float) -> None:
+        files: SessionFiles | None = None
+        problem, written = "an error of the program; its log says more", 0
+        try:
+            self._check_room()
+            first_s = frames[0].captured_s
+            files = SessionFiles(self._parent, about, self._config, first_s=first_s, now_s=now_s, origin="last seconds")
+            files.dropped_before = frames[0].dropped
+            for event in (*_beginning(frames[0], events), *events):
+                files.write_event(event)
+            for frame in frames:
+                self._check_room()
+                files.write_frame(frame)
+                written += 1
+            problem = ""
+        except (VideoError, SessionError) as error:
+            problem = str(error)
+        except OSError as error:
+            problem = f"{error.filename or self._parent}: {error.strerror or error}"
+        finally:  # also after what nobody has thought of, which goes on to the log
+            try:
+                if files is not None:
+                    # The folder itself says that it is not whole: a message in a window is soon forgotten.
+                    lost = frames[-1].dropped - frames[0].dropped + len(frames) - written
+                    at_end = files.close(problem or "saved from memory", lost)
+                    problem = problem or at_end
+            finally:
+                self._tell(problem, files, written, len(frames))
+
+    def _check_room(self) -> None:
+        """The last room of a disk is not for this, as it is for no recording: what is open must still be closed. SessionError."""
+        disk = look_at_disk(self._parent, self._config)
+        if disk is not None and disk.full:
+            raise SessionError(f"{disk.full}; make room and save them again")
+
+    def _tell(self, problem: str, files: SessionFiles | None, written: int, frames: int) -> None:
+        self._board.show(saving=False)
+        if not problem:
+            self._board.show(saved=files.folder if files is not None else None)
+        elif not written:
+            self._board.notice(f"the last seconds were not saved: {problem}")
+        else:
+            self._board.notice(f"of the last seconds only {written} of {frames} frames were saved: {problem}")
+
+
+def _beginning(first: EncodedFrame, events: Sequence[Event]) -> Iterator[Event]:
+    """Where driving stood at the first frame, as every session must tell by itself; nothing where the ring knows how it began."""
+    drive = json.loads(first.row)["drive"]
+    mode = next((event for event in events if event.kind is EventKind.MODE), None)
+    if drive is None or (mode is not None and "from" not in mode.data):
+        return
+    yield Event(first.captured_s, EventKind.MODE, drive["mode"])
+    for cause, detail in drive["active"]:
+        yield Event(first.captured_s, EventKind.FAULT, cause, {"detail": detail})
+
+
+_TELL_EVERY_S = 1.0
+_MAX_EARLY_EVENTS = 1000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedTick:
+    """A tick with who drives and the servo bus's status; ``dropped`` counts the frames dropped before it, ever."""
+
+    tick: Tick
+    drive: DriveView | None
+    bus: Any
+    dropped: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Lost:
+    """How many frames of the camera are known to be lost, how many of them were told, and when (or when it was first looked at)."""
+
+    total: int
+    told: int
+    told_s: float
+
+
+class Recording:
+    """The ring, and the session if there is one.
+
+    Parameters
+    ----------
+    parent : where sessions are made.
+    clock : the clock of the frames.
+    board : where the state is shown.
+    """
+
+    def __init__(self, config: RecordConfig, about: About, parent: Path, clock: Callable[[], float], board: StatusBoard) -> None:
+        self._config = config
+        self._about = about
+        self._parent = parent
+        self._clock = clock
+        self._board = board
+        self._ring = Ring(config.ring_s, round(config.ring_mb * 1e6)) if config.ring_s > 0 else None
+        self._encoder: FrameEncoder | None = None
+        self._files: SessionFiles | None = None
+        self._is_armed = False
+        self._early: list[Event] = []
+        self._drive: DriveView | None = None
+        self._target: Event | None = None
+        self._dropped_told = 0
+        self._dropped_told_s = -math.inf
+        self._last_s = 0.0
+        self._lost: _Lost | None = None
+        # read by other threads
+        self.dropped_before = 0
+        self.began_s = 0.0
+        self.saver = RingSaver(parent, config, board)
+
+    @property
+    def wants_pictures(self) -> bool:
+        """Is there anybody who would take them?"""
+        return self._ring is not None or self._files is not None or self._is_armed
+
+    @property
+    def is_on(self) -> bool:
+        """Is a session being recorded, or about to be?"""
+        return self._files is not None or self._is_armed
+
+    def take_picture(self, picture: RecordedTick) -> None:
+        """Encode it, keep it, write it. Raises VideoError, SessionError or OSError, after which `fail` must be called."""
+        if not self.wants_pictures:
+            return
+        frame = picture.tick.frame
+        if not math.isfinite(frame.captured_s):
+            frame = replace(frame, captured_s=self._clock())
+            picture = replace(picture, tick=replace(picture.tick, frame=frame))
+        if self._is_armed:
+            self._open(picture)
+        if self._drive is None and picture.drive is not None:
+            self.take_drive(picture.drive)  # where it began; what changes then comes by itself, all of it and in order
+        self._tell_lost(picture.tick.frame)
+        encoded = self._encoded(picture)
+        if self._ring is not None:
+            self._ring.add(encoded)
+            self._board.show(ring_s=self._ring.seconds)
+        if self._files is not None:
+            self._files.write_frame(encoded)
+            self._last_s = encoded.captured_s
+            self._tell_dropped(picture)
+            self._board.show(frames=self._files.counts.frames, bytes=self._files.counts.bytes)
+
+    def _encoded(self, picture: RecordedTick) -> EncodedFrame:
+        frame = picture.tick.frame
+        size = frame.image.shape[1], frame.image.shape[0]
+        if self._encoder is None or self._encoder.size != size:
+            self.drop_encoder()
+            self._encoder = FrameEncoder(size, self._config)
+        force_key = self._files is not None and self._files.wants_key(frame.captured_s)
+        packet = self._encoder.encode(frame.image, frame.captured_s, force_key=force_key)
+        row = row_of(picture.tick, picture.drive, bus=picture.bus, with_masks=self._config.masks)
+        written = json.dumps(row, allow_nan=False, separators=(",", ":"))
+        return EncodedFrame(frame.captured_s, packet, self._encoder, written, picture.dropped)
+
+    def take_drive(self, view: DriveView) -> None:
+        """Write what changed since the last view; one that is overtaken by a newer one tells nothing new. Raises OSError."""
+        if self._drive is not None and view.time_s < self._drive.time_s:
+            return
+        for event in events_between(self._drive, view):
+            self.take_event(event)
+        self._drive = view
+
+    def take_event(self, event: Event) -> None:
+        """Keep it and write it; between start and the first frame it waits. Raises OSError."""
+        if event.kind is EventKind.TARGET:
+            self._target = event
+        if self._ring is not None:
+            self._ring.add_event(event)
+        if self._files is not None:
+            self._files.write_event(event)
+        elif self._is_armed and len(self._early) < _MAX_EARLY_EVENTS:
+            self._early.append(event)
+
+    def _tell_dropped(self, picture: RecordedTick) -> None:
+        """At most once a second: a recorder that is behind must not be kept busy with saying so."""
+        total, now_s = picture.dropped - self.dropped_before, picture.tick.frame.captured_s
+        if total > self._dropped_told and now_s - self._dropped_told_s >= _TELL_EVERY_S:
+            event = _dropped_event(now_s, total - self._dropped_told, total)
+            self._dropped_told, self._dropped_told_s = total, now_s
+            self.take_event(event)
+
+    def _tell_lost(self, frame: Frame) -> None:
+        """Frames that never came from the camera; at most once a second, too. A camera that was opened again counts from 0."""
+        known = self._lost
+        if known is None or frame.lost < known.total:
+            for event in self._untold(frame.captured_s):
+                self.take_event(event)
+            self._lost = _Lost(frame.lost, frame.lost, frame.captured_s)
+            return
+        self._lost = replace(known, total=frame.lost)
+        if frame.captured_s - known.told_s >= _TELL_EVERY_S:
+            for event in self._untold(frame.captured_s):
+                self.take_event(event)
+
+    def _untold(self, time_s: float) -> Iterator[Event]:
+        """What the camera has lost and nobody was told yet; it counts as told then."""
+        known = self._lost
+        if known is not None and known.total > known.told:
+            count = known.total - known.told
+            self._lost = _Lost(known.total, known.total, time_s)
+            yield Event(time_s, EventKind.LOST, f"{count} frames", {"count": count, "total": known.total})
+
+    def begin(self) -> None:
+        """A session begins with the next frame; nothing happens when one is being recorded."""
+        if self._files is None:
+            self._is_armed = True
+            self._board.show(armed=True, problem="", is_disk_full=False)
+
+    def _open(self, picture: RecordedTick) -> None:
+        self._is_armed = False
+        first_s = self._last_s = picture.tick.frame.captured_s
+        self._files = SessionFiles(self._parent, self._about, self._config, first_s=first_s, now_s=self._clock())
+        self.dropped_before = self._files.dropped_before = picture.dropped
+        self._dropped_told, self._dropped_told_s = 0, -math.inf
+        self.began_s = self._clock()
+        self._leave_losses_before(picture.tick.frame)
+        self._board.show(armed=False, recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
+        drive = picture.drive or self._drive
+        if drive is not None:
+            # the session must tell by itself where it began
+            self._drive = replace(drive, time_s=first_s)
+            self._files.write_event(next(events_between(None, self._drive)))
+            for fault in drive.active:
+                self._files.write_event(Event(first_s, EventKind.FAULT, str(fault.cause), {"detail": fault.detail}))
+        if self._target is not None and self._target.data and self._target not in self._early:
+            self._files.write_event(replace(self._target, time_s=first_s))
+        early, self._early = self._early, []
+        for event in early:
+            self._files.write_event(event)
+
+    def _leave_losses_before(self, first: Frame) -> None:
+        """What was lost before the first frame of a session is not the session's: the ring is told, which reaches further back."""
+        if self._ring is None:
+            self._lost = None  # nobody has counted between two sessions
+        elif self._lost is not None:
+            self._lost = replace(self._lost, total=max(first.lost, self._lost.total))
+            for event in self._untold(first.captured_s):
+                self._ring.add_event(event)
+
+    def end(self, ended: str, dropped: int) -> None:
+        """End the session if there is one; `dropped` frames were dropped until now, ever."""
+        self._is_armed, self._early = False, []
+        files, self._files = self._files, None
+        if files is None:
+            self._board.show(armed=False)
+            return
+        count, elapsed_s = dropped - self.dropped_before, max(0.0, self._clock() - self.began_s)
+        with contextlib.suppress(OSError):  # the disk may be why it ends; manifest and rows have the counts, too
+            for event in self._untold(self._last_s):
+                if self._ring is not None:
+                    self._ring.add_event(event)
+                files.write_event(event)
+            if count > self._dropped_told:
+                files.write_event(_dropped_event(self._last_s, count - self._dropped_told, count))
+        problem = files.close(ended, count)
+        self._board.show(recording=False, elapsed_s=elapsed_s, dropped=count, bytes=files.counts.bytes)
+        if problem:
+            self._board.fail(problem)
+        else:
+            self._board.show(saved=files.folder)
+
+    def fail(self, problem: str, dropped: int, *, is_disk_full: bool = False) -> None:
+        """End the session, keeping what was written. The ring goes on, with a new encoder."""
+        was_on = self.is_on
+        self.end(problem, dropped)
+        self.drop_encoder()
+        self._board.fail(f"{STOPPED}{problem}" if was_on else problem, is_disk_full=is_disk_full)
+
+    def change_rig(self, about: About, dropped: int) -> None:
+        """A session never mixes two rigs, and neither does the ring."""
+        self.end("another rig was opened", dropped)
+        self._about, self._drive, self._lost = about, None, None
+        if self._ring is not None:
+            self._ring.clear()
+            self._board.show(ring_s=0.0)
+            if self._target is not None:  # under other thresholds the rig and its destination are the same
+                self._ring.add_event(self._target)
+
+    def save_ring(self) -> None:
+        """Write what the ring holds, in the background."""
+        frames, events = self._ring.content() if self._ring is not None else ([], [])
+        self.saver.save(self._about, frames, events, self._clock())
+
+    def drop_encoder(self) -> None:
+        """With a ring it may still be needed as the template of what the ring holds."""
+        encoder, self._encoder = self._encoder, None
+        if encoder is not None and self._ring is None:
+            encoder.close()
+
+
+def _dropped_event(time_s: float, count: int, total: int) -> Event:
+    """So many more frames were dropped, so many since the session began."""
+    return Event(time_s, EventKind.DROPPED, f"{count} frames", {"count": count, "total": total})
+
 
 _log = logging.getLogger(__name__)
 
@@ -49,7 +490,7 @@ class SessionWriter:
         self._parent = folder if folder is not None else sessions_folder(config.folder)
         self._clock = clock
         self._changed = threading.Condition()
-        self._waiting: deque[Picture | Event | _Order] = deque()
+        self._waiting: deque[RecordedTick | Event | _Order] = deque()
         self._pictures_waiting = 0
         self._starts_waiting = 0
         self._dropped = 0
@@ -99,7 +540,7 @@ class SessionWriter:
                 self._dropped += 1
                 return False
             self._pictures_waiting += 1
-            self._waiting.append(Picture(tick, drive, bus, self._dropped))
+            self._waiting.append(RecordedTick(tick, drive, bus, self._dropped))
             self._changed.notify()
         return True
 
@@ -194,7 +635,7 @@ class SessionWriter:
             self._recording.end("closed", self._dropped_until_end())
             self._recording.drop_encoder()
 
-    def _next(self) -> Picture | Event | _Order | None:
+    def _next(self) -> RecordedTick | Event | _Order | None:
         """What comes next, looking at the disk meanwhile; None when the recorder is closed and all is done."""
         while True:
             self._watch_disk()
@@ -204,14 +645,14 @@ class SessionWriter:
                     self._changed.wait(_LOOK_AT_DISK_S)
                 if self._waiting:
                     item = self._waiting.popleft()
-                    self._pictures_waiting -= isinstance(item, Picture)
+                    self._pictures_waiting -= isinstance(item, RecordedTick)
                     return item
                 if self._is_closing:
                     return None
 
-    def _take(self, item: Picture | Event | _Order) -> None:
+    def _take(self, item: RecordedTick | Event | _Order) -> None:
         try:
-            if isinstance(item, Picture):
+            if isinstance(item, RecordedTick):
                 self._recording.take_picture(item)
             elif isinstance(item, Event):
                 self._recording.take_event(item)

@@ -15,11 +15,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from core.camera_config import CameraConfig
+from core.config.models import CameraConfig
 from core.devices import DeviceError
-from hardware.cameras.capture_clock import CaptureClock
-from hardware.cameras.live_camera import LiveCamera, Shot
-from hardware.usb import DEV, SYS, VideoDevice, video_devices
+from hardware.cameras.live import CaptureClock, LiveCamera, Shot
+from hardware.servos.discovery import DEV, SYS, VideoDevice, video_devices
 
 _log = logging.getLogger(__name__)
 

@@ -1,23 +1,66 @@
-"""What the bus process decides: who may move the servos, with what goals, and what ends a motion. No port, no clock of its own."""
+"""What the bus process decides: who may move the servos, with what goals, and what ends a motion. No port, no clock of its own.
+
+What one order may do: a dead application can move a joint by one bounded step at most. Pure.
+"""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 
-from core.control.bus_watch import BusReport, BusWatch, bus_faults, see_bus
+from core.config.safety import JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.faults import REACTION, Cause, Fault, Reaction, worst
-from core.control.gate import Clamp, GateState, GateStep, GoalRequest, Measurement, Rejection, RejectReason, Source, gate_step
-from core.control.gate_checks import mistrust, outside_envelope
+from core.control.gate import (
+    Clamp,
+    GateState,
+    GateStep,
+    GoalRequest,
+    JointMeasurement,
+    Rejection,
+    RejectReason,
+    Source,
+    gate_step,
+    measurement_problem,
+    outside_envelope,
+)
+from core.control.health import BusReport, BusWatch, bus_faults, see_bus
 from core.control.joints import Joints, joint_goals
-from core.safety_config import SafetyConfig
-from core.servo_config import JointName, ServosConfig
 from core.types import Command
-from hardware.servos.bus_messages import Heartbeat, Order, Sent
-from hardware.servos.errors import NotReady
-from hardware.servos.follow_watch import FollowWatch
-from hardware.servos.one_step import OneStep
-from hardware.servos.status_block import MissingServo, ServoReading, ServoState
+from hardware.servos.bus_ipc import BusOrder, Heartbeat, IssuedGoals
+from hardware.servos.dynamixel_port import NotReady
+from hardware.servos.motion_watch import FollowWatch
+from hardware.servos.registers import MissingServo, ServoReading, ServoState
+
+
+class OneStep:
+    """Keeps the goals of one order within ``max_step_mm`` of where the joints were last seen before it came.
+
+    An order is good for ``command_max_age_s``, which at full speed is more than a step. The gate's own step is counted from the
+    measured position of each cycle, and moves along with the joint.
+    """
+
+    def __init__(self, joints: Sequence[JointConfig]) -> None:
+        self._joints = joints
+        self._order: tuple[float, object] | None = None
+        self._from_mm: Joints = ()
+
+    def bounded(self, goals_mm: Joints, order: tuple[float, object], before_mm: Joints) -> Joints:
+        """The goals, those too far brought nearer.
+
+        Parameters
+        ----------
+        order : time and content; what is equal in both is the same order.
+        before_mm : positions of the cycle before this one, which no new order can be older than. (Counted from this cycle's, a
+            joint that moves would already have moved on since the order was issued.)
+        """
+        if self._order != order:
+            self._order, self._from_mm = order, before_mm
+        return tuple(
+            min(max(goal, start - joint.max_step_mm), start + joint.max_step_mm) if math.isfinite(goal) else goal
+            for goal, start, joint in zip(goals_mm, self._from_mm, self._joints, strict=True)
+        )
+
 
 _MENDED_BY_ARMING = frozenset({Cause.WATCHDOG, Cause.REBOOTED})
 
@@ -53,7 +96,7 @@ class BusGuard:
         self.active: tuple[Fault, ...] = ()
         self.fault_counts: Counter[Cause] = Counter()
         self.restarts = 0
-        self.sent: Sent | None = None
+        self.sent: IssuedGoals | None = None
         self.rejection: Rejection | None = None
         self.clamps: tuple[Clamp, ...] = ()
         self.at_end: tuple[JointName, ...] = ()
@@ -64,10 +107,10 @@ class BusGuard:
         self._one_step = OneStep(servos.joints)
         self._follow = FollowWatch(servos.joints, safety)
         self._written_mm: Joints | None = None
-        self._measurement: Measurement | None = None
-        self._before: Measurement | None = None
-        self.followed: Order | None = None
-        self._orders: dict[Source, Order] = {}
+        self._measurement: JointMeasurement | None = None
+        self._before: JointMeasurement | None = None
+        self.followed: BusOrder | None = None
+        self._orders: dict[Source, BusOrder] = {}
         self._heard_s = self._cycle_s = self._armed_s = now_s
 
     def silence_s(self, beat: Heartbeat | None, now_s: float) -> float:
@@ -151,7 +194,7 @@ class BusGuard:
         self.armed = True
         self._heard_s = self._cycle_s = self._armed_s = now_s
 
-    def step(self, order: Order | None, beat: Heartbeat | None, now_s: float) -> GateStep:
+    def step(self, order: BusOrder | None, beat: Heartbeat | None, now_s: float) -> GateStep:
         """The goals for this cycle, through the gate."""
         # A permission holds good no longer than an order: whoever gives it must still be watching.
         fresh = beat is not None and now_s - beat.time_s <= self._safety.command_max_age_s
@@ -163,7 +206,7 @@ class BusGuard:
         self.rejection, self.clamps = step.rejection, step.clamps
         if step.goals_mm is None:
             # There is not even a hold, whoever may drive; and before there was one, nobody is permitted to. So this comes first.
-            self.rejection = mistrust(self._measurement, now_s, self._servos, self._safety) or step.rejection
+            self.rejection = measurement_problem(self._measurement, now_s, self._servos, self._safety) or step.rejection
             self.sent = self.sent.kept() if self.sent is not None else None
         self.at_end = () if step.is_hold else at_end
         self.clamp_count += len(step.clamps)
@@ -171,7 +214,7 @@ class BusGuard:
             self.rejections[step.rejection.reason] += 1
         return step
 
-    def _order_of(self, permitted: Source | None, newest: Order | None, now_s: float) -> Order | None:
+    def _order_of(self, permitted: Source | None, newest: BusOrder | None, now_s: float) -> BusOrder | None:
         """The newest order of the permitted one, while it is valid; else the newest of all, which the gate will refuse by name.
 
         At a hand-over the next one's order is there before his permission: the cycle between them goes on with the order before,
@@ -185,15 +228,15 @@ class BusGuard:
         is_valid = found is not None and 0.0 <= now_s - found.issued_s <= self._safety.command_max_age_s
         return found if is_valid else newest
 
-    def wrote(self, goals_mm: Joints, order: Order | None, now_s: float) -> None:
+    def wrote(self, goals_mm: Joints, order: BusOrder | None, now_s: float) -> None:
         """These goals went out, as the servos count them."""
         self._written_mm = goals_mm
         right, left, up, down, *_ = goals_mm
         speeds, pull_mm = self._gate.speeds_mm_s, 2.0 * self._servos.max_pull_mm
         motion = Command((right - left) / pull_mm, (up - down) / pull_mm, speeds[4], (speeds[5] + speeds[6]) / 2.0)
-        self.sent = Sent(goals_mm, motion, now_s, order if self.rejection is None else None)
+        self.sent = IssuedGoals(goals_mm, motion, now_s, order if self.rejection is None else None)
 
-    def _request(self, order: Order | None, now_s: float) -> GoalRequest | None:
+    def _request(self, order: BusOrder | None, now_s: float) -> GoalRequest | None:
         self.at_end = ()
         if order is None or order.command is None or self._measurement is None or order.issued_s < self._armed_s:
             return None
@@ -209,7 +252,7 @@ class BusGuard:
         found = [(r.position_mm, r.time_s) for r in readings if isinstance(r, ServoState) and r.position_mm is not None]
         if readings and len(found) == len(readings):
             self._before = self._measurement
-            self._measurement = Measurement(tuple(at for at, _ in found), min(time_s for _, time_s in found))
+            self._measurement = JointMeasurement(tuple(at for at, _ in found), min(time_s for _, time_s in found))
 
     def _faults_of_motion(self, beat: Heartbeat | None, now_s: float) -> list[Fault]:
         faults = []

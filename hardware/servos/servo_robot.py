@@ -9,21 +9,17 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 
-from core.calibration.kept_zero import zero_advice
-from core.calibration_config import ZeroConfig
-from core.control.bus_watch import BusReport
+from core.calibration.servos import zero_advice
+from core.config.calibration import ZeroConfig
+from core.config.safety import JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.gate import Rejection, Source
-from core.control.guarded_robot import SentMotion
-from core.safety_config import SafetyConfig
-from core.servo_config import JointConfig, JointName, ServosConfig
+from core.control.health import BusReport
+from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
 from hardware.servos.bus_guard import report_of
-from hardware.servos.bus_link import END_S, BusLink
-from hardware.servos.bus_messages import BusPhase, BusStatus, Heartbeat, Order, Sent
-from hardware.servos.bus_start import BusProcess
-from hardware.servos.errors import BusProcessLost, NotReady, ServoError
-from hardware.servos.status_block import ServoReading, ServoState
-from hardware.servos.units import wire_force_mn
+from hardware.servos.bus_ipc import END_S, BusClient, BusOrder, BusPhase, BusProcess, BusStatus, Heartbeat, IssuedGoals
+from hardware.servos.dynamixel_port import BusProcessLost, NotReady, ServoError
+from hardware.servos.registers import ServoReading, ServoState, wire_force_mn
 
 _OPEN_S, _ARM_S, _REQUEST_S, _LET_GO_S = 20.0, 10.0, 5.0, 10.0
 _HUNG_S = 0.2
@@ -66,7 +62,7 @@ class ServoRobot:
         self._truth, self._on_close, self._kept_zero = truth, on_close, kept_zero
         self._lock, self._letting_go = threading.Lock(), threading.Lock()
         self._loading = process
-        self._link: BusLink | None = None
+        self._link: BusClient | None = None
         self._closes = 0
         self._supervised = False
         self._states: tuple[ServoReading, ...] = ()
@@ -99,7 +95,7 @@ class ServoRobot:
         try:
             with ExitStack() as undo:
                 loading, self._loading = self._loading, None
-                link = BusLink(self._servos, self._safety, loading)
+                link = BusClient(self._servos, self._safety, loading)
                 undo.callback(link.close)
                 link.request("open", _OPEN_S)
                 with self._lock:
@@ -184,7 +180,7 @@ class ServoRobot:
         with self._letting_go:  # one that has the port is enough
             self._not_connected = failure  # and stays so: this process is not the one that drives
             self._disconnect(_HUNG_S)
-            link = BusLink(self._servos, self._safety)
+            link = BusClient(self._servos, self._safety)
             try:
                 link.request("torque off", _LET_GO_S)
             finally:
@@ -226,7 +222,7 @@ class ServoRobot:
             delivery_mm_s=_limited(command.delivery_mm_s, min(joint.max_speed_mm_s for joint in joints[5:])),
         )
         link = self._connected()
-        link.put_order(Order(limited, source, time.monotonic(), captured_s))
+        link.put_order(BusOrder(limited, source, time.monotonic(), captured_s))
         self._live()
         sent = self._sent(link.status())
         return sent.motion if sent is not None else Command()
@@ -234,7 +230,7 @@ class ServoRobot:
     def hold(self) -> None:
         """Stop all motion and keep the bend; stays armed."""
         if (link := self._link) is not None:
-            link.put_order(Order(None, Source.OPERATOR, time.monotonic()))
+            link.put_order(BusOrder(None, Source.OPERATOR, time.monotonic()))
             self._live()
 
     def status(self) -> RobotStatus:
@@ -310,7 +306,7 @@ class ServoRobot:
             at_end=status.at_end,
         )
 
-    def _sent(self, status: BusStatus | None) -> Sent | None:
+    def _sent(self, status: BusStatus | None) -> IssuedGoals | None:
         if status is None or status.sent is None or not status.armed or self.failure is not None:
             return None
         is_late = time.monotonic() - status.time_s > self._safety.bus_hold_s
@@ -338,7 +334,7 @@ class ServoRobot:
         if link is not None:
             link.close(patience_s)
 
-    def _connected(self) -> BusLink:
+    def _connected(self) -> BusClient:
         link = self._link
         if link is None:
             raise BusProcessLost(f"the {self._name} is not connected: connect it first")

@@ -1,31 +1,422 @@
-"""The bench twin's mechanics: a tendon-driven chain fed through a port into the walls of a phantom. Lock-step and deterministic."""
+"""The bench twin's mechanics: a tendon-driven chain fed through a port into the walls of a phantom. Lock-step and deterministic.
+
+The robot's body in the solver: one MuJoCo model of a given length, and what guide, sheath and port do to its links.
+
+The MuJoCo model of robot and walls. Units mm, kg, s, so forces are millinewtons; board plane z = 0, x right, y down, z away
+from the camera. Numbers come from measurements of stability and bending; they are not calibrated to a real rig. Sparse Jacobian and
+elliptic cones: with 25 contacts on 127 degrees of freedom a step took 1.4 ms, 1.8 with pyramidal cones, 5.8 with a
+dense Jacobian too.
+
+The lumen's walls as thin boxes for the contact solver, pushed outward from the outline of the lumen. Lengths in mm.
+
+Between a bend command and the tendon: slew limit, backlash and dead zone. Tendon friction in the solver gave no hysteresis.
+"""
 
 from __future__ import annotations
 
+import itertools
+import logging
 import math
 import threading
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from skimage.measure import approximate_polygon, find_contours
 
-from core.types import Command, Point, Points, RobotStatus
-from hardware.twin.chain import Chain
-from hardware.twin.lumen_field import lumen_discs
-from hardware.twin.mjcf import (
-    FEED_KP_MN_MM,
-    FEED_KV,
-    LINK_MM,
-    ROBOT_RADIUS_MM,
-    SHAFT_LINK_MM,
-    STEERABLE_LINKS,
-    TIMESTEP_S,
-    Specimen,
-)
+from core.types import Command, Point, Points, RobotStatus, VesselGraph
 from hardware.twin.phantom import Phantom
-from hardware.twin.phantom_check import node_distances_mm
-from hardware.twin.tendon_drive import DriveProperties, TendonDrive
-from hardware.twin.walls import lumen_outline, wall_boxes
+from hardware.twin.phantoms import node_distances_mm
+from hardware.twin.view import lumen_discs
+
+_THICKNESSES_MM = (1.0, 0.6, 0.35, 0.2)
+_GRID_MM = 0.25
+_TOLERANCE_MM = 0.1
+_MAX_PIECE_MM = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """A box: centre, half length along ``angle_rad``, half thickness across; its inner face lies on the lumen's outline."""
+
+    x: float
+    y: float
+    half_length: float
+    half_thickness: float
+    angle_rad: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Port:
+    """Where the robot enters: a point and the unit direction into the lumen."""
+
+    point: NDArray[np.float64]
+    inward: NDArray[np.float64]
+    radius: float
+
+    @property
+    def angle_rad(self) -> float:
+        return float(np.arctan2(self.inward[1], self.inward[0]))
+
+
+def port_of(phantom: Phantom) -> Port:
+    """The phantom's port, with the direction of its first 2 mm of centerline."""
+    for edge in phantom.graph.edges:
+        if phantom.port in (edge.start, edge.end):
+            points, radius = (edge.points, edge.radius) if edge.start == phantom.port else (edge.points[::-1], edge.radius[::-1])
+            step = points[5] - points[0]
+            return Port(points[0], step / np.linalg.norm(step), float(radius[0]))
+    raise ValueError(f"phantom {phantom.name}: node {phantom.port} has no edge, so it cannot be the port")
+
+
+def lumen_outline(graph: VesselGraph) -> list[Points]:
+    """Closed outlines (N, 2) of the union of discs along the centerlines, to about 0.02 mm."""
+    centers, radii = lumen_discs(graph)
+    low = np.floor((centers - radii[:, None]).min(axis=0)) - 2.0
+    high = np.ceil((centers + radii[:, None]).max(axis=0)) + 2.0
+    columns, rows = ((high - low) / _GRID_MM).astype(int)
+    x, y = low[0] + _GRID_MM * np.arange(columns), low[1] + _GRID_MM * np.arange(rows)
+    depth = np.full((rows, columns), -1.0)
+    for (cx, cy), radius in zip(centers, radii, strict=True):
+        # Each disc only touches a window around it; one millimetre outside is enough to interpolate the zero line.
+        reach = radius + 1.0
+        i = slice(int((cy - reach - low[1]) / _GRID_MM), int((cy + reach - low[1]) / _GRID_MM) + 2)
+        j = slice(int((cx - reach - low[0]) / _GRID_MM), int((cx + reach - low[0]) / _GRID_MM) + 2)
+        np.maximum(depth[i, j], radius - np.hypot(y[i, None] - cy, x[None, j] - cx), out=depth[i, j])
+    return [low + _GRID_MM * contour[:, ::-1] for contour in find_contours(depth, 0.0)]
+
+
+def wall_boxes(phantom: Phantom, outlines: list[Points]) -> tuple[list[Wall], Port]:
+    """The walls of a phantom along its ``lumen_outline``, open at its port."""
+    port, discs = port_of(phantom), lumen_discs(phantom.graph)
+    walls = []
+    for outline in outlines:
+        corners = approximate_polygon(outline, _TOLERANCE_MM)
+        for start, end in itertools.pairwise(corners):
+            length = float(np.linalg.norm(end - start))
+            if length < 1e-6:
+                continue
+            along = (end - start) / length
+            # Outlines keep the lumen on a fixed hand, islands too: here (x right, y down) on their left as seen on screen.
+            outward = np.array([along[1], -along[0]])
+            count = int(np.ceil(length / _MAX_PIECE_MM))
+            for piece in range(count):
+                ends = start + np.outer((piece, piece + 1), along) * length / count
+                middle = ends.mean(axis=0)
+                if not _in_mouth(middle, port):
+                    thickness = _thickness(ends, outward, discs)
+                    x, y = middle + outward * thickness / 2
+                    angle = float(np.arctan2(along[1], along[0]))
+                    walls.append(Wall(float(x), float(y), length / count / 2, thickness / 2, angle))
+    return walls, port
+
+
+def _thickness(ends: Points, outward: NDArray[np.float64], discs: tuple[Points, NDArray[np.float64]]) -> float:
+    """As thick as may be without sticking out into the lumen behind, which happens at the sharp divider of two branches."""
+    centers, radii = discs
+    for thickness in _THICKNESSES_MM[:-1]:
+        outer = ends + outward * thickness
+        depth = radii - np.linalg.norm(outer[:, None] - centers, axis=2)
+        if depth.max() < 0.1:
+            return thickness
+    return _THICKNESSES_MM[-1]
+
+
+def _in_mouth(point: NDArray[np.float64], port: Port) -> bool:
+    """The rounded cap of the lumen behind the port, through which the robot comes."""
+    offset = point - port.point
+    return float(offset @ port.inward) < 0.0 and float(np.linalg.norm(offset)) < 1.2 * port.radius + 1.0
+
+
+ROBOT_RADIUS_MM = 1.25
+LINK_MM = 2.0
+"""Length of the steerable links; facts on the bend per pull hold for ten of them."""
+SHAFT_LINK_MM = 3.0
+"""Shaft links are longer: at the shaft's tightest bends (8 mm) the axis is off by 0.14 mm, and a step costs half."""
+STEERABLE_LINKS = 10
+TENDONS = ("right", "left", "up", "down")
+TIMESTEP_S = 0.002
+LUMEN_HALF_HEIGHT_MM = 6.0
+TENDON_OFFSET_MM = 1.0
+FEED_KP_MN_MM, FEED_KV = 2000.0, 200.0
+_MASS_KG_MM = 3e-5
+_TENDON_KP_MN_MM, _TENDON_KV, _TENDON_MAX_MN = 2000.0, 40.0, 4000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Specimen:
+    """One robot's mechanical properties; no two are alike.
+
+    ``shaft_ei`` and ``tip_ei`` are bending stiffnesses (mN mm2), ``damping_s`` is damping over stiffness, ``tip_set_deg`` the bend
+    that the steerable part keeps with slack tendons (positive: right), ``friction`` that against the wall.
+    """
+
+    shaft_ei: float = 2e4
+    tip_ei: float = 8e3
+    damping_s: float = 0.04
+    friction: float = 0.1
+    tip_set_deg: float = 0.0
+    feed_force_mn: float = 600.0
+
+    @staticmethod
+    def drawn(seed: int) -> Specimen:
+        """The nominal robot for seed 0, else one drawn at random."""
+        if seed == 0:
+            return Specimen()
+        rng = np.random.default_rng([seed, 40427])
+        return Specimen(
+            shaft_ei=rng.uniform(1.8e4, 3.5e4),
+            tip_ei=8e3 * rng.uniform(0.9, 1.15),
+            friction=rng.uniform(0.06, 0.15),
+            tip_set_deg=float(np.clip(rng.normal(0.0, 2.0), -5.0, 5.0)),
+        )
+
+
+def link_lengths_mm(shaft_links: int) -> NDArray[np.float64]:
+    """Lengths of all links of a chain, tail -> head."""
+    return np.array([SHAFT_LINK_MM] * shaft_links + [LINK_MM] * STEERABLE_LINKS)
+
+
+def build_model(walls: list[Wall], port: Port, shaft_links: int, specimen: Specimen) -> mujoco.MjModel:
+    """Compile the model: a chain of capsules on a slide along the port's axis, with its tip at the port for slide position 0.
+
+    Joint order: slide, then one planar hinge per link, followed by the pitch hinge where the link is steerable. Actuator order:
+    right, left, up, down, feed.
+    """
+    x, y = port.point
+    wall_geoms = "".join(
+        f'<geom class="wall" type="box" size="{wall.half_length + 0.01:.5f} {wall.half_thickness:.5f} {LUMEN_HALF_HEIGHT_MM + 1}" '
+        f'pos="{wall.x:.5f} {wall.y:.5f} 0" euler="0 0 {wall.angle_rad:.6f}"/>'
+        for wall in walls
+    )
+    lengths = link_lengths_mm(shaft_links)
+    sites = range(shaft_links - 1, len(lengths))
+    tendons = "".join(
+        f'<spatial name="{name}">' + "".join(f'<site site="{name}{link}"/>' for link in sites) + "</spatial>" for name in TENDONS
+    )
+    pulls = "".join(
+        f'<position name="{name}" tendon="{name}" kp="{_TENDON_KP_MN_MM}" kv="{_TENDON_KV}" forcerange="-{_TENDON_MAX_MN} 0"/>'
+        for name in TENDONS
+    )
+    return mujoco.MjModel.from_xml_string(f"""
+<mujoco>
+  <compiler angle="radian" autolimits="true"/>
+  <option timestep="{TIMESTEP_S}" gravity="0 0 0" integrator="discrete"
+          solver="Newton" jacobian="sparse" cone="elliptic" iterations="20" tolerance="1e-8"/>
+  <default>
+    <joint armature="0.05"/>
+    <geom condim="3" friction="{specimen.friction} 0.001 0.0001" solref=".004 1" solimp=".9 .95 .05"/>
+    <default class="wall"><geom contype="2" conaffinity="1"/></default>
+    <default class="link">
+      <geom type="capsule" size="{ROBOT_RADIUS_MM}" contype="1" conaffinity="2"/>
+    </default>
+  </default>
+  <worldbody>
+    {wall_geoms}
+    <geom class="wall" type="plane" size="1 1 1" pos="0 0 -{LUMEN_HALF_HEIGHT_MM}"/>
+    <geom class="wall" type="plane" size="1 1 1" pos="0 0 {LUMEN_HALF_HEIGHT_MM}" euler="{np.pi} 0 0"/>
+    <body name="base" pos="{x:.6f} {y:.6f} 0" euler="0 0 {port.angle_rad:.9f}">
+      <joint name="feed" type="slide" axis="1 0 0" range="0 {lengths.sum()}" armature="0.05"/>
+      <inertial pos="0 0 0" mass="0.001" diaginertia="0.01 0.01 0.01"/>
+      {_chain(lengths, specimen)}
+    </body>
+  </worldbody>
+  <tendon>{tendons}</tendon>
+  <actuator>
+    {pulls}
+    <position name="feed" joint="feed" kp="{FEED_KP_MN_MM}" kv="{FEED_KV}"/>
+  </actuator>
+</mujoco>""")
+
+
+def _chain(lengths: NDArray[np.float64], specimen: Specimen) -> str:
+    """The nested bodies of the chain, written from the base outward."""
+    opening, first = [], len(lengths) - STEERABLE_LINKS
+    before = -float(lengths.sum())
+    for link, length in enumerate(lengths):
+        steerable = link >= first
+        stiffness = (specimen.tip_ei if steerable else specimen.shaft_ei) / length
+        hinge = f'stiffness="{stiffness:.6g}" damping="{stiffness * specimen.damping_s:.6g}" range="-0.45 0.45"'
+        set_rad = np.radians(specimen.tip_set_deg) / STEERABLE_LINKS if steerable else 0.0
+        opening.append(f'<body pos="{before} 0 0"><joint axis="0 0 1" {hinge} springref="{set_rad:.6g}"/>')
+        if steerable:
+            # Positive pitch lifts the tip towards the camera (-z).
+            opening.append(f'<joint axis="0 1 0" {hinge}/>')
+        opening.append(f'<geom class="link" fromto="0 0 0 {length} 0 0" mass="{_MASS_KG_MM * length}"/>')
+        if link >= first - 1:
+            side = TENDON_OFFSET_MM
+            places = {"right": (side, 0.0), "left": (-side, 0.0), "up": (0.0, -side), "down": (0.0, side)}
+            at = length - LINK_MM / 2
+            opening.extend(f'<site name="{name}{link}" pos="{at} {y} {z}"/>' for name, (y, z) in places.items())
+        before = float(length)
+    return "".join(opening) + "</body>" * len(lengths)
+
+
+_log = logging.getLogger(__name__)
+_FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+_GUIDE_EI = 1e8
+_GUIDE_DAMPING_S = 0.004
+_GUIDE_MM = 3.0
+_SHEATH_EI = 6e4
+
+
+def _on_warning(message: str) -> None:
+    _log.warning("MuJoCo: %s", message)
+
+
+# Without a callback MuJoCo writes its warnings to a file in the working directory.
+mujoco.set_mju_user_warning(_on_warning)
+
+
+class LinkChain:
+    """A chain of links with the port at slide position 0 of its tip.
+
+    Attributes
+    ----------
+    model, data : MuJoCo's.
+    length_mm : of all links.
+    slack_mm : tendon lengths (4,) of the straight robot.
+    """
+
+    def __init__(self, walls: list[Wall], port: Port, shaft_links: int, specimen: Specimen) -> None:
+        self.model = build_model(walls, port, shaft_links, specimen)
+        self.data = mujoco.MjData(self.model)
+        lengths = link_lengths_mm(shaft_links)
+        self.length_mm = float(lengths.sum())
+        self._specimen = specimen
+        self._starts_mm = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) - self.length_mm
+        self._bodies = np.arange(self.model.nbody - len(lengths), self.model.nbody)
+        self._geoms = self.model.body_geomadr[self._bodies].copy()
+        self._tip_length_mm = float(lengths[-1])
+        # Joint 0 is the feed; joints and degrees of freedom have the same numbers in a chain of hinges.
+        link = np.searchsorted(self._bodies, self.model.jnt_bodyid[1:])
+        self._joint_link, self._joint_length = link, lengths[link]
+        ei = np.where(link >= shaft_links, specimen.tip_ei, specimen.shaft_ei)
+        self._own_stiffness = ei / self._joint_length
+        self._set_rad = self.model.qpos_spring[1:].copy()
+        self._shaped_for: tuple[float, float] | None = None
+        self.shape(0.0)
+        mujoco.mj_forward(self.model, self.data)
+        self.slack_mm = self.data.ten_length.copy()
+
+    @property
+    def insertion_mm(self) -> float:
+        return float(self.data.qpos[0])
+
+    def reset(self) -> None:
+        """Straight, at rest, tip at the port, time 0."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.ctrl[:4] = self.slack_mm
+        self.shape(0.0)
+        mujoco.mj_forward(self.model, self.data)
+
+    def step(self) -> None:
+        """One time step.
+
+        Raises
+        ------
+        FloatingPointError
+            When the state is no longer finite. It was never seen; MuJoCo would silently start again from the straight robot.
+        """
+        mujoco.mj_step(self.model, self.data)
+        if any(self.data.warning[kind].number for kind in _FATAL):
+            raise FloatingPointError(f"the twin's physics diverged at {self.data.time:.3f} s")
+
+    def take_over(self, other: LinkChain) -> None:
+        """Carry on from the state of a shorter or longer chain: the distal joints are copied, further ones are straight."""
+        self.reset()
+        joints = min(self.model.nv, other.model.nv) - 1
+        self.data.time = other.data.time
+        for mine, theirs in (
+            (self.data.qpos, other.data.qpos),
+            (self.data.qvel, other.data.qvel),
+            (self.data.qacc_warmstart, other.data.qacc_warmstart),
+        ):
+            mine[0] = theirs[0]
+            mine[-joints:] = theirs[-joints:]
+        self.data.ctrl[:] = other.data.ctrl
+
+    def shape(self, delivery_mm: float) -> None:
+        """Stiffen what the guide behind the port and the sheath cover; links touch walls only once they are inside.
+
+        Joints outside are held straight by stiffness, so the robot cannot buckle there and comes back clean.
+        """
+        insertion_mm = self.insertion_mm
+        key = round(insertion_mm, 1), round(delivery_mm, 1)
+        if key == self._shaped_for:
+            return
+        self._shaped_for = key
+        starts = insertion_mm + self._starts_mm
+        inside = (starts >= 0.0).astype(np.int32)
+        self.model.geom_contype[self._geoms] = inside
+        self.model.geom_conaffinity[self._geoms] = 2 * inside
+        at = starts[self._joint_link]
+        guided = np.clip((_GUIDE_MM - at) / _GUIDE_MM, 0.0, 1.0) ** 3
+        covered = np.clip((delivery_mm - at) / self._joint_length, 0.0, 1.0)
+        own = self._own_stiffness + covered * _SHEATH_EI / self._joint_length
+        held = guided * _GUIDE_EI / self._joint_length
+        self.model.jnt_stiffness[1:] = own + held
+        self.model.dof_damping[1:] = own * self._specimen.damping_s + held * _GUIDE_DAMPING_S
+        # Guide and sheath are straight, so they pull against the robot's own set.
+        self.model.qpos_spring[1:] = self._set_rad * self._own_stiffness / (own + held)
+
+    def corners_mm(self, outside_mm: float) -> Points:
+        """The axis on the board (N, 2): link starts from at most `outside_mm` behind the port on, then the last link's end."""
+        joints = self.data.xpos[self._bodies][:, :2]
+        direction = self.data.xmat[self._bodies[-1]].reshape(3, 3)[:2, 0]
+        first = max(0, int(np.searchsorted(self._starts_mm + self.insertion_mm, -outside_mm)) - 1)
+        return np.vstack([joints[first:], joints[-1] + direction * self._tip_length_mm])
+
+    def wall_force_mn(self) -> float:
+        """Sum of the normal forces of all contacts."""
+        count = self.data.ncon
+        if count == 0:
+            return 0.0
+        rows = self.data.contact.efc_address[:count]
+        return float(self.data.efc_force[rows[rows >= 0]].sum())
+
+
+MAX_PULL_MM = 2.0
+"""Tendon pull at a bend or pitch of 1; the tip bends about 47 degrees per millimetre."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveProperties:
+    """``backlash_mm`` is the play between motor and tendon, ``dead_zone_mm`` the slack that must be taken up before it pulls."""
+
+    slew_mm_s: float = 10.0
+    backlash_mm: float = 0.08
+    dead_zone_mm: float = 0.02
+
+
+class TendonDrive:
+    """One antagonistic pair. ``pull_mm`` is what reaches the tendons: positive on the first, the second gets its negative."""
+
+    def __init__(self, properties: DriveProperties) -> None:
+        self._properties = properties
+        self.reset()
+
+    def reset(self) -> None:
+        self._motor_mm = 0.0
+        self._carried_mm = 0.0
+
+    def step(self, demand: float, duration_s: float) -> float:
+        """Move towards `demand` (-1..1) for `duration_s`; returns ``pull_mm``."""
+        properties = self._properties
+        reach = properties.slew_mm_s * duration_s
+        target = max(-1.0, min(1.0, demand)) * MAX_PULL_MM
+        self._motor_mm += max(-reach, min(reach, target - self._motor_mm))
+        play = properties.backlash_mm / 2
+        self._carried_mm = max(self._motor_mm - play, min(self._motor_mm + play, self._carried_mm))
+        return self.pull_mm
+
+    @property
+    def pull_mm(self) -> float:
+        beyond = max(0.0, abs(self._carried_mm) - self._properties.dead_zone_mm)
+        return beyond if self._carried_mm > 0 else -beyond
+
 
 STEERABLE_MM = STEERABLE_LINKS * LINK_MM
 OUTSIDE_MM = 30.0
@@ -65,7 +456,7 @@ class TwinPhysics:
         self._outline = cKDTree(np.concatenate(outlines))
         self._lock = threading.RLock()
         self._bend, self._pitch = TendonDrive(drive or DriveProperties()), TendonDrive(drive or DriveProperties())
-        self._chains: dict[int, Chain] = {}
+        self._chains: dict[int, LinkChain] = {}
         self.reset()
 
     def reset(self) -> None:
@@ -80,14 +471,14 @@ class TwinPhysics:
             self._contact_mn = 0.0
             self._due_s = 0.0
 
-    def _chain_of(self, size: int) -> Chain:
+    def _chain_of(self, size: int) -> LinkChain:
         """The chain with `size` + 1 times twenty shaft links, at most what the phantom's longest way needs.
 
         What lies far outside the port cannot matter, and the cost of a step grows faster than the number of links.
         """
         shaft_links = min(self._shaft_links, (size + 1) * _CHAIN_STEP_LINKS)
         if size not in self._chains:
-            self._chains[size] = Chain(self._walls, self._port, shaft_links, self.specimen)
+            self._chains[size] = LinkChain(self._walls, self._port, shaft_links, self.specimen)
         self._size = size
         return self._chains[size]
 

@@ -12,7 +12,7 @@ import time
 import tty
 from pathlib import Path
 
-from hardware.servos.pedal_protocol import NUMBERS, PERIOD_S, PedalLine, line_bytes
+from hardware.inputs.pedal import NUMBERS, PERIOD_S, PedalLine, line_bytes
 
 _STOP_REPORTS = 5
 """Reports that tell of a STOP, however short it was; docs/bench.md has the same in the firmware."""

@@ -12,24 +12,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.config import Config
-from core.control.drive import Drive
+from core import geometry
+from core.config.models import Config, PolicyName
+from core.control.motion import AdviceController
 from core.control.policies import Policy, make_policy
-from core.perception import polyline
+from core.evaluation.accuracy import TrueMasks
+from core.evaluation.trial import Row, TrialLog, TrialSample, trial_row
+from core.perception.centerline import plan_route
 from core.perception.pipeline import Pipeline
-from core.perception.route import plan_route
-from core.policy_config import PolicyName
-from core.study.accuracy import TrueMasks
-from core.study.trial import Measure, Row, TrialLog, trial_row
 from core.types import Advice, Command, Frame, Point, Points, Scene, Speed
-from hardware.twin.autopilot import RouteFollower
-from hardware.twin.camera import TwinCamera
-from hardware.twin.look import named_appearance
-from hardware.twin.look_titles import BENCH_LOOK, LOOK_TITLES, RARE_TITLES
+from hardware.twin.catalog import BENCH_LOOK, LOOK_TITLES, RARE_TITLES
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
-from hardware.twin.view import View
-from hardware.twin.world import TwinWorld
+from hardware.twin.rendering.appearance import named_appearance
+from hardware.twin.truth import RouteFollower
+from hardware.twin.view import CameraView
+from hardware.twin.world import TwinCamera, TwinWorld
 
 FIRST_SEED = 2_000_000
 """Trial 0 has this seed's phantom, look and robot; sets for training stay below it."""
@@ -75,7 +73,7 @@ class Target:
     click_px: Point
 
 
-def choose_target(phantom: Phantom, view: View, seed: int) -> Target:
+def choose_target(phantom: Phantom, view: CameraView, seed: int) -> Target:
     """One of the ends that the camera sees the way to, drawn at random; the click lies on the centerline shortly before the end.
 
     An end outside the picture is aimed at as far as the picture goes.
@@ -87,15 +85,15 @@ def choose_target(phantom: Phantom, view: View, seed: int) -> Target:
     return whole[int(np.random.default_rng([seed, 30011]).integers(len(whole)))]
 
 
-def _target_at(phantom: Phantom, view: View, node: int) -> Target:
+def _target_at(phantom: Phantom, view: CameraView, node: int) -> Target:
     follower = RouteFollower(phantom, node)
-    along = polyline.arc_length(follower.route)
+    along = geometry.arc_length(follower.route)
     pixels = view.project(follower.route)
     limit = np.array(view.size) - 1 - _MARGIN_PX
     hidden = np.any((pixels < _MARGIN_PX) | (pixels > limit), axis=1) & (along > _START_MM)
     seen_mm = float(along[int(np.argmax(hidden))]) if hidden.any() else follower.length_mm
     at_mm = min(seen_mm, follower.length_mm - _BEFORE_END_MM)
-    point = polyline.point_at(follower.route, along, np.array([at_mm]))
+    point = geometry.point_at(follower.route, along, np.array([at_mm]))
     click = view.project(point)[0]
     return Target(node, follower.route, at_mm, (float(point[0, 0]), float(point[0, 1])), (float(click[0]), float(click[1])))
 
@@ -104,7 +102,7 @@ def start_mm(phantom: Phantom, target: Target) -> float:
     """How far the robot is brought in by hand: to shortly before the first bifurcation, so that autonomy takes all."""
     graph = phantom.graph
     degree = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
-    places = [polyline.nearest(target.route, (x, y))[:2] for x, y in graph.nodes[degree >= 3].tolist()]
+    places = [geometry.nearest(target.route, (x, y))[:2] for x, y in graph.nodes[degree >= 3].tolist()]
     first_mm = min((along for away, along in places if away < 0.5), default=math.inf)
     return max(_START_MM, min(_START_MOST_MM, first_mm - _BEFORE_JUNCTION_MM, target.at_mm - _LEAST_WAY_MM / 2))
 
@@ -130,7 +128,7 @@ class Trial:
         self._pipeline, self._masks = pipeline, masks
         pipeline.reset()
         self._policy: Policy = make_policy(policy, config, own_seed)
-        self._drive = Drive(config.policy.drive)
+        self._drive = AdviceController(config.policy.drive)
         self._operator = _Operator(config.safety.pose_disarm_s)
         self._hand = RouteFollower(phantom, self.target.node)
         self._log = TrialLog()
@@ -216,7 +214,7 @@ class Trial:
             d_px = truth.offset_ratio * truth.lumen_radius_px
         head_mm = self._world.physics.head_mm
         self._log.measures.append(
-            Measure(
+            TrialSample(
                 time_s=time_s,
                 head_mm=head_mm,
                 insertion_mm=insertion_mm,

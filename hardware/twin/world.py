@@ -1,27 +1,121 @@
-"""The bench twin as one world: phantom, physics, look and camera view share a clock that is stepped or follows the wall clock."""
+"""The bench twin as one world: phantom, physics, look and camera view share a clock that is stepped or follows the wall clock.
+
+The twin's camera: gives what the world renders, either as it runs or one frame per read in lock-step.
+
+The twin's robot behind the ``Robot`` protocol: it keeps the current command, which the world applies as it steps the physics.
+
+The twin's robot without servos in between, under the pilot's rules: no bus, no process, the lightest load on the machine.
+"""
 
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from core.config import PerceptionConfig, TwinConfig
-from core.latest import Latest
-from core.perception.route import plan_route
-from core.types import Command, Frame, Point, Points
-from hardware.twin.appearance import Appearance, make_view
-from hardware.twin.autopilot import RouteFollower, nearest_target
-from hardware.twin.look import appearance_of
+from core.config.models import PerceptionConfig, TwinConfig
+from core.config.safety import JOINT_NAMES, JointName, SafetyConfig
+from core.control.gate import Rejection, RejectReason, Source
+from core.control.health import BusReport
+from core.control.robot import SentMotion
+from core.devices import DeviceError, Latest
+from core.perception.centerline import plan_route
+from core.types import Command, Frame, Point, Points, RobotStatus
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import TwinPhysics
-from hardware.twin.renderer import Picture, Renderer
-from hardware.twin.robot import TwinRobot
-from hardware.twin.truth import Truth, true_graph, truth_of
+from hardware.twin.rendering.appearance import Appearance, appearance_of, make_view
+from hardware.twin.rendering.renderer import RenderedFrame, Renderer
+from hardware.twin.truth import RouteFollower, Truth, nearest_target, true_graph, truth_of
+
+MAX_ADVANCE_MM_S = 20.0
+MAX_DELIVERY_MM_S = 10.0
+
+
+class TwinRobot:
+    """Clamps commands to the robot's limits and holds the last one. All methods may be called from any thread."""
+
+    def __init__(
+        self, physics: TwinPhysics, *, max_advance_mm_s: float = MAX_ADVANCE_MM_S, max_delivery_mm_s: float = MAX_DELIVERY_MM_S
+    ) -> None:
+        self._physics = physics
+        self._max_advance_mm_s = max_advance_mm_s
+        self._max_delivery_mm_s = max_delivery_mm_s
+        self._lock = threading.Lock()
+        self._command = Command()
+        self._connected = False
+        self._sent_s = time.monotonic()
+
+    @property
+    def name(self) -> str:
+        return "bench twin"
+
+    @property
+    def current_command(self) -> Command:
+        """What the world applies now."""
+        with self._lock:
+            return self._command
+
+    def connect(self) -> None:
+        """Ready for commands, at rest."""
+        with self._lock:
+            self._command = Command()
+            self._connected = True
+
+    def send(self, command: Command) -> Command:
+        """Make `command`, clamped to the limits, the current one; returns what was really sent.
+
+        Raises
+        ------
+        ValueError
+            When a number is not finite; the current command stays.
+        DeviceError
+            When the robot is not connected.
+        """
+        values = (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s)
+        if not all(math.isfinite(value) for value in values):
+            raise ValueError(f"command is not finite: {command}")
+        sent = Command(
+            bend=_clamp(command.bend, 1.0),
+            pitch=_clamp(command.pitch, 1.0),
+            advance_mm_s=_clamp(command.advance_mm_s, self._max_advance_mm_s),
+            delivery_mm_s=_clamp(command.delivery_mm_s, self._max_delivery_mm_s),
+        )
+        with self._lock:
+            if not self._connected:
+                raise DeviceError("the bench twin's robot is not connected: call connect() first")
+            self._command = sent
+            self._sent_s = time.monotonic()
+        return sent
+
+    def command_age_s(self) -> float:
+        """Time since the last command came; the living world holds a robot whose driver has fallen silent."""
+        with self._lock:
+            return time.monotonic() - self._sent_s
+
+    def hold(self) -> None:
+        """Stop all motion and keep the bend."""
+        with self._lock:
+            self._command = replace(self._command, advance_mm_s=0.0, delivery_mm_s=0.0)
+
+    def status(self) -> RobotStatus:
+        return self._physics.status()
+
+    def close(self) -> None:
+        """Hold; further commands are refused."""
+        self.hold()
+        with self._lock:
+            self._connected = False
+
+
+def _clamp(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))
+
 
 _log = logging.getLogger(__name__)
 
@@ -101,7 +195,7 @@ class TwinWorld:
         picture = self._renderer.render(points, sheath_mm, noise_seed=index)
         return Frame(index, now if captured_s is None else captured_s, picture.image)
 
-    def picture(self, robot_points_mm: Points, sheath_mm: float = 0.0) -> Picture:
+    def picture(self, robot_points_mm: Points, sheath_mm: float = 0.0) -> RenderedFrame:
         """Image and exact masks for a robot shape."""
         return self._renderer.render(robot_points_mm, sheath_mm, noise_seed=self._frame_index)
 
@@ -162,3 +256,155 @@ class TwinWorld:
             wait = min(clock + _CONTROL_S, next_frame) - time.monotonic()
             if wait > 0:
                 self._stop.wait(wait)
+
+
+class TwinCamera:
+    """A ``Camera`` over a ``TwinWorld``. In lock-step every read advances the world by one frame period."""
+
+    def __init__(self, world: TwinWorld, *, lock_step: bool = False) -> None:
+        self._world = world
+        self._lock_step = lock_step
+
+    @property
+    def name(self) -> str:
+        return f"bench twin: {self._world.phantom.title}"
+
+    @property
+    def is_live(self) -> bool:
+        """False: what it shows is simulated."""
+        return False
+
+    def open(self) -> None:
+        if not self._lock_step:
+            self._world.start()
+
+    def read(self, timeout_s: float) -> Frame | None:
+        if self._lock_step:
+            self._world.advance(1.0 / self._world.config.frames_per_second)
+            return self._world.frame()
+        frame = self._world.frames.take(timeout_s)
+        if frame is None and self._world.failure is not None:
+            raise DeviceError(self._world.failure)
+        return frame
+
+    def close(self) -> None:
+        self._world.stop()
+
+
+_WELL = BusReport(
+    misses=(0,) * len(JOINT_NAMES),
+    hardware_errors=(0,) * len(JOINT_NAMES),
+    temperatures_c=(25.0,) * len(JOINT_NAMES),
+    voltages_v=(12.0,) * len(JOINT_NAMES),
+    tracking_mm=(0.0,) * len(JOINT_NAMES),
+)
+"""Servos that do not exist are always well."""
+
+
+class DirectRobot:
+    """Follows the orders of whoever the newest ``beat`` permits, while it is fresh. All methods may be called from any thread."""
+
+    def __init__(self, robot: TwinRobot, safety: SafetyConfig) -> None:
+        self._robot, self._safety = robot, safety
+        self._lock = threading.Lock()
+        self._permitted: Source | None = None
+        self._beat_s = -1.0
+        self._armed = False
+        self._cycle = 0
+        self._sent: SentMotion | None = None
+        self._waiting: SentMotion | None = None
+
+    @property
+    def name(self) -> str:
+        return self._robot.name
+
+    @property
+    def failure(self) -> str | None:
+        return None
+
+    def connect(self) -> None:
+        self._robot.connect()
+
+    def beat(self, permitted: Source | None) -> None:
+        """Who may drive; holds good for 100 ms. An order that came just before its permission is followed now."""
+        with self._lock:
+            self._permitted, self._beat_s = permitted, time.monotonic()
+            waiting, self._waiting = self._waiting, None
+            if waiting is not None and self._beat_s - waiting.time_s <= self._safety.command_max_age_s:
+                self._follow(waiting)
+
+    def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
+        """Make the command the current one if its source may drive; otherwise the robot holds."""
+        with self._lock:
+            return self._follow(SentMotion(0, time.monotonic(), command, source, captured_s))
+
+    def hold(self) -> None:
+        with self._lock:
+            self._waiting = None
+            self._hold(None)
+
+    def stop(self) -> None:
+        with self._lock:
+            self._armed, self._waiting = False, None
+            self._robot.hold()
+
+    def arm(self) -> None:
+        with self._lock:
+            self._armed = True
+
+    def disarm(self) -> None:
+        self.stop()
+
+    def acknowledge(self) -> None:
+        """There is nothing that latches."""
+
+    def zero(self, names: Sequence[JointName] | None = None) -> None:
+        """There is nothing to zero."""
+
+    def reboot(self, servo_id: int) -> None:
+        """There is nothing to restart."""
+
+    def torque_off(self) -> None:
+        self.stop()
+
+    def report(self) -> BusReport | None:
+        with self._lock:
+            return replace(_WELL, armed=self._armed)
+
+    def sent_motion(self) -> SentMotion | None:
+        with self._lock:
+            return self._sent if self._armed else None
+
+    def kept_back(self) -> Rejection | None:
+        """There is no gate: what is sent is done."""
+        return None
+
+    def status(self) -> RobotStatus:
+        return self._robot.status()
+
+    def close(self) -> None:
+        self._robot.close()
+
+    def _follow(self, order: SentMotion) -> Command:
+        """Do as the order says if its source may drive; else hold, and keep it for a permission that follows at once."""
+        self._waiting = None
+        is_stale = time.monotonic() - self._beat_s > self._safety.command_max_age_s
+        if not self._armed or is_stale or self._permitted is None:
+            self._hold(RejectReason.NOT_ARMED)
+            self._waiting = order
+            return Command()
+        if order.source is not self._permitted:
+            self._hold(RejectReason.WRONG_SOURCE)
+            self._waiting = order
+            return Command()
+        sent = self._robot.send(order.motion)
+        self._note(replace(order, motion=sent))
+        return sent
+
+    def _hold(self, rejection: RejectReason | None) -> None:
+        self._robot.hold()
+        self._note(SentMotion(0, time.monotonic(), self._robot.current_command, rejection=rejection))
+
+    def _note(self, sent: SentMotion) -> None:
+        self._cycle += 1
+        self._sent = SentMotion(self._cycle, sent.time_s, sent.motion, sent.source, sent.captured_s, sent.rejection)

@@ -7,13 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from core.config import PerceptionConfig
+from core.annotation.masks import polygons_of
+from core.annotation.model import Annotation, ImageView, MaskTarget, measure_lines
+from core.annotation.store import DEFAULT_NAME, AnnotationStore, FoundImage, ItemKey, find_images
+from core.config.models import PerceptionConfig
 from core.learning.dataset import write_png
-from core.study.annotation_images import FoundImage, find_images
-from core.study.annotation_records import ItemKey
-from core.study.annotation_store import DEFAULT_NAME, AnnotationStore
-from core.study.annotations import Annotation, MaskTarget, View, measure_lines
-from core.study.mask_polygons import polygons_of
 from core.types import Image, Mask, PoseState
 
 SIZE = (160, 120)
@@ -66,4 +64,4 @@ def _save(
     key = ItemKey(image.sha256, study, rater, repeat)
     entry = store.history(key).edit("drawn", content)
     assert entry is not None
-    store.save(key, View.AS_IS, entry, content, measure_lines(content, image.record.size, PerceptionConfig()), 1.0)
+    store.save(key, ImageView.AS_IS, entry, content, measure_lines(content, image.record.size, PerceptionConfig()), 1.0)

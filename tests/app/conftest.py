@@ -16,9 +16,9 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.operator_window import OperatorWindow
-from app.theme import apply_theme
-from core.config import Config, PerceptionConfig
+from app.operator.window import OperatorWindow
+from app.ui.theme import apply_theme
+from core.config.models import Config, PerceptionConfig
 from hardware.rig import RigKind
 from tests.app.fakes import FakeBench, FakeEngine
 
@@ -74,7 +74,7 @@ def all_orientations() -> None:
 @pytest.fixture
 def looked_at_once(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures that stand are looked at in one orientation of eight: for tests that are about something else than what is seen."""
-    import app.annotation_desk  # noqa: F401 - takes open_pipeline when it is imported, which must be the real one
+    import app.annotator.model  # noqa: F401 - takes open_pipeline when it is imported, which must be the real one
     from core.perception import pipeline
 
     if "all_orientations" in request.fixturenames:

@@ -18,11 +18,11 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QMessageBox
 
-from app.application import make_application
-from app.crash_report import CrashWatch
-from app.operator_window import OperatorWindow
-from app.side_work import SideWork
-from core.config import Config
+from app.operator.startup import WindowServices
+from app.operator.window import OperatorWindow
+from app.ui.crash_report import CrashWatch
+from app.ui.window_base import make_application
+from core.config.models import Config
 from hardware.rig import RigKind
 from tests.app.fakes import FakeEngine
 
@@ -41,7 +41,7 @@ def main() -> None:
     window = OperatorWindow(config, lambda _config: engine, RigKind.SIM)
     watch = CrashWatch(folder / "crashes", lambda: window.config.model_dump(mode="json"))
     watch.install()
-    side = SideWork(window, folder, watch)
+    side = WindowServices(window, folder, watch)
     window.show()
     window.start()
 

@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 from pytestqt.qtbot import QtBot
 
-from core.config import PerceptionConfig, PoseConfig
+from core.config.models import PerceptionConfig, PoseConfig
 from core.control.alerts import Alert
-from core.control.drive_view import DriveNews, DriveView
 from core.control.faults import Fault
-from core.control.gate_checks import Source
-from core.control.hand import Jog
+from core.control.gate import Source
 from core.control.modes import Act, Mode
+from core.control.motion import Jog
+from core.control.pilot import DriveNews, DriveView
 from core.types import (
     Advice,
     Centerline,

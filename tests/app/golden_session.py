@@ -12,16 +12,15 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-from core.config import PerceptionConfig, TwinConfig, load_config
+from core.config.models import PerceptionConfig, TwinConfig, load_config
 from core.perception.pipeline import open_pipeline
-from core.session.events import event_of_target
-from core.session.lines import sealed
-from core.session.manifest import FRAMES, about_rig
+from core.session.files import sealed
+from core.session.format import row_of
+from core.session.manifest import FRAMES, about_rig, event_of_target
 from core.session.reader import SessionReader
-from core.session.rows import row_of
 from core.session.writer import SessionWriter
 from core.types import Frame, Point, Reason, Refusal, Scene, Tick
-from hardware.twin.autopilot import RouteFollower
+from hardware.twin.truth import RouteFollower
 from hardware.twin.world import TwinWorld
 
 GOLDEN = Path(__file__).resolve().parents[1] / "data" / "golden_session"

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from app import synth_command
 from app.cli import app, main
+from app.commands import train
 from core.session.manifest import read_manifest
-from hardware.twin.rare_looks import RARE
+from hardware.twin.rendering.presets import RARE
 from tests.core.session_data import record, tick_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -112,7 +112,7 @@ def test_an_interrupted_command_ends_with_130(capsys: pytest.CaptureFixture[str]
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(synth_command, "run_synth", interrupted)
+    monkeypatch.setattr(train, "run_synth", interrupted)
     monkeypatch.setattr(sys, "argv", ["main.py", "synth", "--out", "x", "--count", "4"])
     with pytest.raises(SystemExit) as left:
         main()

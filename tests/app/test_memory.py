@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.memory import give_back
+from core.system import give_back
 
 
 class _Knot:
@@ -52,7 +52,7 @@ def test_what_other_threads_have_freed_goes_back_to_the_system() -> None:
 
 _MANY_THREADS = """
 import ctypes, sys, threading
-from app.memory import share_heaps
+from core.system import share_heaps
 if sys.argv[1] == "shared":
     share_heaps()
 libc = ctypes.CDLL(None)
@@ -82,7 +82,7 @@ def test_threads_share_two_heaps(how: str, fewest: int, most: int, tmp_path: Pat
 _PICTURES = """
 import resource, sys
 import numpy as np
-from app.memory import keep_freed
+from core.system import keep_freed
 if sys.argv[1] == "kept":
     keep_freed()
 def picture():

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
-from core.perception import polyline
+from core import geometry
 from core.types import Mask, Masks, Point, Points
 
 SIZE = (640, 480)
@@ -22,7 +22,7 @@ def picture(mask: Mask) -> str:
 
 def depth(line: Points, radius: float, size: tuple[int, int] = SIZE) -> np.ndarray:
     """How deep each pixel lies in a tube with flat ends around a polyline, in px; negative outside. Shape (h, w)."""
-    points = polyline.resample(np.asarray(line, np.float64), 0.5)
+    points = geometry.resample(np.asarray(line, np.float64), 0.5)
     reach = 2 * radius + 2  # what lies further away is so far outside that it does not matter how far
     near = np.zeros((size[1], size[0]), np.uint8)
     cv2.polylines(near, [np.round(points).astype(np.int32)], isClosed=False, color=1, thickness=2 * int(reach) + 3)
@@ -61,5 +61,5 @@ def direction(angle_deg: float) -> Point:
 def curve(*points: tuple[float, float]) -> Points:
     """A smooth line through some points, a point every px."""
     corners = np.asarray(points, np.float64)
-    along = polyline.arc_length(corners)
-    return polyline.resample(CubicSpline(along, corners)(np.linspace(0.0, along[-1], 400)), 1.0)
+    along = geometry.arc_length(corners)
+    return geometry.resample(CubicSpline(along, corners)(np.linspace(0.0, along[-1], 400)), 1.0)

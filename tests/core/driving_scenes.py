@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from core.config import Config
-from core.perception.centerline import centerline_at
+from core.config.models import Config
+from core.perception.centerline import centerline_at, plan_route
 from core.perception.pose import measure
-from core.perception.route import plan_route
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.types import GraphEdge, Point, Points, RobotPath, RobotStatus, Scene, VesselGraph
 

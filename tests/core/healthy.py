@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from core.control.bus_watch import BusReport
-from core.control.deadman import DeadmanReport
-from core.control.frame_watch import FrameReport, RouteState
-from core.control.health import Beat, ModelReport, Part, ServosChecked
-from core.control.supervisor import Act, Decision, Event, Mode, SupervisorState, supervise
-from core.safety_config import SafetyConfig
-from core.servo_config import ServosConfig
+from core.config.safety import SafetyConfig, ServosConfig
+from core.control.health import Beat, BusReport, DeadmanReport, FrameReport, ModelReport, Part, RouteState, ServosChecked
+from core.control.modes import Act, Decision, Event, Mode, SupervisorState
+from core.control.supervisor import supervise
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 TICK_S = 0.03125  # a power of two: sums are exact

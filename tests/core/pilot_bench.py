@@ -7,29 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.config import Config
-from core.control.bus_watch import BusReport
-from core.control.drive_view import LeftOver
-from core.control.gate_checks import Rejection, Source
-from core.control.guarded_robot import SentMotion
-from core.control.hand import AT_REST
-from core.control.health import ModelReport
+from core.config.models import Config
+from core.control.gate import Rejection, Source
+from core.control.health import BusReport, ModelReport
 from core.control.modes import Act, Mode
-from core.control.pilot import PERIOD_S, Pilot
+from core.control.motion import AT_REST
+from core.control.pilot import PERIOD_S, LeftOver, Pilot
+from core.control.robot import SentMotion
 from core.devices import DeviceError
-from core.types import (
-    Advice,
-    Centerline,
-    Command,
-    Frame,
-    Pose,
-    PoseState,
-    RobotPath,
-    RobotStatus,
-    Route,
-    Scene,
-    Speed,
-)
+from core.types import Advice, Centerline, Command, Frame, Pose, PoseState, RobotPath, RobotStatus, Route, Scene, Speed
 
 WELL = BusReport(
     misses=(0,) * 7, hardware_errors=(0,) * 7, temperatures_c=(30.0,) * 7, voltages_v=(12.0,) * 7, tracking_mm=(0.0,) * 7

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from core.control.drive_view import DriveView
+from core.config.models import RecordConfig
 from core.control.faults import Cause, Fault
-from core.control.gate_checks import Source
+from core.control.gate import Source
 from core.control.modes import Hindrance, Mode
-from core.record_config import RecordConfig
+from core.control.pilot import DriveView
 from core.session.manifest import About
 from core.session.writer import SessionWriter
 from core.types import (

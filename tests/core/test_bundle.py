@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from core.perception import bundle, polyline
-from core.perception.bundle import Bundle
+from core import geometry
+from core.geometry import Bundle
 from core.types import Points
 from tests.core.drawing import curve
 
@@ -25,27 +25,27 @@ def test_lines_come_back_as_they_went_in() -> None:
 
 @pytest.mark.parametrize("step_px", [1.0, 2.0, 7.5])
 def test_resampling_is_that_of_each_line(step_px: float) -> None:
-    found = bundle.resample(ALL, step_px)
+    found = geometry.resample_bundle(ALL, step_px)
     for line, again in zip(LINES, found.split(found.points), strict=True):
-        np.testing.assert_allclose(again, polyline.resample(line, step_px), atol=1e-9)
+        np.testing.assert_allclose(again, geometry.resample(line, step_px), atol=1e-9)
 
 
 @pytest.mark.parametrize("keeps_bends", [False, True])
 @pytest.mark.parametrize("sigma", [1.0, 4.0])
 def test_smoothing_and_normals_are_those_of_each_line(sigma: float, keeps_bends: bool) -> None:
-    even = bundle.resample(ALL, 2.0)
-    smooth = bundle.smooth(even, sigma, keeps_bends=keeps_bends)
-    normals = Bundle(bundle.normals(smooth), smooth.starts)
+    even = geometry.resample_bundle(ALL, 2.0)
+    smooth = geometry.smooth_bundle(even, sigma, keeps_bends=keeps_bends)
+    normals = Bundle(geometry.bundle_normals(smooth), smooth.starts)
     for line, again, across in zip(
         even.split(even.points), smooth.split(smooth.points), normals.split(normals.points), strict=True
     ):
-        np.testing.assert_allclose(again, polyline.smooth(line, sigma, keeps_bends=keeps_bends), atol=1e-9)
+        np.testing.assert_allclose(again, geometry.smooth(line, sigma, keeps_bends=keeps_bends), atol=1e-9)
         if len(line) > 1:
-            np.testing.assert_allclose(across, polyline.normals(again), atol=1e-9)
+            np.testing.assert_allclose(across, geometry.normals(again), atol=1e-9)
 
 
 @pytest.mark.parametrize("lines", [[], [np.array([[3.0, 4.0]])], [np.array([[3.0, 4.0], [3.0, 4.0]])]])
 def test_no_line_and_lines_of_no_length(lines: list[Points]) -> None:
     few = Bundle.of(lines)
-    even = bundle.smooth(bundle.resample(few, 2.0), 4.0)
+    even = geometry.smooth_bundle(geometry.resample_bundle(few, 2.0), 4.0)
     assert [line.tolist() for line in even.split(even.points)] == [[[3.0, 4.0]]] * len(lines)

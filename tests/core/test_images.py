@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.images import ImageError, read_image, to_rgb8
+from core.files import ImageError, read_image, to_rgb8
 
 
 def test_colour_order_is_rgb(tmp_path: Path) -> None:

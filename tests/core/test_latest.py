@@ -1,6 +1,6 @@
 import threading
 
-from core.latest import Latest
+from core.devices import Latest
 
 
 def test_the_newest_value_wins_and_the_lost_ones_are_counted() -> None:

@@ -1,23 +1,23 @@
 import numpy as np
 import pytest
 
-from core.perception import polyline
+from core import geometry
 
 CORNER = np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 40.0]])
 
 
 def test_arc_length_is_the_distance_walked() -> None:
-    assert polyline.arc_length(CORNER).tolist() == [0.0, 30.0, 70.0]
+    assert geometry.arc_length(CORNER).tolist() == [0.0, 30.0, 70.0]
 
 
 def test_resampling_keeps_both_ends_and_spaces_evenly() -> None:
-    even = polyline.resample(CORNER, 10.0)
+    even = geometry.resample(CORNER, 10.0)
     assert even.tolist() == [[0, 0], [10, 0], [20, 0], [30, 0], [30, 10], [30, 20], [30, 30], [30, 40]]
 
 
 def test_a_cut_keeps_inner_corners_and_is_clamped_to_the_ends() -> None:
-    assert polyline.cut(CORNER, 20.0, 35.0).tolist() == [[20, 0], [30, 0], [30, 5]]
-    assert polyline.cut(CORNER, -5.0, 500.0).tolist() == CORNER.tolist()
+    assert geometry.cut(CORNER, 20.0, 35.0).tolist() == [[20, 0], [30, 0], [30, 5]]
+    assert geometry.cut(CORNER, -5.0, 500.0).tolist() == CORNER.tolist()
 
 
 @pytest.mark.parametrize(
@@ -27,14 +27,14 @@ def test_a_cut_keeps_inner_corners_and_is_clamped_to_the_ends() -> None:
 def test_the_nearest_place_lies_on_a_segment_not_on_a_vertex(
     point: tuple[float, float], distance: float, position: float, foot: tuple[float, float]
 ) -> None:
-    assert polyline.nearest(CORNER, point) == (pytest.approx(distance), pytest.approx(position), pytest.approx(foot))
+    assert geometry.nearest(CORNER, point) == (pytest.approx(distance), pytest.approx(position), pytest.approx(foot))
 
 
 def test_smoothing_keeps_the_ends_and_leaves_a_straight_line_alone() -> None:
     line = np.column_stack([np.linspace(0, 50, 26), np.linspace(10, 35, 26)])
-    np.testing.assert_allclose(polyline.smooth(line, 3.0), line, atol=1e-9)
+    np.testing.assert_allclose(geometry.smooth(line, 3.0), line, atol=1e-9)
     staircase = line + np.tile([[0.0, 0.5], [0.0, -0.5]], (13, 1))
-    smoothed = polyline.smooth(staircase, 3.0)
+    smoothed = geometry.smooth(staircase, 3.0)
     np.testing.assert_allclose(smoothed[[0, -1]], staircase[[0, -1]], atol=1e-9)
     assert np.abs(smoothed[9:-9] - line[9:-9]).max() < 0.1
 
@@ -44,12 +44,12 @@ def test_smoothing_that_keeps_bends_leaves_a_circle_where_it_is() -> None:
     angle = np.arange(0, 2.0, 0.05)
     circle = 40.0 * np.column_stack([np.cos(angle), np.sin(angle)])
     inner = slice(13, -13)
-    drawn = 40.0 - np.hypot(*polyline.smooth(circle, 4.0)[inner].T)
-    kept = 40.0 - np.hypot(*polyline.smooth(circle, 4.0, keeps_bends=True)[inner].T)
+    drawn = 40.0 - np.hypot(*geometry.smooth(circle, 4.0)[inner].T)
+    kept = 40.0 - np.hypot(*geometry.smooth(circle, 4.0, keeps_bends=True)[inner].T)
     assert drawn == pytest.approx(0.8, abs=0.05)
     assert np.abs(kept).max() < 0.02
     rough = np.random.default_rng(4).normal(0, 0.5, circle.shape)
-    smoothed = polyline.smooth(circle + rough, 5.0, keeps_bends=True)[16:-16]
+    smoothed = geometry.smooth(circle + rough, 5.0, keeps_bends=True)[16:-16]
     assert np.hypot(*smoothed.T).std() < 0.25
 
 
@@ -57,25 +57,25 @@ def test_smoothing_that_keeps_bends_leaves_a_circle_where_it_is() -> None:
 def test_the_ends_of_a_bend_and_short_bends_are_kept_better_than_by_a_gaussian(count: int) -> None:
     angle = 0.05 * np.arange(count)
     arc = 40.0 * np.column_stack([np.cos(angle), np.sin(angle)])
-    kept, drawn = (np.abs(40.0 - np.hypot(*polyline.smooth(arc, 4.5, keeps_bends=keeps).T)).max() for keeps in (True, False))
+    kept, drawn = (np.abs(40.0 - np.hypot(*geometry.smooth(arc, 4.5, keeps_bends=keeps).T)).max() for keeps in (True, False))
     assert kept < 0.25
     assert kept <= drawn + 1e-9
 
 
 def test_a_map_is_sampled_between_pixels_and_beyond_its_border() -> None:
     ramp = np.tile(np.arange(8, dtype=np.float32), (6, 1))
-    assert polyline.sample(ramp, np.array([[2.5, 3.0], [-4.0, 1.0], [20.0, 1.0]])).tolist() == [2.5, 0.0, 7.0]
+    assert geometry.sample(ramp, np.array([[2.5, 3.0], [-4.0, 1.0], [20.0, 1.0]])).tolist() == [2.5, 0.0, 7.0]
 
 
 @pytest.mark.parametrize("values", [[3.0], [4.0, 1.0], [5.0, 2.0, 9.0], [1.0, 8.0, 2.0, 4.0]])
 def test_the_median_of_a_few_numbers(values: list[float]) -> None:
-    assert polyline.median(np.array(values)) == np.median(values)
+    assert geometry.median(np.array(values)) == np.median(values)
 
 
 def test_a_known_arc_length_need_not_be_given_again_and_changes_nothing() -> None:
-    along = polyline.arc_length(CORNER)
-    assert polyline.cut(CORNER, 20.0, 35.0, along).tolist() == polyline.cut(CORNER, 20.0, 35.0).tolist()
-    assert polyline.nearest(CORNER, (33.0, 44.0), along) == polyline.nearest(CORNER, (33.0, 44.0))
+    along = geometry.arc_length(CORNER)
+    assert geometry.cut(CORNER, 20.0, 35.0, along).tolist() == geometry.cut(CORNER, 20.0, 35.0).tolist()
+    assert geometry.nearest(CORNER, (33.0, 44.0), along) == geometry.nearest(CORNER, (33.0, 44.0))
 
 
 @pytest.mark.parametrize("over_px", [20.0, 30.0, 60.0])
@@ -83,7 +83,7 @@ def test_a_short_line_goes_on_with_half_the_bend_that_it_has(over_px: float) -> 
     """A circle of 40 px radius, of which 20 px are known."""
     angle = np.linspace(0.0, 0.5, 41)
     line = 40.0 * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
-    onward = polyline.continued(line, 20.0, over_px)
+    onward = geometry.continued(line, 20.0, over_px)
     heading = np.unwrap(np.arctan2(*np.diff(onward, axis=0).T[::-1]))
     assert heading[0] == pytest.approx(0.44, abs=0.01)  # its last half has 0.375
     assert np.diff(heading) == pytest.approx(0.5 / 40.0, rel=0.05)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from core.whole_file import sweep_unfinished, write_whole
+from core.files import sweep_unfinished, write_whole
 
 
 @pytest.mark.parametrize("durable", [False, True])
@@ -57,7 +57,7 @@ def test_a_folder_that_cannot_be_synced_is_no_failure_for_the_new_file_is_there(
     def cannot(_: Path) -> None:
         raise OSError(errno.EINVAL, "Invalid argument")
 
-    monkeypatch.setattr("core.whole_file.sync_folder", cannot)
+    monkeypatch.setattr("core.files.sync_folder", cannot)
     write_whole(tmp_path / "a.toml", b"new", durable=True)
     assert (tmp_path / "a.toml").read_bytes() == b"new"
 

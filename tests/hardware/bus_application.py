@@ -10,11 +10,10 @@ import math
 import sys
 import time
 
+from core.config.safety import SafetyConfig, ServosConfig
 from core.control.gate import Source
-from core.safety_config import SafetyConfig
-from core.servo_config import ServosConfig
 from core.types import Command
-from hardware.servos.errors import ServoError
+from hardware.servos.dynamixel_port import ServoError
 from hardware.servos.servo_robot import ServoRobot
 
 PERIOD_S = 0.02

@@ -19,8 +19,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.servo_config import ServosConfig
-from hardware.twin.servo_bus import SoftServoBus
+from core.config.safety import ServosConfig
+from hardware.twin.servos.bus import SoftServoBus
 
 ROOT = Path(__file__).resolve().parents[2]
 BOUND_S = 0.3

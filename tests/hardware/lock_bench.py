@@ -8,17 +8,16 @@ from typing import Literal
 
 import numpy as np
 
-from core.calibration.look import Look
-from core.config import Config
-from core.control.gate_checks import Source
+from core.calibration.servos import Look
+from core.config.models import Config
+from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
+from core.control.gate import Source
 from core.perception.pipeline import Pipeline, open_pipeline
-from core.safety_config import SafetyConfig
-from core.servo_config import JOINT_NAMES, ServosConfig
 from core.types import Command, Points
-from hardware.servo_wizard import Bench
-from hardware.servos.lock_step import LockStepServos
-from hardware.servos.probe import ProbeLimits, StopSwitch, probe_config
-from hardware.twin.servo_joints import JointsToTwin, wired
+from hardware.calibration.servo_identification import Bench
+from hardware.calibration.servo_probe import ProbeLimits, StopSwitch, probe_config
+from hardware.servos.lockstep import LockStepServos
+from hardware.twin.process import JointsToTwin, wired
 from hardware.twin.world import TwinWorld
 
 _CYCLE_S = 0.02

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pyrealsense2 as rs
 
-from core.camera_config import CameraConfig
+from core.config.models import CameraConfig
 from core.types import Image
 
 WIDTH, HEIGHT = 160, 120

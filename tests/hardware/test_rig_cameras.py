@@ -10,20 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.calibration.board import BoardSpec, find_board
-from core.calibration.lens import BoardView, fit_lens, straighten
-from core.calibration.scale import scale_of_board
-from core.calibration_config import CalibrationConfig, LensConfig
-from core.config import TwinConfig, load_config
+from core.calibration.camera import BoardSpec, BoardView, find_board, fit_lens, scale_of_board, straighten
+from core.config.calibration import CalibrationConfig, LensConfig
+from core.config.models import TwinConfig, load_config
+from core.config.rig_file import RigFileError, make_rig, with_rig, write_rig
 from core.devices import CameraLost, DeviceError
-from core.rig_file import RigFileError, make_rig, with_rig, write_rig
 from core.types import Frame
-from hardware.cameras.camera_feed import CameraFeed
+from hardware.cameras.live import CameraFeed
 from hardware.cameras.realsense import RealSenseInfo
-from hardware.cameras.straightened import StraightenedCamera
+from hardware.cameras.undistorted import UndistortedCamera
 from hardware.rig import open_rig
-from hardware.rig_search import search, with_camera, with_port
-from hardware.twin.board_picture import BoardPictures
+from hardware.servos.discovery import search, with_camera, with_port
+from hardware.twin.rendering.calibration_board import BoardPictures
 
 LENS = LensConfig(k1=-0.12, center_px=(319.5, 239.5), size_px=(640, 480), residual_px=0.1, pictures=3)
 
@@ -62,7 +60,7 @@ def _frame(image: np.ndarray) -> Frame:
 def test_frames_come_straightened_and_keep_the_rest() -> None:
     image = np.full((480, 640, 3), 50, np.uint8)
     image[:, 60:64] = 255  # a straight line, as a bent lens shows it
-    frame = StraightenedCamera(ScriptedCamera(_frame(image)), LENS).read(0.1)
+    frame = UndistortedCamera(ScriptedCamera(_frame(image)), LENS).read(0.1)
     assert frame is not None
     assert (frame.index, frame.captured_s, frame.lost) == (7, 1.5, 3)
     columns = [int(np.argmax(frame.image[row, :200, 0])) for row in (5, 240, 474)]
@@ -74,14 +72,14 @@ def test_frames_come_straightened_and_keep_the_rest() -> None:
     "image", [np.zeros((720, 1280, 3), np.uint8), np.zeros((480, 640), np.uint8), np.zeros((480, 640, 3), np.uint16)]
 )
 def test_what_is_no_such_picture_is_passed_on(image: np.ndarray) -> None:
-    frame = StraightenedCamera(ScriptedCamera(_frame(image)), LENS).read(0.1)
+    frame = UndistortedCamera(ScriptedCamera(_frame(image)), LENS).read(0.1)
     assert frame is not None
     assert frame.image is image
 
 
 def test_no_lens_no_work() -> None:
     image = np.zeros((480, 640, 3), np.uint8)
-    frame = StraightenedCamera(ScriptedCamera(_frame(image)), None).read(0.1)
+    frame = UndistortedCamera(ScriptedCamera(_frame(image)), None).read(0.1)
     assert frame is not None
     assert frame.image is image
 
@@ -199,7 +197,7 @@ def test_a_rig_is_opened_with_its_lens() -> None:
     path = write_rig(make_rig(base, "bent", known))
     rig = open_rig(with_rig(base, make_rig(base, "bent", known), path))
     try:
-        assert isinstance(rig.camera, StraightenedCamera)
+        assert isinstance(rig.camera, UndistortedCamera)
         assert rig.camera.lens == LENS
         frame = None
         while frame is None:

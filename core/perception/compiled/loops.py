@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from core.perception.compiled import lines, maps, openings, pixels
 
+
 __all__ = ["lines", "load", "maps", "openings", "pixels"]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from core.learning.dataset import Sample
-from core.learning.device_frames import DeviceFrames
+from core.learning.gpu_batches import DeviceFrames
 from tests.core.device.device_set import loaded, write_frames
 
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from core.learning.dataset import Sample, find_samples, write_mask, write_png
-from core.learning.device_frames import DeviceFrames
+from core.learning.gpu_batches import DeviceFrames
 
 CPU = torch.device("cpu")
 TIP = (330.0, 199.5)

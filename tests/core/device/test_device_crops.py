@@ -8,10 +8,22 @@ import pytest
 import torch
 from torch import Tensor
 
-from core.learning.crops import _nearness, true_ends
-from core.learning.device_crops import DeviceCrops, _with_strip, nearness, random_crops, some_pixel, with_strips
-from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, padded_places
-from core.learning.device_looks import compressed, random_looks
+from core.learning.augmentation import _nearness, true_ends
+from core.learning.gpu_batches import (
+    MOST_ENDS,
+    ROBOT,
+    VESSEL,
+    DeviceCrops,
+    DeviceFrames,
+    _with_strip,
+    compressed,
+    nearness,
+    padded_places,
+    random_crops,
+    random_looks,
+    some_pixel,
+    with_strips,
+)
 from core.learning.training import Progress, train
 from core.learning.training_plan import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
-from core.learning.crops import true_ends
+from core.learning.augmentation import true_ends
 from core.learning.dataset import DatasetError, Sample, find_samples
-from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, Share, Shown, fits, padded_places
+from core.learning.gpu_batches import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, Share, Shown, fits, padded_places
 from tests.core.device.device_set import CPU, generator, masks_of, picture_of, write_frame
 
 

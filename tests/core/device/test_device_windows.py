@@ -10,12 +10,21 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from core.learning.crops import EDGE_PX, _wrong
-from core.learning.device_frames import MOST_ENDS, ROBOT, VESSEL, DeviceFrames, padded_places
-from core.learning.device_windows import DeviceWindows, _far, _turned, first_looks
+from core.learning.augmentation import EDGE_PX, _wrong
+from core.learning.gpu_batches import (
+    MOST_ENDS,
+    ROBOT,
+    VESSEL,
+    DeviceFrames,
+    DeviceWindows,
+    _far,
+    _turned,
+    first_looks,
+    padded_places,
+)
 from core.learning.training import train
 from core.learning.training_plan import TrainingPlan
-from core.perception.second_look import WINDOW_PX, places_to_look
+from core.perception.tip_refinement import WINDOW_PX, places_to_look
 from core.perception.unet import DualUNet, UNetShape
 from tests.core.device.device_set import told_by_colour
 
@@ -51,7 +60,7 @@ def test_windows_come_in_all_orientations_whatever_the_batch(
         ways.extend([way] * len(planes))
         return _turned(planes, ends, way)
 
-    monkeypatch.setattr("core.learning.device_windows._turned", watched)
+    monkeypatch.setattr("core.learning.gpu_batches._turned", watched)
     batches = iter(DeviceWindows(frames, *_seen(frames), TrainingPlan(batch=batch, look_share=0.0)))
     for _ in range(24 // batch):
         next(batches)

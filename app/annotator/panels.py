@@ -1,0 +1,516 @@
+"""The tools below the picture as chips with their keys, and one line on how the chosen one is used.
+
+Above the picture: which image, for whom, and whether everything is on the disk.
+
+The queue: every image with its status, as a list; and how far the rater is.
+
+The angle in large figures, the distances, and the rater's state beside what his lines say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QButtonGroup,
+    QHBoxLayout,
+    QLabel,
+    QListView,
+    QSizePolicy,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.annotator.editing import BRUSH_HINT, Tool
+from app.ui import theme
+from app.ui.i18n import mark, tr, tr_text
+from app.ui.texts import STATE_TITLE, side, tip
+from app.ui.theme import ON_PICTURE
+from app.widgets.state_badge import paint_state
+from core.annotation.model import Annotation, Readout, Status
+
+_DRAWN = ("ROBOT", "VESSEL")
+"""Roles that the picture shows in their own colours."""
+_SEEN = 3.0
+_SWITCHES = (
+    ("L", mark("Loupe"), "TEXT", mark("The surroundings of the cursor, magnified")),
+    ("K", mark("Masks"), "VESSEL", mark("Show the drawn masks")),
+    ("T", mark("Brush"), "ORANGE", mark("Paint the mask instead of moving its points")),
+    (
+        "H",
+        mark("Algorithm"),
+        "TEXT",
+        mark("Show what the algorithm says: answers after it are told apart. Not in a blind study"),
+    ),
+)
+
+
+class AnnotationBar(QWidget):
+    """``tool_chosen`` carries a tool; ``switched`` the key of a switch ("L", "K", "T", "H") and whether it is on."""
+
+    tool_chosen = Signal(object)
+    switched = Signal(str, bool)
+
+    def __init__(self, *, blind: bool) -> None:
+        super().__init__()
+        row = QHBoxLayout()
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(5)
+        self._blind = blind
+        self._tools: dict[Tool, _Chip] = {}
+        group = QButtonGroup(self)
+        for tool in Tool:
+            chip = _Chip(
+                tool.value.key,
+                tr(tool.value.label),
+                tool.value.role,
+                tr("{meaning}  (key {key})", meaning=tr(tool.value.label), key=tool.value.key),
+            )
+            chip.clicked.connect(lambda _on=False, which=tool: self.tool_chosen.emit(which))
+            group.addButton(chip)
+            row.addWidget(chip)
+            self._tools[tool] = chip
+        row.addStretch(1)
+        self._switches: dict[str, _Chip] = {}
+        for key, label, colour, meaning in _SWITCHES:
+            if key == "H" and blind:
+                continue
+            chip = _Chip(key, tr(label), colour, tr("{meaning}  (key {key})", meaning=tr(meaning), key=key))
+            chip.setChecked(key in "LK")
+            chip.toggled.connect(lambda on, which=key: self.switched.emit(which, on))
+            row.addWidget(chip)
+            self._switches[key] = chip
+        self._hint = QLabel()
+        self._hint.setObjectName("card_note")
+        self._hint.setMinimumWidth(10)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(5)
+        column.addLayout(row)
+        column.addWidget(self._hint)
+        self.show_tool(Tool.ROBOT, brush_on=False)
+
+    @property
+    def hint(self) -> str:
+        return self._hint.text()
+
+    def show_tool(self, tool: Tool, *, brush_on: bool) -> None:
+        """The tool in hand and how it is used."""
+        self._tools[tool].setChecked(True)
+        self.set_switch("T", brush_on)
+        self._switches["T"].setEnabled(tool.is_mask)
+        hint = tr(BRUSH_HINT) if brush_on else tool.value.hint
+        self._hint.setText(hint.partition(" · G ")[0] if self._blind else hint)
+
+    def set_switch(self, key: str, on: bool) -> None:
+        """Show a switch as on or off without ``switched``."""
+        chip = self._switches.get(key)
+        if chip is not None and chip.isChecked() is not on:
+            chip.blockSignals(True)
+            chip.setChecked(on)
+            chip.blockSignals(False)
+
+    def is_on(self, key: str) -> bool:
+        return self._switches[key].isChecked()
+
+    def toggle(self, key: str) -> None:
+        """As a click on the switch."""
+        chip = self._switches.get(key)
+        if chip is not None and chip.isEnabled():
+            chip.toggle()
+
+
+class _Chip(QAbstractButton):
+    """Key cap, colour and name; filled when on, outlined when off."""
+
+    def __init__(self, key: str, label: str, role: str, tip: str) -> None:
+        super().__init__()
+        self._key, self._role = key, role
+        self.setCheckable(True)
+        self.setText(label)
+        self.setFixedHeight(30)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setToolTip(tip)
+        self.setAccessibleName(label)
+
+    def sizeHint(self) -> QSize:
+        return QSize(50 + QFontMetrics(theme.semi_bold(12)).horizontalAdvance(self.text()), 30)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        on, is_enabled = self.isChecked(), self.isEnabled()
+        frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+        edge = theme.SKY if on else theme.TEXT_FAINT if self.underMouse() and is_enabled else theme.LINE
+        painter.setPen(QPen(QColor(edge), 1.4 if on else 1.0))
+        painter.setBrush(QColor(theme.RAISED) if on else QColor(theme.WINDOW))
+        painter.drawRoundedRect(frame, 6, 6)
+        painter.setOpacity(1.0 if is_enabled else 0.45)
+        painter.setPen(QColor(theme.TEXT_DIM if on else theme.TEXT_FAINT))
+        painter.setFont(theme.semi_bold(11))
+        painter.drawText(QRectF(9, 0, 12, self.height()), Qt.AlignmentFlag.AlignCenter, self._key)
+        name = getattr(ON_PICTURE, self._role) if self._role in _DRAWN else theme.of(self._role)
+        is_lost = theme.contrast(name, theme.RAISED) < _SEEN  # a pale colour on a light chip
+        painter.setPen(QPen(QColor(theme.TEXT_FAINT if is_lost else name), 1.5))
+        painter.setBrush(QColor(name) if on else Qt.BrushStyle.NoBrush)
+        painter.drawRoundedRect(QRectF(27, self.height() / 2 - 4, 8, 8), 2, 2)
+        painter.setPen(QColor(theme.TEXT if on else theme.TEXT_DIM))
+        painter.setFont(theme.semi_bold(12))
+        painter.drawText(QRectF(41, 0, self.width() - 45, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
+        painter.end()
+
+
+class AnnotationHeader(QWidget):
+    """Title on the left, study and rater in the middle, the state of the file on the right."""
+
+    def __init__(self, who: str) -> None:
+        super().__init__()
+        self._title = QLabel()
+        theme.set_sheet(self._title, "color: @TEXT; font-size: 17px; font-weight: 700;")
+        self._title.setMinimumWidth(40)
+        self._title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._who = QLabel(who)
+        theme.set_sheet(self._who, "color: @TEXT_DIM; font-size: 13px;")
+        self._saved = QLabel()
+        self._saved.setAccessibleName(tr("State of the file"))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(4, 2, 4, 0)
+        row.setSpacing(18)
+        row.addWidget(self._title, 1)
+        row.addWidget(self._who)
+        row.addWidget(self._saved)
+        self.show_saved(True)
+
+    @property
+    def saved_text(self) -> str:
+        return self._saved.text()
+
+    def show_title(self, text: str) -> None:
+        self._title.setText(text)
+        self._title.setToolTip(text)
+
+    def show_saved(self, is_saved: bool) -> None:
+        self._show(tr("\N{CHECK MARK}  saved") if is_saved else tr("saving"), "ALLOWED" if is_saved else "TEXT_DIM", "")
+
+    def show_unsaved(self, count: int, why: str) -> None:
+        """Edits that could not be written, and why."""
+        self._show(
+            tr("\N{WARNING SIGN}  NOT SAVED: 1 edit")
+            if count == 1
+            else tr("\N{WARNING SIGN}  NOT SAVED: {count} edits", count=count),
+            "FAULT",
+            why,
+        )
+
+    def _show(self, text: str, role: str, tip: str) -> None:
+        self._saved.setText(text)
+        self._saved.setToolTip(tip)
+        theme.set_sheet(self._saved, f"color: @{role}; font-size: 13px; font-weight: 600;")
+
+
+_ROW = 30
+_MARK = {Status.NEW: "", Status.BEGUN: "\N{HORIZONTAL ELLIPSIS}", Status.DONE: "\N{CHECK MARK}", Status.CANNOT_TELL: "?"}
+_WORD = {
+    Status.NEW: mark("new"),
+    Status.BEGUN: mark("begun"),
+    Status.DONE: mark("done"),
+    Status.CANNOT_TELL: mark("can't tell"),
+}
+_ROLE = {
+    Status.NEW: "TEXT_FAINT",
+    Status.BEGUN: "ORANGE",
+    Status.DONE: "ALLOWED",
+    Status.CANNOT_TELL: "SKY",
+}
+_STYLE = """
+QListView { background: @PANEL; outline: none; }
+QScrollBar:vertical { background: transparent; width: 8px; margin: 0; }
+QScrollBar::handle:vertical { background: @LINE; border-radius: 4px; min-height: 24px; }
+QScrollBar::add-line:vertical, QScrollBar::sub-line:vertical { height: 0; }
+QScrollBar::add-page:vertical, QScrollBar::sub-page:vertical { background: transparent; }
+"""
+_Index = QModelIndex | QPersistentModelIndex
+
+
+class QueueModel(QAbstractListModel):
+    """Rows of name, status, and whether there are masks; the window tells when one changes."""
+
+    def __init__(self, names: list[str], status: Callable[[int], Status], has_masks: Callable[[int], bool]) -> None:
+        super().__init__()
+        self._names, self._status, self._has_masks = names, status, has_masks
+
+    def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
+        return 0 if parent.isValid() else len(self._names)
+
+    def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        if not index.isValid():
+            return None
+        row = index.row()
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._names[row]
+        if role == Qt.ItemDataRole.UserRole:
+            return self._status(row)
+        if role == Qt.ItemDataRole.UserRole + 1:
+            return self._has_masks(row)
+        if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
+            masks = tr(", with masks") if self._has_masks(row) else ""
+            return f"{row + 1}: {self._names[row]}: {tr(_WORD[self._status(row)])}{masks}"
+        return None
+
+    def renew(self, row: int) -> None:
+        index = self.index(row)
+        self.dataChanged.emit(index, index)
+
+
+class _QueueRow(QStyledItemDelegate):
+    """Number, name, and the status as a sign in its colour."""
+
+    def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:
+        return QSize(120, _ROW)
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
+        status, has_masks = index.data(Qt.ItemDataRole.UserRole), index.data(Qt.ItemDataRole.UserRole + 1)
+        box = QRectF(option.rect).adjusted(1, 1, -1, -1)  # type: ignore[attr-defined]
+        is_current = bool(option.state & QStyle.StateFlag.State_Selected)  # type: ignore[attr-defined]
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if is_current:
+            painter.setPen(QPen(QColor(theme.SKY), 1.2))
+            painter.setBrush(QColor(theme.RAISED))
+            painter.drawRoundedRect(box, 5, 5)
+        painter.setFont(theme.font(12))
+        painter.setPen(QColor(theme.TEXT_FAINT))
+        painter.drawText(box.adjusted(6, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, str(index.row() + 1))
+        text_font = theme.semi_bold(13) if is_current else theme.font(13)
+        painter.setFont(text_font)
+        painter.setPen(QColor(theme.TEXT if is_current or status is Status.NEW else theme.TEXT_DIM))
+        room = box.width() - 44 - 52
+        painter.drawText(box.adjusted(44, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, theme.elide(text_font, index.data(), int(room)))
+        right = box.right() - 8
+        if has_masks:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(theme.colour(theme.VESSEL, 0.8))
+            painter.drawRoundedRect(QRectF(right - 36, box.center().y() - 5, 10, 10), 3, 3)
+        painter.setFont(theme.bold(14))
+        painter.setPen(QColor(theme.of(_ROLE[status])))
+        painter.drawText(QRectF(right - 18, box.top(), 18, box.height()), Qt.AlignmentFlag.AlignCenter, _MARK[status])
+        painter.restore()
+
+
+class QueueList(QWidget):
+    """``chosen`` carries the row that the user wants."""
+
+    chosen = Signal(int)
+
+    def __init__(self, model: QueueModel) -> None:
+        super().__init__()
+        self._model = model
+        model.setParent(self)
+        self._view = QListView()
+        self._view.setModel(model)
+        self._view.setItemDelegate(_QueueRow(self._view))
+        self._view.setUniformItemSizes(True)
+        self._view.setFrameShape(QListView.Shape.NoFrame)
+        self._view.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        theme.set_sheet(self._view, _STYLE)
+        self._view.setAccessibleName(tr("Images"))
+        self._view.activated.connect(lambda index: self.chosen.emit(index.row()))
+        self._view.clicked.connect(lambda index: self.chosen.emit(index.row()))
+        self._progress = _ProgressBar()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(6)
+        column.addWidget(self._progress)
+        column.addWidget(self._view, 1)
+
+    @property
+    def progress_text(self) -> str:
+        return self._progress.text
+
+    def renew(self, row: int) -> None:
+        """The status of a row has changed."""
+        self._model.renew(row)
+
+    def show_current(self, row: int) -> None:
+        index = self._model.index(row)
+        self._view.setCurrentIndex(index)
+        self._view.scrollTo(index)
+
+    def show_progress(self, finished: int, count: int) -> None:
+        self._progress.show_progress(finished, count)
+
+    def take_focus(self) -> None:
+        self._view.setFocus()
+
+
+class _ProgressBar(QWidget):
+    def __init__(self) -> None:
+        super().__init__()
+        self._finished, self._count = 0, 0
+        self.setFixedHeight(34)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(tr("Progress"))
+
+    @property
+    def text(self) -> str:
+        left = self._count - self._finished
+        return tr("{finished} of {count} done", finished=self._finished, count=self._count) + (
+            tr(", {left} left", left=left) if left else ""
+        )
+
+    def show_progress(self, finished: int, count: int) -> None:
+        self._finished, self._count = finished, count
+        self.setAccessibleDescription(self.text)
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setFont(theme.semi_bold(14))
+        painter.setPen(QColor(theme.TEXT))
+        painter.drawText(QRectF(0, 0, self.width(), 20), Qt.AlignmentFlag.AlignVCenter, self.text)
+        painter.setPen(Qt.PenStyle.NoPen)
+        for share, name in ((1.0, theme.LINE), (self._finished / max(self._count, 1), theme.ALLOWED)):
+            painter.setBrush(QColor(name))
+            if share > 0:
+                painter.drawRoundedRect(QRectF(0, 25, self.width() * share, 6), 3, 3)
+        painter.end()
+
+
+_DASH = "\N{EN DASH}"
+_HEIGHT = 232
+
+
+class AnnotationReadout(QWidget):
+    """Shows one annotation with its readout; without both lines it says what is still to be drawn."""
+
+    def __init__(self, wanted_px: float) -> None:
+        super().__init__()
+        self._wanted_px = wanted_px
+        self._annotation = Annotation()
+        self._readout = Readout()
+        self._is_preview = False
+        self.setFixedHeight(_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(tr("Readout"))
+        self.setToolTip(tip("theta", "d_head", "d_tail", "crossed", "lines_used", "state"))
+
+    @property
+    def angle_text(self) -> str:
+        pose = self._readout.pose
+        return _DASH if pose is None else f"{pose.theta_deg:.1f}°"
+
+    @property
+    def state_text(self) -> str:
+        """The line beside the badge."""
+        annotation, pose = self._annotation, self._readout.pose
+        if annotation.cannot_tell:
+            return tr("Can't tell")
+        if annotation.state is not None:
+            return tr(STATE_TITLE[annotation.state])
+        return tr("No state yet") if pose is not None else tr("No state")
+
+    @property
+    def advice_text(self) -> str:
+        """What the lines say of the state, or what is missing."""
+        annotation, pose = self._annotation, self._readout.pose
+        if annotation.cannot_tell:
+            return tr("X takes it back")
+        if pose is None:
+            missing = tr_text(self._readout.missing)
+            return missing[:1].upper() + missing[1:]
+        if annotation.state is None:
+            return tr("The lines say {state}: Enter takes it, or press A B C D", state=pose.state.value)
+        if annotation.state is not pose.state:
+            return tr("The lines say {state}, by the rule", state=pose.state.value)
+        return tr("The lines say the same")
+
+    def sizeHint(self) -> QSize:
+        return QSize(320, _HEIGHT)
+
+    def show_annotation(self, annotation: Annotation, readout: Readout, *, is_preview: bool = False) -> None:
+        """`is_preview`: a point is still moving."""
+        self._annotation, self._readout, self._is_preview = annotation, readout, is_preview
+        self.setAccessibleDescription(f"{tr('theta')} {self.angle_text}; {self.state_text}; {self.advice_text}")
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._paint_angle(painter)
+        self._paint_distances(painter)
+        self._paint_state(painter)
+        painter.end()
+
+    def _paint_angle(self, painter: QPainter) -> None:
+        pose = self._readout.pose
+        painter.setPen(QColor(theme.THETA if pose is not None else theme.TEXT_FAINT))
+        painter.setFont(theme.bold(58 if pose is not None else 34))
+        box = QRectF(0, 0, self.width() * 0.62, 72)
+        painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, self.angle_text)
+        left = self.width() * 0.62
+        painter.setFont(theme.semi_bold(14))
+        painter.setPen(QColor(theme.TEXT if pose is not None else theme.TEXT_FAINT))
+        turn = side(pose.theta_signed_deg) if pose is not None and pose.theta_deg >= 0.05 else ""
+        painter.drawText(
+            QRectF(left, 14, self.width() - left, 20), Qt.AlignmentFlag.AlignVCenter, f"\N{GREEK SMALL LETTER THETA} {turn}"
+        )
+        painter.setFont(theme.font(12))
+        painter.setPen(QColor(theme.TEXT_DIM))
+        painter.drawText(
+            QRectF(left, 36, self.width() - left, 18), Qt.AlignmentFlag.AlignVCenter, tr("moving") if self._is_preview else ""
+        )
+
+    def _paint_distances(self, painter: QPainter) -> None:
+        pose, readout = self._readout.pose, self._readout
+        cells = (
+            ("d_head", f"{pose.d_head_px:.1f} px" if pose else _DASH, theme.D_HEAD),
+            ("d_tail", f"{pose.d_tail_px:.1f} px" if pose else _DASH, theme.D_TAIL),
+            (tr("crossed"), (tr("yes") if pose.crossed else tr("no")) if pose else _DASH, theme.TEXT),
+            (tr("lines used"), self._lengths() if readout.robot_vector is not None else _DASH, theme.TEXT),
+        )
+        width = self.width() / len(cells)
+        for place, (name, value, colour) in enumerate(cells):
+            painter.setFont(theme.font(12))
+            painter.setPen(QColor(theme.TEXT_DIM))
+            painter.drawText(QRectF(place * width, 80, width, 16), Qt.AlignmentFlag.AlignVCenter, name)
+            painter.setFont(theme.fitted(theme.semi_bold(15), value, int(width - 4)))
+            painter.setPen(QColor(colour if pose or place == 3 else theme.TEXT_FAINT))
+            painter.drawText(QRectF(place * width, 98, width, 20), Qt.AlignmentFlag.AlignVCenter, value)
+
+    def _lengths(self) -> str:
+        """Arc lengths that the vectors are fitted to; less than wanted is less certain."""
+        robot, vessel = round(self._readout.robot_length_px), round(self._readout.vessel_length_px)
+        return f"{robot} + {vessel} px" if vessel else f"{robot} px"
+
+    def _paint_state(self, painter: QPainter) -> None:
+        annotation, pose = self._annotation, self._readout.pose
+        painter.setPen(QPen(QColor(theme.LINE), 1))
+        painter.drawLine(QPointF(0, 131), QPointF(self.width(), 131))
+        box = QRectF(2, 146, 62, 62)
+        shown = None if annotation.cannot_tell else annotation.state
+        if annotation.cannot_tell:
+            painter.setPen(QPen(QColor(theme.TEXT_DIM), 2, Qt.PenStyle.DashLine))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawEllipse(box.adjusted(3, 3, -3, -3))
+            painter.setFont(theme.bold(30))
+            painter.setPen(QColor(theme.TEXT))
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, "?")
+        else:
+            paint_state(painter, box, shown)
+        left = 80.0
+        painter.setFont(theme.bold(20))
+        painter.setPen(QColor(theme.TEXT if shown or annotation.cannot_tell else theme.TEXT_DIM))
+        painter.drawText(QRectF(left, 148, self.width() - left, 26), Qt.AlignmentFlag.AlignVCenter, self.state_text)
+        differs = shown is not None and pose is not None and pose.state is not shown
+        painter.setFont(theme.font(13))
+        painter.setPen(QColor(theme.ORANGE if differs else theme.TEXT_DIM))
+        flags = int(Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
+        painter.drawText(QRectF(left, 178, self.width() - left, 52), flags, self.advice_text)

@@ -1,0 +1,374 @@
+"""``annotate``: ground truth by hand, alone or as a study of several raters; agreement, export, import.
+
+Which pictures the window of ``annotate`` shows a rater, in which order: those of a study as it was begun, or every one once.
+
+What goes out of an annotation file and comes into it: ``annotate --export``, ``--import``, ``--join`` and ``--salvage``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.annotator.sources import (
+    FRAMES,
+    AnnotateOptions,
+    StudyOptions,
+    asked_files,
+    asked_rater,
+    default_store,
+    listed_images,
+    of_rater,
+    read_annotated,
+    tell_problems,
+)
+from app.commands.progress import check_can_write, progress_bar
+from app.ui.i18n import tr
+from core.annotation.model import AnnotationError, ImageView, measure_lines
+from core.annotation.store import AnnotationStore, FoundImage, ItemKey
+from core.annotation.study import QueueOrder, StudySettings, Task, queue_order, repeat_views, settings_from, tasks
+from core.config.files import own_config
+from core.config.models import Config, choose_model, load_config
+from core.perception.compiled import loops
+from core.types import Frame
+
+if TYPE_CHECKING:
+    from app.annotator.model import QueueEntry
+
+
+_DISAGREEMENT_DEG = 30.0
+
+
+def queue_of(
+    store: AnnotationStore, images: Sequence[FoundImage], rater: str, options: StudyOptions, config: Config
+) -> list[QueueEntry]:
+    """The items of the window: of the study, or every image once."""
+    from app.annotator.model import QueueEntry
+
+    here = {image.sha256: image for image in images}
+    if options.name:
+        settings = _settings(store, images, options, config)
+        missing = [sha256 for sha256 in settings.images if sha256 not in here]
+        others = len(set(here) - set(settings.images))
+        tell_problems([f"{others} images are here that do not belong to study {options.name!r}; left out"] if others else [])
+        if missing:
+            names = store.images()
+            tell_problems(
+                [f"{names[m].name if m in names else m[:12]}: belongs to the study, but is not here; left out" for m in missing]
+            )
+        queue = [task for task in tasks(settings, rater) if task.sha256 in here]
+        if not queue:
+            raise AnnotationError(f"study {options.name!r}: none of its {len(settings.images)} images is here")
+    else:
+        if options.repeats not in (None, 1) or options.mirror or options.turn:
+            raise AnnotationError("--repeats, --mirror and --turn belong to a study: give it a name with --study")
+        order = _order(options.order, QueueOrder.LISTED)
+        listed = [image.sha256 for image in images]
+        if order is QueueOrder.RANDOM:
+            queue = tasks(StudySettings(tuple(listed), seed=options.seed or 0), rater)
+        else:
+            queue = [Task(sha256) for sha256 in queue_order(listed, order, _sureness(store, images, order, config))]
+    return [QueueEntry(here[t.sha256], ItemKey(t.sha256, options.name, rater, t.repeat), t.view) for t in queue]
+
+
+def _order(name: str | None, default: QueueOrder) -> QueueOrder:
+    if name is None:
+        return default
+    try:
+        return QueueOrder(name)
+    except ValueError:
+        raise AnnotationError(f"--order {name}: must be one of {', '.join(QueueOrder)}") from None
+
+
+def _settings(store: AnnotationStore, images: Sequence[FoundImage], options: StudyOptions, config: Config) -> StudySettings:
+    """The settings that the study was begun with; what the command line says must not contradict them."""
+    kept = store.study_settings(options.name)
+    if kept is None:
+        order = _order(options.order, QueueOrder.RANDOM)
+        views = repeat_views(options.repeats or 2, mirror=options.mirror, turn=options.turn)
+        listed = queue_order([image.sha256 for image in images], order, _sureness(store, images, order, config))
+        settings = StudySettings(listed, views, order, options.seed or 0)
+        store.begin_study(options.name, settings.to_json())
+        return settings
+    settings = settings_from(kept, f"study {options.name!r}")
+    repeats = settings.repeats if options.repeats is None else options.repeats
+    asked_views = repeat_views(repeats, mirror=options.mirror, turn=options.turn)
+    given = options.repeats is not None or options.mirror or options.turn
+    differs = (
+        (given and asked_views != settings.views)
+        or (options.seed is not None and options.seed != settings.seed)
+        or (options.order is not None and _order(options.order, settings.order) is not settings.order)
+    )
+    if differs:
+        shown = ", ".join(view.value for view in settings.views)
+        was = f"shown {settings.repeats} times ({shown}), order {settings.order.value}, seed {settings.seed}"
+        raise AnnotationError(f"study {options.name!r} was begun otherwise: {was}; leave these options out, or choose another name")
+    return settings
+
+
+def _sureness(store: AnnotationStore, images: Sequence[FoundImage], order: QueueOrder, config: Config) -> dict[str, float] | None:
+    """How sure the algorithm is of each image (0: refused), for the order "worst".
+
+    Where a rater has measured already, a disagreement takes away from it: half at 15 degrees, everything from 30 degrees on.
+    """
+    if order is not QueueOrder.WORST:
+        return None
+    from core.files import read_image
+    from core.perception.pipeline import open_pipeline
+
+    measured = {
+        one.key.sha256: one.theta_deg for one in store.annotations() if one.theta_deg is not None and not one.content.cannot_tell
+    }
+    pipeline = open_pipeline(config.perception)
+    sureness = {}
+    with progress_bar() as bar:
+        for image in bar.track(images, description="asking the algorithm"):
+            pose = pipeline.perceive_single(Frame(0, 0.0, read_image(image.path))).pose
+            sureness[image.sha256] = 0.0
+            if pose is not None:
+                differs_deg = abs(pose.theta_deg - measured.get(image.sha256, pose.theta_deg))
+                sureness[image.sha256] = pose.confidence * max(0.0, 1.0 - differs_deg / _DISAGREEMENT_DEG)
+    return sureness
+
+
+EXPORTS = ("dataset", "csv", "coco")
+
+
+def export_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    """``--export``: a training set, COCO masks, or the table that ``evaluate --csv`` reads, as far as it was interrupted.
+
+    Raises AnnotationError, and KeyboardInterrupt after an interrupted table was written.
+    """
+    from core.annotation.agreement_report import finished
+    from core.annotation.exchange import export_coco, export_training_set
+    from core.evaluation.evaluation import write_measurements
+
+    assert options.out is not None
+    annotations, images = read_annotated(store_path, paths, options.frames or FRAMES)
+    asked, everybodys = options.study.asked, annotations
+    if asked is not None:
+        annotations = [one for one in everybodys if one.key.study == asked]
+    annotations = of_rater(annotations, options.study.rater)
+    if options.export == "dataset":
+        if asked and not annotations:
+            raise AnnotationError(f"{store_path}: nobody has answered in study {asked!r}")
+        # A study is blind, so that masks are drawn outside it: its angles and states are chosen, not its masks.
+        drawn, measured = annotations, None
+        if asked is not None:
+            drawn, measured = of_rater(everybodys, options.study.rater), finished(annotations)
+        count, problems = export_training_set(drawn, images, options.out, measured=measured)
+        tell_problems(problems)
+        sys.stderr.write(f"{count} frames with both masks in {options.out}: train --data {options.out}\n")
+    elif options.export == "coco":
+        count = export_coco(annotations, images, options.out)
+        sys.stderr.write(f"masks of {count} images in {options.out}\n")
+    else:
+        from app.annotator.sources import compared_rows, fitted_alike
+
+        if options.out.exists():
+            raise AnnotationError(f"{options.out}: is there already; choose another --out")
+        check_can_write(options.out, "--out")
+        done, notes = fitted_alike(annotations, images, config, options.study.asked, str(store_path))
+        tell_problems(notes)
+        rows, _, _, missed = compared_rows(done, images, config)
+        try:
+            write_measurements(options.out, rows)
+        except OSError as error:
+            raise AnnotationError(f"{options.out}: cannot be written ({error.strerror}); choose another --out") from None
+        sys.stderr.write(f"{len(rows)} images in {options.out}: evaluate --csv {options.out} --out DIR\n")
+        if missed:
+            raise KeyboardInterrupt
+    return 0
+
+
+def import_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    """``--import``: the lines and masks of other programs' files, for one rater. Raises AnnotationError where there are none."""
+    from core.annotation.exchange import merged, read_files
+
+    sources = [file for path in options.imports for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]
+    if not sources:
+        raise AnnotationError(f"{options.imports[0]}: no .json file in it")
+    if not any(source.is_file() for source in sources):  # before an annotation file is made for them
+        raise AnnotationError(f"{sources[0]}: no such file; nothing was imported")
+    rater = asked_rater(options.study)
+    files = asked_files(paths, options.frames)
+    counts: Counter[str] = Counter()
+    with AnnotationStore(store_path) as store:
+        images = listed_images(files, store)
+        imported, problems = read_files(sources, images)
+        existing = {one.key: one.content for one in store.annotations(options.study.name, rater)}
+        for one in imported:
+            key = ItemKey(one.image.sha256, options.study.name, rater)
+            history = store.history(key)
+            old = existing.get(key, history.current)  # whose record is damaged, his journal still has
+            content = merged(old, one.content)
+            entry = history.edit(f"import {one.source.name}", content)
+            if entry is None or content == old:
+                problems.append(f"{one.source}: {one.image.path.name} has these annotations already; left as they are")
+                continue
+            store.save(key, ImageView.AS_IS, entry, content, measure_lines(content, one.image.record.size, config.perception), 0.0)
+            existing[key] = content
+            counts[one.image.sha256] += 1
+        problems += store.problems
+    tell_problems(problems)
+    if not counts:
+        raise AnnotationError("nothing was imported")
+    sys.stderr.write(f"{len(counts)} images got annotations, for rater {rater}, in {store_path}\n")
+    return 0
+
+
+def join_annotations(store_path: Path, options: AnnotateOptions) -> int:
+    """``--join``: what other raters have answered in files of their own; raises AnnotationError, and changes nothing then."""
+    from core.annotation.merge import join
+
+    names: dict[str, str] = {}
+    for said in options.names:
+        there, _, here = (part.strip() for part in said.partition("="))
+        if not there or not here or names.get(there, here) != here:
+            raise AnnotationError(f"--as {said}: must be THERE=HERE, a rater's name in the file that is joined and his name here")
+        names[there] = here
+    is_new = not store_path.exists()
+    try:
+        with AnnotationStore(store_path) as store:
+            joined = join(store, options.joins, options.study.asked, names)
+    except AnnotationError:
+        if is_new:
+            store_path.unlink(missing_ok=True)
+        raise
+    tell_problems(joined.told)
+    for path, persons in joined.persons.items():
+        who = ", ".join(here if here == there else f"{here} (there: {there})" for there, here in sorted(persons.items()))
+        sys.stderr.write(f"{path}: {who or 'nobody has answered in it'}\n")
+    sys.stderr.write(f"{joined.new} answers are new in {store_path}, {joined.grown} went on, {joined.known} were there already\n")
+    return 0
+
+
+def salvage_annotations(store_path: Path, out: Path | None) -> int:
+    """``--salvage``: what can be read of a damaged file, in a new one. Raises AnnotationError."""
+    from core.annotation.merge import salvage
+
+    target = out or store_path.with_name(f"salvaged_{store_path.name}")
+    kept, problems = salvage(store_path, target)
+    tell_problems(problems)
+    sys.stderr.write(f"{kept} annotations saved into {target}; the damaged file is as it was\n")
+    return 0
+
+
+_KEPT = (("loupe", "L"), ("masks", "K"))
+"""Switches of the window that are as they were left, and their keys."""
+
+
+def run_annotate(options: AnnotateOptions) -> int:
+    """Open the window, or report, export, import, join, salvage; returns the exit code. Raises UserError."""
+    if options.export is not None and options.export not in EXPORTS:
+        raise AnnotationError(f"--export {options.export}: must be one of {', '.join(EXPORTS)}")
+    if sum((options.report, options.export is not None, bool(options.imports), bool(options.joins), options.salvage)) > 1:
+        raise AnnotationError("--report, --export, --import, --join and --salvage are different things: give one of them")
+    if options.names and not options.joins:
+        raise AnnotationError("--as says who somebody is in a file that is joined: give --join FILE, too")
+    if options.joins and options.study.rater is not None:
+        raise AnnotationError("--join takes all raters of a file; --as THERE=HERE says what one of them is called here")
+    if options.export is not None and options.out is None:
+        raise AnnotationError("--export needs --out: a folder for dataset, a file for csv and coco")
+    if options.as_json and not options.report:
+        raise AnnotationError("--json is for --report; leave it out")
+    config = _config(options)
+    given = options.paths or (Path(),)
+    store_path = options.store or _store_of(given)
+    paths = tuple(path.parent if path.suffix == ".sqlite" else path for path in given)
+    if options.salvage:
+        return salvage_annotations(store_path, options.out)
+    if options.report:
+        return _report(store_path, options, config)
+    if options.export is not None:
+        return export_annotations(store_path, paths, options, config)
+    if options.joins:
+        return join_annotations(store_path, options)
+    if options.imports:
+        return import_annotations(store_path, paths, options, config)
+    return _window(store_path, paths, options, config)
+
+
+def _config(options: AnnotateOptions) -> Config:
+    return load_config(options.config_path, overrides=choose_model(options.model))
+
+
+def _store_of(paths: Sequence[Path]) -> Path:
+    """A path that is an annotation file itself, or the file beside the images."""
+    return paths[0] if paths[0].suffix == ".sqlite" else default_store(paths)
+
+
+def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
+    from app.ui.window_base import check_display, make_application, run_until_closed
+
+    check_display()
+    rater = asked_rater(options.study)
+    files = asked_files(paths, options.frames)
+    with AnnotationStore(store_path) as store:
+        images = listed_images(files, store)
+        items = queue_of(store, images, rater, options.study, config)
+        loops.load()  # drawing uses them, and may not wait
+        application = make_application(own_config().window)
+
+        from app.annotator.model import AnnotationModel
+        from app.annotator.window import AnnotatorWindow
+        from app.ui.layout_state import LayoutState, Parts, Switch, toggling
+
+        desk = AnnotationModel(store, items, config.perception, blind=bool(options.study.name))
+        tell_problems(store.problems)
+        who = (
+            tr("study {name}, rater {rater}, blind", name=options.study.name, rater=rater)
+            if options.study.name
+            else tr("rater {rater}", rater=rater)
+        )
+        window = AnnotatorWindow(desk, who)
+        bar = window.panels.bar
+        switches = {name: Switch(partial(bar.is_on, key), toggling(partial(bar.toggle, key))) for name, key in _KEPT}
+        LayoutState(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
+        return run_until_closed(application, window, window.say)
+
+
+def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
+    from app.annotator.sources import groups_of_answered
+    from core.annotation.agreement_report import (
+        agreement_report,
+        choose_study,
+        group_notes,
+        measured_alike,
+        rater_notes,
+        write_measures,
+    )
+
+    with AnnotationStore(store_path, read_only=True) as store:
+        annotations = choose_study(store.annotations(), options.study.asked, str(store_path))
+        images = store.images()
+        annotations, notes = measured_alike(of_rater(annotations, options.study.rater), images, config.perception)
+        names = {sha256: image.name for sha256, image in images.items()}
+        groups = groups_of_answered(annotations, {sha256: store_path.parent / name for sha256, name in names.items()})
+        tell_problems([*store.problems, *rater_notes(annotations), *group_notes(annotations, groups), *notes])
+    study = annotations[0].key.study
+    report = {"study": study} | agreement_report(annotations, names, options.study.seed or 0, groups)
+    if options.out is not None:
+        try:
+            options.out.mkdir(parents=True, exist_ok=True)
+            text = json.dumps(report, indent=1, ensure_ascii=False, allow_nan=False)
+            (options.out / "agreement.json").write_text(text + "\n", encoding="utf-8")
+            write_measures(options.out / "measures.csv", report["measures"])
+        except OSError as error:
+            raise AnnotationError(
+                f"{error.filename or options.out}: cannot be written ({error.strerror}); choose another --out"
+            ) from None
+    if options.as_json:
+        sys.stdout.write(json.dumps(report, allow_nan=False) + "\n")
+    else:
+        from app.annotator.sources import print_agreement
+
+        print_agreement(report)
+        if options.out is not None:
+            sys.stderr.write(f"agreement.json and measures.csv are in {options.out}\n")
+    return 0

@@ -1,0 +1,266 @@
+"""``benchmark``: speed against the paper-literal baseline in the same run, accuracy on a labelled set, the window's pace."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, MutableMapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from app.commands.perceive import LeftOut
+from app.commands.progress import progress_bar
+from core.config.models import Config, TwinConfig, choose_model, load_config
+from core.devices import UserError
+from core.types import Frame, Image, Scene
+
+if TYPE_CHECKING:
+    from core.evaluation.accuracy import FrameScore
+    from core.evaluation.paper import PaperBaseline
+    from core.perception.pipeline import Pipeline
+
+
+_BASELINE_EVERY = 8
+_WARM_UP = 3
+
+
+def _config(model: str | None, preset: str | None, config_path: Path | None) -> Config:
+    return load_config(config_path, preset, choose_model(model))
+
+
+def _as_in_a_stream(config: Config) -> Config:
+    """What is timed frame by frame is what a stream would cost: there a frame is seen in all orientations only on request."""
+    segmentation = config.perception.segmentation
+    if segmentation.mirrored != "pictures":
+        return config
+    once = config.perception.model_copy(update={"segmentation": segmentation.model_copy(update={"mirrored": "never"})})
+    return config.model_copy(update={"perception": once})
+
+
+def quantiles(values: Sequence[float]) -> dict[str, float]:
+    """Median and 95th percentile, rounded to microseconds when the values are milliseconds."""
+    return {"p50": round(float(np.median(values)), 3), "p95": round(float(np.percentile(values, 95)), 3)}
+
+
+def run_speed(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
+    """Time perception frame by frame on twin pictures, with a baseline frame in between every eighth; raises UserError."""
+    from core.perception.pipeline import open_pipeline
+
+    config = _as_in_a_stream(_config(model, preset, config_path))
+    pipeline = open_pipeline(config.perception)
+    # The window takes the configuration's model: how long it needs for another one is not asked.
+    first_frame_s = _first_frame_s(config_path) if model is None and preset is None else None
+    peak_memory_mb, baseline = _warm_up(pipeline)
+    scenes: list[Scene] = []
+    baseline_ms: list[float] = []
+    started, spent = time.perf_counter(), 0.0
+    with progress_bar() as bar:
+        task = bar.add_task("frames", total=frames)
+        for index, image in enumerate(_pictures(frames + _WARM_UP)):
+            before = time.perf_counter()
+            scene = pipeline.perceive_single(Frame(index, index / 30, image))
+            if index < _WARM_UP:
+                continue
+            spent += time.perf_counter() - before
+            scenes.append(scene)
+            if (index - _WARM_UP) % _BASELINE_EVERY == 0 and scene.masks is not None:
+                baseline_ms.append(baseline.time(image, scene.masks.vessel, scene.masks.robot).total_ms)
+            bar.advance(task)
+    if not baseline_ms:
+        reason = next((scene.refusal.reason.value for scene in scenes if scene.refusal is not None), "no masks")
+        raise UserError(f"the pictures are refused before there are masks to compare ({reason}); change [perception.quality]")
+    stages = sorted({stage for scene in scenes for stage in scene.latency_ms} - {"total"})
+    totals = [scene.latency_ms["total"] for scene in scenes]
+    until_seen = [scene.latency_ms.get("prepare", 0.0) + scene.latency_ms.get("network", 0.0) for scene in scenes]
+    after = [total - network for total, network in zip(totals, until_seen, strict=True)]
+    result = {
+        "total_ms": quantiles(totals),
+        "after_network_ms": quantiles(after),
+        "stages_ms": {stage: quantiles([scene.latency_ms.get(stage, 0.0) for scene in scenes]) for stage in stages},
+        "baseline_total_ms": quantiles(baseline_ms),
+        "speedup": round(float(np.median(baseline_ms) / np.median(totals)), 2),
+        "fps": round(len(scenes) / spent, 2),
+        "peak_memory_mb": peak_memory_mb,
+        "first_frame_s": first_frame_s,
+        "engine": pipeline.engine,
+        "cores": os.cpu_count(),
+        "frames": len(scenes),
+        "answered": sum(scene.pose is not None for scene in scenes),
+        "seconds": round(time.perf_counter() - started, 1),
+    }
+    _print(result, as_json, "speed")
+
+
+def _warm_up(pipeline: Pipeline) -> tuple[float, PaperBaseline]:
+    """Perceive some frames, weigh the process before torch is in it, then load the baseline and run it once cold."""
+    for index, image in enumerate(_pictures(_WARM_UP)):
+        scene = pipeline.perceive_single(Frame(index, index / 30, image))
+    peak_memory_mb = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1)
+    from core.evaluation.paper import PaperBaseline
+
+    baseline = PaperBaseline()
+    if scene.masks is not None:
+        baseline.time(image, scene.masks.vessel, scene.masks.robot)
+    return peak_memory_mb, baseline
+
+
+def _pictures(count: int) -> Iterator[Image]:
+    """Pictures of the named phantoms in the default look, with the robot at various depths; rendered before they are timed."""
+    from hardware.twin.phantoms import PHANTOM_NAMES
+    from hardware.twin.world import TwinWorld
+
+    ready: list[Image] = []
+    for place, name in enumerate(PHANTOM_NAMES):
+        world = TwinWorld(TwinConfig(phantom=name, appearance_seed=place), seed=place)
+        for depth in (50.0, 80.0):
+            world.insert(depth)
+            ready.append(world.frame().image)
+    for index in range(count):
+        yield ready[index % len(ready)]
+
+
+def _first_frame_s(config_path: Path | None) -> float | None:
+    """Seconds from starting ``main.py`` to its first overlaid frame, in a process of its own (offscreen without a display).
+
+    As on the first day: nothing is there that an earlier start has kept.
+    """
+    main = Path(sys.modules["__main__"].__file__ or "main.py").resolve()
+    environment = dict(os.environ)
+    _without_display(environment)
+    started = time.monotonic()
+    command = [sys.executable, str(main), "gui", "--until-first-frame", "--rig", "twin"]
+    command += ["--config", str(config_path)] if config_path is not None else []
+    try:
+        with tempfile.TemporaryDirectory() as cache:
+            environment["XDG_CACHE_HOME"] = cache
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    except subprocess.TimeoutExpired:
+        sys.stderr.write("the window showed no understood frame within 120 s\n")
+        return None
+    try:
+        return round(float(json.loads(done.stdout)["first_frame_monotonic_s"]) - started, 2)
+    except (ValueError, KeyError):
+        sys.stderr.write(f"the window did not start (exit code {done.returncode}): {done.stderr.strip()[-300:]}\n")
+        return None
+
+
+def run_window_pace(seconds: float, *, config_path: Path | None, as_json: bool) -> None:
+    """Run the operator window and measure it (offscreen when there is no display)."""
+    _without_display(os.environ)
+    from tools.benchmarks import measure_window
+
+    _print(measure_window(seconds, config_path), as_json, "window")
+
+
+def run_player(minutes: float, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
+    """Open a long session in the player window and measure it (offscreen when there is no display)."""
+    _without_display(os.environ)
+    from tools.benchmarks import measure_player
+
+    _print(measure_player(_config(model, preset, config_path), minutes), as_json, "player")
+
+
+def _without_display(environment: MutableMapping[str, str]) -> None:
+    if sys.platform.startswith("linux") and not environment.get("DISPLAY") and not environment.get("WAYLAND_DISPLAY"):
+        environment.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+
+def run_recording(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
+    """How much a recording slows perception down."""
+    from tools.benchmarks import measure_recording
+
+    _print(measure_recording(_as_in_a_stream(_config(model, preset, config_path)), frames), as_json, "recording")
+
+
+def run_accuracy(
+    folder: Path,
+    *,
+    model: str | None,
+    preset: str | None,
+    config_path: Path | None,
+    as_json: bool,
+    store: bool = False,
+    true_masks: bool = False,
+) -> None:
+    """Perceive every frame of a synth set as a single image and compare with its truth.
+
+    `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network: not both.
+    An interruption (Ctrl-C) tells the figures of the frames until then, and stores nothing.
+    """
+    from core.learning.dataset import POSE_KEYS, find_labelled
+    from core.learning.model_writer import check_can_change, write_figures
+    from core.perception.model_file import model_folder, sha256_of, trained_without
+
+    config = _config(model, preset, config_path)
+    if store:
+        check_can_change(config.perception.segmentation.model)  # said before anything is looked at
+    samples, truth = find_labelled(folder, POSE_KEYS)
+
+    from core.evaluation.accuracy import TrueMasks, score_set, summarise, summarise_looks
+    from core.evaluation.confidence import describe_confidence, describe_gates
+    from core.perception.pipeline import Pipeline, open_pipeline
+
+    masks, left_out = TrueMasks(), LeftOut()
+    pipeline = Pipeline(masks, config.perception) if true_masks else open_pipeline(config.perception)
+    scores: list[FrameScore] = []
+    interrupted = False
+    with progress_bar() as bar:
+        found = score_set(samples, truth, pipeline, masks, left_out.add)
+        try:
+            for score in bar.track(found, total=len(samples), description="frames"):
+                scores.append(score)
+        except KeyboardInterrupt:
+            interrupted = True
+    if interrupted and not scores:
+        raise KeyboardInterrupt
+    left_out.tell(len(scores))
+    confident_from = config.perception.quality.confident_from
+    figures = summarise(scores, confident_from) | describe_confidence(scores) | {"stricter_gates": describe_gates(scores)}
+    if left_out:
+        figures["left_out"] = len(left_out)
+    if interrupted:
+        figures |= {"interrupted": True, "frames_of_set": len(samples)}
+    looks = {stem: str(row["family"]) for stem, row in truth.items() if row.get("family") is not None}
+    if scores and all(score.stem in looks for score in scores):
+        without = [] if true_masks else trained_without(model_folder(config.perception.segmentation.model))
+        figures |= summarise_looks(scores, looks, without, confident_from)
+    part = f", interrupted after {len(scores)} of {len(samples)} frames" if interrupted else ""
+    try:
+        _print(figures, as_json, f"accuracy on {folder}{part}")
+    finally:  # neither costs the other
+        if store and not interrupted:
+            described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
+            write_figures(model_folder(config.perception.segmentation.model), described | figures)
+    if interrupted:
+        raise KeyboardInterrupt
+
+
+def _print(result: dict[str, Any], as_json: bool, title: str) -> None:
+    if as_json:
+        sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
+        return
+    table = Table(title=title, show_header=False)
+    for key, value in result.items():
+        if isinstance(value, dict) and any(isinstance(inner, dict) for inner in value.values()):
+            for inner_key, inner in value.items():
+                table.add_row(f"{key}.{inner_key}", _words(inner))
+        else:
+            table.add_row(key, _words(value))
+    Console(markup=False, emoji=False).print(table)
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_words(inner)}" for key, inner in value.items()) or "-"
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,379 @@
+"""``evaluate``: algorithm against manual measures, as the paper did it: figures, table, report."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from app.annotator.sources import print_agreement
+from app.commands.evaluation_report import print_tables, render_report
+from app.commands.perceive import LeftOut
+from app.commands.progress import asked_teller, check_no_input, progress_bar
+from core.annotation.agreement_report import write_measures
+from core.annotation.store import FoundImage, StoredAnnotation
+from core.config.models import Config, choose_model, load_config
+from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, evaluate, read_measurements, write_measurements
+from core.evaluation.paper import PAPER, against_paper, choose_images, measure_twice, wanted_images
+from core.files import name_as_text, name_of, write_whole
+from core.types import Frame
+
+
+@dataclass(frozen=True, slots=True)
+class LikePaper:
+    """A study built like the paper's: its share of states, two manual measures with an error of so many degrees (SD)."""
+
+    manual_sd_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Study:
+    """What is to be evaluated, where it comes from, and what is to be said about it."""
+
+    rows: list[Measurement]
+    source: dict[str, Any]
+    notes: list[str]
+    agreement: dict[str, Any] | None = None
+    interrupted: bool = False
+
+
+@dataclass(slots=True)
+class _Perceived:
+    """Rows, how often which reason was given on images with a pose, and where the network ran."""
+
+    engine: str
+    rows: list[Measurement] = field(default_factory=list)
+    reasons: Counter[str] = field(default_factory=Counter)
+    left_out: LeftOut = field(default_factory=LeftOut)
+    interrupted: bool = False
+
+
+def run_evaluate(
+    folder: Path | None,
+    csv: Path | None,
+    out: Path,
+    *,
+    as_json: bool,
+    model: str | None,
+    preset: str | None,
+    config_path: Path | None,
+    like_paper: LikePaper | None,
+    seed: int,
+    study_name: str | None = None,
+) -> None:
+    """Evaluate a table, a labelled set or images annotated by hand (one study of them) into `out`; raises UserError.
+
+    An interruption (Ctrl-C) evaluates what was perceived until then.
+    """
+    if (folder is None) == (csv is None):
+        raise EvaluationError("give either a labelled set (evaluate DIR) or a table (evaluate --csv FILE)")
+    if study_name is not None and (csv is not None or like_paper is not None):
+        raise EvaluationError("--study needs images annotated by hand (evaluate DIR), not --csv or --like-paper")
+    if csv is not None:
+        if like_paper is not None or model is not None or preset is not None or config_path is not None:
+            raise EvaluationError("--like-paper, --model, --preset and --config need a labelled set (evaluate DIR), not --csv")
+        for name in _written_names():
+            check_no_input(out / name, [csv], "--out")
+        study = _Study(read_measurements(csv), {"kind": "table of measures", "name": name_as_text(csv.name)}, [])
+        _make_folder(out)
+    else:
+        assert folder is not None
+        annotations = _annotation_file(folder, study_name)
+        if annotations is not None and like_paper is not None:
+            raise EvaluationError("--like-paper needs a labelled set with its truth, not annotations by hand")
+        if annotations is None and study_name is not None:
+            raise EvaluationError(f"{folder}: has no annotation file; begin the study with: annotate {folder} --study {study_name}")
+        truth = _read_set(folder) if annotations is None else []
+        _make_folder(out)
+        config = load_config(config_path, preset, choose_model(model))
+        if annotations is not None:
+            as_recorded = config_path is None and preset is None
+            study = _perceive_annotated(annotations, config, preset, model, study_name, seed, as_recorded=as_recorded)
+        else:
+            study = _perceive_set(folder, truth, config, preset, like_paper, seed)
+    metrics: dict[str, Any] = {"source": study.source, "seed": seed} | evaluate(study.rows, seed)
+    if csv is not None and not metrics["angle"]["n"] and not metrics["state"]["n"]:
+        raise EvaluationError(f"{csv}: no row has both a manual and an algorithmic measure; nothing to compare")
+    metrics["notes"] = study.notes + metrics["notes"]
+    metrics["paper"] = PAPER
+    if study.agreement is not None:
+        _take_within(metrics, study.agreement["within"])
+        metrics["agreement"] = {key: value for key, value in study.agreement.items() if key != "measures"}
+    if like_paper is not None:
+        metrics["against_paper"] = against_paper(metrics)
+    try:
+        _write(out, study.rows, metrics)
+        if study.agreement is not None:
+            write_measures(out / "raters.csv", study.agreement["measures"])
+    except OSError as error:
+        raise EvaluationError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from None
+    if (teller := asked_teller()) is not None:
+        teller.tell({"report": str(out / "report.html")} | metrics["images"])
+    elif as_json:
+        sys.stdout.write(json.dumps(metrics, allow_nan=False) + "\n")
+    else:
+        print_tables(metrics)
+        if study.agreement is not None:
+            print_agreement(study.agreement, within=False)  # stands among the angles
+        sys.stderr.write(f"report and figures are in {out}\n")
+    if study.interrupted:
+        raise KeyboardInterrupt
+
+
+def _take_within(metrics: dict[str, Any], within: dict[str, Any]) -> None:
+    """The SD of one manual measure is that of each rater's own repeats, where there are any: the columns are means over raters."""
+    manual = metrics["manual"]
+    if within["n"] > 1:
+        manual["repeatability_sd_deg"], manual["ci95"]["repeatability_sd_deg"] = within["sd_deg"], within["ci95"]
+    elif within["n"] == 0 and manual["repeatability_sd_deg"] is not None:
+        metrics["notes"].append(
+            "No rater measured an image twice: the SD of one manual measure is that of several, and holds their differences."
+        )
+
+
+def _make_folder(out: Path) -> None:
+    """Before the work, so that nobody waits for results that cannot be kept."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise EvaluationError(f"{out}: cannot be made ({error.strerror}); choose another --out") from None
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise EvaluationError(f"{out}: cannot be written to; choose another --out")
+
+
+def _written_names() -> list[str]:
+    """All that ``--out`` gets, or loses because an earlier evaluation wrote it."""
+    from app.commands.figures import ENDINGS, FIGURES
+
+    drawn = [f"{name}{ending}" for name in FIGURES for ending in ENDINGS]
+    return ["metrics.json", "measurements.csv", "raters.csv", "report.html", *drawn]
+
+
+def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
+    from app.commands.figures import ENDINGS, FIGURES, draw_figures, drawn
+
+    told = json.dumps(metrics, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    write_whole(out / "metrics.json", told.encode())
+    write_measurements(out / "measurements.csv", rows)
+    (out / "raters.csv").unlink(missing_ok=True)  # of an earlier evaluation, as figures below; it would belie this one
+    figures = {
+        name: {ending: drawn(figure, ending) for ending in ENDINGS}
+        for name, figure in draw_figures(angle_pairs(rows), metrics).items()
+    }
+    for name in FIGURES:
+        for ending in ENDINGS:
+            path = out / f"{name}{ending}"
+            if name in figures:
+                write_whole(path, figures[name][ending])
+            else:
+                path.unlink(missing_ok=True)
+    report = render_report(metrics, {name: files[".svg"] for name, files in figures.items()})
+    write_whole(out / "report.html", report.encode())
+
+
+def _annotation_file(given: Path, study: str | None) -> Path | None:
+    """The annotation file that is given, or that of a folder without a truth of its own, or whose `study` is asked for."""
+    from core.annotation.store import DEFAULT_NAME
+
+    if given.suffix == ".sqlite" and given.is_file():
+        return given
+    own = given / DEFAULT_NAME
+    return own if own.is_file() and (study is not None or not (given / "truth.jsonl").is_file()) else None
+
+
+def _perceive_annotated(
+    annotations: Path, config: Config, preset: str | None, model: str | None, study: str | None, seed: int, *, as_recorded: bool
+) -> _Study:
+    """Images that were annotated by hand, against the algorithm; those of a session as it was set in the session."""
+    from app.annotator.sources import compared_rows, fitted_alike, raters_agreement, read_annotated
+
+    answers, images = read_annotated(annotations, _places_of(annotations))
+    notes = []
+    recorded = _recorded(annotations.parent, config, model) if as_recorded else None
+    if recorded is not None:
+        config, told = recorded
+        notes += told
+    notes += _how_answered(annotations, answers, images, study)
+    done, told = fitted_alike(answers, images, config, study, str(annotations))
+    notes += told
+    rows, reasons, engine, missed = compared_rows(done, images, config)
+    source: dict[str, Any] = {
+        "kind": "annotated by hand",
+        "name": name_as_text(name_of(annotations.parent)),
+        "model": config.perception.segmentation.model,
+    }
+    unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
+    notes += [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
+    notes += [f"Interrupted after {len(rows)} of {len(rows) + missed} images."] if missed else []
+    agreement = raters_agreement(done, images, seed)
+    source |= {"preset": preset, "engine": engine, "refused": reasons, "study": study}
+    return _Study(rows, source, notes, agreement, interrupted=missed > 0)
+
+
+def _places_of(annotations: Path) -> list[Path]:
+    """Where the annotated images may be: in the file's folder, and those of other folders where they were seen last."""
+    from core.annotation.store import AnnotationStore
+
+    folder = annotations.parent.resolve()
+    with AnnotationStore(annotations, read_only=True) as store:
+        seen = [Path(os.path.normpath(folder / image.name)) for image in store.images().values()]
+    elsewhere = [path for path in seen if path.parent != folder and path.is_file()]
+    own = [] if elsewhere and len(elsewhere) == len(seen) else [annotations.parent]
+    return [*own, *sorted(elsewhere)]
+
+
+def _how_answered(
+    annotations: Path, answers: Sequence[StoredAnnotation], images: Sequence[FoundImage], study: str | None
+) -> list[str]:
+    """What a reader must know of the manual answers: which are not among the figures, and which know the algorithm's own."""
+    from core.annotation.agreement_report import choose_study, undecided
+    from core.annotation.store import AnnotationStore
+
+    done, here = choose_study(answers, study, str(annotations)), {image.sha256 for image in images}
+    gone = len({one.key.sha256 for one in done} - here)
+    with AnnotationStore(annotations, read_only=True) as store:
+        taken_over, after_look = store.taken_over(), store.given_after_look()
+    taken = sum(one.key.sha256 in here and one.key in taken_over for one in done)
+    notes = [f"Of the annotated images {gone} are not where they were; they are in none of the figures."] if gone else []
+    if tied := undecided(one for one in done if one.key.sha256 in here):
+        notes.append(
+            f"On {tied} images no state was given most often (two raters of different minds, for one); that of the rater whose "
+            "name comes first counts there."
+        )
+    if taken:
+        notes.append(
+            f"Of the manual answers {taken} began with the algorithm's own lines (key G): they agree with it the more for that. "
+            "A blind study (annotate --study NAME) hides them."
+        )
+    looked = sum(one.key.sha256 in here and one.key in after_look - taken_over for one in done)
+    if looked:
+        notes.append(
+            f"Of the manual answers {looked} were given, or changed, after the algorithm's lines had been shown (key H): they may "
+            "agree with it the more for that."
+        )
+    return notes
+
+
+def _recorded(folder: Path, config: Config, model: str | None) -> tuple[Config, list[str]] | None:
+    """The configuration that a session was recorded with, with another `model` if given, and notes on it; None: no session."""
+    from app.commands.replay import ReplayOptions, model_note, model_of, replay_config
+    from core.session.manifest import MANIFEST, SessionError, read_manifest
+
+    if not (folder / MANIFEST).is_file():
+        return None
+    try:
+        manifest = read_manifest(folder)
+    except SessionError:  # damaged: then as now
+        return None
+    as_recorded, notes = replay_config(manifest, ReplayOptions(folder, model))
+    if not notes:
+        notes = ["Each picture of the session was perceived by itself, with the settings that it was recorded with."]
+    notes += model_note(manifest, as_recorded, model_of(as_recorded)) if model is None else []
+    return config.model_copy(update={"perception": as_recorded.perception}), notes
+
+
+@dataclass(frozen=True, slots=True)
+class _Truth:
+    """A labelled image; theta and state are None where it shows no pose."""
+
+    stem: str
+    image: Path
+    theta_deg: float | None
+    state: str | None
+    group: str | None
+
+
+def _read_set(folder: Path) -> list[_Truth]:
+    """The images of a labelled set with their truth, by name; raises EvaluationError, DatasetError."""
+    from core.learning.dataset import UNMEASURED, find_labelled
+
+    if not (folder / "truth.jsonl").is_file() or not (folder / "images").is_dir():
+        what = (
+            "needs images/ and truth.jsonl as synth writes them, or the annotation file of annotate"
+            if folder.is_dir()
+            else "no such folder"
+        )
+        raise EvaluationError(f"{folder}: not a labelled set ({what}); for a table use --csv FILE")
+    samples, truth = find_labelled(folder)
+    found = []
+    for sample in samples:
+        row = truth[sample.stem]
+        if row.get("reason") == UNMEASURED:  # drawn to train on: nobody has said that it has no pose
+            continue
+        theta, state = row.get("theta_deg"), row.get("state")
+        angle, state = (float(theta), str(state)) if theta is not None and state is not None else (None, None)
+        group = f"phantom {row['seed']}" if row.get("seed") is not None else None
+        found.append(_Truth(sample.stem, sample.image, angle, state, group))
+    if not found:
+        raise EvaluationError(f"{folder}: no frame of it was measured, only drawn: draw both lines and set the state (annotate)")
+    return found
+
+
+def _perceive_set(
+    folder: Path, truth: list[_Truth], config: Config, preset: str | None, like_paper: LikePaper | None, seed: int
+) -> _Study:
+    """Perceive each image by itself; the truth (or two noisy measures of it) stands for the manual measure."""
+    notes: list[str] = []
+    source: dict[str, Any] = {"kind": "labelled set", "name": name_as_text(name_of(folder))}
+    measured: dict[str, tuple[float, float | None]] = {t.stem: (t.theta_deg, None) for t in truth if t.theta_deg is not None}
+    if like_paper is not None:
+        states = {t.stem: t.state for t in truth if t.state is not None}
+        chosen = choose_images(states, seed)
+        if not chosen:
+            raise EvaluationError(f"{folder}: has no image of the states B, C and D, which the paper's test consists of")
+        truth = [t for t in truth if t.stem in set(chosen)]
+        angles = [t.theta_deg for t in truth if t.theta_deg is not None]
+        measured = dict(zip([t.stem for t in truth], measure_twice(angles, like_paper.manual_sd_deg, seed), strict=True))
+        wanted, having = wanted_images(), Counter(t.state for t in truth)
+        source |= {"kind": "study like the paper's", "wanted": wanted, "manual_sd_deg": like_paper.manual_sd_deg}
+        notes += [f"The set has {having[s]} of the {n} wanted images of state {s}." for s, n in wanted.items() if having[s] < n]
+        notes.append(
+            f"Built like the paper's test: {len(truth)} images drawn with seed {seed}; each manual angle is the true one with a "
+            f"normal error of {like_paper.manual_sd_deg:g}° (SD), the manual state is the true one."
+        )
+    done = _perceive(truth, measured, config)
+    rows, reasons = done.rows, dict(sorted(done.reasons.items()))
+    source |= {"model": config.perception.segmentation.model, "preset": preset, "engine": done.engine, "refused": reasons}
+    if done.interrupted:
+        notes.append(f"Interrupted after {len(rows)} of {len(truth)} images.")
+    if done.left_out:
+        notes.append(f"{len(done.left_out)} images could not be read and are left out.")
+    poseless = [row for row in rows if row.state is None]
+    if poseless:
+        answered = sum(row.algorithm_state is not None for row in poseless)
+        notes.append(f"{len(poseless)} images show no pose to measure (the algorithm answered {answered} of them).")
+    return _Study(rows, source, notes, interrupted=done.interrupted)
+
+
+def _perceive(truth: list[_Truth], measured: dict[str, tuple[float, float | None]], config: Config) -> _Perceived:
+    """Each image by itself; an interruption (Ctrl-C) keeps what was done until then."""
+    from core.files import ImageError, read_image
+    from core.perception.pipeline import open_pipeline
+
+    pipeline = open_pipeline(config.perception)
+    done = _Perceived(pipeline.engine)
+    with progress_bar() as bar:
+        try:
+            for one in bar.track(truth, description="images"):
+                try:
+                    image = read_image(one.image)
+                except ImageError as error:
+                    done.left_out.add(error)
+                    continue
+                scene = pipeline.perceive_single(Frame(len(done.rows), 0.0, image))
+                angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
+                first, second = measured.get(one.stem, (None, None))
+                done.rows.append(Measurement(name_as_text(one.stem), first, second, one.state, angle, state, one.group))
+                if scene.refusal is not None and one.state is not None:
+                    done.reasons[scene.refusal.reason.value] += 1
+        except KeyboardInterrupt:
+            if not done.rows:
+                raise
+            done.interrupted = True
+    done.left_out.tell(len(done.rows))
+    return done

@@ -1,0 +1,162 @@
+"""Work over processes of this machine: ``--workers``.
+
+Work on the machines of a Dask cluster: ``--scheduler ADDRESS``. Each of them has LumenPilot's folder, at the same state.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import logging
+import multiprocessing
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+from core.devices import UserError
+from core.system import begin_as_worker
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+class WorkerEnded(UserError):
+    """A process was ended from outside."""
+
+
+def over_processes(workers: int, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
+    """Results as they come, of so many processes with one thread each. What runs when the iterator is closed is ended.
+
+    Raises
+    ------
+    WorkerEnded
+        A process was ended from outside.
+    """
+    # Spawned, not forked: physics, OpenCV and OpenVINO own threads that a fork would cut off.
+    context = multiprocessing.get_context("spawn")
+    with _one_thread_each(), ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
+        futures = [pool.submit(function, task) for task in tasks]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except BrokenProcessPool:
+            raise WorkerEnded("a worker ended (out of memory?); run the same command with fewer --workers") from None
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in multiprocessing.active_children():
+                worker.terminate()  # nothing runs any more unless it was interrupted
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Numeric libraries read their number of threads once, at import: it must be in the environment that a worker inherits."""
+    before = os.environ.get("OMP_NUM_THREADS")
+    os.environ["OMP_NUM_THREADS"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["OMP_NUM_THREADS"]
+        else:
+            os.environ["OMP_NUM_THREADS"] = before
+
+
+def _start_worker() -> None:
+    begin_as_worker()  # before an import that takes its time
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+_ROOT = Path(__file__).resolve().parents[2]
+_STATE = ("app/**/*.py", "core/**/*.py", "hardware/**/*.py", "resources/models/**/*.safetensors")
+"""What decides of a trial or a frame: the code, and the weights that a model's name stands for."""
+_TIMEOUT = "10s"
+_START = "in LumenPilot's folder: .venv/bin/python -m dask worker {address} --nworkers 2 --nthreads 1"
+
+
+_PORT = re.compile(r":\d{1,5}/?$")
+
+
+class ClusterError(UserError):
+    """The cluster cannot be used; the message says what to do."""
+
+
+def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
+    """Results as they come. What has not begun when the iterator is closed is cancelled.
+
+    Raises
+    ------
+    ClusterError
+        No scheduler answers, it has no workers, or a worker cannot run this code or has other code.
+    """
+    if not _PORT.search(address):  # of this the client makes its own error, and waits for it as for an answer
+        raise ClusterError(f"--scheduler {address}: says no port; give it as HOST:PORT, as the scheduler tells it")
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
+    distributed = importlib.import_module("distributed")  # a second that only who asks for it pays
+    try:
+        client = distributed.Client(address, timeout=_TIMEOUT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        why = str(error).partition("\n")[0]
+        raise ClusterError(
+            f"--scheduler {address}: no Dask scheduler answers there ({why}); start one (.venv/bin/python -m dask scheduler), "
+            "or use --workers"
+        ) from None
+    with client:
+        _check_workers(client, address)
+        futures = client.map(function, tasks, pure=False)
+        try:
+            for future in distributed.as_completed(futures, loop=client.loop):
+                result = future.result()
+                future.release()  # or its worker would keep it until the last one is done
+                yield result
+        except distributed.KilledWorker:
+            raise ClusterError(
+                f"--scheduler {address}: a task ended its worker again and again (out of memory?); start fewer workers a machine"
+            ) from None
+        except (OSError, distributed.CancelledError) as error:
+            why = str(error).partition("\n")[0]
+            raise ClusterError(f"--scheduler {address}: the scheduler has gone ({why}); start it and its workers again") from None
+        finally:
+            client.cancel(futures)
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """Without workers a campaign would wait for ever, and with another version's its figures would be of two programs."""
+    start = _START.format(address=address)
+    if not client.scheduler_info(n_workers=-1)["workers"]:
+        raise ClusterError(f"--scheduler {address}: has no workers; start some, {start}")
+
+    def code() -> str | None:  # goes there by value: a worker without LumenPilot could not even find it
+        try:
+            pass
+        except ImportError:
+            return None
+        return code_of_worker()
+
+    found: dict[str, str | None] = client.run(code)
+    without = sorted(worker for worker, its in found.items() if its is None)
+    if without:
+        raise ClusterError(f"--scheduler {address}: LumenPilot is not to be found by {', '.join(without)}; start them {start}")
+    others = sorted(worker for worker, its in found.items() if its != code_of_worker())
+    if others:
+        raise ClusterError(
+            f"--scheduler {address}: another version of LumenPilot runs on {', '.join(others)}; bring its folder to the state of "
+            "this one, and start the worker again"
+        )
+
+
+@cache
+def code_of_worker() -> str:
+    """What this process runs: SHA-256 of the program's files and models, as they were when it was asked first."""
+    told = hashlib.sha256()
+    for pattern in _STATE:
+        for path in sorted(_ROOT.glob(pattern)):
+            told.update(f"{path.relative_to(_ROOT).as_posix()} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return told.hexdigest()

@@ -1,0 +1,685 @@
+"""Ties the operator's controls and the panels that show driving to the pilot of the running rig.
+
+Keys that move the robot by hand: hold to move, release to stop. STOP stops everything, whatever has the focus.
+
+What is held on keyboard or screen: said again and again while it is, and let go when nobody can be holding it any more.
+
+The deadman on the keyboard and on the screen: Shift, or a field that is held with the mouse.
+
+The keys of STOP. Space is STOP in any focus, except while a text is typed and nothing can move: then it is a space.
+
+Pause, and Space with Ctrl, Alt or Meta, are STOP in any focus and in every mode, so that a key is there at any moment.
+
+Gamepad and foot pedal, beside the keys: their threads talk straight to the pilot, never by way of the window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import Protocol
+
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QAbstractSpinBox,
+    QApplication,
+    QLineEdit,
+    QMenuBar,
+    QPlainTextEdit,
+    QTextEdit,
+    QWidget,
+)
+
+from app.operator.engine_thread import EngineThread
+from app.operator.recording import Recorder
+from app.ui.i18n import mark, tr, tr_text
+from app.ui.texts import OperatorStep, Undriven
+from app.widgets.alerts import AlertSounds
+from app.widgets.basics import SCROLL_KEYS
+from app.widgets.event_log import LogKind
+from core.config.models import Config
+from core.config.safety import JointName
+from core.control.alerts import Alert
+from core.control.modes import Act
+from core.control.motion import AT_REST, Jog
+from core.control.pilot import DriveView, Pilot
+from core.types import Point
+from hardware.inputs.gamepad import Gamepad, GamepadError, GamepadState
+from hardware.inputs.pedal import Pedal, PedalError, PedalReport
+from hardware.servos.bus_ipc import BusStatus
+
+_WINDOW_LOST = (QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked)
+"""Blocked by a dialog, a window gets no release any more, even where the desktop leaves it the focus."""
+
+
+class HeldInput(QObject):
+    """Listens to the keys of the whole application, from its making to ``detach``.
+
+    Subclasses say what a press and a release mean, how all is let go, and what is said every `period_ms` while ``_timer`` runs. All
+    is let go when `window` or the application loses the focus, or a dialog blocks it, so that nothing goes on unattended.
+    """
+
+    def __init__(self, window: QWidget, period_ms: int) -> None:
+        super().__init__(window)
+        self._window = window
+        self._timer = QTimer(self)
+        self._timer.setInterval(period_ms)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self._repeat)
+        application = QApplication.instance()
+        if application is not None:
+            application.installEventFilter(self)
+        if isinstance(application, QGuiApplication):
+            application.applicationStateChanged.connect(self._on_application_state)
+
+    def release_all(self) -> None:
+        """Nothing is held any more."""
+        raise NotImplementedError
+
+    def detach(self) -> None:
+        """Let go and listen no more."""
+        self.release_all()
+        application = QApplication.instance()
+        if application is not None:
+            application.removeEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kind = event.type()
+        if kind == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
+            return self._on_press(watched, event)
+        if kind == QEvent.Type.KeyRelease and isinstance(event, QKeyEvent):
+            return self._on_release(event)
+        if kind in _WINDOW_LOST and watched is self._window:
+            self.release_all()
+        return False
+
+    def _on_press(self, watched: QObject, event: QKeyEvent) -> bool:
+        """True when the key goes no further."""
+        raise NotImplementedError
+
+    def _on_release(self, event: QKeyEvent) -> bool:
+        raise NotImplementedError
+
+    def _repeat(self) -> None:
+        raise NotImplementedError
+
+    @Slot(Qt.ApplicationState)
+    def _on_application_state(self, state: Qt.ApplicationState) -> None:
+        if state != Qt.ApplicationState.ApplicationActive:
+            self.release_all()
+
+
+def place_of(event: QKeyEvent) -> tuple[str, int]:
+    """Which key of the keyboard it is.
+
+    What a key means may change while it is down: with NumLock the keypad's Up, pressed beside Shift, is let go as an 8, and where
+    Shift and Alt together change the layout, Shift itself is let go as another key.
+    """
+    scan_code = event.nativeScanCode()
+    return ("place", scan_code) if scan_code else ("key", event.key())
+
+
+NUMBERS_ONLY = "numbers_only"
+"""Property of a line edit whose text is a number: Space is STOP there, too."""
+_NEVER_TYPED = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
+
+
+def is_stop(watched: QObject, event: QKeyEvent, can_move: bool) -> bool:
+    """Whether the press is a STOP.
+
+    Parameters
+    ----------
+    watched : the widget that the key goes to.
+    can_move : whether anything can move, or is about to; then Space is STOP in a text field, too.
+    """
+    if event.key() == Qt.Key.Key_Pause:
+        return True
+    if event.key() != Qt.Key.Key_Space:
+        return False
+    return can_move or bool(event.modifiers() & _NEVER_TYPED) or not takes_a_space(watched)
+
+
+def takes_a_space(widget: QObject) -> bool:
+    """Whether it is a field that a space can be typed in; numbers have none."""
+    if not isinstance(widget, QLineEdit | QPlainTextEdit | QTextEdit) or not widget.isEnabled() or widget.isReadOnly():
+        return False
+    return not (isinstance(widget, QLineEdit) and widget.property(NUMBERS_ONLY))
+
+
+class StopKeys(QObject):
+    """Hears STOP in all windows of the program while `owner` is visible, for a dialog that has the servos.
+
+    Parameters
+    ----------
+    owner : the dialog.
+    can_move : asked at each press.
+    stop : what STOP does.
+    """
+
+    def __init__(self, owner: QWidget, can_move: Callable[[], bool], stop: Callable[[], object]) -> None:
+        super().__init__(owner)
+        self._owner, self._can_move, self._stop = owner, can_move, stop
+        application = QApplication.instance()
+        assert application is not None
+        application.installEventFilter(self)
+
+    def detach(self) -> None:
+        """Listen no more."""
+        application = QApplication.instance()
+        if application is not None:
+            application.removeEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() not in (QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride) or not isinstance(event, QKeyEvent):
+            return False
+        if not isinstance(watched, QWidget) or not self._owner.isVisible() or not is_stop(watched, event, self._can_move()):
+            return False
+        if event.type() == QEvent.Type.ShortcutOverride:
+            event.accept()  # it comes as a key, whatever shortcut has it
+            return True
+        if not event.isAutoRepeat():
+            self._stop()
+        return True
+
+
+PERIOD_MS = 33
+
+
+class Motion(Enum):
+    """One direction that can be held."""
+
+    STEER_LEFT = mark("steer left")
+    STEER_RIGHT = mark("steer right")
+    ADVANCE = mark("advance")
+    RETRACT = mark("retract")
+    PITCH_UP = mark("pitch up")
+    PITCH_DOWN = mark("pitch down")
+    DELIVER = mark("sheath forward")
+    WITHDRAW = mark("sheath back")
+    STRAIGHTEN = mark("straighten the head")
+
+
+KEYS: dict[Motion, tuple[Qt.Key, ...]] = {
+    Motion.STEER_LEFT: (Qt.Key.Key_Left, Qt.Key.Key_A),
+    Motion.STEER_RIGHT: (Qt.Key.Key_Right, Qt.Key.Key_D),
+    Motion.ADVANCE: (Qt.Key.Key_Up, Qt.Key.Key_W),
+    Motion.RETRACT: (Qt.Key.Key_Down, Qt.Key.Key_S),
+    Motion.PITCH_UP: (Qt.Key.Key_E,),
+    Motion.PITCH_DOWN: (Qt.Key.Key_Q,),
+    Motion.DELIVER: (Qt.Key.Key_PageUp,),
+    Motion.WITHDRAW: (Qt.Key.Key_PageDown,),
+    Motion.STRAIGHTEN: (Qt.Key.Key_X,),
+}
+_MOTION_OF_KEY = {key: motion for motion, keys in KEYS.items() for key in keys}
+_BY_PLACE = {
+    24: Qt.Key.Key_Q, 25: Qt.Key.Key_W, 26: Qt.Key.Key_E, 38: Qt.Key.Key_A, 39: Qt.Key.Key_S, 40: Qt.Key.Key_D, 53: Qt.Key.Key_X,
+}  # fmt: skip
+"""Where these letters lie, in the numbers of X11 and Wayland, for a layout that has the letters of another alphabet there."""
+_FIRST_LETTER, _FIRST_OTHER_KEY = 0x80, 0x0100_0000
+_OTHER_MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
+
+
+class JogKeys(HeldInput):
+    """Turns held keys and held buttons into a ``Jog``.
+
+    Everything held is released when the window loses the focus, so nothing moves unattended. ``changed`` carries the jog; it comes
+    at each press and release and every 33 ms while something is held, since its silence counts as let go. ``stop_pressed`` comes
+    from a key of STOP in any window of the program that has the focus; ``can_move`` is asked when Space is pressed in a text field.
+    """
+
+    changed = Signal(object)
+    held_changed = Signal(object)
+    stop_pressed = Signal()
+
+    def __init__(self, window: QWidget, can_move: Callable[[], bool] = lambda: True) -> None:
+        super().__init__(window, PERIOD_MS)
+        self._can_move = can_move
+        self._held: dict[object, Motion] = {}
+
+    @property
+    def held(self) -> frozenset[Motion]:
+        return frozenset(self._held.values())
+
+    @property
+    def jog(self) -> Jog:
+        """How the controls are held now."""
+        held = self.held
+        return Jog(
+            bend=_sign(held, Motion.STEER_RIGHT, Motion.STEER_LEFT),
+            pitch=_sign(held, Motion.PITCH_UP, Motion.PITCH_DOWN),
+            advance=_sign(held, Motion.ADVANCE, Motion.RETRACT),
+            delivery=_sign(held, Motion.DELIVER, Motion.WITHDRAW),
+            straighten=Motion.STRAIGHTEN in held,
+        )
+
+    def press(self, source: object, motion: Motion) -> None:
+        """`source` (a key, a button) starts to hold `motion`."""
+        if self._held.get(source) is not motion:
+            self._held[source] = motion
+            self._timer.start()
+            self._announce()
+
+    def release(self, source: object) -> None:
+        """`source` lets go."""
+        if source in self._held:
+            del self._held[source]
+            if not self._held:
+                self._timer.stop()
+            self._announce()
+
+    def release_all(self) -> None:
+        """Nothing is held any more; nothing is said when nothing was held."""
+        if self._held:
+            self._held.clear()
+            self._timer.stop()
+            self._announce()
+
+    def _on_press(self, watched: QObject, event: QKeyEvent) -> bool:
+        if not isinstance(watched, QWidget):
+            return False
+        key = _key_of(event)
+        if is_stop(watched, event, self._can_move()):  # wherever it goes to: menus, lists and dialogs too
+            if not event.isAutoRepeat():
+                self.stop_pressed.emit()
+                self.release_all()
+            return True
+        if event.isAutoRepeat() and place_of(event) in self._held:
+            return True  # a field or menu that gets the focus meanwhile is not typed into by it
+        if watched.window() is not self._window or event.modifiers() & _OTHER_MODIFIERS:
+            return False
+        motion = _MOTION_OF_KEY.get(key)
+        # A field keeps its letters and arrows, and what it does not use must not reach the robot by way of its parent.
+        focus = self._window.focusWidget()
+        # A tap on Alt gives the keys to the menu bar, where the arrows go from menu to menu.
+        if motion is None or isinstance(focus, QAbstractSpinBox | QLineEdit | QMenuBar):
+            return False
+        if isinstance(focus, QAbstractItemView) and key in SCROLL_KEYS:
+            return False
+        if not event.isAutoRepeat():
+            self.press(place_of(event), motion)
+        return True
+
+    def _on_release(self, event: QKeyEvent) -> bool:
+        """A release counts wherever it goes to, or motion would go on after a menu opened over the window."""
+        place = place_of(event)
+        if event.isAutoRepeat():
+            return place in self._held
+        if place in self._held:
+            self.release(place)
+            return True
+        return False
+
+    def _repeat(self) -> None:
+        self.changed.emit(self.jog)
+
+    def _announce(self) -> None:
+        self.held_changed.emit(self.held)
+        self.changed.emit(self.jog if self._held else AT_REST)
+
+
+def _key_of(event: QKeyEvent) -> Qt.Key:
+    """By its letter; where that is none of the Latin ones, by the place of the keyboard where theirs would be."""
+    key = Qt.Key(event.key())
+    return _BY_PLACE.get(event.nativeScanCode(), key) if _FIRST_LETTER <= key < _FIRST_OTHER_KEY else key
+
+
+def _sign(held: frozenset[Motion], plus: Motion, minus: Motion) -> int:
+    """+1, -1, or 0 when neither or both are held."""
+    return (plus in held) - (minus in held)
+
+
+REPEAT_MS = 25
+"""Silence of 80 ms counts as let go, so it is said three times in that time."""
+_KEY = Qt.Key.Key_Shift
+
+
+class DeadmanKey(HeldInput):
+    """``reported`` comes with True every 25 ms while it is held, and with False at once when it is let go or the focus is lost.
+
+    A key that was down when the window got the focus does not count: only a press does.
+    """
+
+    reported = Signal(bool)
+
+    def __init__(self, window: QWidget) -> None:
+        super().__init__(window, REPEAT_MS)
+        self._holders: set[str] = set()
+        self._places: set[tuple[str, int]] = set()
+
+    @property
+    def is_held(self) -> bool:
+        return bool(self._holders)
+
+    def hold(self, holder: str, on: bool) -> None:
+        """The key or the mouse takes it, or lets go."""
+        before = self.is_held
+        if on:
+            self._holders.add(holder)
+        else:
+            self._holders.discard(holder)
+        if self.is_held is not before:
+            if self.is_held:
+                self._timer.start()
+            else:
+                self._timer.stop()
+            self.reported.emit(self.is_held)
+
+    def release_all(self) -> None:
+        """Nobody holds it."""
+        self._places.clear()
+        for holder in tuple(self._holders):
+            self.hold(holder, False)
+
+    def _on_press(self, watched: QObject, event: QKeyEvent) -> bool:
+        is_ours = isinstance(watched, QWidget) and watched.window() is self._window
+        if event.key() == _KEY and is_ours and not event.isAutoRepeat():
+            self._places.add(place_of(event))
+            self.hold("key", True)
+        return False
+
+    def _on_release(self, event: QKeyEvent) -> bool:
+        """The first Shift that comes up counts, and whatever a Shift that went down has become meanwhile."""
+        if not event.isAutoRepeat() and (event.key() == _KEY or place_of(event) in self._places):
+            self._places.clear()
+            self.hold("key", False)
+        return False
+
+    def _repeat(self) -> None:
+        self.reported.emit(True)
+
+
+_LOOK_EVERY_MS = 50
+_ACT_OF = {
+    OperatorStep.ACKNOWLEDGE: Act.ACKNOWLEDGE,
+    OperatorStep.ARM: Act.ARM,
+    OperatorStep.HAND_OVER: Act.HAND_OVER,
+    OperatorStep.TAKE_BACK: Act.TAKE_BACK,
+    OperatorStep.DISARM: Act.DISARM,
+}
+
+
+class DrivePanels(Protocol):
+    """What the desk shows things on."""
+
+    def show_drive(self, view: DriveView | None, bus: BusStatus | None, why_not: Undriven = Undriven.NO_ROBOT) -> None: ...
+    def show_alerts(self, alerts: tuple[Alert, ...]) -> None: ...
+    def log(self, kind: LogKind, text: str) -> None: ...
+
+
+class DriveController(QObject):
+    """The operator's side of driving. Without a pilot (a recording) it shows that there is nothing to drive.
+
+    Parameters
+    ----------
+    window : whose keys are listened to.
+    thread : runs the rig.
+    panels : what to show the pilot's view on.
+    recorder : keeps alerts and destinations with the session.
+    """
+
+    def __init__(self, window: QWidget, thread: EngineThread, panels: DrivePanels, recorder: Recorder) -> None:
+        super().__init__(window)
+        self._thread, self._panels, self._recorder = thread, panels, recorder
+        self.jog = JogKeys(window, lambda: self.can_move)
+        self.deadman = DeadmanKey(window)
+        self.sounds = AlertSounds(self)
+        self._shown: DriveView | None = None
+        self._speed = 1.0
+        self.why_not = Undriven.NOT_YET
+        """What is shown while there is no pilot."""
+        self._timer = QTimer(self)
+        self._timer.setInterval(_LOOK_EVERY_MS)
+        self._timer.timeout.connect(self.look)
+        self.jog.changed.connect(self._on_jog)
+        self.jog.stop_pressed.connect(self.stop)
+        self.deadman.reported.connect(self._on_deadman)
+
+    @property
+    def view(self) -> DriveView | None:
+        """What is on the screen."""
+        return self._shown
+
+    @property
+    def bus(self) -> BusStatus | None:
+        """The servo bus's latest word; None where there is none."""
+        return self._thread.bus_status()
+
+    @property
+    def can_move(self) -> bool:
+        """Whether anything can move now, or is about to; without a rig nothing can."""
+        pilot = self._thread.pilot
+        return pilot is not None and pilot.can_move
+
+    def start(self) -> None:
+        """Look at the pilot from now on; each look is a sign of life of the window."""
+        self._timer.start()
+
+    def reset(self) -> None:
+        """Let go of everything, and let nobody drive, for a rig that is being opened."""
+        self.halt()
+        self.jog.release_all()
+        self.deadman.release_all()
+
+    def halt(self) -> None:
+        """Nobody drives any more: the rig is about to be closed."""
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.halt()
+
+    def detach(self) -> None:
+        """Let go, look and listen no more."""
+        self._timer.stop()
+        self.jog.detach()
+        self.deadman.detach()
+
+    # ---- requests
+
+    def take(self, step: OperatorStep) -> None:
+        """One of the steps that have a button and a key."""
+        if step is OperatorStep.SERVOS_ON:
+            self.switch_on()
+        else:
+            self.ask(_ACT_OF[step])
+
+    def ask(self, act: Act) -> None:
+        """A request of the operator; refusals come back as alerts."""
+        pilot = self._thread.pilot
+        if pilot is None and act is Act.STOP:
+            if self._thread.stop_opening():
+                self._panels.log(LogKind.OPERATOR, tr("stop: the rig that is being opened starts stopped"))
+                return
+            pilot = self._thread.pilot  # it may have been opened between the two questions
+        if pilot is not None:
+            pilot.ask(act)
+            self._panels.log(LogKind.OPERATOR, act.value)
+        elif act is Act.STOP:
+            self._panels.log(LogKind.OPERATOR, tr("stop: no rig is open, so nothing moves"))
+
+    @Slot()
+    def stop(self) -> None:
+        """STOP, before anything else."""
+        self.ask(Act.STOP)
+        self.jog.release_all()
+        self.deadman.release_all()
+
+    @Slot()
+    def switch_on(self) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None and pilot.switch_on():
+            self._panels.log(LogKind.OPERATOR, tr("servos on"))
+
+    @Slot(int)
+    def reboot(self, servo_id: int) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None and pilot.reboot(servo_id):
+            self._panels.log(LogKind.OPERATOR, tr("restart servo {servo_id}", servo_id=servo_id))
+
+    @Slot(object)
+    def zero(self, names: Sequence[JointName] | None) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None and pilot.zero(names):
+            self._panels.log(
+                LogKind.OPERATOR,
+                tr("zero {what}", what=", ".join(tr_text(name) for name in names) if names else tr("all servos")),
+            )
+
+    @Slot()
+    def torque_off(self) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None and pilot.torque_off():
+            self._panels.log(LogKind.OPERATOR, tr("torque off"))
+
+    def drive(self, jog: Jog) -> None:
+        """Move the robot as held keys do; to be repeated."""
+        self._on_jog(jog)
+
+    @Slot(float)
+    def set_speed(self, share: float) -> None:
+        """Move at a share of full speed, 0..1, by whatever control; the next rig keeps it."""
+        self._speed = share
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.hand_speed(share)
+
+    def log_target(self, target: Point | None) -> None:
+        self._recorder.target(target)
+        self._panels.log(
+            LogKind.TARGET,
+            tr("cleared") if target is None else tr("set to {x:.0f}, {y:.0f} px", x=target[0], y=target[1]),
+        )
+
+    @Slot(object)
+    def press(self, motion: Motion) -> None:
+        """A cap on the screen is held."""
+        self.jog.press(("cap", motion), motion)
+
+    @Slot(object)
+    def release(self, motion: Motion) -> None:
+        self.jog.release(("cap", motion))
+
+    def hold_deadman(self, on: bool) -> None:
+        """The field on the screen is held."""
+        self.deadman.hold("mouse", on)
+
+    # ---- the pilot
+
+    @Slot(object)
+    def _on_jog(self, jog: Jog) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.jog("window", jog)
+
+    @Slot(bool)
+    def _on_deadman(self, held: bool) -> None:
+        pilot = self._thread.pilot
+        if pilot is not None:
+            pilot.deadman("window", held)
+
+    @Slot()
+    def look(self) -> None:
+        """Take in what the pilot has said since the last look."""
+        pilot = self._thread.pilot
+        if pilot is None:
+            # A pilot that has just gone belonged to a rig that is over, even where nobody has told so yet.
+            has_just_gone, self._shown = self._shown is not None, None
+            is_told = not has_just_gone or self.why_not is not Undriven.NO_ROBOT
+            self._panels.show_drive(None, None, self.why_not if is_told else Undriven.NOT_YET)
+            return
+        pilot.window_alive()
+        pilot.hand_speed(self._speed)
+        if not self.deadman.is_held:
+            pilot.deadman("window", False)
+        news = pilot.news()
+        # The recorder may have heard of the next rig already; what this one said until then was told before (``look``).
+        is_kept = not self._thread.is_ending
+        for view in news.changes if is_kept else ():
+            self._recorder.drive(view)
+        before, self._shown = self._shown, news.view
+        if before is None or before.mode is not news.view.mode:
+            self._panels.log(LogKind.MODE, news.view.mode.value)
+        for alert in news.alerts:
+            detail = f": {tr_text(alert.detail)}" if alert.detail else ""
+            self._panels.log(LogKind.ALERT, f"{tr(alert.spec.text)}{detail}")
+            if is_kept:
+                self._recorder.alert(alert, news.view.time_s)
+            if alert.sound is not None:
+                self.sounds.play(alert.sound)
+        self._panels.show_drive(news.view, self._thread.bus_status())
+        if news.alerts:
+            self._panels.show_alerts(news.alerts)
+
+
+class OperatorDevices(QObject):
+    """From ``start`` to ``close``. ``said`` carries a line for people: what was found, lost, or cannot be used, and what to do.
+
+    Parameters
+    ----------
+    config : sections `gamepad` and `pedal`; without a pedal's port there is no pedal.
+    pilot : the running rig's pilot, None while there is none; called from the devices' threads.
+    stop : called instead for STOP while there is no pilot: somebody else may be moving the servos.
+    """
+
+    said = Signal(str, bool)
+
+    def __init__(
+        self,
+        config: Config,
+        pilot: Callable[[], Pilot | None],
+        parent: QObject | None = None,
+        stop: Callable[[], None] = lambda: None,
+    ) -> None:
+        super().__init__(parent)
+        self._pilot, self._stop = pilot, stop
+        self._gamepad = Gamepad(config.gamepad, self._on_gamepad, self._on_gamepad_device)
+        self._gamepad_name: str | None = None
+        self._pedal = Pedal(config.pedal, self._on_pedal, self._on_pedal_problem) if config.pedal.port is not None else None
+
+    def start(self) -> None:
+        self._gamepad.start()
+        if self._pedal is not None:
+            self._pedal.start()
+
+    def close(self) -> None:
+        """Let go, and end; may be called twice."""
+        self._gamepad.close()
+        if self._pedal is not None:
+            self._pedal.close()
+
+    def _on_gamepad(self, state: GamepadState) -> None:
+        pilot = self._pilot() or self._pilot_after(state.stop)
+        if pilot is None:
+            return
+        pilot.jog("gamepad", Jog(state.bend_rate, state.pitch_rate, state.advance, state.delivery))
+        if state.deadman is not None:
+            pilot.deadman("gamepad", state.deadman)
+        if state.stop:
+            pilot.ask(Act.STOP)
+
+    def _pilot_after(self, stop: bool) -> Pilot | None:
+        """Without a pilot STOP goes to whoever else has the servos; a rig may have been opened in that moment."""
+        if not stop:
+            return None
+        self._stop()
+        return self._pilot()
+
+    def _on_gamepad_device(self, name: str | None, problem: GamepadError | None) -> None:
+        before, self._gamepad_name = self._gamepad_name, name
+        if problem is not None:
+            self.said.emit(str(problem), True)
+        elif name is not None and name != before:
+            self.said.emit(tr("Gamepad: {name}", name=name), False)
+        elif name is None and before is not None:
+            self.said.emit(tr("Gamepad lost: {name}", name=before), True)
+
+    def _on_pedal(self, report: PedalReport) -> None:
+        pilot = self._pilot() or self._pilot_after(report.stop)
+        if pilot is None:
+            return
+        pilot.deadman("pedal", report.deadman)
+        if report.stop:
+            pilot.ask(Act.STOP)
+
+    def _on_pedal_problem(self, problem: PedalError | None) -> None:
+        self.said.emit(tr("Foot pedal: ready") if problem is None else str(problem), problem is not None)

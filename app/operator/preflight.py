@@ -1,0 +1,240 @@
+"""The checks before the program may drive: made beside the window, kept for some minutes, and a red one stands against arming."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import QObject, QTimer, Signal, Slot
+
+from app.ui.i18n import tr, tr_text
+from app.ui.texts import OperatorStep, sentence
+from app.ui.workers import ChildProcess, module_of
+from core.config.models import Config
+from core.control.alerts import ALERTS
+from core.control.faults import AREA, REACTION, Area, Reaction
+from core.control.pilot import DriveView
+from hardware.preflight.checks import Check
+from hardware.preflight.preflight import Level, level_of
+
+KEPT_S = 600.0
+_BEGIN_AFTER_MS = 4000
+"""After the first picture of a rig: its own start has the computer to itself."""
+_LONGEST_MS = 60_000
+_MATTERS = ("rig", "camera", "perception", "servos", "pedal", "gamepad", "record")
+
+
+@dataclass(frozen=True, slots=True)
+class PreflightFinding:
+    """One line of the list: what was looked at, how it is, what was found and what to do about it."""
+
+    name: str
+    level: Level
+    detail: str
+    fix: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Preflight:
+    """What is known. ``is_running``: more is to come. ``age_s`` None: never finished, or for another configuration."""
+
+    findings: tuple[PreflightFinding, ...] = ()
+    is_running: bool = False
+    age_s: float | None = None
+    problem: str = ""
+
+    @property
+    def is_fresh(self) -> bool:
+        return self.age_s is not None and self.age_s <= KEPT_S and not self.problem
+
+    @property
+    def against(self) -> tuple[PreflightFinding, ...]:
+        """What stands against driving."""
+        return tuple(finding for finding in self.findings if finding.level is Level.BAD)
+
+    @property
+    def headline(self) -> str:
+        """In one line."""
+        good = sum(finding.level is Level.GOOD for finding in self.findings)
+        if self.problem:
+            return tr("The checks could not be made: {problem}", problem=self.problem)
+        if self.is_running:
+            return tr("Checking: {count} looked at", count=len(self.findings))
+        if self.against:
+            count = len(self.against)
+            whole = len(self.findings)
+            if count == 1:
+                return tr("Not ready: 1 of {whole} checks stands against driving", whole=whole)
+            return tr("Not ready: {count} of {whole} checks stand against driving", count=count, whole=whole)
+        if not self.is_fresh:
+            return tr("Not checked yet")
+        warned = len(self.findings) - good
+        return tr("Ready: {good} of {count} checks good", good=good, count=len(self.findings)) + (
+            tr(", {warned} to note", warned=warned) if warned else ""
+        )
+
+
+def live_findings(view: DriveView | None) -> tuple[PreflightFinding, ...]:
+    """What the open rig says of its own camera and servos, now."""
+    if view is None:
+        return ()
+    found = []
+    for area, name in ((Area.CAMERA, tr("camera's pictures")), (Area.SERVOS, tr("servos' answers"))):
+        faults = [fault for fault in view.active if AREA[fault.cause] is area]
+        held = [fault for fault in faults if REACTION[fault.cause] >= Reaction.HOLD]
+        worst = next(iter(held or faults), None)
+        if worst is None:
+            found.append(PreflightFinding(name, Level.GOOD, tr("no fault")))
+            continue
+        spec = ALERTS[worst.cause]
+        detail = f"{tr(spec.text)} ({tr_text(worst.detail)})" if worst.detail else tr(spec.text)
+        found.append(PreflightFinding(name, Level.BAD if held else Level.WARNING, detail, tr(spec.what_to_do)))
+    return tuple(found)
+
+
+class PreflightModel(QObject):
+    """Makes the checks in a process of their own, and says whether arming may be asked for.
+
+    ``changed`` comes when there is something new to show; ``asked`` when an operator wanted to arm and could not yet, with a line.
+
+    Parameters
+    ----------
+    config : the configuration in force.
+    view : who drives, now; None while there is nothing to drive.
+    command : what makes the checks; each line of it a check, as ``hardware.preflight.preflight`` writes them.
+    """
+
+    changed = Signal()
+    asked = Signal(str)
+
+    def __init__(
+        self,
+        config: Callable[[], Config],
+        view: Callable[[], DriveView | None],
+        parent: QObject | None = None,
+        *,
+        command: list[str] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        super().__init__(parent)
+        self._config, self._view, self._clock = config, view, clock
+        self._command = command if command is not None else module_of("hardware.preflight.preflight")
+        self._child: ChildProcess | None = None
+        self._checks: list[Check] = []
+        self._checked: str | None = None
+        self._of = ""
+        self._done_s = 0.0
+        self._problem = ""
+        self._later = QTimer(self)
+        self._later.setSingleShot(True)
+        self._later.setInterval(_BEGIN_AFTER_MS)
+        self._later.timeout.connect(self._begin_if_needed)
+        self._limit = QTimer(self)
+        self._limit.setSingleShot(True)
+        self._limit.setInterval(_LONGEST_MS)
+        self._limit.timeout.connect(self._on_too_long)
+
+    @property
+    def has_robot(self) -> bool:
+        """Whether there is anything to arm."""
+        return self._view() is not None
+
+    @property
+    def preflight(self) -> Preflight:
+        """What is known now."""
+        is_of_now = self._of == _digest(self._config())
+        age_s = self._clock() - self._done_s if self._checked is not None and is_of_now else None
+        made = (
+            tuple(PreflightFinding(check.name, level_of(check), check.detail, check.fix) for check in self._checks)
+            if is_of_now
+            else ()
+        )
+        return Preflight((*live_findings(self._view()), *made), self._child is not None, age_s, self._problem)
+
+    def begin_soon(self) -> None:
+        """A rig has given its first picture: have the answer ready before it is asked for."""
+        self._later.start()
+
+    @Slot()
+    def begin(self) -> None:
+        """Make the checks, anew; those that are being made are given up."""
+        self._give_up()
+        config = self._config()
+        self._checks, self._checked, self._problem, self._of = [], None, "", _digest(config)
+        child = ChildProcess(self._command, self, given=config.model_dump_json())
+        child.told.connect(self._on_check)
+        child.ended.connect(self._on_ended)
+        self._child = child
+        self._limit.start()
+        child.start()
+        self.changed.emit()
+
+    def may_take(self, step: OperatorStep) -> bool:
+        """Every step may be asked for at any time, but arming only after the checks. What is missing is begun and said."""
+        if step is not OperatorStep.ARM or self._view() is None:
+            return True
+        now = self.preflight
+        if now.is_fresh and not now.is_running and not now.against:
+            return True
+        if now.against:
+            first = now.against[0]
+            more = tr(" (+{count} more)", count=len(now.against) - 1) if len(now.against) > 1 else ""
+            self.asked.emit(
+                tr(
+                    "Not armed. {what} What to do: {fix}{more}",
+                    what=sentence(f"{tr_text(first.name)}: {tr_text(first.detail)}"),
+                    fix=tr_text(first.fix),
+                    more=more,
+                )
+            )
+            if not now.is_fresh and not now.is_running:
+                self.begin()
+        else:
+            if not now.is_running:
+                self.begin()
+            self.asked.emit(tr("Not armed yet: the checks before driving take some seconds, then arm again"))
+        return False
+
+    def close(self) -> None:
+        self._later.stop()
+        self._give_up()
+
+    def _give_up(self) -> None:
+        child, self._child = self._child, None
+        self._limit.stop()
+        if child is not None:
+            child.leave()
+            child.kill()
+
+    @Slot()
+    def _begin_if_needed(self) -> None:
+        if self._child is None and self._view() is not None and not self.preflight.is_fresh:
+            self.begin()
+
+    def _on_check(self, record: dict[str, Any]) -> None:
+        if {"name", "ok", "detail", "fix"} <= record.keys():
+            self._checks.append(Check(str(record["name"]), record["ok"] is True, str(record["detail"]), str(record["fix"])))
+            self.changed.emit()
+
+    def _on_ended(self, code: int, line: str) -> None:
+        self._child = None
+        self._limit.stop()
+        if code == 0 and self._checks:
+            self._checked, self._done_s = self._of, self._clock()
+        else:
+            self._problem = line or tr("they ended with exit code {code}", code=code)
+        self.changed.emit()
+
+    @Slot()
+    def _on_too_long(self) -> None:
+        self._give_up()
+        self._problem = tr("no answer within {seconds:.0f} s", seconds=_LONGEST_MS / 1000)
+        self.changed.emit()
+
+
+def _digest(config: Config) -> str:
+    """What the checks depend on: another phantom needs no new ones."""
+    return json.dumps({name: getattr(config, name).model_dump(mode="json") for name in _MATTERS}, sort_keys=True)

@@ -1,0 +1,574 @@
+"""Recording from the window: the writer of sessions beside the engine's thread, and what the bar shows of it.
+
+What is done with a session that has ended: annotate it, evaluate it, play it; each in a process of its own beside the window.
+
+Sessions that were cut (kill, power, full disk): looked for when the window starts, offered one by one, recovered into copies.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from PySide6.QtCore import QObject, QTimer, QUrl, Signal, Slot
+from PySide6.QtGui import QDesktopServices
+
+from app.operator.engine_thread import EngineThread
+from app.ui.i18n import mark, tr, tr_text
+from app.ui.workers import NOT_STARTED, ChildProcess, Worker, command_of
+from app.widgets.messages import Offer, OfferButton
+from core.annotation.store import DEFAULT_NAME
+from core.config.models import Config
+from core.control.alerts import Alert
+from core.control.faults import Cause
+from core.control.pilot import DriveView
+from core.files import write_whole
+from core.session.manifest import About, Event, EventKind, about_rig, event_of_alert, event_of_target
+from core.session.recovery import CutSession, find_cut_sessions
+from core.session.writer import STOPPED, RecordStatus, SessionWriter, faults_between
+from core.types import Point, Tick
+from hardware.rig import RigKind
+
+_LOOK_EVERY_MS = 250
+_CLOSE_WITHIN_S = 10.0
+
+
+class Recorder(QObject):
+    """Keeps every tick of the running rig, as a session while one is being recorded, else in memory for "save the last seconds".
+
+    ``changed`` carries the ``RecordStatus``, ``said`` a line for people and whether it is a fault.
+
+    Parameters
+    ----------
+    thread : whose ticks are recorded; they come in its own thread, and nothing here makes it wait.
+    """
+
+    changed = Signal(object)
+    said = Signal(str, bool)
+
+    def __init__(self, config: Config, kind: RigKind, thread: EngineThread, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._kind, self._thread = kind, thread
+        self._writer: SessionWriter | None = None
+        self._about: About | None = None
+        self._target: Event | None = None
+        self._config = config
+        self._shown = RecordStatus()
+        self._marks = 0
+        self._timer = QTimer(self)
+        self._timer.setInterval(_LOOK_EVERY_MS)
+        self._timer.timeout.connect(self._look)
+        thread.on_tick = self._put
+
+    @property
+    def status(self) -> RecordStatus:
+        """How it is going."""
+        return self._writer.status() if self._writer is not None else RecordStatus()
+
+    def open_rig(self, config: Config, kind: RigKind) -> None:
+        """Another rig is being opened: what is being recorded ends, for a session never mixes two rigs."""
+        self._kind = kind
+        self._about = about_rig(config, self._kind.value, config.rig.name)
+        if self._writer is None:
+            self._config = config
+            self._writer = SessionWriter(config.record, self._about)
+            self._timer.start()
+        else:
+            self._living(self._writer).set_about(self._about)
+
+    def _living(self, writer: SessionWriter) -> SessionWriter:
+        """The writer, or another one in the place of one that a fault of the program has ended: a day's recording goes on."""
+        if writer.is_alive or self._about is None:
+            return writer
+        writer.close(0.0)
+        self._writer = living = SessionWriter(self._config.record, self._about)
+        if self._target is not None:
+            living.add_event(self._target)
+        return living
+
+    @Slot()
+    def toggle(self) -> None:
+        """Begin a session with the next picture, or end it; one that has not begun yet is taken back."""
+        if self._writer is None:
+            return
+        writer = self._living(self._writer)
+        status = writer.status()
+        if status.recording or status.armed:
+            writer.stop()
+        else:
+            self._marks = 0  # on paper each session's marks count from 1
+            writer.start()
+
+    def stop(self, why: str) -> None:
+        """End the session that is being recorded, if any; `why` goes into it. From any thread."""
+        if self._writer is not None:
+            self._writer.stop(why)
+
+    @Slot()
+    def save_last(self) -> None:
+        """Make a session of the last seconds, without having recorded."""
+        if self._writer is None:
+            return
+        writer = self._living(self._writer)
+        if writer.status().ring_s <= 0.0:
+            self.said.emit(tr("Nothing to save yet: record.ring_s is 0, or the rig has just been opened"), True)
+            return
+        writer.save_last()
+
+    @Slot()
+    def mark(self) -> None:
+        """Mark this moment with a numbered note in the session, or in the last seconds; what it was can be said in the player.
+
+        Nothing is typed here: hands stay on the controls, and Space stays STOP.
+        """
+        if self._writer is None:
+            return
+        writer = self._living(self._writer)
+        status = writer.status()
+        is_recorded = status.recording or status.armed
+        if not is_recorded and status.ring_s <= 0.0:
+            self.said.emit(tr("Nothing is being recorded that could be marked: F9 begins a session"), True)
+            return
+        if not writer.event(EventKind.NOTE, f"mark {self._marks + 1}"):
+            self.said.emit(tr("Not marked: the recorder is behind"), True)
+            return
+        self._marks += 1
+        if is_recorded:
+            self.said.emit(tr("Mark {number} is in the session", number=self._marks), False)
+        else:
+            self.said.emit(tr("Mark {number} is in the last seconds: F10 saves them", number=self._marks), False)
+
+    def target(self, target: Point | None) -> None:
+        """Keep the operator's destination, source pixels."""
+        self._target = event_of_target(target, time.monotonic())
+        if self._writer is not None:
+            self._writer.add_event(self._target)
+
+    def drive(self, view: DriveView) -> None:
+        """Keep that mode or faults have changed, also when there are no pictures."""
+        if self._writer is not None:
+            self._writer.drive(view)
+
+    def rig_stopped(self, message: str) -> None:
+        """Keep that the rig stopped by itself, and why: from here on there is no pilot whose views would tell."""
+        if self._writer is not None:
+            self._writer.event(EventKind.FAULT, Cause.WORKER_DEAD.value, {"detail": message})
+
+    def alert(self, alert: Alert, time_s: float) -> None:
+        """Keep an alert that was shown."""
+        if self._writer is not None:
+            self._writer.add_event(event_of_alert(alert, time_s))
+
+    def close(self) -> bool:
+        """End the session; False when the disk has not answered in time."""
+        self._timer.stop()
+        self._thread.on_tick = None
+        self._about = None  # what has ended now is not to live again
+        return self._writer.close(_CLOSE_WITHIN_S) if self._writer is not None else True
+
+    def _put(self, tick: Tick) -> None:
+        """A tick, in the engine's thread."""
+        writer, pilot = self._writer, self._thread.pilot
+        if writer is not None:
+            writer.put(tick, pilot.view if pilot is not None else None, self._thread.bus_status())
+
+    @Slot()
+    def _look(self) -> None:
+        before, self._shown = self._shown, self.status
+        self.changed.emit(self._shown)
+        self._tell(before, self._shown)
+
+    def _tell(self, before: RecordStatus, now: RecordStatus) -> None:
+        """What the operator and the pilot's alerts must know."""
+        if (pilot := self._thread.pilot) is not None:
+            for fault in faults_between(before, now):
+                pilot.report(fault)
+        if now.saved is not None and now.saved != before.saved:
+            self.said.emit(tr("Session saved: {saved}", saved=now.saved), False)
+        if now.notices != before.notices:
+            self.said.emit(tr_text(now.notice), True)
+        if now.problem and now.problems != before.problems:  # last: what was saved until then must not cover it
+            problem = now.problem.removeprefix(STOPPED)
+            self.said.emit(tr("Recording stopped: {problem}", problem=tr_text(problem)), True)
+
+
+_KEY = "recovery"
+_END_WITHIN_MS = 3000
+
+
+class Offers(Protocol):
+    """Where offers are shown."""
+
+    def offer(self, offer: Offer) -> None: ...
+    def withdraw(self, key: str) -> None: ...
+
+
+class Declined:
+    """The sessions that nobody wants to hear of again, by their folders' names; a small file in the program's state folder."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def names(self) -> set[str]:
+        """A file that cannot be read declines nothing."""
+        try:
+            names = json.loads(self._path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError):
+            return set()
+        return {name for name in names if isinstance(name, str)} if isinstance(names, list) else set()
+
+    def add(self, name: str) -> None:
+        """Raises OSError."""
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(self._path, json.dumps(sorted(self.names() | {name})).encode())
+
+
+class RecoveryController(QObject):
+    """Looks, measures, offers, recovers. The window waits for none of it, and the damaged original is never touched.
+
+    ``said`` carries a line for people and whether it is a fault; ``recovered`` the folder of a copy and what it lacks, in words.
+
+    Parameters
+    ----------
+    folder : where recordings go.
+    offers : where to ask.
+    declined : what is not asked again.
+    """
+
+    said = Signal(str, bool)
+    recovered = Signal(object, str)
+
+    def __init__(self, folder: Path, offers: Offers, declined: Declined, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._folder, self._offers, self._declined = folder, offers, declined
+        self._waiting: list[CutSession] = []
+        self._found = 0
+        self._child: ChildProcess | None = None
+        self._says_none = False
+        self._is_closed = False
+        self._work = Worker("looking for cut sessions", self)
+        self._work.done.connect(self._on_looked)
+        self._work.failed.connect(self._on_look_failed)
+
+    def look(self, *, again: bool = False) -> None:
+        """Look for cut sessions; `again`: also for those that were declined, and say when there are none."""
+        if self._child is not None or self._waiting or self._is_closed:
+            return
+        self._says_none = again
+        folder, declined = self._folder, self._declined
+
+        def find() -> list[CutSession]:
+            not_wanted = set() if again else declined.names()
+            return [cut for cut in find_cut_sessions(folder) if cut.folder.name not in not_wanted]
+
+        self._work.submit("look", find, once=True)
+
+    def close(self) -> None:
+        """Look no further; a recovery that goes on ends by itself, and leaves a whole copy or none."""
+        self._is_closed = True
+        if self._child is not None:
+            self._child.leave()
+            self._child.ask_to_end()
+        self._work.stop(finish=False)
+        self._work.wait(_END_WITHIN_MS)
+
+    def _on_looked(self, _key: object, found: list[CutSession]) -> None:
+        if self._is_closed:  # what was found meanwhile was already on its way
+            return
+        self._waiting, self._found = list(found), len(found)
+        if not found and self._says_none:
+            self.said.emit(tr("No cut session in {folder}", folder=self._folder), False)
+        self._measure_next()
+
+    def _on_look_failed(self, _key: object, line: str) -> None:
+        self.said.emit(tr("Cut sessions could not be looked for: {line}", line=line), True)
+
+    # ---- one after the other
+
+    def _measure_next(self) -> None:
+        """How much would be lost is read before anybody is asked."""
+        if not self._waiting:
+            return
+        session = self._waiting[0].folder
+        told: dict[str, Any] = {}
+        self._run("--only-look", session, told.update, lambda code, line: self._on_measured(session, told, code, line))
+
+    def _on_measured(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
+        self._child = None
+        lost = told.get("lost")
+        if _says_nothing(code):
+            self._offer_again(session, code, line, self._measure_next)
+            return
+        if code != 0 or not isinstance(lost, dict):
+            never = OfferButton(tr("Never"), lambda: self._decline(session), tr("Do not ask again for this one"))
+            text = tr("A recording was cut, and it cannot be recovered")
+            self._offers.offer(Offer(_KEY, text, line or session.name, (never,), is_fault=True, dismissed=self._next))
+            return
+        place = (
+            tr(" ({place} of {count})", place=self._found - len(self._waiting) + 1, count=self._found) if self._found > 1 else ""
+        )
+        text = tr("A recording was cut{place}: {loss}", place=place, loss=loss_words(lost))
+        kept = tr("{count} pictures are whole", count=told.get("pictures", 0))
+        self._offers.offer(
+            Offer(
+                _KEY,
+                text,
+                tr("{name}; {kept}. The damaged original stays as it is.", name=session.name, kept=kept),
+                (
+                    OfferButton(
+                        tr("Recover"), lambda: self._recover(session), tr("Make a whole copy beside {session}", session=session)
+                    ),
+                    OfferButton(tr("Not now"), self._next, tr("Ask again at the next start")),
+                    OfferButton(tr("Never"), lambda: self._decline(session), tr("Do not ask again for this one")),
+                ),
+                dismissed=self._next,
+            )
+        )
+
+    def _offer_again(self, session: Path, code: int, line: str, again: Callable[[], None]) -> None:
+        """The session may well be recovered, at another time; so nothing is said against it."""
+        if code == NOT_STARTED:
+            text = tr("A recording was cut; the program that recovers it could not be started")
+        else:
+            text = tr("A recording was cut; the program that recovers it was ended from outside")
+        why = f": {tr_text(line)}" if line else ""
+        answers = (
+            OfferButton(tr("Try again"), again, tr("Once there is memory and room on the disk, for instance")),
+            OfferButton(tr("Not now"), self._next, tr("Ask again at the next start")),
+        )
+        self._offers.offer(Offer(_KEY, text, f"{session.name}{why}", answers, is_fault=True, dismissed=self._next))
+
+    def _next(self) -> None:
+        self._waiting.pop(0)
+        self._measure_next()
+
+    def _decline(self, session: Path) -> None:
+        try:
+            self._declined.add(session.name)
+        except OSError as error:
+            self.said.emit(tr("That you do not want to be asked could not be kept ({why})", why=error.strerror), True)
+        self._next()
+
+    def _recover(self, session: Path) -> None:
+        told: dict[str, Any] = {}
+
+        def on_told(record: dict[str, Any]) -> None:
+            if "done" in record:  # progress
+                self._show_share(session, record)
+            else:
+                told.update(record)
+
+        self._show_share(session, {})
+        self._run("--progress-json", session, on_told, lambda code, line: self._on_recovered(session, told, code, line))
+
+    def _show_share(self, session: Path, record: dict[str, Any]) -> None:
+        done, total = record.get("done"), record.get("total")
+        share = min(1.0, done / total) if done is not None and total else -1.0
+        self._offers.offer(Offer(_KEY, tr("Recovering a copy"), session.name, share=share))
+
+    def _on_recovered(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
+        self._child = None
+        if _says_nothing(code):
+            self._offer_again(session, code, line, lambda: self._recover(session))
+            return
+        self._offers.withdraw(_KEY)
+        if code == 0 and "session" in told:
+            words = loss_words(told["lost"])
+            self.said.emit(tr("Recovered: {session}; {words}", session=told["session"], words=words), False)
+            self.recovered.emit(Path(told["session"]), tr("Recovered; {words}", words=words))
+        else:
+            self.said.emit(tr("Not recovered: {why}", why=tr_text(line) or tr("exit code {code}", code=code)), True)
+        self._next()
+
+    def _run(
+        self, option: str, session: Path, on_told: Callable[[dict[str, Any]], None], on_ended: Callable[[int, str], None]
+    ) -> None:
+        self._child = ChildProcess(command_of("session", "recover", str(session), option, "--json"), self)
+        self._child.told.connect(on_told)
+        self._child.ended.connect(on_ended)
+        self._child.start()
+
+
+def _says_nothing(code: int) -> bool:
+    """Whether a process never began, or a signal ended it: that tells nothing of the session."""
+    return code == NOT_STARTED or code < 0
+
+
+def loss_words(lost: dict[str, Any]) -> str:
+    """A loss as people say it."""
+    if not lost["rows"] and not lost["pictures"]:
+        return tr("nothing of it is lost")
+    return tr(
+        "{seconds:.1f} s are lost (rows: {rows}, pictures: {pictures})",
+        seconds=lost["seconds"],
+        rows=lost["rows"],
+        pictures=lost["pictures"],
+    )
+
+
+FRAMES = 48
+"""Pictures of a session that are offered for annotation, evenly over its time: as many as the paper's."""
+REPORT = "report.html"
+_OFFER, _WORK = "session", "evaluation"
+
+
+def open_file(path: Path) -> bool:
+    """Show a file with whatever the desktop shows such files with."""
+    return QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
+
+
+class AfterSession(QObject):
+    """Offers the next steps for a session, and takes them.
+
+    ``said`` carries a line for people and whether it is a fault.
+
+    Parameters
+    ----------
+    offers : where to ask and to show how it goes.
+    show_file : opens the report; False when it cannot.
+    """
+
+    said = Signal(str, bool)
+
+    def __init__(self, offers: Offers, show_file: Callable[[Path], bool] = open_file, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._offers, self._show_file = offers, show_file
+        self.session: Path | None = None
+        """The newest one, until there is another."""
+        self._evaluation: ChildProcess | None = None
+        self._windows: list[ChildProcess] = []
+
+    def offer(self, session: Path, text: str = mark("Session saved")) -> None:
+        """A session has ended, or was recovered; `text` says which."""
+        self.session = session
+        answers = (
+            OfferButton(
+                tr("Evaluate"), lambda: self.evaluate(session), tr("The algorithm against angles measured by hand, as a report")
+            ),
+            OfferButton(
+                tr("Annotate"),
+                lambda: self.annotate(session),
+                tr("Measure by hand: {frames} pictures, evenly over the session", frames=FRAMES),
+            ),
+            OfferButton(tr("Play"), lambda: self.play(session), tr("The player, with everything as it was understood")),
+        )
+        self._offers.offer(
+            Offer(_OFFER, tr_text(text), tr("{name}, in {parent}", name=session.name, parent=session.parent), answers)
+        )
+
+    def withdraw(self) -> None:
+        """Another recording has begun: what is offered is no longer the matter."""
+        self._offers.withdraw(_OFFER)
+
+    def close(self) -> None:
+        """Windows that people work in stay open; an evaluation ends."""
+        for window in self._windows:
+            window.leave()
+        if self._evaluation is not None:
+            self._evaluation.leave()
+            self._evaluation.kill()
+
+    # ---- the steps
+
+    def annotate(self, session: Path) -> None:
+        """The annotation tool on pictures evenly over the session."""
+        self._open(
+            tr("Opening the annotation tool: {name}", name=session.name),
+            "annotate",
+            str(session),
+            "--frames",
+            str(FRAMES),
+            "--order",
+            "even",
+        )
+
+    def play(self, session: Path) -> None:
+        """The player."""
+        self._open(tr("Opening the player: {name}", name=session.name), "play", str(session))
+
+    def evaluate(self, session: Path) -> None:
+        """The report; without anything measured by hand yet, the annotation tool, for that comes first."""
+        if self._evaluation is not None:
+            self.said.emit(tr("An evaluation is running already"), False)
+            return
+        if not (session / DEFAULT_NAME).is_file():
+            self._needs_annotations(session, tr("Nothing is measured by hand yet"))
+            return
+        out = session / "evaluation"
+        told: dict[str, Any] = {}
+        child = ChildProcess(command_of("evaluate", str(session), "--out", str(out), "--progress-json"), self)
+        child.told.connect(lambda record: self._on_told(session, record, told))
+        child.ended.connect(lambda code, line: self._on_evaluated(session, told, code, line))
+        self._evaluation = child
+        self._show_share(session, -1.0, tr("loading the network"))
+        child.start()
+
+    def _on_told(self, session: Path, record: dict[str, Any], told: dict[str, Any]) -> None:
+        if "done" not in record:
+            told.update(record)
+            return
+        done, total = record["done"], record["total"]
+        left = tr(", {left:.0f} s left", left=record["left_s"]) if record.get("left_s") else ""
+        self._show_share(
+            session,
+            done / total if total else -1.0,
+            tr("{done:.0f} of {total:.0f} {what}{left}", done=done, total=total or 0, what=tr_text(record["what"]), left=left),
+        )
+
+    def _show_share(self, session: Path, share: float, detail: str) -> None:
+        cancel = OfferButton(tr("Cancel"), self._cancel, tr("Stop; a report of before stays"))
+        self._offers.offer(
+            Offer(_WORK, tr("Evaluating {name}", name=session.name), detail, (cancel,), share=share, dismissed=self._cancel)
+        )
+
+    def _cancel(self) -> None:
+        child, self._evaluation = self._evaluation, None
+        if child is not None:
+            child.leave()
+            child.kill()
+            self.said.emit(tr("Evaluation cancelled"), False)
+
+    def _on_evaluated(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
+        self._evaluation = None
+        self._offers.withdraw(_WORK)
+        if code == 0:
+            report = session / "evaluation" / REPORT
+            shown = self._show_file(report)
+            judged = tr(
+                "{answered} of {measured} pictures answered", answered=told.get("answered", 0), measured=told.get("measured", 0)
+            )
+            self.said.emit(
+                (
+                    tr("Evaluated: {judged}. Report opened: {report}", judged=judged, report=report)
+                    if shown
+                    else tr("Evaluated: {judged}. The report is: {report}", judged=judged, report=report)
+                ),
+                False,
+            )
+        elif "no finished annotation" in line:
+            self._needs_annotations(session, tr("No picture is measured to the end yet: both lines and a state, or can't tell"))
+        else:
+            self.said.emit(tr("Not evaluated: {why}", why=tr_text(line) or tr("exit code {code}", code=code)), True)
+
+    def _needs_annotations(self, session: Path, why: str) -> None:
+        measure = OfferButton(
+            tr("Annotate"), lambda: self.annotate(session), tr("{frames} pictures, evenly over the session", frames=FRAMES)
+        )
+        detail = tr("The annotation tool takes {frames} pictures, evenly over the session. Then evaluate again.", frames=FRAMES)
+        self._offers.offer(Offer(_OFFER, why, detail, (measure,)))
+
+    def _open(self, words: str, *arguments: str) -> None:
+        child = ChildProcess(command_of(*arguments), self, priority=0)
+        child.ended.connect(lambda code, line, one=child: self._on_closed(one, code, line))
+        self._windows.append(child)
+        self.said.emit(words, False)
+        child.start()
+
+    def _on_closed(self, child: ChildProcess, code: int, line: str) -> None:
+        self._windows.remove(child)
+        child.deleteLater()
+        if code != 0:
+            self.said.emit(tr_text(line) or tr("That window ended with exit code {code}", code=code), True)

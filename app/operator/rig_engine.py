@@ -1,0 +1,146 @@
+"""Opens a rig and puts engine and pilot on it; the window's thread runs what comes out."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+
+from core.config.models import Config, PerceptionConfig, SegmentationConfig
+from core.config.rig_file import as_calibrated
+from core.control.engine import Engine, Perceive
+from core.control.health import ModelReport
+from core.control.pilot import LeftOver, Pilot
+from core.control.policies import make_policy
+from core.perception.inference import cores
+from core.perception.model_file import ModelError
+from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
+from core.system import give_back, let_the_window_first
+from core.types import Frame, Point, Scene
+from hardware.rig import Rig, RigKind, open_rig
+from hardware.servos.bus_ipc import BusStatus
+from hardware.servos.servo_robot import ServoRobot
+
+if TYPE_CHECKING:
+    from hardware.twin.process import PrestartedProcesses
+
+
+class RigEngine(Engine):
+    """An engine that can also be asked for the newest status of the servo bus."""
+
+    def __init__(self, rig: Rig, perceive: Perceive, config: Config, model: ModelReport, left_over: LeftOver | None = None) -> None:
+        policy = make_policy(config.policy.name, config)
+        pilot = Pilot(rig.robot, policy, config, model, left_over=left_over) if rig.robot is not None else None
+        super().__init__(rig.camera, perceive, policy, rig.close, pilot, rig.robot)
+        self._servos = rig.robot if isinstance(rig.robot, ServoRobot) else None
+        self._network: Pipeline | None = None
+        self._knows_past = True
+        if pilot is not None and rig.kind is RigKind.SIM and left_over is None:
+            pilot.switch_on()  # there is nobody whom the twin could hurt
+
+    def use_network(self, network: Pipeline, *, knows_past: bool) -> None:
+        """What ``set_perception`` makes others from; without a past every frame stands by itself."""
+        self._network, self._knows_past = network, knows_past
+
+    def set_perception(self, config: PerceptionConfig) -> bool:
+        """Perceive under other thresholds from the next frame on, with the same head; from any thread. False without a network."""
+        if self._network is None:
+            return False
+        changed, running = self._network.with_config(config), self._perceive
+        if isinstance(running, Pipeline):
+            changed.follow_on(running)
+        self._perceive = changed if self._knows_past else changed.perceive_single
+        return True
+
+    def bus_status(self) -> BusStatus | None:
+        """None where there is no servo bus, and before its first status."""
+        return self._servos.bus_status() if self._servos is not None else None
+
+
+class EngineMaker:
+    """Opens rig and engine for a configuration, in the engine's thread, one at a time.
+
+    The network is loaded once and kept. So is what the operator has not acknowledged when a rig is closed: starting again is no
+    acknowledgement, or F5 would clear a latched STOP.
+
+    `ahead` is what ``start_ahead`` gave for the first rig.
+    """
+
+    def __init__(self, ahead: PrestartedProcesses | None = None) -> None:
+        self._ahead = ahead
+        self._pilot: Pilot | None = None
+        self._left_over: LeftOver | None = None
+        self._perceive: Perceive | None = None
+        self._loaded: PerceptionConfig | None = None
+
+    def __call__(self, config: Config) -> RigEngine:
+        """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame, with why."""
+        config = as_calibrated(config)
+        if self._pilot is not None:  # a rig that could not be opened, or that nobody drives, acknowledges nothing either
+            self._left_over, self._pilot = self._pilot.left_over, None
+            give_back()
+        with ExitStack() as undo, ThreadPoolExecutor(1, "network", let_the_window_first) as beside:
+            loading = beside.submit(self._perception, leaving_a_core(config.perception))  # both take seconds
+            ahead, self._ahead = self._ahead, None
+            rig = open_rig(config, ahead)
+            undo.callback(rig.close)
+            perceive, model = loading.result()
+            network = perceive if isinstance(perceive, Pipeline) else None
+            # Pictures that have nothing to do with each other have no past.
+            knows_past = config.rig.camera != "image_folder"
+            if network is not None and not knows_past:
+                perceive = network.perceive_single
+            engine = RigEngine(rig, perceive, config, model, self._left_over)
+            undo.pop_all()
+        if network is not None:
+            engine.use_network(network, knows_past=knows_past)
+        self._pilot = engine.pilot
+        return engine
+
+    def close(self) -> None:
+        """End what was started ahead, where no rig was opened with it."""
+        ahead, self._ahead = self._ahead, None
+        if ahead is not None:
+            ahead.end()
+
+    def _perception(self, config: PerceptionConfig) -> tuple[Perceive, ModelReport]:
+        if isinstance(self._perceive, Pipeline) and self._loaded is not None and _same_network(self._loaded, config):
+            self._perceive = self._perceive.with_config(config)
+            self._loaded = config
+        elif self._perceive is None or self._loaded != config:
+            try:
+                self._perceive = open_pipeline(config)
+                self._perceive.warm_up()
+                self._loaded = config
+            except ModelError as error:
+                # Not remembered: once the model is restored, starting the rig again is enough.
+                return NoPerception(str(error)), ModelReport(False, str(error))
+        assert self._perceive is not None
+        return self._perceive, ModelReport(True)
+
+    def perceive_again(self, frame: Frame, target: Point | None, config: PerceptionConfig) -> Scene | None:
+        """A frame by itself under other thresholds, for a rig that is closed; None without a network."""
+        if not isinstance(self._perceive, Pipeline):
+            return None
+        return self._perceive.with_config(config).perceive_single(frame, target)
+
+
+def _same_network(first: PerceptionConfig, second: PerceptionConfig) -> bool:
+    """Whether only thresholds differ: what the network itself is set to is the same."""
+    return _network_of(first.segmentation) == _network_of(second.segmentation)
+
+
+def _network_of(config: SegmentationConfig) -> SegmentationConfig:
+    return config.model_copy(update={"vessel_threshold": 0.5, "robot_threshold": 0.5})
+
+
+def leaving_a_core(config: PerceptionConfig) -> PerceptionConfig:
+    """With threads "all": one core less, for window, servos and camera.
+
+    Two threads of a network wait for each other; on two cores, with a twin beside them, they took 32 ms (p95 of the frame 68 ms)
+    where one takes 29 (51 ms).
+    """
+    if config.segmentation.threads:
+        return config
+    threads = max(1, cores() - 1)
+    return config.model_copy(update={"segmentation": config.segmentation.model_copy(update={"threads": threads})})

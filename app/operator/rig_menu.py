@@ -1,0 +1,314 @@
+"""The Rig menu: choose a rig or a camera, make a new rig, calibrate the present one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QTimer, Slot
+from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import QMenu
+
+from app.commands.rig import describe, quick_sight
+from app.operator.engine_thread import EnginePhase
+from app.operator.window import OperatorWindow
+from app.rig_wizard.model import MakeSight, OpenBench, RigWizardModel
+from app.rig_wizard.wizard import RigWizard
+from app.ui.actions import MenuEntry, add_menu
+from app.ui.i18n import mark, tr, tr_text
+from core.config.calibration import CalibrationConfig, PortConfig
+from core.config.models import Config
+from core.config.rig_file import ListedRig, RigFileError, calibration_of, find_rig, list_rigs, set_port, with_rig
+from core.control.modes import ARMED_MODES, Mode
+from core.types import Point
+from hardware.rig import RigKind, kind_of
+from hardware.servos.discovery import FoundCamera, search, with_camera
+
+_LEAVING = mark("Waiting for the wizard to give camera and servos back; where a driver hangs, start the program again")
+_SLOW_MS = 3000
+_LENT = mark("the rig wizard has camera and servos; the rig is opened again when it is closed")
+
+
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    """What the wizard is to begin with, once the rig is free."""
+
+    name: str
+    config: Config
+    known: CalibrationConfig | None
+    order: int = 0
+
+
+def _open_bench(config: Config, see: Callable) -> object:  # type: ignore[type-arg]
+    from hardware.calibration.bench import open_bench
+
+    return open_bench(config, see)
+
+
+class RigMenuController(QObject):
+    """Lives as long as the window.
+
+    Parameters
+    ----------
+    window : gets the menu; the chosen rig, of whatever kind, is opened in it.
+    open_bench, make_sight : what the wizard works with.
+    """
+
+    def __init__(
+        self,
+        window: OperatorWindow,
+        open_bench: OpenBench = _open_bench,  # type: ignore[assignment]
+        make_sight: MakeSight = quick_sight,
+    ) -> None:
+        super().__init__(window)
+        self._window = window
+        self._open_bench, self._make_sight = open_bench, make_sight
+        self._wish: _Wish | None = None
+        self._saved = ""
+        self.wizard: RigWizard | None = None
+        self._leaving: RigWizard | None = None
+        new = add_menu(
+            window,
+            tr("Ri&g"),
+            [
+                MenuEntry(tr("&New rig..."), self.new),
+                MenuEntry(tr("&Calibrate..."), self.calibrate),
+                MenuEntry(tr("Set the insertion &port..."), self.ask_port),
+                MenuEntry(tr("&Forget the insertion port"), self.forget_port),
+            ],
+        )[0]
+        self._menu = next(one for one in new.associatedObjects() if isinstance(one, QMenu))
+        self._menu.setToolTipsVisible(True)
+        self._group = QActionGroup(self)
+        self._rigs: list[QAction] = []
+        self._cameras = QMenu(tr("C&amera"), self._menu)
+        self._menu.addMenu(self._cameras)
+        self._menu.addSeparator()
+        self._menu.aboutToShow.connect(self.renew)
+        self._cameras.aboutToShow.connect(self._renew_cameras)
+        window.phase_changed.connect(self._on_phase)
+        window.stop_lent = self.stop
+        self.renew()
+
+    @property
+    def entries(self) -> list[str]:
+        """The rigs as they are listed."""
+        return [action.text() for action in self._rigs]
+
+    def stop(self) -> bool:
+        """STOP while the wizard has the servos; False: it moves none. From any thread."""
+        wizard = self.wizard or self._leaving
+        return wizard is not None and wizard.desk.stop()
+
+    @Slot()
+    def close(self) -> None:
+        """The program ends: the wizard gives back what it has, and opens no rig again."""
+        wizard, self.wizard, self._leaving = self.wizard or self._leaving, None, None
+        if wizard is not None:
+            wizard.finished.disconnect(self._on_finished)
+            wizard.desk.closed.disconnect(self._on_closed)
+            wizard.reject()
+            wizard.desk.wait_closed()
+
+    # ---- the menu
+
+    @Slot()
+    def renew(self) -> None:
+        """List the rigs anew: the wizard, or somebody with an editor, may have made one."""
+        for action in self._rigs:
+            self._menu.removeAction(action)
+            action.deleteLater()
+        self._rigs = [self._rig_action(rig) for rig in list_rigs()]
+
+    def _rig_action(self, rig: ListedRig) -> QAction:
+        action = QAction(rig.name.replace("&", "&&"), self._menu)
+        action.setCheckable(True)
+        action.setChecked(self._window.config.rig.file == str(rig.path))
+        action.setEnabled(rig.rig is not None)
+        action.setToolTip(describe(rig.rig) if rig.rig is not None else rig.problem)
+        action.triggered.connect(partial(self.choose, rig.name))
+        self._group.addAction(action)
+        self._menu.addAction(action)
+        return action
+
+    @Slot()
+    def _renew_cameras(self) -> None:
+        """Those that are plugged in; none is looked for while none may be chosen, since a look may hold the window up for so long
+        that the robot is disarmed."""
+        self._cameras.clear()
+        if why := self.hindrance():
+            self._cameras.addAction(tr("The rig stays as it is: {why}", why=why)).setEnabled(False)
+            return
+        for camera in search().cameras:
+            self._cameras.addAction(tr_text(camera.title).replace("&", "&&"), partial(self.choose_camera, camera))
+
+    # ---- choosing
+
+    def choose(self, name: str, _checked: bool = False) -> None:
+        """Open a rig by its name."""
+        if why := self.hindrance():
+            self._refuse(why)
+            return
+        try:
+            path, rig = find_rig(name)
+        except RigFileError as error:
+            self._refuse(str(error))
+            return
+        self._window.use_config(with_rig(self._window.config, rig, path))
+        self.renew()
+
+    def choose_camera(self, camera: FoundCamera) -> None:
+        """Another camera in the present rig; what was calibrated with the old one does not hold good for it."""
+        if why := self.hindrance():
+            self._refuse(why)
+            return
+        self._window.use_config(with_camera(self._window.config, camera))
+
+    def hindrance(self) -> str:
+        """Why neither rig nor camera may be taken away now; "" when they may."""
+        view = self._window.desk.view
+        if view is not None and view.mode in ARMED_MODES:
+            return tr("the robot is armed: disarm it first")
+        if view is not None and (view.mode is Mode.STOPPED or view.latched is not None):
+            return tr("a stop or fault is not acknowledged: acknowledge it first")
+        if view is not None and view.busy:
+            return tr("wait: {what}", what=tr_text(view.busy))
+        if self._window.recorder.status.recording:
+            return tr("a session is being recorded: end it first")
+        if self._leaving is not None:
+            return tr(_LEAVING)
+        return ""
+
+    def _refuse(self, why: str) -> None:
+        self._window.say(tr("The rig stays as it is: {why}", why=why), is_fault=True)
+        self.renew()
+
+    # ---- the insertion port
+
+    @Slot()
+    def ask_port(self) -> None:
+        """The next click into the picture says where the robot is inserted: that end of it is its tail."""
+        if self._rig_path() is not None:
+            self._window.ask_for_place(self._set_port)
+            self._window.say(tr("Click where the robot is inserted; Esc leaves it as it is"))
+
+    @Slot()
+    def forget_port(self) -> None:
+        """Nobody knows any more where the robot is inserted."""
+        self._keep_port(None, tr("The insertion port is forgotten"))
+
+    def _set_port(self, place: Point) -> None:
+        tick = self._window.last_tick
+        if tick is None:
+            return
+        width, height = tick.scene.source_size
+        x, y = (min(1.0, max(0.0, value / (size - 1))) for value, size in zip(place, (width, height), strict=True))
+        said = tr("The insertion port is at {x:.0f}, {y:.0f} px from now on", x=place[0], y=place[1])
+        self._keep_port(PortConfig(x_share=x, y_share=y), said)
+
+    def _keep_port(self, port: PortConfig | None, said: str) -> None:
+        path = self._rig_path()
+        if path is None:
+            return
+        try:
+            set_port(path, port)
+        except RigFileError as error:
+            self._refuse(str(error))
+            return
+        self._window.preview(self._window.config.perception)
+        self._window.say(said)
+
+    def _rig_path(self) -> Path | None:
+        """The rig file that keeps the port; None, said, when there is none or the robot is in use."""
+        file = self._window.config.rig.file
+        why = self.hindrance() if file is not None else tr("it has no file: save one first (menu Rig, New rig)")
+        if why:
+            self._refuse(why)
+        return Path(file) if file is not None and not why else None
+
+    # ---- the wizard
+
+    @Slot()
+    def new(self) -> None:
+        """Make a rig, beginning with what is configured."""
+        config = self._window.config
+        self._begin("", config.model_copy(update={"rig": config.rig.model_copy(update={"file": None})}), None)
+
+    @Slot()
+    def calibrate(self) -> None:
+        """Calibrate the present rig once more, or make one of it."""
+        config = self._window.read_rig_again(self._window.config)  # or the wizard would save the file's old servos once more
+        try:
+            known = calibration_of(config)
+        except RigFileError as error:
+            self._refuse(str(error))
+            return
+        self._begin(config.rig.name if config.rig.file is not None else "", config, known)
+
+    def _begin(self, name: str, config: Config, known: CalibrationConfig | None) -> None:
+        if self.wizard is not None or self._wish is not None:
+            return
+        why = self.hindrance()
+        if kind_of(config.rig) is RigKind.PLAYBACK:
+            why = tr("a recording is played: start with a camera or the twin")
+        if why:
+            self._refuse(why)
+            return
+        self._window.lend(_LENT)
+        self._wish = _Wish(name, config, known, self._window.orders)
+
+    @Slot(object)
+    def _on_phase(self, phase: EnginePhase) -> None:
+        wish = self._wish
+        if wish is None or phase is EnginePhase.STARTING:
+            return
+        if self._window.orders != wish.order:  # another order came in between: F5, a phantom, a model
+            self._wish = None
+            self._window.say(tr("The rig was opened anew meanwhile; ask for the wizard again"), is_fault=True)
+        elif self._is_lent(phase):  # and not what became of the rig before
+            self._wish = None
+            QTimer.singleShot(0, partial(self._show, wish))
+
+    def _is_lent(self, phase: EnginePhase) -> bool:
+        return phase is EnginePhase.FAULT and self._window.phase_message == _LENT
+
+    def _show(self, wish: _Wish) -> None:
+        desk = RigWizardModel(wish.config, wish.known, self._open_bench, self._make_sight)
+        wizard = RigWizard(desk, wish.name, self._window)
+        wizard.saved.connect(self._on_saved)
+        wizard.finished.connect(self._on_finished)
+        desk.closed.connect(self._on_closed)
+        self.wizard = wizard
+        wizard.show()
+
+    @Slot(str)
+    def _on_saved(self, name: str) -> None:
+        self._saved = name
+
+    @Slot(int)
+    def _on_finished(self, _result: int) -> None:
+        self._leaving, self.wizard = self.wizard, None
+        QTimer.singleShot(_SLOW_MS, self._tell_slow)
+
+    @Slot()
+    def _tell_slow(self) -> None:
+        if self._leaving is not None:
+            self._window.say(tr(_LEAVING), is_fault=True)
+
+    @Slot()
+    def _on_closed(self) -> None:
+        """Camera and servos are free: the rig is opened again."""
+        wizard, self._leaving = self._leaving, None
+        if wizard is not None:
+            wizard.deleteLater()
+        saved, self._saved = self._saved, ""
+        if saved:
+            self._window.say(tr("Rig {name} saved", name=saved))
+        if self._is_lent(self._window.phase):  # or somebody has opened a rig meanwhile, and may be recording or driving
+            if saved:
+                self.choose(saved)
+            else:
+                self._window.use_config(self._window.config)
+        self.renew()

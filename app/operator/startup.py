@@ -1,0 +1,508 @@
+"""Opens the operator window on a rig.
+
+What the operator window does beside driving: cut sessions, the steps after a session, checks before arming, models, crashes.
+
+When the tour is shown: once, at the first start on a real screen, and whenever it is asked for.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import logging
+import sys
+import time
+from enum import Enum
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import platformdirs
+from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QFileDialog, QMessageBox
+
+from app.annotator.sources import default_store
+from app.commands.perceive import VIDEO_ENDINGS
+from app.operator.engine_thread import EnginePhase
+from app.operator.models import ModelMenu
+from app.operator.preflight import PreflightModel
+from app.operator.recording import AfterSession, Declined, RecoveryController, open_file
+from app.operator.window import OperatorWindow
+from app.training.dialog import TrainingDialog, collect_from_file
+from app.ui.actions import MenuEntry, add_menu
+from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run
+from app.ui.i18n import mark, tr
+from app.ui.texts import OperatorStep
+from app.ui.window_base import check_display, make_application, run_until_closed
+from app.widgets.messages import Offer, OfferButton
+from app.widgets.preflight_list import PreflightList
+from core.config.files import settings_of_windows
+from core.config.models import Config, load_config, merge, sessions_folder
+from core.config.rig_file import RESERVED, find_rig, with_rig
+from core.control.modes import ARMED_MODES, Act, Mode
+from core.devices import DeviceError, UserError
+from core.files import ImageError, read_image
+from core.learning.dataset import IMAGE_ENDINGS
+from core.perception.compiled import loops
+from core.session.writer import RecordStatus
+from core.types import Reason
+from hardware.rig import RigKind, kind_of, start_ahead
+from hardware.twin.phantom import PHANTOM_TITLES
+
+if TYPE_CHECKING:
+    from app.operator.rig_engine import EngineMaker
+
+
+RIGS = RESERVED
+_REALSENSE_ENDING = ".bag"
+
+
+def window_config(
+    rig: str | None, config_path: Path | None, source: Path | None, own: dict[str, Any] | None = None
+) -> tuple[Config, RigKind]:
+    """The configuration of a rig or of a recorded source, and what the banner says; raises UserError.
+
+    Without `rig` it is the one that the configuration names; with it, the configuration says how that rig is set. `own` is what the
+    user has set, over the defaults.
+    """
+    if rig is not None and source is not None:
+        raise UserError("--source is looked at instead of a rig's camera: leave --rig out")
+    if source is None:
+        config = load_config(config_path, overrides=own)
+        if rig is not None:
+            config = _choose(config, rig) if rig in RIGS else _from_file(config, rig)
+    else:
+        try:
+            found = source.exists()
+        except OSError as error:
+            raise DeviceError(f"{source}: cannot be read ({error.strerror})") from None
+        if not found:
+            raise DeviceError(f"{source}: no such file or folder")
+        camera = "video_file" if source.suffix.lower() in VIDEO_ENDINGS else "image_folder"
+        camera = "realsense" if source.suffix.lower() == _REALSENSE_ENDING else camera
+        if camera == "image_folder" and source.is_file():
+            _check_picture(source)
+        chosen = {"rig": {"camera": camera, "robot": "none", "source": str(source), "file": None}}
+        config = load_config(config_path, overrides=merge(own or {}, chosen))
+    return config, kind_of(config.rig)
+
+
+def _check_picture(file: Path) -> None:
+    """A file that is no video by its name must be a picture: said here, and not in a window that would show nothing."""
+    try:
+        read_image(file)
+    except ImageError as error:
+        if file.suffix.lower() in IMAGE_ENDINGS:
+            raise
+        endings = ", ".join((*IMAGE_ENDINGS, *VIDEO_ENDINGS, _REALSENSE_ENDING))
+        raise UserError(f"{error}; --source takes a folder of pictures, or a file that ends in {endings}") from None
+
+
+def _from_file(config: Config, name: str) -> Config:
+    """A rig that the wizard has made; raises RigFileError."""
+    path, rig = find_rig(name)
+    return with_rig(config, rig, path)
+
+
+def _choose(config: Config, rig: str) -> Config:
+    """Another rig than the configuration's own: a real camera drives real servos when their port is known."""
+    if config.rig.camera == rig and config.rig.source is None:
+        return config
+    servos = config.servos
+    if rig == "twin":
+        robot, servos = "twin", servos.model_copy(update={"port": None})
+    else:
+        robot = "servos" if servos.port is not None else "none"
+    # Without its file: what was calibrated is another camera's.
+    chosen = config.rig.model_copy(update={"name": rig, "camera": rig, "robot": robot, "source": None, "file": None})
+    return config.model_copy(update={"rig": chosen, "servos": servos})
+
+
+def finish_loading() -> None:
+    """What a window needs is loaded before it is there, and stays, so that later collections of garbage are short.
+
+    Loading holds the interpreter's lock, and so stops the window, for up to a quarter of a second, mostly for such collections.
+    """
+    loops.load()
+    gc.freeze()
+
+
+def make_window(config: Config, kind: RigKind, maker: EngineMaker | None = None) -> OperatorWindow:
+    """The window, not shown yet. There must be an application."""
+    from app.operator.rig_engine import EngineMaker
+    from app.operator.window import OperatorWindow
+
+    return OperatorWindow(config, maker or EngineMaker(), kind, list(PHANTOM_TITLES.items()))
+
+
+def run_window(
+    rig: str | None, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False, tour: bool = False
+) -> int:
+    """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
+    check_display()
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    file = settings_of_windows(config_path)
+    is_own = config_path is None and not until_first_frame  # what is measured does not depend on who measures
+    config, kind = window_config(rig, config_path, source, file.data if is_own else None)
+    ahead = start_ahead(config)  # before all that is slow to load here
+
+    from app.operator.manual_drive import OperatorDevices
+    from app.operator.rig_engine import EngineMaker
+    from app.operator.rig_menu import RigMenuController
+    from app.settings.apply import SettingsController
+    from app.ui.crash_report import CrashWatch, state_folder
+    from app.ui.layout_state import LayoutState, Parts, overlay_switches
+
+    finish_loading()
+    application = make_application(config.window)
+    maker = EngineMaker(ahead)
+    window = make_window(config, kind, maker)
+    watch = CrashWatch(state_folder() / "crashes", lambda: window.config.model_dump(mode="json"))
+    watch.install()
+    side_work = WindowServices(window, state_folder(), watch)
+    settings = SettingsController(window, file, maker.perceive_again)
+    if not until_first_frame:
+        panels = window.panels
+        switches = overlay_switches(panels.overlay_bar)
+        LayoutState(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
+    rigs = RigMenuController(window)
+
+    def stop() -> None:  # whoever has the servos, or is about to
+        window.stop_opening()
+        window.stop_lent()
+
+    devices = OperatorDevices(config, lambda: window.pilot, window, stop)
+    devices.said.connect(window.say)
+    application.aboutToQuit.connect(settings.close)
+    application.aboutToQuit.connect(rigs.close)
+    application.aboutToQuit.connect(devices.close)
+    application.aboutToQuit.connect(side_work.close)
+    timers: list[QTimer] = []
+
+    def begin() -> None:
+        devices.start()
+        side_work.start()
+        settings.start()
+        if until_first_frame:
+            timers.append(_leave_after_first_frame(window))
+        else:
+            tour_at_start(window, asked=tour)
+
+    try:
+        code = run_until_closed(application, window, window.say, begin)
+    finally:
+        maker.close()
+    watch.remove()
+    return code
+
+
+def _leave_after_first_frame(window: OperatorWindow) -> QTimer:
+    """For ``benchmark``: say when the first understood frame was on screen, and close."""
+    from PySide6.QtCore import QTimer
+
+    timer = QTimer(window)
+
+    def look() -> None:
+        tick = window.shown_tick
+        if tick is not None and tick.scene.refusal is not None and tick.scene.refusal.reason is Reason.NO_MODEL:
+            timer.stop()
+            sys.stderr.write(f"error: {tick.scene.refusal}\n")
+            window.close()
+        elif tick is not None and tick.scene.path is not None:
+            timer.stop()
+            window.repaint()
+            sys.stdout.write(json.dumps({"first_frame_monotonic_s": time.monotonic()}) + "\n")
+            window.close()
+
+    timer.timeout.connect(look)
+    timer.start(5)
+    return timer
+
+
+_LOOK_AFTER_MS = 1500
+"""The window is open and its rig is being started; a search must not delay that."""
+_CRASH = "crash"
+
+
+class StopOutcome(Enum):
+    """What the STOP after an unforeseen error has reached, in the words of its box."""
+
+    SERVOS = mark("The servos were stopped")
+    OPENING = mark("The rig that is being opened starts stopped")
+    NOTHING = mark("No servos were in use, so there was nothing to stop")
+    UNKNOWN = mark("It is not certain that the servos were stopped: press Space")
+
+
+class WindowServices(QObject):
+    """Composes and wires; all work is done in threads and processes of their own.
+
+    Parameters
+    ----------
+    window : not started yet.
+    state : folder of what the program remembers between runs.
+    watch : is told what to do at an unforeseen error; installed and removed by its owner.
+    """
+
+    _crashed = Signal(object)
+    _stopped_again = Signal()
+
+    def __init__(self, window: OperatorWindow, state: Path, watch: CrashWatch | None = None) -> None:
+        super().__init__(window)
+        self._window, self._state = window, state
+        offers = window.panels.offers
+        self._offers = offers
+        self.after = AfterSession(offers, parent=self)
+        self.recovery = RecoveryController(
+            sessions_folder(window.config.record.folder), offers, Declined(state / "not_to_recover.json"), self
+        )
+        self.preflight = PreflightModel(lambda: window.config, lambda: window.desk.view, self)
+        self.checks = PreflightList(self.preflight, window, window.panels.mode_bar.stop)
+        self.models = ModelMenu(window, offers, self._model, self._against_another_model, self._cost_of_another_model, self.train)
+        self.training: TrainingDialog | None = None
+        self._saved: Path | None = None
+        self._is_recording = False
+        self._stopped = StopOutcome.UNKNOWN
+        self._wire()
+        self._add_menus()
+        if watch is not None:
+            watch.on_error, watch.on_report = self.make_safe, self._crashed.emit
+            # also from the window's own thread not before the slot that failed has returned
+            self._crashed.connect(self._show_crash, Qt.ConnectionType.QueuedConnection)
+            self._stopped_again.connect(self._tell_stopped_again, Qt.ConnectionType.QueuedConnection)
+
+    def _wire(self) -> None:
+        window = self._window
+        for part in (self.after, self.recovery, self.models):
+            part.said.connect(window.say)
+        self.recovery.recovered.connect(self.after.offer)
+        window.recorder.changed.connect(self._on_recording)
+        window.phase_changed.connect(self._on_phase)
+        window.may_take = self.preflight.may_take
+        self.preflight.asked.connect(self._on_not_armed)
+        self.checks.arm_asked.connect(partial(window.take, OperatorStep.ARM))
+        self.models.chosen.connect(self._use_model)
+
+    def _add_menus(self) -> None:
+        window = self._window
+        session = [
+            MenuEntry(tr("&Evaluate the newest session"), partial(self._with_newest, self.after.evaluate)),
+            MenuEntry(tr("&Annotate the newest session"), partial(self._with_newest, self.after.annotate)),
+            MenuEntry(tr("&Play the newest session"), partial(self._with_newest, self.after.play)),
+            MenuEntry(tr("&Open another session..."), self._choose_session),
+            None,
+            MenuEntry(tr("Look for &cut sessions"), partial(self.recovery.look, again=True)),
+        ]
+        add_menu(window, tr("&Session"), session)
+        add_menu(window, tr("&Robot"), [MenuEntry(tr("Chec&ks before driving..."), self.checks.open_list, ("F2",))])
+
+    def start(self) -> None:
+        """Look for what the last run left behind."""
+        QTimer.singleShot(_LOOK_AFTER_MS, self, self.recovery.look)
+        crash = crash_of_last_run(self._state / "crashes")
+        if crash is not None and crash.report is not None:
+            self._offer_report(tr("The last run of the program crashed"), crash)
+
+    def close(self) -> None:
+        """The window closes."""
+        for part in (self.recovery, self.preflight, self.after):
+            part.close()
+        self.checks.close()
+        if self.training is not None:
+            self.training.end()
+
+    # ---- sessions
+
+    def _on_recording(self, status: RecordStatus) -> None:
+        if status.recording and not self._is_recording:
+            self.after.withdraw()
+        self._is_recording = status.recording
+        if status.saved is not None and status.saved != self._saved:
+            self._saved = status.saved
+            if not status.recording:
+                self.after.offer(status.saved)
+
+    def _with_newest(self, step: object) -> None:
+        session = self.after.session
+        if session is None:
+            self._window.say(tr("No session yet: F9 records one"), False)
+        elif callable(step):
+            step(session)
+
+    def _choose_session(self) -> None:
+        folder = sessions_folder(self._window.config.record.folder)
+        dialog = QFileDialog(self._window, tr("A recorded session"), str(folder))
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+        dialog.fileSelected.connect(lambda path: self.after.offer(Path(path), tr("Session")))
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.show()  # not open(): the STOP button must stay within reach
+
+    # ---- before driving
+
+    def _on_phase(self, phase: EnginePhase) -> None:
+        if phase is EnginePhase.RUNNING:
+            self.preflight.begin_soon()
+
+    def _on_not_armed(self, line: str) -> None:
+        self._window.say(line, True)
+        self.checks.open_list()
+
+    # ---- models
+
+    def _model(self) -> str:
+        return self._window.config.perception.segmentation.model
+
+    def _against_another_model(self) -> str:
+        view = self._window.desk.view
+        if view is not None and view.mode in ARMED_MODES:
+            return tr("the program is armed; disarm first (Shift+F6)")
+        return ""
+
+    def _cost_of_another_model(self) -> str:
+        ends = tr(" The recording ends.") if self._is_recording else ""
+        return tr("The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}", ends=ends)
+
+    def _use_model(self, name: str) -> None:
+        config = self._window.config
+        segmentation = config.perception.segmentation.model_copy(update={"model": name})
+        perception = config.perception.model_copy(update={"segmentation": segmentation})
+        self._window.say(tr("Model {name} from now on, until the program ends", name=name), False)
+        self._window.use_config(config.model_copy(update={"perception": perception}))
+
+    def train(self) -> None:
+        """The training that is there already, or a new one on a chosen annotation file."""
+        if self.training is not None and self.training.is_busy:
+            self.training.show()
+            self.training.raise_()
+            return
+        session = self.after.session
+        start = default_store([session]).parent if session is not None else sessions_folder(self._window.config.record.folder)
+        dialog = QFileDialog(self._window, tr("Annotations to train on"), str(start), tr("Annotations (*.sqlite)"))
+        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+        dialog.fileSelected.connect(lambda path: self.open_training(Path(path)))
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.show()
+
+    def open_training(self, store: Path) -> None:
+        """The dialog for an annotation file."""
+        if self.training is not None:
+            self.training.end()
+            self.training.deleteLater()
+        self.training = TrainingDialog(partial(collect_from_file, store), str(store), self._window)
+        self.training.job.installed.connect(self._on_installed)
+        self.training.show()
+
+    def _on_installed(self, name: str) -> None:
+        self._window.say(tr("Model {name} is installed; choose it in the Model menu", name=name), False)
+
+    # ---- crashes
+
+    def make_safe(self, is_first: bool = True) -> None:
+        """After an unforeseen error, from any thread: the servos stop, and at the first one the recording ends as a whole session.
+
+        Later ones find an operator who was told and went on: they stop what he drives.
+        """
+        if is_first:
+            self._stopped = self._stop_whoever_moves()
+            self._window.recorder.stop("the program met an unforeseen error")
+        elif not self._is_at_rest() and self._stop_whoever_moves() is StopOutcome.SERVOS:
+            self._stopped_again.emit()
+
+    def _is_at_rest(self) -> bool:
+        """Whether the rig would not move anyway: an error may come with every repaint, and each STOP is told."""
+        pilot = self._window.pilot
+        return pilot is not None and (not pilot.can_move or pilot.view.mode is Mode.STOPPED)
+
+    def _stop_whoever_moves(self) -> StopOutcome:
+        """STOP to the rig's pilot, to a rig that is being opened, and to whoever the rig is lent to."""
+        window = self._window
+        before = window.pilot
+        if before is not None:
+            before.ask(Act.STOP)
+        is_opening, is_lent = window.stop_opening(), window.stop_lent()
+        pilot = window.pilot
+        if pilot is not None and pilot is not before:  # opened between the questions
+            pilot.ask(Act.STOP)
+        if before is not None or pilot is not None or is_lent:
+            return StopOutcome.SERVOS
+        return StopOutcome.OPENING if is_opening else StopOutcome.NOTHING
+
+    def _tell_stopped_again(self) -> None:
+        self._window.say(tr("Another unforeseen error: the servos were stopped again"), True)
+
+    def _show_crash(self, crash: Crash) -> None:
+        where = (
+            tr("The report is {report}", report=crash.report) if crash.report is not None else tr("The report could not be written")
+        )
+        box = QMessageBox(
+            QMessageBox.Icon.Critical,
+            tr("Unforeseen error"),
+            tr("The program met an error: {what}", what=crash.what),
+            parent=self._window,
+        )
+        box.setInformativeText(
+            tr(
+                "{stopped}. A recording that ran was ended and is whole.\n\n{where}.\n\nBest close the program "
+                "and start it again. Space is still STOP.",
+                stopped=tr(self._stopped.value),
+                where=where,
+            )
+        )
+        leave = box.addButton(tr("Close the program"), QMessageBox.ButtonRole.AcceptRole)
+        if crash.report is not None:
+            show = box.addButton(tr("Show the report"), QMessageBox.ButtonRole.ActionRole)
+            show.clicked.disconnect()  # it answers nothing: the box stays
+            show.clicked.connect(partial(open_file, crash.report))
+        box.addButton(tr("Go on"), QMessageBox.ButtonRole.RejectRole)
+        box.setDefaultButton(leave)
+        box.setModal(False)
+        box.buttonClicked.connect(lambda button: self._window.close() if button is leave else None)
+        box.finished.connect(box.deleteLater)
+        box.show()
+
+    def _offer_report(self, text: str, crash: Crash) -> None:
+        report = crash.report
+        assert report is not None
+        show = OfferButton(tr("Show the report"), partial(open_file, report), str(report))
+        self._offers.offer(
+            Offer(_CRASH, text, tr("{what}. The report: {report}", what=crash.what, report=report), (show,), is_fault=True)
+        )
+
+
+_SEEN = "tour/seen"
+_NO_SCREEN = ("offscreen", "minimal", "vnc")
+_LOOK_EVERY_MS = 300
+
+
+def _settings() -> QSettings:
+    folder = Path(platformdirs.user_config_dir("LumenPilot", appauthor=False))
+    return QSettings(str(folder / "seen.ini"), QSettings.Format.IniFormat)
+
+
+def was_seen() -> bool:
+    """Whether the tour was shown to this user, skipped or not."""
+    return str(_settings().value(_SEEN, "")).lower() == "true"
+
+
+def mark_seen() -> None:
+    """Not again by itself. A folder that cannot be written is no reason to disturb anybody."""
+    settings = _settings()
+    settings.setValue(_SEEN, True)
+    settings.sync()
+
+
+def tour_at_start(window: OperatorWindow, *, asked: bool) -> None:
+    """Begin it when the first picture is there: if it was `asked` for, or at the first start on a real screen."""
+    if not asked and (QGuiApplication.platformName() in _NO_SCREEN or was_seen()):
+        return
+    timer = QTimer(window)
+
+    def look() -> None:
+        if window.shown_tick is not None:
+            timer.stop()
+            mark_seen()
+            window.show_tour()
+
+    timer.timeout.connect(look)
+    timer.start(_LOOK_EVERY_MS)

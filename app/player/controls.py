@@ -1,0 +1,450 @@
+"""Playing: a slider in milliseconds, buttons for play and single frames, jumps with their chooser, speed, selection and clip.
+
+Where one types a time as the clock shows it: 1:23.4, or plain seconds.
+
+The events of a recorded session as a list; choosing one goes there.
+
+Beside the PLAYBACK banner: what was recorded, SIM or LIVE, on which rig, when.
+
+A line for a note that goes into a file.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Sequence
+
+from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QRectF, QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QValidator
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QListView,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QSlider,
+    QSpinBox,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.player.session_model import LISTED, MARK_LOOK, SPEEDS, JumpKind, clock_text, event_line
+from app.player.timeline import paint_mark
+from app.ui import theme
+from app.ui.i18n import tr, tr_text
+from app.widgets.basics import name_list
+from core.session.manifest import Event, Manifest
+
+_TYPED = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:[.,]\d*)?|[.,]\d+)(?: *(ms|s))?")
+_UNFINISHED = re.compile(r"[\d:., ms]*")
+_MS = {"ms": 1.0, "s": 1000.0, None: 1000.0}
+
+
+def typed_ms(text: str) -> int | None:
+    """Milliseconds of "1:02:03.5", "1:23.4", "83.4", "83.4 s" or "83400 ms", with a decimal point or comma; None for no time."""
+    found = _TYPED.fullmatch(text.strip())
+    if found is None or (found[2] is not None and found[4] == "ms"):
+        return None
+    minutes = 60 * int(found[1] or 0) + int(found[2] or 0)
+    return round(60_000 * minutes + float(found[3].replace(",", ".")) * _MS[found[4]])
+
+
+class TimeField(QSpinBox):
+    """Its value is in milliseconds. What is no time is not taken: leaving the field shows the value again."""
+
+    def textFromValue(self, value: int) -> str:
+        return clock_text(value / 1000)
+
+    def valueFromText(self, text: str) -> int:
+        found = typed_ms(text)
+        return self.value() if found is None else min(found, self.maximum())
+
+    def validate(self, text: str, position: int) -> object:
+        if typed_ms(text) is not None:
+            return QValidator.State.Acceptable, text, position
+        is_begun = _UNFINISHED.fullmatch(text) is not None
+        return (QValidator.State.Intermediate if is_begun else QValidator.State.Invalid), text, position
+
+    def fixup(self, text: str) -> str:
+        """What was typed is no time: the value as it is."""
+        return self.textFromValue(self.value())
+
+
+_BUTTON = 34
+_LONGEST_MS = 2**31 - 1
+"""A damaged row may be of another month; sliders end here."""
+_STYLE = """
+QPushButton { padding: 3px 6px; }
+QPushButton#play { background: @PLAYBACK; color: @INK; font-weight: 700; font-size: 16px; }
+QPushButton#play:focus { border: 2px solid @TEXT; }
+QSlider::groove:horizontal { height: 6px; background: @RAISED; border-radius: 3px; }
+QSlider::sub-page:horizontal { background: @PLAYBACK; border-radius: 3px; }
+QSlider::handle:horizontal { background: @TEXT; width: 14px; margin: -5px 0; border-radius: 7px; }
+QSlider::handle:horizontal:focus { background: @SKY; }
+QProgressBar { background: @RAISED; border: 1px solid @LINE; border-radius: 5px; text-align: center;
+    color: @TEXT; font-size: 12px; }
+QProgressBar::chunk { background: @LINE; border-radius: 4px; }
+"""
+
+
+class PlayerBar(QWidget):
+    """Shows and asks; it decides nothing. Times are milliseconds from the first row."""
+
+    play_asked = Signal()
+    step_asked = Signal(int)
+    jump_asked = Signal(int)
+    sought_ms = Signal(int)
+    speed_chosen = Signal(float)
+    jump_kind_chosen = Signal(object)
+    clip_asked = Signal()
+    cancel_asked = Signal()
+    note_asked = Signal()
+    snapshot_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        theme.set_sheet(self, _STYLE)
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setAccessibleName(tr("Position in milliseconds"))
+        self.slider.setSingleStep(100)
+        self.slider.setPageStep(1000)
+        self.position = TimeField()
+        self.position.setKeyboardTracking(False)
+        self.position.setButtonSymbols(TimeField.ButtonSymbols.NoButtons)
+        self.position.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.position.setFixedWidth(124)
+        self.position.setAccessibleName(tr("Go to a time"))
+        self.position.setToolTip(tr("Time from the first frame; type one as 1:23.4 or in seconds, and press Enter  (key T)"))
+        self.length = _label(tr("of {time}", time="0:00.000"))
+        self.frame = _label("")
+        self.frame.setObjectName("card_note")
+        self.play = self._button(
+            "\N{BLACK RIGHT-POINTING TRIANGLE}", tr("Play or pause  (Space)"), self.play_asked.emit, tr("Play")
+        )
+        self.play.setObjectName("play")
+        self.play.setFixedWidth(56)
+        self.kind = QComboBox()
+        for kind in JumpKind:
+            self.kind.addItem(tr(kind.value), kind)
+        name_list(self.kind, tr("What N and P jump to"))
+        self.kind.setToolTip(tr("What N and P jump to  (K: the next kind)"))
+        self.kind.setFixedWidth(142)
+        self.speed = QComboBox()
+        for speed in SPEEDS:
+            self.speed.addItem(f"{speed:g}\N{MULTIPLICATION SIGN}", speed)
+        name_list(self.speed, tr("Speed"))
+        self.speed.setToolTip(tr("Speed  ([ slower, ] faster)"))
+        self.speed.setFixedWidth(78)
+        self.clip = self._button(
+            tr("Clip"), tr("Save the selection as a video, without one the session  (E)"), self.clip_asked.emit
+        )
+        self.note = self._button(tr("Note"), tr("Add a note at this time  (M)"), self.note_asked.emit)
+        self.snapshot = self._button(tr("Snapshot"), tr("Save this picture  (S)"), self.snapshot_asked.emit)
+        self.progress = QProgressBar()
+        self.progress.setFixedHeight(24)
+        self.progress.setAccessibleName(tr("Clip being written"))
+        self.cancel = self._button(tr("Cancel"), tr("Stop writing the clip  (Esc)"), self.cancel_asked.emit, tr("Cancel the clip"))
+        self._lay_out()
+        self._wire()
+        self.show_progress(None)
+        self.show_length(0, 0)
+
+    def show_length(self, duration_ms: int, rows: int) -> None:
+        """How long the session is, as far as it is known."""
+        for field in (self.slider, self.position):
+            with QSignalBlocker(field):
+                field.setRange(0, min(max(0, duration_ms), _LONGEST_MS))
+        self._rows = rows
+        self.length.setText(tr("of {time}", time=clock_text(duration_ms / 1000)))
+
+    def show_position(self, time_ms: int, place: int) -> None:
+        """Where playing is. A number that is being typed stays."""
+        time_ms = min(time_ms, _LONGEST_MS)
+        with QSignalBlocker(self.slider):
+            self.slider.setValue(time_ms)
+        if not self.position.hasFocus():
+            with QSignalBlocker(self.position):
+                self.position.setValue(time_ms)
+        self.frame.setText(tr("frame {place} of {count}", place=place + 1, count=self._rows) if self._rows else tr("no frames"))
+
+    def abandon(self) -> None:
+        """Forget a time that was typed and not confirmed; leaving the field would count it otherwise."""
+        self.position.lineEdit().setText(self.position.textFromValue(self.position.value()))
+
+    def show_playing(self, on: bool) -> None:
+        self.play.setText("\N{DOUBLE VERTICAL BAR}" if on else "\N{BLACK RIGHT-POINTING TRIANGLE}")
+        self.play.setAccessibleName(tr("Pause") if on else tr("Play"))
+
+    def show_speed(self, speed: float) -> None:
+        with QSignalBlocker(self.speed):
+            self.speed.setCurrentIndex(self.speed.findData(speed))
+
+    def show_kind(self, kind: JumpKind) -> None:
+        with QSignalBlocker(self.kind):
+            self.kind.setCurrentIndex(self.kind.findData(kind))
+
+    def show_selection(self, length_s: float | None) -> None:
+        """How long the clip will be."""
+        self.clip.setText(tr("Clip") if length_s is None else tr("Clip {seconds:.1f} s", seconds=length_s))
+
+    def show_progress(self, share: float | None) -> None:
+        """Of the clip that is being written; None: none is."""
+        for widget in (self.progress, self.cancel):
+            widget.setVisible(share is not None)
+        self.clip.setVisible(share is None)
+        if share is not None:
+            self.progress.setValue(round(100 * share))
+
+    def _button(self, text: str, tip: str, slot: object, name: str = "") -> QPushButton:
+        button = QPushButton(text)
+        button.setToolTip(tip)
+        button.setAccessibleName(name or tip.partition("  (")[0])
+        button.setFixedWidth(max(_BUTTON, QFontMetrics(theme.font(14)).horizontalAdvance(text) + 18))
+        button.clicked.connect(slot)
+        return button
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout()
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(5)
+        before = self._button("\N{LEFTWARDS ARROW}", tr("One frame back  (\N{LEFTWARDS ARROW})"), lambda: self.step_asked.emit(-1))
+        after = self._button("\N{RIGHTWARDS ARROW}", tr("One frame on  (\N{RIGHTWARDS ARROW})"), lambda: self.step_asked.emit(1))
+        previous = self._button("P", tr("Previous of the kind beside  (P)"), lambda: self.jump_asked.emit(-1))
+        following = self._button("N", tr("Next of the kind beside  (N)"), lambda: self.jump_asked.emit(1))
+        for step in (before, self.play, after):
+            row.addWidget(step)
+        row.addSpacing(6)
+        for jump in (previous, self.kind, following):
+            row.addWidget(jump)
+        row.addSpacing(6)
+        row.addWidget(self.speed)
+        row.addStretch(1)
+        for widget in (self.progress, self.cancel, self.clip, self.note, self.snapshot):
+            row.addWidget(widget)
+        top = QHBoxLayout()
+        top.setContentsMargins(0, 0, 0, 0)
+        top.setSpacing(8)
+        top.addWidget(self.slider, 1)
+        top.addWidget(self.position)
+        top.addWidget(self.length)
+        top.addWidget(self.frame)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(5)
+        column.addLayout(top)
+        column.addLayout(row)
+        self.clip.setFixedWidth(QFontMetrics(theme.font(14)).horizontalAdvance("Clip 0000.0 s") + 18)
+        self.frame.setMinimumWidth(150)
+        self.frame.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+
+    def _wire(self) -> None:
+        self.slider.valueChanged.connect(self.sought_ms)
+        self.position.valueChanged.connect(self.sought_ms)
+        self.speed.activated.connect(lambda _index: self.speed_chosen.emit(self.speed.currentData()))
+        self.kind.activated.connect(lambda _index: self.jump_kind_chosen.emit(self.kind.currentData()))
+
+
+def _label(text: str) -> QLabel:
+    label = QLabel(text)
+    theme.set_sheet(label, "color: @TEXT_DIM;")
+    return label
+
+
+_ROW_HEIGHT = 24
+_TIME_WIDTH = 86
+
+_Index = QModelIndex | QPersistentModelIndex
+
+
+class SessionEvents(QListView):
+    """By time. Click or Enter goes to an event: ``chosen`` carries it."""
+
+    chosen = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._model = _Model()
+        self.setModel(self._model)
+        self.setItemDelegate(_Painter(self))
+        self.setUniformItemSizes(True)
+        self.setFrameShape(QListView.Shape.NoFrame)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setMinimumHeight(2 * _ROW_HEIGHT)
+        self.setAccessibleName(tr("Events of the session"))
+        self.clicked.connect(self._choose)
+        self.activated.connect(self._choose)
+
+    @property
+    def lines(self) -> list[str]:
+        """What is listed."""
+        return [self._model.line(event) for event in self._model.events]
+
+    def show_events(self, events: Sequence[Event], first_s: float) -> None:
+        """All events; times are told from the first row."""
+        self._model.show(tuple(event for event in events if event.kind in LISTED), first_s)
+
+    def show_time(self, time_s: float) -> None:
+        """Mark the last one that had happened at a time of the recorded clock."""
+        row = bisect_right(self._model.events, time_s + 1e-6, key=lambda event: event.time_s) - 1
+        if row != self.currentIndex().row() and not self.hasFocus():
+            self.setCurrentIndex(self._model.index(row) if row >= 0 else QModelIndex())
+
+    def _choose(self, index: QModelIndex) -> None:
+        self.chosen.emit(self._model.events[index.row()])
+
+
+class _Model(QAbstractListModel):
+    def __init__(self) -> None:
+        super().__init__()
+        self.events: tuple[Event, ...] = ()
+        self._first_s = 0.0
+
+    def show(self, events: tuple[Event, ...], first_s: float) -> None:
+        self.beginResetModel()
+        self.events, self._first_s = events, first_s
+        self.endResetModel()
+
+    def time_text(self, event: Event) -> str:
+        return clock_text(event.time_s - self._first_s)
+
+    def line(self, event: Event) -> str:
+        return f"{self.time_text(event)}  {event_line(event)}"
+
+    def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default, never changed
+        return 0 if parent.isValid() else len(self.events)
+
+    def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        event = self.events[index.row()]
+        if role == Qt.ItemDataRole.UserRole:
+            return event
+        if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole):
+            return self.line(event)
+        return event_line(event) if role == Qt.ItemDataRole.ToolTipRole else None
+
+
+class _Painter(QStyledItemDelegate):
+    """Time, mark, text."""
+
+    def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:
+        return QSize(100, _ROW_HEIGHT)
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
+        model, event = index.model(), index.data(Qt.ItemDataRole.UserRole)
+        assert isinstance(model, _Model)
+        room = QRectF(option.rect)  # type: ignore[attr-defined]
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if option.state & QStyle.StateFlag.State_Selected:  # type: ignore[attr-defined]
+            painter.fillRect(room, QColor(theme.RAISED))
+        painter.setFont(theme.font(12))
+        painter.setPen(QColor(theme.TEXT_FAINT))
+        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(QRectF(room.left(), room.top(), _TIME_WIDTH - 14, room.height()), right, model.time_text(event))
+        look = MARK_LOOK.get(event.kind)
+        if look is not None:
+            middle = room.topLeft()
+            middle.setX(middle.x() + _TIME_WIDTH + 2)
+            middle.setY(room.center().y())
+            paint_mark(painter, middle, look.shape, look.colour)
+        text_font = theme.font(13)
+        painter.setFont(text_font)
+        painter.setPen(QColor(theme.TEXT))
+        left = room.left() + _TIME_WIDTH + 16
+        width = room.right() - left - 4
+        text = theme.elide(text_font, event_line(event), int(width))
+        painter.drawText(QRectF(left, room.top(), width, room.height()), Qt.AlignmentFlag.AlignVCenter, text)
+        painter.restore()
+
+
+_KNOWN = ("SIM", "LIVE", "PLAYBACK")
+_HEIGHT = 34
+
+
+class RecordedPlate(QWidget):
+    """An outlined word, never filled as the banner of something that happens now."""
+
+    def __init__(self, manifest: Manifest | None, name: str) -> None:
+        super().__init__()
+        self._kind = manifest.kind if manifest is not None else "UNKNOWN"
+        self._manifest, self._name = manifest, name
+        self._note = ""
+        self.setFixedHeight(_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.show_written(False)
+
+    def show_written(self, is_written: bool) -> None:
+        """Whether it is still being recorded: what has not ended yet was not cut off."""
+        self._note = _note(self._manifest, self._name, is_written=is_written)
+        self.setAccessibleName(self.text)
+        self.setToolTip(self.text)
+        self.update()
+
+    @property
+    def text(self) -> str:
+        """All that is said."""
+        return tr("recorded {kind}, {note}", kind=tr_text(self._kind), note=self._note)
+
+    def sizeHint(self) -> QSize:
+        return QSize(420, _HEIGHT)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colour = QColor(theme.of(self._kind if self._kind in _KNOWN else "FAULT"))
+        word, word_font = tr("recorded {kind}", kind=tr_text(self._kind)), theme.bold(14)
+        plate = QRectF(1, 3, QFontMetrics(word_font).horizontalAdvance(word) + 24, _HEIGHT - 6)
+        pen = QPen(colour, 2, Qt.PenStyle.DashLine)
+        painter.setPen(pen)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawRoundedRect(plate, 6, 6)
+        painter.setFont(word_font)
+        painter.setPen(colour)
+        painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, word)
+        note_font = theme.font(theme.Size.BODY)
+        painter.setFont(note_font)
+        painter.setPen(QColor(theme.TEXT_DIM))
+        left = plate.right() + 12
+        room = QRectF(left, 0, max(0.0, self.width() - left), self.height())
+        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, theme.elide(note_font, self._note, int(room.width())))
+        painter.end()
+
+
+def _note(manifest: Manifest | None, name: str, *, is_written: bool) -> str:
+    if manifest is None:
+        return tr("{name}: its manifest is damaged", name=name)
+    started = manifest.started_utc.astimezone()
+    how = "" if manifest.closed else tr(", being recorded") if is_written else tr(", cut off")
+    how += tr(", recovered") if manifest.recovered is not None else ""
+    return tr("{started:%Y-%m-%d %H:%M:%S}, rig {name}{how}", started=started, name=manifest.rig or tr("unknown"), how=how)
+
+
+_MOST_LETTERS = 2000
+
+
+class NoteField(QLineEdit):
+    """`hint` stands in it while it is empty; `edge` is the role of its frame's colour, which the focus makes bright."""
+
+    def __init__(self, hint: str, edge: str = "LINE") -> None:
+        super().__init__()
+        self.setPlaceholderText(hint)
+        self.setAccessibleName(tr("Note"))
+        self.setMaxLength(_MOST_LETTERS)
+        theme.set_sheet(
+            self,
+            f"QLineEdit {{ background: @PANEL; color: @TEXT; border: 1px solid @{edge}; border-radius: 6px; padding: 5px 10px; }}"
+            " QLineEdit:focus { border-color: @SKY; }",
+        )
+
+    @property
+    def kept_text(self) -> str:
+        """What is written, as a file can hold it: half of a surrogate pair, pasted, becomes a question mark."""
+        return self.text().encode("utf-8", errors="replace").decode("utf-8").strip()

@@ -1,0 +1,300 @@
+"""What all pages of the rig wizard have in common: a heading, what to do, and the wizard's desk.
+
+The camera's picture in the rig wizard, with what was found drawn over it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.rig_wizard.model import RigWizardModel
+from app.ui import theme
+from app.ui.i18n import tr, tr_text
+from core.types import Image, Point
+
+_ARROW_HEAD_PX = 11.0
+
+
+@dataclass(frozen=True, slots=True)
+class Cross:
+    """A place of the picture."""
+
+    at: Point
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """A direction in the picture."""
+
+    start: Point
+    end: Point
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredLine:
+    """A length in the picture."""
+
+    start: Point
+    end: Point
+
+
+Shape = Cross | Arrow | MeasuredLine
+
+
+class WizardPicture(QWidget):
+    """Shows one picture as large as there is room. ``clicked`` carries a place of the picture, in its own pixels."""
+
+    clicked = Signal(float, float)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._image: QImage | None = None
+        self._shapes: tuple[Shape, ...] = ()
+        self._text = ""
+        self.setMinimumSize(360, 270)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAccessibleName(tr("Camera picture"))
+
+    def sizeHint(self) -> QSize:
+        return QSize(560, 420)
+
+    @property
+    def text(self) -> str:
+        """What stands in the place of a picture."""
+        return self._text
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        return self._shapes
+
+    def show_image(self, image: Image) -> None:
+        """Another picture, (H, W, 3)."""
+        height, width = image.shape[:2]
+        self._image = QImage(image.tobytes(), width, height, 3 * width, QImage.Format.Format_RGB888)
+        self.update()
+
+    def show_shapes(self, shapes: Sequence[Shape]) -> None:
+        """What is drawn over the picture."""
+        self._shapes = tuple(shapes)
+        self.setAccessibleDescription(
+            ", ".join(shape.text for shape in shapes if not isinstance(shape, MeasuredLine) and shape.text)
+        )
+        self.update()
+
+    def show_text(self, text: str) -> None:
+        """No picture, and why."""
+        self._image, self._text = None, text
+        self.update()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if self._image is None or event.button() is not Qt.MouseButton.LeftButton:
+            return
+        box, zoom = self._place(self._image)
+        x, y = (event.position().x() - box.left()) / zoom - 0.5, (event.position().y() - box.top()) / zoom - 0.5
+        if -0.5 <= x < self._image.width() - 0.5 and -0.5 <= y < self._image.height() - 0.5:
+            self.clicked.emit(x, y)
+
+    def on_screen(self, point: Point) -> Point:
+        """A place of the picture -> of the widget."""
+        if self._image is None:
+            return 0.0, 0.0
+        box, zoom = self._place(self._image)
+        return box.left() + (point[0] + 0.5) * zoom, box.top() + (point[1] + 0.5) * zoom
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        painter.fillRect(self.rect(), QColor(theme.ON_PICTURE.INK))
+        if self._image is None:
+            painter.setPen(QColor(theme.ON_PICTURE.TEXT_DIM))
+            painter.setFont(theme.font(theme.Size.BODY))
+            flags = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
+            painter.drawText(QRectF(self.rect()).adjusted(24, 24, -24, -24), flags, self._text)
+        else:
+            painter.drawImage(self._place(self._image)[0], self._image)
+            for shape in self._shapes:
+                self._paint_shape(painter, shape)
+        painter.end()
+
+    def _place(self, image: QImage) -> tuple[QRectF, float]:
+        zoom = min(self.width() / image.width(), self.height() / image.height())
+        width, height = image.width() * zoom, image.height() * zoom
+        return QRectF((self.width() - width) / 2, (self.height() - height) / 2, width, height), zoom
+
+    def _paint_shape(self, painter: QPainter, shape: Shape) -> None:
+        colour = QColor(theme.ON_PICTURE.TARGET if isinstance(shape, Cross) else theme.ON_PICTURE.ROBOT_VECTOR)
+        for pen in (QPen(QColor(0, 0, 0, 150), 4.0), QPen(colour, 2.0)):
+            painter.setPen(pen)
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            if isinstance(shape, Cross):
+                at = QPointF(*self.on_screen(shape.at))
+                painter.drawLine(at - QPointF(4, 0), at + QPointF(4, 0))
+                painter.drawLine(at - QPointF(0, 4), at + QPointF(0, 4))
+                continue
+            start, end = QPointF(*self.on_screen(shape.start)), QPointF(*self.on_screen(shape.end))
+            painter.drawLine(start, end)
+            if isinstance(shape, Arrow):
+                painter.drawPolyline(_arrow_head(start, end))
+        if not isinstance(shape, MeasuredLine) and shape.text:
+            self._paint_text(painter, shape, colour)
+
+    def _paint_text(self, painter: QPainter, shape: Cross | Arrow, colour: QColor) -> None:
+        painter.setFont(theme.semi_bold(theme.Size.BODY))
+        at = QPointF(*self.on_screen(shape.at if isinstance(shape, Cross) else shape.end))
+        away = QPointF(8.0, -6.0)
+        if isinstance(shape, Arrow):
+            way = at - QPointF(*self.on_screen(shape.start))
+            away = QPointF(8.0 if way.x() >= -4.0 else -52.0, 16.0 if way.y() > 4.0 else -6.0)
+        place = QPointF(
+            max(4.0, min(at.x() + away.x(), self.width() - 60.0)), max(16.0, min(at.y() + away.y(), self.height() - 6.0))
+        )
+        painter.setPen(QColor(0, 0, 0, 200))
+        painter.drawText(place + QPointF(1, 1), shape.text)
+        painter.setPen(colour)
+        painter.drawText(place, shape.text)
+
+
+def _arrow_head(start: QPointF, end: QPointF) -> QPolygonF:
+    angle = math.atan2(end.y() - start.y(), end.x() - start.x())
+    sides = [
+        end - QPointF(math.cos(angle + turn) * _ARROW_HEAD_PX, math.sin(angle + turn) * _ARROW_HEAD_PX) for turn in (0.5, -0.5)
+    ]
+    return QPolygonF([sides[0], end, sides[1]])
+
+
+_TEXT_PX = 400
+"""A page's text is a little wider."""
+_HEAD_PX = 28
+
+
+class WizardPage(QWidget):
+    """One step. ``name`` stands in the list of steps; the page adds its controls to ``column``."""
+
+    name = ""
+    hint = ""
+    needs_servos = False
+
+    def __init__(self, desk: RigWizardModel, picture: WizardPicture) -> None:
+        super().__init__()
+        self.desk, self.picture = desk, picture
+        self.still: Image | None = None
+        """Shown instead of the living picture; None: that."""
+        self.main: QPushButton | None = None
+        """What the page is for; it stands out until that is done."""
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(0, 0, 0, 0)
+        self.column.setSpacing(theme.GAP)
+        title = QLabel(tr(self.name))
+        title.setFont(theme.semi_bold(18))
+        self.column.addWidget(title)
+        self.column.addWidget(note(tr(self.hint)))
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the step has been done: it gets a tick, and Next is not called Skip."""
+        return False
+
+    @property
+    def may_leave(self) -> bool:
+        """Whether there is a next step."""
+        return True
+
+    def enter(self) -> None:
+        """The page comes to the front."""
+        self.refresh()
+
+    def leave(self) -> None:
+        """Another page comes to the front."""
+
+    def refresh(self) -> None:
+        """Show what is known now; called whenever a job begins or ends."""
+
+    def shapes(self) -> Sequence[Shape]:
+        """What is drawn over the picture."""
+        return ()
+
+    def click(self, x: float, y: float) -> None:
+        """A place of the picture was clicked."""
+
+
+def note(text: str) -> QLabel:
+    """A text of several lines."""
+    label = QLabel(text)
+    label.setWordWrap(True)
+    theme.set_sheet(label, "color: @TEXT_DIM;")
+    label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    return label
+
+
+def tell(label: QLabel, text: str) -> None:
+    """Another text for a note, with the room for all its lines: a table beside it would take that otherwise."""
+    label.setText(tr_text(text))
+    label.setMinimumHeight(label.heightForWidth(_TEXT_PX) if text else 0)
+
+
+def button(text: str, slot: Callable[[], object], tip: str = "") -> QPushButton:
+    made = QPushButton(text)
+    made.setToolTip(tip)
+    made.setAutoDefault(False)
+    made.clicked.connect(lambda _checked=False: slot())
+    return made
+
+
+def mark_main(which: QPushButton, is_main: bool) -> None:
+    """Whether a button is what comes next."""
+    name = "main_button" if is_main else ""
+    if which.objectName() != name:
+        which.setObjectName(name)
+        which.style().unpolish(which)
+        which.style().polish(which)
+
+
+def table(headings: Sequence[str], rows: int, name: str) -> QTableWidget:
+    """An empty table of texts; the last column takes what room is left."""
+    made = QTableWidget(rows, len(headings))
+    made.setHorizontalHeaderLabels(list(headings))
+    made.verticalHeader().hide()
+    made.setAccessibleName(name)
+    made.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+    made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+    made.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+    made.setTabKeyNavigation(False)
+    made.horizontalHeader().setFixedHeight(_HEAD_PX)
+    made.horizontalHeader().setHighlightSections(False)
+    made.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+    made.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+    made.horizontalHeader().setStretchLastSection(True)
+    return made
+
+
+def fit(where: QTableWidget) -> None:
+    """As high as its rows, so that what follows stands beneath them."""
+    rows = where.rowCount() * where.verticalHeader().defaultSectionSize()
+    where.setFixedHeight(_HEAD_PX + rows + 2 * max(1, where.frameWidth()))
+    where.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+
+
+def put(where: QTableWidget, row: int, column: int, text: str) -> None:
+    """A text into a cell, which also is its tool tip."""
+    item = QTableWidgetItem(text)
+    item.setToolTip(text)
+    where.setItem(row, column, item)

@@ -1,0 +1,379 @@
+"""The rig wizard: camera, scale and lens, servos, zero, steering, one page each, with STOP always in reach.
+
+Last page of the rig wizard: what was found, what was left out, and what to keep in mind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QPointF, QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QCloseEvent, QColor, QIcon, QKeyEvent, QPainter, QPen, QPixmap, QPolygonF
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QComboBox,
+    QDialog,
+    QFrame,
+    QHBoxLayout,
+    QLineEdit,
+    QListWidget,
+    QListWidgetItem,
+    QPlainTextEdit,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.commands.rig import calibration_lines, describe
+from app.operator.manual_drive import StopKeys
+from app.rig_wizard.camera_pages import CameraPage, ScalePage
+from app.rig_wizard.model import RigWizardModel
+from app.rig_wizard.pages_base import WizardPage, WizardPicture, button, mark_main, note
+from app.rig_wizard.servo_pages import IdentifyPage, PortPage, SteeringPage, ZeroPage
+from app.ui import theme
+from app.ui.i18n import mark, tr, tr_text
+from app.ui.window_base import is_asked_to_end
+from app.widgets.basics import Card, StillWheel, takes_enter
+from app.widgets.messages import QuestionStrip
+from app.widgets.mode_bar import StopButton
+from core.config.rig_file import RigFile, RigFileError
+
+
+class SummaryPage(WizardPage):
+    """Shows the rig as it will be saved; ``rig_name`` tells its name."""
+
+    name = mark("Save")
+    hint = mark("This is what will be saved. A step that was left out can be done later: menu Rig, Calibrate.")
+
+    def __init__(self, desk: RigWizardModel, picture: WizardPicture, rig_name: Callable[[], str]) -> None:
+        super().__init__(desk, picture)
+        self._rig_name = rig_name
+        self.text = QPlainTextEdit()
+        self.text.setReadOnly(True)
+        self.text.setFrameShape(QFrame.Shape.NoFrame)
+        self.text.setAccessibleName(tr("The rig as it will be saved"))
+        self.text.setTabChangesFocus(True)
+        self.column.addWidget(self.text, 1)
+
+    def rig(self) -> RigFile | None:
+        """The rig; None before a camera is open. Raises RigFileError."""
+        draft = self.desk.draft
+        return draft.rig_file(self._rig_name()) if draft is not None else None
+
+    @property
+    def is_done(self) -> bool:
+        return False
+
+    def refresh(self) -> None:
+        try:
+            rig = self.rig()
+        except RigFileError as error:
+            self.text.setPlainText(str(error))
+            return
+        draft = self.desk.draft
+        if rig is None or draft is None:
+            return
+        lines = [
+            f"{rig.name}: {describe(rig)}",
+            "",
+            *calibration_lines(rig),
+            "",
+            *dict.fromkeys(tr_text(line) for line in draft.notes),
+        ]
+        if rig.robot != "none":
+            lines.append(tr("Zero is lost whenever the servos are switched off: zero them again then, with slack wires."))
+        self.text.setPlainText("\n".join(lines))
+
+
+_SIZE = QSize(1240, 660)
+_FRAME = QSize(16, 56)
+"""Room that the desktop needs for title bar and borders."""
+_STEPS_PX, _CONTROLS_PX = 190, 450
+_STEP_LINE_PX, _SIGN_PX = 30, 16
+_TICK = QPolygonF([QPointF(2.5, 8.5), QPointF(6.5, 12.5), QPointF(13.5, 4.0)])
+_LOOK_EVERY_MS = 50
+_FIELDS = (QAbstractSpinBox, QLineEdit, QComboBox)
+"""Where something is typed or chosen: Esc leaves them, and not the dialog."""
+
+
+class RigWizard(QDialog):
+    """Makes or calibrates a rig. ``saved`` carries its name.
+
+    Next leads through the pages in their order, and is called Skip on a page whose step was not done. Space is STOP, except in a
+    text field while no job runs. Whoever leaves with something found and not saved is asked; ``reject`` asks nobody.
+
+    Parameters
+    ----------
+    desk : closed when the dialog is.
+    rig_name : empty for a new rig.
+    """
+
+    saved = Signal(str)
+
+    def __init__(self, desk: RigWizardModel, rig_name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.desk = desk
+        desk.setParent(self)
+        self.setWindowTitle(tr("Calibrate {name}", name=rig_name) if rig_name else tr("New rig"))
+        self.setModal(True)
+        theme.set_sheet(self, theme.FORM_SHEET)
+        self.resize(_SIZE.boundedTo(self.screen().availableGeometry().size() - _FRAME))
+        self.picture = WizardPicture()
+        self.picture.show_text(tr("No camera yet"))
+        self.camera_page = CameraPage(desk, self.picture, rig_name)
+        self.camera_page.ask = self._ask
+        self.scale_page = ScalePage(desk, self.picture)
+        self.port_page = PortPage(desk, self.picture)
+        self.identify_page = IdentifyPage(desk, self.picture)
+        self.zero_page = ZeroPage(desk, self.picture)
+        self.steering_page = SteeringPage(desk, self.picture)
+        self.summary_page = SummaryPage(desk, self.picture, lambda: self.camera_page.rig_name)
+        self.pages: tuple[WizardPage, ...] = (
+            self.camera_page,
+            self.scale_page,
+            self.port_page,
+            self.identify_page,
+            self.zero_page,
+            self.steering_page,
+            self.summary_page,
+        )
+        self.steps = QListWidget()
+        self.stack = QStackedWidget()
+        self.stop_button = StopButton()
+        self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
+        self.cancel_button = button(tr("Cancel"), self.ask_to_leave)
+        self.line = note("")
+        self.question = QuestionStrip()
+        self.question.closed.connect(self._on_answered)
+        self._lay_out()
+        StillWheel(self)
+        self.stop_button.asked.connect(desk.stop)
+        self._stop_keys = StopKeys(self, lambda: desk.is_busy, desk.stop)  # servos are open while a job runs only
+        desk.said.connect(self._say)
+        desk.failed.connect(lambda line: self._say(line, is_fault=True))
+        desk.changed.connect(self._refresh)
+        self.picture.clicked.connect(self._on_picture_clicked)
+        self._timer = QTimer(self)
+        self._timer.setInterval(_LOOK_EVERY_MS)
+        self._timer.timeout.connect(self._look)
+        self._timer.start()
+        self._shown_frame: object = None
+        self._go(0)
+
+    @property
+    def page(self) -> WizardPage:
+        """The page in front."""
+        return self.pages[self.stack.currentIndex()]
+
+    @property
+    def message(self) -> str:
+        """The line at the foot."""
+        return self.line.text()
+
+    def next(self) -> None:
+        """The next page; on the last one: save."""
+        if self.page is self.summary_page:
+            self._save()
+        elif self.page.may_leave and not self.desk.is_busy:
+            self._go(self.stack.currentIndex() + 1)
+
+    def back(self) -> None:
+        """The page before."""
+        if self.stack.currentIndex() > 0 and not self.desk.is_busy:
+            self._go(self.stack.currentIndex() - 1)
+
+    def stop(self) -> None:
+        """STOP, from whoever has one: key, button, pedal, gamepad."""
+        self.desk.stop()
+
+    def ask_to_leave(self) -> None:
+        """Close the dialog; with something found and not saved only after a question in place of the line at the foot."""
+        if not self._has_news():
+            self.reject()
+        elif not self.question.text:
+            self._ask(tr("Leave without saving what was found?"), tr("Leave"), self.reject)
+
+    def done(self, result: int) -> None:
+        """The dialog closes, whichever way: nothing moves any more, camera and port are free."""
+        self._timer.stop()
+        self._stop_keys.detach()
+        self.desk.close()
+        super().done(result)
+
+    def follow_theme(self) -> None:
+        self._refresh()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            if not event.isAutoRepeat():
+                self._on_escape()
+        elif not takes_enter(self, event):
+            super().keyPressEvent(event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        if self.isVisible() and is_asked_to_end():
+            self.reject()
+        elif self.isVisible():
+            self.ask_to_leave()
+        event.setAccepted(not self.isVisible())
+
+    # ---- inside
+
+    def _on_escape(self) -> None:
+        """Back by one step: the question, the field, the dialog."""
+        if self.question.text:
+            self.question.cancel()
+        elif isinstance(self.focusWidget(), _FIELDS):
+            self.setFocus()
+        else:
+            self.ask_to_leave()
+
+    def _has_news(self) -> bool:
+        draft = self.desk.draft
+        return draft is not None and draft.has_news
+
+    @Slot()
+    def _on_answered(self) -> None:
+        self._show_question(False)
+        self.setFocus()
+
+    def _ask(self, question: str, answer: str, action: Callable[[], None]) -> None:
+        self._show_question(True)
+        self.question.ask(question, answer, action)
+
+    def _show_question(self, on: bool) -> None:
+        """In place of the line and of Cancel: the question has one of its own, which goes on with the wizard."""
+        self.question.setVisible(on)
+        for part in (self.line, self.cancel_button):
+            part.setVisible(not on)
+
+    def _lay_out(self) -> None:
+        self.steps.setFixedWidth(_STEPS_PX)
+        self.steps.setAccessibleName(tr("Steps"))
+        self.steps.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.steps.setSelectionMode(QListWidget.SelectionMode.NoSelection)
+        self.steps.setIconSize(QSize(_SIGN_PX, _SIGN_PX))
+        for page in self.pages:
+            item = QListWidgetItem(tr(page.name))
+            item.setSizeHint(QSize(_STEPS_PX - 8, _STEP_LINE_PX))
+            self.steps.addItem(item)
+            self.stack.addWidget(page)
+        self.stack.setFixedWidth(_CONTROLS_PX)
+        middle = QHBoxLayout()
+        middle.setSpacing(theme.GAP)
+        middle.addWidget(self.steps)
+        middle.addWidget(Card("", self.stack))
+        middle.addWidget(self.picture, 1)
+        foot = QHBoxLayout()
+        foot.setSpacing(theme.GAP)
+        foot.addWidget(self.stop_button)
+        foot.addWidget(self.line, 1)
+        foot.addWidget(self.question, 1)
+        for part in (self.cancel_button, self.back_button, self.next_button):
+            foot.addWidget(part, 0, Qt.AlignmentFlag.AlignBottom)
+        for line in (self.line, self.question):
+            line.setMinimumHeight(44)
+        self.question.hide()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(14, 12, 14, 12)
+        column.setSpacing(theme.GAP)
+        column.addLayout(middle, 1)
+        column.addLayout(foot)
+
+    def _go(self, index: int) -> None:
+        self.page.leave()
+        self.question.cancel()
+        self._say("")  # what was said belonged to the page before
+        self.stack.setCurrentIndex(index)
+        self.page.enter()
+        self._refresh()
+
+    @Slot(float, float)
+    def _on_picture_clicked(self, x: float, y: float) -> None:
+        self.page.click(x, y)
+
+    @Slot()
+    def _refresh(self) -> None:
+        busy, page = self.desk.is_busy, self.page
+        page.refresh()
+        for row, other in enumerate(self.pages):
+            item = self.steps.item(row)
+            item.setIcon(self._sign(other.is_done, is_here=other is page))
+            words = [tr(other.name), *([tr("done")] if other.is_done else []), *([tr("this page")] if other is page else [])]
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, ", ".join(words))
+            font = item.font()
+            font.setBold(other is page)
+            item.setFont(font)
+        is_last = page is self.summary_page
+        self.next_button.setText(
+            tr("&Save") if is_last else tr("&Next") if page.is_done or page is self.camera_page else tr("&Skip")
+        )
+        self.next_button.setEnabled(page.may_leave and not busy and (not is_last or self.desk.draft is not None))
+        self.back_button.setEnabled(self.stack.currentIndex() > 0 and not busy)
+        mark_main(self.next_button, is_last or page.is_done)
+        if page.main is not None:
+            mark_main(page.main, not page.is_done)
+        if busy:
+            work = tr_text(self.desk.busy)
+            self._say(f"{work[0].upper()}{work[1:]} ...")
+        elif self.message.endswith(" ..."):
+            self._say("")
+        self._look(anew=True)
+
+    def _sign(self, is_done: bool, *, is_here: bool) -> QIcon:
+        """A tick, or a point for the page in front."""
+        ratio = self.devicePixelRatioF()
+        pixmap = QPixmap(QSize(_SIGN_PX, _SIGN_PX) * ratio)
+        pixmap.setDevicePixelRatio(ratio)
+        pixmap.fill(Qt.GlobalColor.transparent)
+        painter = QPainter(pixmap)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if is_done:
+            pen = QPen(QColor(theme.ALLOWED), 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
+            painter.setPen(pen)
+            painter.drawPolyline(_TICK)
+        elif is_here:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(theme.SKY))
+            painter.drawEllipse(QPointF(_SIGN_PX / 2, _SIGN_PX / 2), 4.0, 4.0)
+        painter.end()
+        return QIcon(pixmap)
+
+    @Slot(str)
+    def _say(self, text: str, is_fault: bool = False) -> None:
+        if is_fault:
+            self.question.cancel()  # what went wrong must be read
+        theme.set_sheet(self.line, "color: @FAULT;" if is_fault else "color: @TEXT;")
+        self.line.setText(tr_text(text))
+        self.line.setAccessibleName(text)
+
+    def _look(self, anew: bool = False) -> None:
+        """The newest picture, or the page's still."""
+        bench, still = self.desk.bench, self.page.still
+        self.picture.show_shapes(self.page.shapes())
+        if still is not None:
+            if still is not self._shown_frame or anew:
+                self._shown_frame = still
+                self.picture.show_image(still)
+            return
+        if bench is None:
+            return
+        frame = bench.feed.newest
+        if bench.feed.problem is not None:
+            self.picture.show_text(bench.feed.problem)
+        elif frame is not None and (frame is not self._shown_frame or anew):
+            self._shown_frame = frame
+            self.picture.show_image(frame.image)
+
+    def _save(self) -> None:
+        try:
+            rig = self.summary_page.rig()
+            if rig is None:
+                return
+            path = self.desk.save(rig)
+        except RigFileError as error:
+            self._say(str(error), is_fault=True)
+            return
+        self._say(tr("Saved: {path}", path=path))
+        self.saved.emit(rig.name)
+        self.accept()

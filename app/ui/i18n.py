@@ -1,0 +1,623 @@
+"""The language of the windows, by Qt's own translation: English in the code, others from ``resources/translations``.
+
+English is the language of everything that is kept or read by programs: session files, JSON, logs, the command line. A text is
+translated only where it is shown; those that come from ``core``, which knows no window, by the list in ``core_texts``.
+
+Texts of the layers below that windows show: finished ones, and patterns of those with values in them. No Qt here.
+
+Core and hardware speak English, for files, logs and the command line; so do the names of edits. What is listed here is translated
+where it is shown (``language.tr_text``); a text that is not listed is shown as it is. A test looks every entry up in the code.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from core.config.models import RESOURCES
+from core.config.schema import Effect, schema
+from core.control.alerts import ALERTS
+from core.control.faults import Cause
+from core.control.gate import RejectReason
+from core.control.joints import Limit
+from core.control.modes import Hindrance
+from core.types import Reason
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
+
+
+FIXED = (
+    # modes, requests, kinds of rig, state of the servo bus
+    "ADVISORY",
+    "ARMED",
+    "AUTONOMOUS",
+    "HOLD",
+    "STOPPED",
+    "stop",
+    "acknowledge",
+    "arm",
+    "hand over",
+    "take back",
+    "disarm",
+    "port closed",
+    "disarmed",
+    "armed",
+    "stopped",
+    "quiet",
+    # the settings file
+    "a profile's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit",
+    "was no TOML",
+    "was changed meanwhile",
+    "had values that are not allowed",
+    "too much is wrong",
+    # joints
+    "right",
+    "left",
+    "up",
+    "down",
+    "advance",
+    "delivery_1",
+    "delivery_2",
+    # stages of perception
+    "total",
+    "prepare",
+    "network",
+    "masks",
+    "skeletons",
+    "gaps",
+    "graph",
+    "path",
+    "pose",
+    "steadiness",
+    # refusals
+    "it has no pixels",
+    "the network's output is not finite",
+    "no centerline beside the robot's head",
+    "it reaches the image border at its head, which may be out of view",
+    "both of its ends lie at the image border, so its head may be out of view",
+    "it has no direction",
+    "the centerline beside the head has no direction",
+    # the way to the destination
+    "no vessel was found",
+    "no vessel that was found leads there",
+    # advice
+    "on the centerline and along it",
+    "straight on",
+    "at the target",
+    "along the route",
+    "a bend ahead",
+    "a bifurcation ahead",
+    "the head must turn first",
+    "the head is near the wall",
+    "the robot meets the wall",
+    "the target is near",
+    "the way seems to lie behind the head: looking again",
+    "the way to the target branches off behind the head",
+    "the robot is fed but its head does not move",
+    # faults, and what is being done
+    "no report yet",
+    "no frame yet",
+    "no pose yet",
+    "it shows something else",
+    "not checked yet",
+    "the servo process is not armed",
+    "no sign of life yet",
+    "the rig stopped while it was armed",
+    "no frame behind the command",
+    "checking the servos",
+    "the torque is not proven to be off: cut the servos' power",
+    "acknowledging",
+    "zeroing the servos",
+    "switching the torque off",
+    "stopped meanwhile: acknowledge, then switch the servos on again",
+    "the torque was switched off meanwhile: switch the servos on again",
+    # phantoms of the twin
+    "S-curve",
+    "Y-branch",
+    "Tree with five ends",
+    "Aortic arch with supra-aortic vessels",
+    "Tortuous vessel",
+    "Carotid siphon",
+    "Three parallel channels",
+    "Loop of two ways",
+    "Coronary tree with stenosis",
+    # looks of the twin
+    "Clear bench",
+    "Silicone on white",
+    "Silicone on red",
+    "Silicone on dark",
+    "Silicone on a coloured board",
+    "Tinted liquid",
+    "Opaque channels",
+    "Channels in a clear block",
+    "Lit from behind",
+    "Fluoroscopy",
+    "Subtraction angiography",
+    "Turbid gel",
+    "Creased drape",
+    "Lamps of two colours",
+    "Glowing liquid",
+    "Tank of rippling water",
+    "Printed photograph",
+    "Layers of printed resin",
+    # checks before driving
+    "camera",
+    "picture",
+    "cores and memory",
+    "recordings",
+    "clock",
+    "model",
+    "self-test",
+    "python",
+    "cameras found",
+    "see the camera; close other programs that use it (fuser -v /dev/video*)",
+    "packages",
+    "system libraries",
+    "vendor libraries",
+    "display",
+    "servo port",
+    "servos",
+    "adapter latency",
+    "foot pedal",
+    "gamepad",
+    "not configured",
+    "the rig has servos, but no port",
+    "the bench twin needs none",
+    "only real cameras are tried",
+    "no RealSense camera",
+    "no webcam",
+    "plug it into a USB 3 port; if it is: another cable, or another port",
+    "plug it in; if it is: another cable, or another port",
+    "plug it in, or set camera.device",
+    "check the cable; another USB port, without a hub",
+    "lens cap, lamp, focus; or set camera.exposure_ms",
+    "release STOP; check its wire",
+    "check its USB cable",
+    "check the pedal's power and firmware, then plug it in again",
+    "set record.folder to one that can be written",
+    "check the disk, or set record.folder",
+    "restart the computer; in a virtual machine check its clock source",
+    "restore the model folder, or set perception.segmentation.model to another one",
+    "train it with the twin's frames too, or choose another model",
+    "plug the USB adapter in, or set servos.port (ls /dev/serial/by-id)",
+    "unplug the USB adapter and plug it in again",
+    "see the servo port",
+    "see the vendor libraries in main.py doctor",
+    "switch the servos' 12 V on, check the cables, servos.baud and the joints' ids",
+    "find the reason (jam, heat, supply), then restart that servo in the servo table",
+    # calibration
+    "Bench twin (no hardware)",
+    "pulls the head to the right",
+    "pulls the head to the left",
+    "pulls the head out of the picture's plane",
+    "feeds the robot",
+    "feeds the catheter",
+    "seen by eye",
+    "up and down are assumed by the order of their ids: one camera cannot tell them apart; swap them if it is wrong",
+    "zero and steering were found with the servos in other places: find them anew",
+    "every servo must have one name, and every name one servo",
+    "the robot's head is not seen: move the robot until all of its last centimetres are in the picture",
+    "too little of the robot is seen: feed it farther into the vessel",
+    "the robot's end has no direction: feed it farther into the vessel",
+    "the head does not follow the wire: is it hung in, does the head lie free? Or zero it by eye",
+    "a step was stopped half way and the wires are where it left them: find the zeros anew",
+    "the board is still in the picture: take it away, then go on",
+    "take the board away: the servos move when it is out of sight",
+    "the head does not follow the wire's pull: pull it by hand, or zero it by eye",
+    "the wire was taut before it was pulled: loosen it, then try again, or zero it by eye",
+    "board",
+    "two clicks",
+    # what is still to be drawn in an annotation
+    "draw the robot, from its tail to its head",
+    "draw the vessel's centerline beside the head",
+    "the vessel line ends too soon beside the head: draw it farther",
+    # devices
+    "no answer",
+    "the robot is not connected: connect it first",
+    "the servo bus process does not listen: connect the robot again",
+    "no RealSense camera: plug it into a USB 3 port; main.py doctor --rig realsense says more",
+    "no webcam: plug it in; main.py doctor --rig webcam says more",
+    "no pedal is configured: set pedal.port to its path in /dev/serial/by-id",
+    "the bench twin has not told anything yet",
+    "the bench twin did not start: free memory, then start the rig again (F5)",
+    # edits of an annotation, which are undone by name
+    "put in a point",
+    "move a point",
+    "take out a point",
+    "nudge a point",
+    "add a point",
+    "can tell",
+    "can't tell",
+    "note",
+    "take the algorithm's lines",
+    "nothing to save: no frames in memory yet",
+    "the last seconds are still being saved",
+)
+
+# A value called by one letter is a number; any other is a text that may be known itself.
+TEMPLATES = (
+    "the library of RealSense cameras cannot be used: {problem}",
+    "{path}: end of the video",
+    "{path}: cut short: {a} of {b} pictures",
+    "{path}: cut short: {a} of {b} s",
+    "{path}: damaged after frame {a} ({why}), and not read on",
+    "{path}: damaged before its first frame ({why}), and not read on",
+    # refusals
+    "99 % of it is darker than {a} (black below {b} of 255)",
+    "99 % of it is brighter than {a} (overexposed above {b} of 255)",
+    "sharpness {a} (at least {b})",
+    "highest vessel probability {a}, but only in specks",
+    "highest robot probability {a}, but only in specks; it does not know such pictures: {why}",
+    "highest robot probability {a}; it does not know such pictures: {why}",
+    "highest robot probability {a}, but only in specks",
+    "highest vessel probability {a}",
+    "highest robot probability {a}",
+    "what looks like it covers {a} % of the image (at most {b} %); it does not know such pictures: {why}",
+    "what looks like it covers {a} % of the image (at most {b} %)",
+    "its mask has no centerline, or more than {a} branches",
+    "{a} px long (at least {b} px)",
+    "what looks like one has walls beside the head that are blurred over {a} px (at most {b} px)",
+    "{a} % of the robot is bridged (at most {b} %)",
+    "{a} % of its last {b} px lie in the vessel (at least {c} %)",
+    "its head is {a} px from the nearest centerline (at most {b} px)",
+    "a second branch fits {a} % as well (at most {b} %)",
+    "{a} % (at least {b} %)",
+    "distance {a} from the pictures that it knows (at most {b})",
+    "{a} px since the last frame (at most {b} px)",
+    "the target is {a} px beside the vessel",
+    # advice
+    "coming back to the centerline from the {side}",
+    "moving away from the centerline to the {side}",
+    "crossed the centerline to the {side}, angle left",
+    "the robot presses against the wall with {a} N",
+    "backing off: {why}",
+    "missed the branch {a} times: take over, or choose another destination",
+    "came no farther in {a} tries: take over, or choose another destination",
+    "the robot cannot go back any farther: take over, or choose another destination",
+    # faults, and what is being done
+    "{joint} off by {a} mm (at most {b} mm)",
+    "{joint} stands {a} mm from its goal for {b} ms",
+    "{joint} went {a} mm where nobody sent it",
+    "{joint} stays at {a} mm, outside its envelope ({b} to {c} mm)",
+    "{joint} up to {a} mA for {b} ms (at most {c} mA)",
+    "torque of {names} is not proven to be off: cut the servos' power",
+    "silent for {a} ms",
+    "for {a} ms",
+    "{a} in {b} s (at most {c})",
+    "newest frame {a} ms old",
+    "{a} ms old",
+    "{a} identical pictures",
+    "by {a} px (at most {b} px)",
+    "{a} until now",
+    "{a} in a row",
+    "{a} frames",
+    "{a} ms (at most {b} ms)",
+    "the computer slept for {a} s",
+    "measured position: {what}",
+    "{joint} at {a} mm ({b} to {c} mm)",
+    "{joint} to {a} mm ({b} to {c} mm)",
+    "{joint} by {a} mm (at most {b} mm)",
+    "{joint} at {a} mm, sent to {b} mm",
+    "restarting servo {a}",
+    "not armed: {why}; check its supply and cable",
+    "not armed: {why}",
+    "outside its envelope: {where}: switch the torque off and move it back by hand, or zero it again",
+    # checks before driving
+    "QT_QPA_PLATFORM={name}: nothing is shown on a screen",
+    "{engine}, first frame in {a} ms: state {state} (true {truth}), theta off by {b} deg, head by {c} px",
+    "not configured; none is plugged in",
+    "monotonic, now {time} UTC",
+    "{a} cores, {b} GB of memory, {c} GB free",
+    "{a} core, {b} GB of memory, {c} GB free",
+    "{a}x{b}, {rate} frames/s, {c} lost, brightness {light} of 255",
+    "close other programs: {a} GB must be free, and {b} GB there in all",
+    "make room ({a} GB or more), or set record.folder to another disk",
+    "missing: {names}",
+    "{what}; {a} V at least, {b} \u00b0C at most, torque off",
+    "the supply must give {a} V or more at every servo",
+    "let it cool below {a} \u00b0C",
+    "it should give {a}: more light, camera.exposure_ms below {b}, or a USB 3 port without a hub",
+    "{port} reports; deadman released",
+    "{port} reports; deadman pressed",
+    "{port} is silent",
+    "{port}: STOP is pressed, or its wire is broken",
+    "what comes from {port} is no pedal's report",
+    "{a} frames in {b} s",
+    "the last seconds were not saved: {why}",
+    "of the last seconds only {a} of {b} frames were saved: {why}",
+    "{why}; make room and save them again",
+    "disk full ({left} MB left in {folder})",
+    "disk nearly full: {left} MB left",
+    "{folder}: {a} GB free of {b} GB",
+    "{a} as pinned",
+    "{a} can be loaded",
+    "{names} can be loaded",
+    "{port} is free",
+    "{port} is in use by another program",
+    "{port} is no serial port",
+    "{name}: all {count} files are whole (SHA-256)",
+    "{a} answer, model {b}, firmware {rest}",
+    "no permission for {node}",
+    # calibration
+    "the feed goes by about {a} mm at one turn of the servo's horn, as the camera saw it, and is configured with {b} mm: measure "
+    "it, and set servos.joints, advance, mm_per_turn",
+    "board {a}: {b} of {c} corners",
+    "a board of {a} x {b} squares needs {c} markers, and there are {count}: take fewer squares",
+    "lens: up to {a} px at the border, {b} px left over",
+    "lens: straight enough ({a} px at the border)",
+    "scale: {a} mm/px, ±{b} %",
+    "seven servos at {a} baud: {ids}",
+    "servos at several speeds: {ids} at {a} baud; {others}; set all seven to one",
+    "where the servos stand could not be kept ({why}): learn the steering, which keeps it, too",
+    "steering: roll {a}°, way and heading {b}° from a right angle",
+    "servo {a}: {b} mm both ways",
+    "servo {a}: nothing clear was seen",
+    "servo {a} {function} ({seen}), direction {sign}",
+    "{joint}: taut {a} mm farther",
+    "{joint}: taut {a} mm back",
+    "{joint}: {a} mm of pull, {b} px of way",
+    "head {a} px to the {side}",
+    "head {a} px forward",
+    "{a} px less of the robot seen",
+    "sheath {a} px farther",
+    "{a} of its markers and {b} of its {c} corners are seen",
+    "too much current: {names}; the servos were let go: something holds the wires",
+    "robot line < {a} px",
+    # devices
+    "the servo bus process did not answer within {a} s: connect the robot again",
+    "the servo bus process cannot be started ({why}): free memory, then try again",
+    "servo port {port} vanished while it was opened ({why}): check the USB cable",
+    "servo port {port} is lost ({why}): check the USB cable, then connect again",
+    "servo port {port} does not exist: plug the USB adapter in, or set servos.port",
+    "no permission for servo port {port}: add your user to the group dialout, then log in again",
+    "servo port {port} is in use by another program: close that program first",
+    "servo port {port} has no device behind it: unplug the USB adapter and plug it in again",
+    "{port} cannot be used as servo port ({why}): set servos.port to the USB adapter",
+    "the pedal at {port} is gone: plug its USB cable in",
+    "the pedal at {port} is gone ({why}): plug its USB cable in",
+    "the pedal at {port} has not reported yet",
+    "the pedal at {port} is silent: check its power and firmware, then plug it in again",
+    "what comes from {port} is no pedal's report: check pedal.baud, the cable, and that it is the pedal",
+    "the pedal is no longer read ({kind}: {why}): start the program again",
+    "pedal port {port} does not exist: plug the pedal in, or set pedal.port",
+    "no permission for pedal port {port}: add your user to the group dialout, then log in again",
+    "pedal port {port} is in use by another program, or by the servos: close it there, or set pedal.port",
+    "pedal port {port} has no device behind it: unplug the pedal and plug it in again",
+    "{port} cannot be used as pedal port at {a} baud ({why}): set pedal.port and pedal.baud",
+    "gamepad {path} is not there: plug it in, or leave gamepad.device out to take the first",
+    "gamepad {path} cannot be opened: plug it in, or leave gamepad.device out to take the first",
+    "no permission for gamepad {path}: add your user to the group input, then log in again",
+    "{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is",
+    "gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one",
+    "gamepad {name} is in use by another window, so its STOP does nothing here: close that window, or set gamepad.device",
+    "gamepad {name} cannot be locked ({why}), so its STOP does nothing here: unplug it and plug it in again",
+    "the gamepad is no longer read ({kind}: {why}): start the program again",
+    "{camera} gives no pictures: check its cable",
+    "the driver of {camera} does not return: plug the camera out and in again",
+    "{camera} cannot be started ({why}): close other programs that use it",
+    "{camera} is lost ({why}): check its cable",
+    "{camera} is lost: check its cable",
+    "{camera} ({node}) cannot be opened: close other programs that use it, or join the group video",
+    "{camera} {serial} is not there any more (there are: {serials}): plug it in, or start again with another one",
+    "webcam {camera} is not there; webcams: {paths}: plug it in, or set camera.device",
+    "the camera's picture is {kind} {shape}, not 8-bit RGB: set its colour format",
+    "{path}: cannot be read as a video ({why})",
+    "the bench twin stopped ({why}): start the rig again (F5)",
+    "the bench twin cannot be started ({why}): free memory, then try again",
+    "driving stopped by an unexpected {kind}: {why}; start the rig again",
+    "{what} failed ({kind}: {why}): start the rig again",
+    "servo {a}: {miss}, {b} times: check its supply and cable, and that no two servos have the same id",
+    "no answer",
+    "damaged answer",
+    "a late answer may still come",
+    "no answer, behind two silent servos",
+    # names of rigs
+    "a rig's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit",
+    "a rig cannot be called {name}: choose another name",
+    # the settings file
+    "{path}: cannot be read ({why}); the defaults are used",
+    "{path}: {why}; the defaults are used",
+    "{path}: {why}; it is kept as {name}, and the defaults are used",
+    "{path}: {why}, and cannot be set aside ({trouble}); the defaults are used",
+    "{path}: {key}: {why}; the default is used",
+    "is no TOML ({why})",
+    "profile {name}: it is no longer there ({path})",
+    "profile {name}: a preset has this name; choose another one",
+    "profile {name}: it comes with the program and cannot be deleted",
+    "profile {name}: cannot be deleted ({why})",
+    "{path}: cannot be written ({why}); nothing was changed",
+    "{name} {why}: the old one is kept as {kept}",
+    # edits of an annotation
+    "draw {what} mask",
+    "simplify {what} mask",
+    "clear the {what}",
+    "take the algorithm's {what} mask",
+)
+
+
+COMPOSED = (
+    "{path}: has no video in it",
+    "{path}: has a video of a kind that cannot be decoded here",
+    "{path}: {key}: unknown key, kept but not used",
+    "above {a} and at most {rest}",
+    "above {a} and below {rest}",
+    "at least {a} and below {rest}",
+    "{a} to {end}, a multiple of {rest}",
+    "{a} to {rest}",
+    "at least {rest}",
+    "above {rest}",
+    "at most {rest}",
+    "below {rest}",
+)
+"""Lines about files and ranges of settings, which the core puts together from parts."""
+
+
+def texts_of_tables() -> Iterator[str]:
+    """Texts that stand in tables of the core: reasons, every alert, every setting with its section and when it acts."""
+    for words in (Reason, Cause, Hindrance, RejectReason, Limit, Effect):
+        yield from words
+    for spec in ALERTS.values():
+        yield from (spec.text, spec.what_to_do)
+    for section in schema().walk():
+        yield from (section.title, section.description)
+        for setting in section.settings:
+            yield from (setting.title, setting.description)
+
+
+CONTEXT = "LumenPilot"
+"""The one context of all texts."""
+FOLDER = RESOURCES / "translations"
+AUTO, ENGLISH, CHINESE = "auto", "en", "zh"
+"""What ``window.language`` may be."""
+LOCALE = {CHINESE: "zh_CN"}
+"""Languages that are translations, and how their files are called."""
+
+
+@dataclass(slots=True)
+class _InUse:
+    """Which language the windows speak, how a text is looked up (None: English, as it stands in the code), what is missing."""
+
+    code: str = ENGLISH
+    lookup: Callable[[str], str] | None = None
+    problem: str = ""
+
+
+_IN_USE = _InUse()
+_VALUE = re.compile(r"\{(\w+)\}")
+_AS_WRITTEN: ContextVar[bool] = ContextVar("texts as written", default=False)
+
+
+def mark(text: str) -> str:
+    """A text in a table that is translated later, by ``tr`` where it is shown; it stays as it is."""
+    return text
+
+
+def tr(text: str, /, **values: object) -> str:
+    """`text` in the language of the windows, with `values` in the places of its {names}."""
+    shown = text if _IN_USE.lookup is None or _AS_WRITTEN.get() else _IN_USE.lookup(text)
+    return shown.format(**values) if values else shown
+
+
+def tr_text(text: str) -> str:
+    """A finished text of a layer below: a known one, or one made by a known pattern; any other stays English."""
+    if _IN_USE.lookup is None or _AS_WRITTEN.get() or not text:
+        return text
+    return _finished(text)
+
+
+@lru_cache(maxsize=1024)
+def _finished(text: str) -> str:
+    whole = tr(text)
+    if whole != text:
+        return whole
+    for template, pattern in _patterns():
+        found = pattern.fullmatch(text)
+        if found is not None:
+            return tr(template, **{name: tr_text(part) for name, part in found.groupdict().items()})
+    return text
+
+
+@cache
+def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
+    """The more words of its own a template has, the earlier it is tried: a short one would fit the texts of longer ones."""
+    templates = sorted((*TEMPLATES, *COMPOSED), key=lambda template: len(_VALUE.sub("", template)), reverse=True)
+    return tuple((template, _pattern(template)) for template in templates)
+
+
+def _pattern(template: str) -> re.Pattern[str]:
+    parts = _VALUE.split(template)
+    made = (re.escape(part) if k % 2 == 0 else f"(?P<{part}>{_value(part)})" for k, part in enumerate(parts))
+    return re.compile("".join(made), re.DOTALL)
+
+
+def _value(name: str) -> str:
+    return r"[-+]?\d[\d.]*" if len(name) == 1 else ".+?"
+
+
+@contextmanager
+def english_texts() -> Iterator[None]:
+    """In here, and in this thread only, texts are English: what is kept in a file is."""
+    token = _AS_WRITTEN.set(True)
+    try:
+        yield
+    finally:
+        _AS_WRITTEN.reset(token)
+
+
+def language_in_use() -> str:
+    """ "en", or the translation's code."""
+    return _IN_USE.code
+
+
+def language_problem() -> str:
+    """What ``use_language`` has said: empty, or one line about what is missing."""
+    return _IN_USE.problem
+
+
+def wanted(choice: str) -> str:
+    """The language of a choice: the system's where it is "auto"; English where there is no such translation."""
+    if choice != AUTO:
+        return choice if choice in LOCALE else ENGLISH
+    from PySide6.QtCore import QLocale
+
+    names = QLocale.system().uiLanguages()
+    code = names[0].replace("_", "-").partition("-")[0].lower() if names else ENGLISH
+    return code if code in LOCALE else ENGLISH
+
+
+def use_language(application: QApplication, choice: str = AUTO, folder: Path = FOLDER) -> str:
+    """Speak this language from now on, in windows that are opened later.
+
+    Parameters
+    ----------
+    application : the one there is.
+    choice : "auto", "en" or "zh"; an unknown one is English.
+    folder : of the translations.
+
+    Returns
+    -------
+    str
+        Empty, or one line about what is missing: the translation (it stays English then), or a font that has its letters.
+    """
+    from PySide6.QtCore import QCoreApplication, QLibraryInfo, QTranslator
+
+    for old in application.findChildren(QTranslator):
+        application.removeTranslator(old)
+        old.deleteLater()
+    _IN_USE.code, _IN_USE.lookup, _IN_USE.problem = ENGLISH, None, ""
+    _finished.cache_clear()
+    code = wanted(choice)
+    if code not in LOCALE:
+        return ""
+    own = QTranslator(application)
+    path = folder / f"lumenpilot_{LOCALE[code]}.qm"
+    if not own.load(str(path)) or own.isEmpty():
+        own.deleteLater()
+        _IN_USE.problem = f"{path.name} is missing or damaged, so the windows are in English: put back resources/translations"
+        return _IN_USE.problem
+    application.installTranslator(own)
+    of_qt = QTranslator(application)  # buttons and dialogs of Qt itself
+    if of_qt.load(f"qtbase_{LOCALE[code]}", QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)):
+        application.installTranslator(of_qt)
+    _IN_USE.code, _IN_USE.lookup, _IN_USE.problem = code, _looked_up(QCoreApplication.translate), font_problem(code)
+    return _IN_USE.problem
+
+
+def _looked_up(translate: Any) -> Callable[[str], str]:
+    return lru_cache(maxsize=4096)(lambda text: str(translate(CONTEXT, text)))
+
+
+def font_problem(code: str) -> str:
+    """Empty, or one line: no font has the letters of this language. There must be an application."""
+    from PySide6.QtGui import QFontDatabase
+
+    if code != CHINESE or QFontDatabase.families(QFontDatabase.WritingSystem.SimplifiedChinese):
+        return ""
+    return "No font with Chinese letters is installed, so they show as boxes: install the package fonts-noto-cjk"

@@ -1,0 +1,137 @@
+"""Snapshots: the raw picture, the picture with overlays, and the values, written away from the GUI thread."""
+
+from __future__ import annotations
+
+import json
+import logging
+from dataclasses import dataclass
+from datetime import datetime
+from itertools import count
+from pathlib import Path
+
+import cv2
+import platformdirs
+from PySide6.QtCore import QObject, QRunnable, QThreadPool, Signal
+
+from app.commands.perceive import scene_to_json
+from app.ui.i18n import tr
+from app.ui.workers import QueuedCallback
+from app.widgets.overlay_image import draw_overlay
+from core.types import Image, Tick
+
+_FINISH_WITHIN_MS = 5_000
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a picture comes from: what the banner says of the rig, the phantom if there is one, and the network."""
+
+    rig: str
+    phantom: str | None = None
+    model: str | None = None
+
+
+def pictures_folder(configured: str | None) -> Path:
+    """Where snapshots go: the configured folder, else LumenPilot in the user's pictures."""
+    return Path(configured).expanduser() if configured else Path(platformdirs.user_pictures_dir()) / "LumenPilot"
+
+
+def write_snapshot(folder: Path, tick: Tick, origin: Origin, now: datetime) -> Path:
+    """Write ``<time>.png``, ``<time>_overlay.png`` and ``<time>.json``; returns the first path. Raises OSError.
+
+    What is there already stays: the later one of the same millisecond is called ``<time>_2``.
+    The JSON object is that of one image, with ``rig``, ``phantom``, ``model``, ``frame`` (index since the rig's start) and
+    ``captured_s`` (seconds of the camera's clock) added.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    name = _free_name(folder, f"{now:%Y-%m-%d_%H-%M-%S}_{now.microsecond // 1000:03d}")
+    first = folder / f"{name}.png"
+    _write_new(first, _png(tick.frame.image))
+    overlay = draw_overlay(tick.frame.image, tick.scene, tick.advice, stamp=origin.rig)
+    _write_new(folder / f"{name}_overlay.png", _png(overlay))
+    record = scene_to_json(first.name, tick.scene) | {
+        "rig": origin.rig,
+        "phantom": origin.phantom,
+        "model": origin.model,
+        "frame": tick.frame.index,
+        "captured_s": round(tick.frame.captured_s, 6),
+    }
+    _write_new(folder / f"{name}.json", (json.dumps(record, indent=1, allow_nan=False) + "\n").encode())
+    return first
+
+
+def _free_name(folder: Path, name: str) -> str:
+    """The name, or the first one numbered after it, of which none of the three files is there."""
+    names = (name if k == 1 else f"{name}_{k}" for k in count(1))
+    return next(free for free in names if not any((folder / f"{free}{end}").exists() for end in (".png", "_overlay.png", ".json")))
+
+
+def _write_new(path: Path, data: bytes) -> None:
+    """Raises OSError, also when somebody else has made one of that name meanwhile."""
+    with path.open("xb") as file:
+        file.write(data)
+
+
+def _png(image: Image) -> bytes:
+    done, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    if not done:
+        raise OSError("the picture could not be encoded")
+    return data.tobytes()
+
+
+class SnapshotWriter(QObject):
+    """Writes in a thread of its own. ``saved`` and ``failed`` carry the line to show."""
+
+    saved = Signal(str)
+    failed = Signal(str)
+
+    def __init__(self, folder: Path, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._folder = folder
+        self._pool = QThreadPool(self)
+        self._pool.setMaxThreadCount(1)
+
+    @property
+    def folder(self) -> Path:
+        return self._folder
+
+    def set_folder(self, folder: Path) -> None:
+        """Where the next ones go."""
+        self._folder = folder
+
+    def write(self, tick: Tick, origin: Origin) -> None:
+        """Start to write; returns at once."""
+        self._pool.start(_Job(QueuedCallback(self), self._folder, tick, origin, datetime.now()))
+
+    def finish(self, within_ms: int = _FINISH_WITHIN_MS) -> bool:
+        """Wait until everything is on the disk; False when the disk has not answered in time."""
+        return self._pool.waitForDone(within_ms)
+
+
+class _Job(QRunnable):
+    def __init__(self, letters: QueuedCallback[SnapshotWriter], folder: Path, tick: Tick, origin: Origin, now: datetime) -> None:
+        super().__init__()
+        self._letters = letters
+        self._folder = folder
+        self._tick = tick
+        self._origin = origin
+        self._now = now
+
+    def run(self) -> None:
+        try:
+            path = write_snapshot(self._folder, self._tick, self._origin, self._now)
+        except OSError as error:
+            self._fail(tr("Snapshot not saved: {file}: {why}", file=error.filename or self._folder, why=error.strerror or error))
+        except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible line
+            _log.error("the snapshot was not written", exc_info=error)
+            self._fail(
+                tr("Snapshot not saved: unexpected {kind}: {why}", kind=type(error).__name__, why=" ".join(str(error).split()))
+            )
+        else:
+            line = tr("Snapshot saved: {path} (with _overlay.png and .json)", path=path)
+            self._letters.send(lambda writer: writer.saved.emit(line))
+
+    def _fail(self, line: str) -> None:
+        self._letters.send(lambda writer: writer.failed.emit(line))

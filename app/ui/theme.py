@@ -1,0 +1,470 @@
+"""Sizes, fonts and style sheet of every window, and which of the two colour schemes is in use; the colours are in ``palette``.
+
+A change of scheme reaches everything that is open: painters look their colours up, style sheets set by ``set_sheet`` are set anew,
+and a widget that keeps something made of colours (a pixmap, a plot's pens, rich text) has a method ``follow_theme`` for it.
+
+The colours of every window and overlay picture, as names. No Qt here, so that pictures can be drawn without a window.
+
+State and overlay colours come from the palette of Okabe and Ito (2008), which stays distinct under every common colour blindness;
+states are told by letter and shape as well. Text colours keep a contrast of at least 4.5 : 1 on the panels (tested).
+
+There are two schemes, dark and light. A colour keeps its hue and its meaning in both; in the light one it is dark enough to be read
+on white, and what is written on it (``INK``) is white. The names of this module (``palette.TEXT``) are those of the scheme in use:
+look them up when you paint, or keep a role's name and ask ``of``. What lies over a camera picture does not depend on the windows:
+its colours are ``ON_PICTURE``.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass, fields
+from enum import StrEnum
+from functools import cache
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QColor, QFont, QFontDatabase, QFontMetrics, QPalette, QPen, QScreen
+from PySide6.QtWidgets import QApplication, QWidget
+
+from core.config.models import RESOURCES
+from core.types import PoseState
+
+
+@dataclass(frozen=True, slots=True)
+class Scheme:
+    """All colours of a window, by role."""
+
+    # surfaces and text
+    WINDOW: str = "#0E1116"
+    PANEL: str = "#171B22"
+    RAISED: str = "#222831"
+    LINE: str = "#323A46"
+    TEXT: str = "#EEF1F5"
+    TEXT_DIM: str = "#A9B3C1"
+    TEXT_FAINT: str = "#8490A0"
+    INK: str = "#0B0D10"  # on a ground of any colour below
+    FAULT: str = "#FF7B72"
+    # Okabe and Ito
+    ORANGE: str = "#E69F00"
+    SKY: str = "#56B4E9"
+    GREEN: str = "#009E73"
+    YELLOW: str = "#F0E442"
+    VERMILLION: str = "#D55E00"
+    PURPLE: str = "#CC79A7"
+    # what is drawn over the picture; gauge, bars and trends use the same hue for the same quantity
+    VESSEL: str = "#56B4E9"
+    ROBOT: str = "#E69F00"
+    ROBOT_VECTOR: str = "#F0E442"
+    VESSEL_VECTOR: str = "#BFE3F9"
+    HEAD: str = "#FFFFFF"
+    NEAREST: str = "#FFFFFF"
+    THETA: str = "#F0E442"
+    D_HEAD: str = "#CC79A7"
+    D_TAIL: str = "#E9C3D8"
+    ROUTE: str = "#35D0A5"
+    GHOST: str = "#8F6BFF"
+    TARGET: str = "#35D0A5"
+    ALLOWED: str = "#1FB58A"
+    SIM: str = "#E69F00"
+    LIVE: str = "#D55E00"
+    PLAYBACK: str = "#56B4E9"
+
+    @property
+    def is_dark(self) -> bool:
+        return contrast(self.WINDOW, "#FFFFFF") > contrast(self.WINDOW, "#000000")
+
+
+DARK = Scheme()
+LIGHT = Scheme(
+    WINDOW="#E8ECF1",
+    PANEL="#FFFFFF",
+    RAISED="#E1E7EE",
+    LINE="#BCC6D1",
+    TEXT="#12161C",
+    TEXT_DIM="#3A4554",
+    TEXT_FAINT="#566172",
+    INK="#FFFFFF",
+    FAULT="#B3201A",
+    ORANGE="#8F5A00",
+    SKY="#0067A3",
+    GREEN="#007052",
+    YELLOW="#6F6400",
+    VERMILLION="#A94700",
+    PURPLE="#A03B74",
+    VESSEL="#0067A3",
+    ROBOT="#8F5A00",
+    ROBOT_VECTOR="#6F6400",
+    VESSEL_VECTOR="#4C6E86",
+    HEAD="#12161C",
+    NEAREST="#12161C",
+    THETA="#6F6400",
+    D_HEAD="#A03B74",
+    D_TAIL="#6B3152",
+    ROUTE="#007052",
+    GHOST="#5B3FD6",
+    TARGET="#007052",
+    ALLOWED="#0A6A4E",
+    SIM="#8F5A00",
+    LIVE="#A94700",
+    PLAYBACK="#0067A3",
+)
+ON_PICTURE = DARK
+"""Over a camera picture, in both schemes."""
+
+STATE_INK = "#0B0D10"
+"""A state's letter on its colour, in both schemes: a state's ground never changes."""
+STATE_COLOUR: dict[PoseState | None, str] = {
+    PoseState.A: "#009E73",
+    PoseState.B: "#56B4E9",
+    PoseState.C: "#D55E00",
+    PoseState.D: "#F0E442",
+    None: DARK.TEXT_FAINT,
+}
+
+# The scheme in use; ``use`` changes them all.
+WINDOW = DARK.WINDOW
+PANEL = DARK.PANEL
+RAISED = DARK.RAISED
+LINE = DARK.LINE
+TEXT = DARK.TEXT
+TEXT_DIM = DARK.TEXT_DIM
+TEXT_FAINT = DARK.TEXT_FAINT
+INK = DARK.INK
+FAULT = DARK.FAULT
+ORANGE = DARK.ORANGE
+SKY = DARK.SKY
+GREEN = DARK.GREEN
+YELLOW = DARK.YELLOW
+VERMILLION = DARK.VERMILLION
+PURPLE = DARK.PURPLE
+VESSEL = DARK.VESSEL
+ROBOT = DARK.ROBOT
+ROBOT_VECTOR = DARK.ROBOT_VECTOR
+VESSEL_VECTOR = DARK.VESSEL_VECTOR
+HEAD = DARK.HEAD
+NEAREST = DARK.NEAREST
+THETA = DARK.THETA
+D_HEAD = DARK.D_HEAD
+D_TAIL = DARK.D_TAIL
+ROUTE = DARK.ROUTE
+GHOST = DARK.GHOST
+TARGET = DARK.TARGET
+ALLOWED = DARK.ALLOWED
+SIM = DARK.SIM
+LIVE = DARK.LIVE
+PLAYBACK = DARK.PLAYBACK
+
+_ROLES = frozenset(field.name for field in fields(Scheme))
+_current = DARK
+
+
+def use(scheme: Scheme) -> None:
+    """Take another scheme for all windows. ``theme.apply_theme`` does it, and has everything painted anew."""
+    global _current  # noqa: PLW0603 - there is one screen, and one scheme for it
+    _current = scheme
+    globals().update(asdict(scheme))
+    STATE_COLOUR[None] = scheme.TEXT_FAINT
+
+
+def current() -> Scheme:
+    """The scheme in use."""
+    return _current
+
+
+def of(role: str) -> str:
+    """The colour of a role (``"SKY"``) in the scheme in use; a colour that is none ("#12AB00") is itself."""
+    return str(getattr(_current, role)) if role in _ROLES else role
+
+
+def sheet(text: str) -> str:
+    """A style sheet in which ``@TEXT`` stands for the colour of that role."""
+    return re.sub(r"@([A-Z_]+)", lambda found: of(found[1]), text)
+
+
+def rgb(name: str) -> tuple[int, int, int]:
+    """A colour "#RRGGBB" as three numbers 0..255."""
+    return int(name[1:3], 16), int(name[3:5], 16), int(name[5:7], 16)
+
+
+def contrast(first: str, second: str) -> float:
+    """Contrast ratio of two colours after WCAG 2.1 (1..21)."""
+
+    def luminance(name: str) -> float:
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (part / 255 for part in rgb(name))]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    high, low = sorted((luminance(first), luminance(second)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+MIN_WINDOW = (1100, 660)  # fits a screen of 720 lines with title bar and task bar
+MIN_WIDE_PX = 1272  # of windows with one long row of controls: fits a screen of 1280 columns
+START_WINDOW = (1600, 900)
+_FRAME = (8, 40)  # room for the title bar and borders that the desktop adds
+GAP = 10
+RADIUS = 8
+
+
+class Size(StrEnum):
+    """Names of the text sizes; pixels in ``_PIXELS``."""
+
+    LABEL = "label"
+    BODY = "body"
+    TITLE = "title"
+    NUMBER = "number"
+
+
+_PIXELS = {Size.LABEL: 12, Size.BODY: 14, Size.TITLE: 27, Size.NUMBER: 32}
+_SEEN = 3.0
+"""Contrast from which on a plain shape is seen (WCAG 2.1)."""
+_CHOSEN = "lumenpilot_theme"
+_SHEET = "lumenpilot_sheet"
+_FAMILIES = ["Inter", "Segoe UI", "Noto Sans", "DejaVu Sans"]
+_CHINESE_FAMILIES = ["Noto Sans CJK SC", "Source Han Sans SC", "Microsoft YaHei", "PingFang SC", "WenQuanYi Micro Hei"]
+"""For letters that the others do not have; without a name the system may take Japanese shapes of them."""
+
+
+def colour(name: str, alpha: float = 1.0) -> QColor:
+    """The colour `name` with opacity 0..1."""
+    result = QColor(name)
+    result.setAlphaF(alpha)
+    return result
+
+
+def edge_of(name: str) -> QPen:
+    """The outline of something filled with a colour on a panel: none, unless it would be lost there (yellow on white)."""
+    if contrast(name, PANEL) >= _SEEN:
+        return QPen(Qt.PenStyle.NoPen)
+    return QPen(QColor(TEXT_DIM), 1.5)
+
+
+def outline_of(name: str, width_px: float) -> QPen:
+    """The pen of a shape on a panel that is not filled; grey where the colour would be lost there."""
+    return QPen(QColor(name if contrast(name, PANEL) >= _SEEN else TEXT_DIM), width_px)
+
+
+@cache
+def font(size: Size | int = Size.BODY, weight: QFont.Weight = QFont.Weight.Normal) -> QFont:
+    """The interface font with digits of equal width, so that nothing moves when a number changes. Copy it before you change it."""
+    result = QFont()
+    result.setFamilies([*_FAMILIES, *_CHINESE_FAMILIES, "sans-serif"])
+    result.setPixelSize(size if isinstance(size, int) else _PIXELS[size])
+    result.setWeight(weight)
+    result.setFeature(QFont.Tag("tnum"), 1)
+    return result
+
+
+def bold(size: Size | int = Size.BODY) -> QFont:
+    return font(size, QFont.Weight.Bold)
+
+
+def semi_bold(size: Size | int = Size.BODY) -> QFont:
+    return font(size, QFont.Weight.DemiBold)
+
+
+def fitted(text_font: QFont, text: str, width_px: int, smallest_px: int = 11) -> QFont:
+    """`text_font`, made smaller until `text` fits into `width_px` (not below `smallest_px`)."""
+    result = QFont(text_font)
+    while result.pixelSize() > smallest_px and QFontMetrics(result).horizontalAdvance(text) > width_px:
+        result.setPixelSize(result.pixelSize() - 1)
+    return result
+
+
+def start_size(screen: QScreen) -> QSize:
+    """The size of a window that opens on `screen`: the usual one, or what there is room for."""
+    room = screen.availableGeometry().size() - QSize(*_FRAME)
+    return QSize(*START_WINDOW).boundedTo(room).expandedTo(QSize(*MIN_WINDOW))
+
+
+class Theme(StrEnum):
+    """What can be chosen; SYSTEM is as the desktop has it."""
+
+    DARK = "dark"
+    LIGHT = "light"
+    SYSTEM = "system"
+
+
+def apply_theme(application: QApplication, theme: str = Theme.DARK) -> None:
+    """Style, palette, fonts and style sheet for the whole program, now and, with SYSTEM, whenever the desktop changes.
+
+    Without the font files the system's sans serif is used.
+    """
+    hints = application.styleHints()
+    if application.property(_CHOSEN) is None:
+        for path in sorted((RESOURCES / "fonts").glob("*.otf")):
+            QFontDatabase.addApplicationFont(str(path))
+        application.setStyle("Fusion")
+        application.setFont(font(Size.BODY))
+        hints.colorSchemeChanged.connect(lambda _scheme: _follow_desktop(application))
+    application.setProperty(_CHOSEN, str(theme))
+    _take_scheme(application, _scheme_of(Theme(theme), hints.colorScheme()))
+
+
+def chosen(application: QApplication) -> str:
+    """The theme that was asked for last."""
+    return str(application.property(_CHOSEN) or Theme.DARK)
+
+
+def set_sheet(widget: QWidget, text: str) -> None:
+    """A style sheet of one widget that follows the scheme: ``@TEXT`` stands for the colour of that role."""
+    widget.setProperty(_SHEET, text)
+    widget.setStyleSheet(sheet(text))
+
+
+def _scheme_of(theme: Theme, desktop: Qt.ColorScheme) -> Scheme:
+    is_light = theme is Theme.LIGHT or (theme is Theme.SYSTEM and desktop is Qt.ColorScheme.Light)
+    return LIGHT if is_light else DARK
+
+
+def _follow_desktop(application: QApplication) -> None:
+    if application.property(_CHOSEN) == Theme.SYSTEM:
+        _take_scheme(application, _scheme_of(Theme.SYSTEM, application.styleHints().colorScheme()))
+
+
+def _take_scheme(application: QApplication, scheme: Scheme) -> None:
+    use(scheme)
+    application.setPalette(_palette())
+    application.setStyleSheet(sheet(_STYLE_SHEET))
+    for widget in application.allWidgets():
+        text = widget.property(_SHEET)
+        if isinstance(text, str):
+            widget.setStyleSheet(sheet(text))
+        follow = getattr(widget, "follow_theme", None)
+        if follow is not None:
+            follow()
+        QWidget.update(widget)  # item views have another one of their own
+
+
+def _palette() -> QPalette:
+    colours = QPalette()
+    roles = QPalette.ColorRole
+    for role, name in (
+        (roles.Window, WINDOW),
+        (roles.WindowText, TEXT),
+        (roles.Base, PANEL),
+        (roles.AlternateBase, RAISED),
+        (roles.Text, TEXT),
+        (roles.PlaceholderText, TEXT_FAINT),
+        (roles.Button, RAISED),
+        (roles.ButtonText, TEXT),
+        (roles.BrightText, TEXT),
+        (roles.ToolTipBase, RAISED),
+        (roles.ToolTipText, TEXT),
+        (roles.Highlight, SKY),
+        (roles.HighlightedText, INK),
+        (roles.Link, SKY),
+    ):
+        colours.setColor(role, QColor(name))
+    for role in (roles.WindowText, roles.Text, roles.ButtonText):
+        colours.setColor(QPalette.ColorGroup.Disabled, role, QColor(TEXT_FAINT))
+    return colours
+
+
+def elide(text_font: QFont, text: str, width_px: int) -> str:
+    """`text`, cut with an ellipsis where it does not fit into `width_px`."""
+    return QFontMetrics(text_font).elidedText(text, Qt.TextElideMode.ElideRight, width_px)
+
+
+_STYLE_SHEET = """
+QMainWindow, QDialog { background: @WINDOW; }
+QFrame#card { background: @PANEL; border: 1px solid @LINE; border-radius: 8px; }
+QLabel#card_title { color: @TEXT_DIM; font-size: 12px; font-weight: 600; }
+QLabel#card_note { color: @TEXT_FAINT; font-size: 12px; }
+QMenuBar { background: @WINDOW; color: @TEXT_DIM; padding: 2px 6px; }
+QMenuBar::item { padding: 4px 10px; border-radius: 4px; background: transparent; }
+QMenuBar::item:selected { background: @RAISED; color: @TEXT; }
+QMenu { background: @RAISED; color: @TEXT; border: 1px solid @LINE; padding: 4px; }
+QMenu::item { padding: 6px 28px 6px 22px; border-radius: 4px; }
+QMenu::item:selected { background: @SKY; color: @INK; }
+QMenu::item:disabled { color: @TEXT_FAINT; }
+QMenu::separator { height: 1px; background: @LINE; margin: 4px 8px; }
+QStatusBar { background: @WINDOW; color: @TEXT_DIM; font-size: 13px; }
+QStatusBar::item { border: none; }
+QToolTip { background: @RAISED; color: @TEXT; border: 1px solid @LINE; padding: 6px; }
+QComboBox, QSpinBox, QDoubleSpinBox { background: @RAISED; color: @TEXT; border: 1px solid @LINE; border-radius: 5px;
+    padding: 3px 8px; min-height: 22px; selection-background-color: @SKY; selection-color: @INK; }
+QComboBox:focus, QSpinBox:focus, QDoubleSpinBox:focus, QPushButton:focus { border: 1px solid @SKY; }
+QSpinBox::up-button, QSpinBox::down-button, QDoubleSpinBox::up-button, QDoubleSpinBox::down-button { subcontrol-origin: border;
+    width: 20px; border: none; background: transparent; }
+QSpinBox::up-button, QDoubleSpinBox::up-button { subcontrol-position: top right; }
+QSpinBox::down-button, QDoubleSpinBox::down-button { subcontrol-position: bottom right; }
+QSpinBox::up-arrow, QDoubleSpinBox::up-arrow { width: 0; height: 0; border-left: 4px solid @RAISED;
+    border-right: 4px solid @RAISED; border-bottom: 5px solid @TEXT_DIM; }
+QSpinBox::down-arrow, QDoubleSpinBox::down-arrow { width: 0; height: 0; border-left: 4px solid @RAISED;
+    border-right: 4px solid @RAISED; border-top: 5px solid @TEXT_DIM; }
+QComboBox::drop-down { border: none; width: 24px; }
+QComboBox::down-arrow { width: 0; height: 0; border-left: 4px solid @RAISED; border-right: 4px solid @RAISED;
+    border-top: 5px solid @TEXT_DIM; margin-right: 10px; }
+QComboBox QAbstractItemView { background: @RAISED; color: @TEXT; border: 1px solid @LINE;
+    selection-background-color: @SKY; selection-color: @INK; outline: none; }
+QPushButton { background: @RAISED; color: @TEXT; border: 1px solid @LINE; border-radius: 5px;
+    padding: 4px 12px; min-height: 22px; }
+QTabWidget::pane { border: none; }
+QTabBar { background: transparent; }
+QTabBar::tab { background: @WINDOW; color: @TEXT_DIM; border: 1px solid @LINE; border-bottom: none;
+    border-top-left-radius: 5px; border-top-right-radius: 5px; padding: 4px 12px; margin-right: 3px; }
+QTabBar::tab:selected { background: @RAISED; color: @TEXT; border-color: @TEXT_FAINT; }
+QTabBar::tab:hover { color: @TEXT; }
+QPushButton:hover { border-color: @TEXT_FAINT; }
+QPushButton:pressed { background: @LINE; }
+QPushButton:disabled, QComboBox:disabled, QSpinBox:disabled, QDoubleSpinBox:disabled { color: @TEXT_FAINT; background: @WINDOW; }
+QSpinBox::up-arrow:disabled, QDoubleSpinBox::up-arrow:disabled { border-left-color: @WINDOW; border-right-color: @WINDOW;
+    border-bottom-color: @LINE; }
+QSpinBox::down-arrow:disabled, QDoubleSpinBox::down-arrow:disabled { border-left-color: @WINDOW; border-right-color: @WINDOW;
+    border-top-color: @LINE; }
+QComboBox::down-arrow:disabled { border-left-color: @WINDOW; border-right-color: @WINDOW; border-top-color: @LINE; }
+QPushButton#main_button:enabled { background: @SKY; color: @INK; font-weight: 600; }
+QPushButton#main_button:focus { border: 2px solid @TEXT; }
+QScrollBar:vertical { background: transparent; width: 10px; margin: 0; }
+QScrollBar:horizontal { background: transparent; height: 10px; margin: 0; }
+QScrollBar::handle:vertical { background: @LINE; border-radius: 4px; min-height: 28px; margin: 0 1px; }
+QScrollBar::handle:horizontal { background: @LINE; border-radius: 4px; min-width: 28px; margin: 1px 0; }
+QScrollBar::handle:hover { background: @TEXT_FAINT; }
+QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
+QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
+QScrollArea#checks { background: transparent; border: 1px solid transparent; border-radius: 6px; }
+QScrollArea#checks:focus { border: 1px solid @SKY; }
+QSplitter::handle { background: transparent; }
+QSplitter::handle:hover { background: @LINE; border-radius: 3px; }
+QDialog#settings QLineEdit { background: @PANEL; color: @TEXT; border: 1px solid @LINE; border-radius: 5px; padding: 4px 8px;
+    min-height: 20px; selection-background-color: @SKY; selection-color: @INK; }
+QDialog#settings QLineEdit:focus { border: 1px solid @SKY; }
+QDialog#settings QLineEdit:disabled { color: @TEXT_FAINT; }
+QDialog#settings QLineEdit[wrong="true"] { border: 1px solid @FAULT; }
+QDialog#settings QTreeWidget { background: @PANEL; color: @TEXT; border: 1px solid @LINE; border-radius: 8px; padding: 4px;
+    outline: none; }
+QDialog#settings QTreeWidget:focus { border: 1px solid @SKY; }
+QDialog#settings QTreeWidget::item { padding: 4px 2px; }
+QDialog#settings QTreeWidget::item:selected { background: @SKY; color: @INK; }
+QDialog#settings QScrollArea, QWidget#setting_page { background: @WINDOW; }
+QFrame#setting { background: @PANEL; border: 1px solid @LINE; border-left: 4px solid @LINE; border-radius: 8px; }
+QFrame#setting[changed="true"] { border-left: 4px solid @ORANGE; }
+QFrame#setting[wrong="true"] { border: 1px solid @FAULT; border-left: 4px solid @FAULT; }
+QLabel#setting_name { color: @TEXT; font-size: 14px; font-weight: 600; }
+QLabel#setting_meaning { color: @TEXT_DIM; font-size: 13px; }
+QLabel#setting_note { color: @TEXT_FAINT; font-size: 12px; }
+QLabel#setting_error { color: @FAULT; font-size: 13px; font-weight: 600; }
+QLabel#section_title { color: @TEXT; font-size: 18px; font-weight: 700; padding-top: 8px; }
+QFrame#setting QSlider::groove:horizontal { height: 4px; background: @LINE; border-radius: 2px; }
+QFrame#setting QSlider::sub-page:horizontal { background: @SKY; border-radius: 2px; }
+QFrame#setting QSlider::handle:horizontal { background: @TEXT_DIM; width: 12px; margin: -4px 0; border-radius: 6px; }
+"""
+
+FORM_SHEET = """
+QPushButton:checked { background: @SKY; color: @INK; }
+QLineEdit { background: @PANEL; color: @TEXT; border: 1px solid @LINE; border-radius: 5px; padding: 4px 8px;
+    min-height: 20px; selection-background-color: @SKY; selection-color: @INK; }
+QLineEdit:focus { border: 1px solid @SKY; }
+QLineEdit:disabled { color: @TEXT_FAINT; background: @WINDOW; }
+QAbstractSpinBox QLineEdit { background: transparent; border: none; padding: 0; min-height: 0; }
+QListWidget, QTableWidget, QPlainTextEdit { background: @PANEL; color: @TEXT; border: 1px solid @LINE;
+    border-radius: 5px; gridline-color: @LINE; selection-background-color: @SKY; selection-color: @INK; outline: none; }
+QListWidget:focus, QTableWidget:focus, QPlainTextEdit:focus { border: 1px solid @SKY; }
+QListWidget::item { padding: 4px 6px; }
+QListWidget::item:selected { background: @SKY; color: @INK; }
+QTableWidget::item { padding: 0 6px; }
+QTableWidget::item:selected { background: @SKY; color: @INK; }
+QTableWidget QHeaderView::section { background: @RAISED; color: @TEXT_DIM; border: none; border-bottom: 1px solid @LINE;
+    padding: 4px 6px; font-size: 12px; font-weight: 600; }
+"""
+"""For a dialog with fields, lists and tables: by ``set_sheet`` on the dialog itself. In the application's sheet, rules that name a
+dialog do not hold for a field that was measured before it came into the dialog: Qt keeps what it has found."""

@@ -1,0 +1,485 @@
+"""A message that goes away by itself, at the lower edge of the live picture.
+
+A message over the live picture: starting, no new picture, recording over, fault.
+
+Offers at the lower edge of the picture: something can be done now, and nothing waits for an answer.
+
+Unlike a dialog it takes no key from the window, so STOP and the hand on the robot work while it is open.
+
+A question in the place where it was raised: unlike a dialog it takes no key from the window, so STOP works while it is open.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from math import ceil
+
+from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QColor, QFontMetricsF, QMouseEvent, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+
+from app.ui import theme
+from app.ui.i18n import tr, tr_text
+
+_SHOWN_MS = 6000
+_AFTER = re.compile(r"[/_-]")
+
+
+class Toast(QLabel):
+    """One line or two; the newest message replaces the one before."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._parent = parent
+        self.setWordWrap(True)
+        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._lift_px = 0
+        self._message = ""
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self.hide)
+        parent.installEventFilter(self)
+        self.hide()
+
+    def show_message(self, text: str, *, is_fault: bool = False) -> None:
+        text = tr_text(text)
+        edge = "@FAULT" if is_fault else "@LINE"
+        theme.set_sheet(
+            self,
+            f"background: @RAISED; color: @TEXT; border: 1px solid {edge}; border-radius: 8px; padding: 8px 16px; font-size: 14px;",
+        )
+        self._message = text
+        self.setText(_AFTER.sub("\\g<0>\N{ZERO WIDTH SPACE}", text))  # where a long name of a file may be broken
+        self.setAccessibleName(text)
+        self._place()
+        self.show()
+        self.raise_()
+        self._timer.start(_SHOWN_MS)
+
+    def text(self) -> str:
+        """The message as it was said."""
+        return self._message
+
+    def lift(self, height_px: int) -> None:
+        """Stay so far above the lower edge, where something else lies."""
+        self._lift_px = height_px
+        if self.isVisible():
+            self._place()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self._place()
+        return False
+
+    def _place(self) -> None:
+        room = self._parent.rect()
+        widest = max(200, room.width() - 40)
+        self.setFixedWidth(min(widest, self.fontMetrics().horizontalAdvance(self.text()) + 60))
+        self.setFixedHeight(self.heightForWidth(self.width()))
+        self.move((room.width() - self.width()) // 2, room.height() - self.height() - 16 - self._lift_px)
+
+
+class NoticeKind(Enum):
+    """How serious it is: the colour of the edge, as a role of the palette."""
+
+    PROGRESS = "SKY"
+    WARNING = "SIM"
+    FAULT = "FAULT"
+
+
+_WIDEST_PX, _EDGE_PX, _TITLE_PX, _DETAIL_PX, _FOOT_PX, _BUTTON_PX = 560, 20, 54, 62, 16, 46
+_SIZES_PX = (14, 13, 12, 11)
+_WRAPPED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
+
+
+class Notice(QWidget):
+    """A card in the middle of its parent. PROGRESS has a moving bar; a fault or an ended recording has a button to start again.
+
+    It is as high as its text needs: what to do stands at the end of it.
+    """
+
+    restart = Signal()
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._parent = parent
+        self._kind = NoticeKind.PROGRESS
+        self._title = ""
+        self._detail = ""
+        self._phase = 0.0
+        self._timer = QTimer(self)
+        self._timer.setInterval(50)
+        self._timer.timeout.connect(self._move_bar)
+        self._button = QPushButton(tr("Start again  (F5)"))
+        self._button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click must not take the keys from the robot
+        self._button.clicked.connect(self.restart)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(24, 24, 24, 20)
+        column.addStretch(1)
+        column.addWidget(self._button, 0, Qt.AlignmentFlag.AlignHCenter)
+        parent.installEventFilter(self)
+        self.hide()
+
+    @property
+    def text(self) -> str:
+        return f"{self._title}. {self._detail}" if self._detail else self._title
+
+    def sizeHint(self) -> QSize:
+        return QSize(520, 170)
+
+    def show_notice(self, kind: NoticeKind, title: str, detail: str = "", *, restartable: bool = False) -> None:
+        self._kind, self._title, self._detail = kind, tr_text(title), tr_text(detail)
+        self._button.setVisible(restartable)
+        self.setAccessibleName(self.text)
+        self.setToolTip(self.text)
+        if kind is NoticeKind.PROGRESS:
+            self._timer.start()
+        else:
+            self._timer.stop()
+        self._place()
+        self.show()
+        self.raise_()
+        self.update()
+
+    def clear(self) -> None:
+        self._timer.stop()
+        self.hide()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize:
+            self._place()
+        return False
+
+    def _place(self) -> None:
+        room = self._parent.rect()
+        width = min(_WIDEST_PX, room.width() - 2 * _EDGE_PX)
+        self.resize(width, self.height())
+        needed = max(_DETAIL_PX, self._detail_height(_SIZES_PX[0]))
+        height = self._around + min(needed, max(_DETAIL_PX, room.height() - _EDGE_PX - self._around))
+        self.setGeometry((room.width() - width) // 2, (room.height() - height) // 2, width, height)
+
+    @property
+    def _around(self) -> int:
+        """What is not the detail's, of the height."""
+        return _TITLE_PX + _FOOT_PX + (_BUTTON_PX if self._button.isVisibleTo(self) else 0)
+
+    def _detail_height(self, size_px: int) -> int:
+        room = QRectF(0, 0, self.width() - 2 - 2 * _EDGE_PX, 0)
+        return ceil(QFontMetricsF(theme.font(size_px)).boundingRect(room, _WRAPPED, self._detail).height())
+
+    @Slot()
+    def _move_bar(self) -> None:
+        self._phase = (self._phase + 0.02) % 1.0
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+        painter.setPen(QPen(QColor(theme.of(self._kind.value)), 2))
+        painter.setBrush(theme.colour(theme.PANEL, 0.96))
+        painter.drawRoundedRect(frame, 10, 10)
+        painter.setPen(QColor(theme.TEXT))
+        painter.setFont(theme.fitted(theme.bold(22), self._title, int(frame.width() - 40)))
+        painter.drawText(QRectF(20, 16, frame.width() - 40, 32), Qt.AlignmentFlag.AlignCenter, self._title)
+        painter.setPen(QColor(theme.TEXT_DIM))
+        room = QRectF(_EDGE_PX, _TITLE_PX, frame.width() - 2 * _EDGE_PX, self.height() - self._around)
+        size_px = next((size for size in _SIZES_PX if self._detail_height(size) <= room.height()), _SIZES_PX[-1])
+        painter.setFont(theme.font(size_px))
+        painter.drawText(room, _WRAPPED, self._detail)
+        if self._kind is NoticeKind.PROGRESS:
+            self._paint_bar(painter, QRectF(60, frame.bottom() - 26, frame.width() - 120, 6))
+        painter.end()
+
+    def _paint_bar(self, painter: QPainter, track: QRectF) -> None:
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.RAISED))
+        painter.drawRoundedRect(track, 3, 3)
+        width = track.width() * 0.28
+        left = track.left() - width + (track.width() + width) * self._phase
+        bar = QRectF(max(left, track.left()), track.top(), 0, track.height())
+        bar.setRight(min(left + width, track.right()))
+        painter.setBrush(QColor(theme.of(self._kind.value)))
+        painter.drawRoundedRect(bar, 3, 3)
+
+
+_OFFER_WIDEST_PX = 900
+_MARGIN_PX = 12
+_INK = theme.ON_PICTURE
+_SHAPE = "padding: 0 10px; min-height: 24px; font-size: 13px;"
+_PLAIN = f"{_SHAPE} background: {_INK.RAISED}; color: {_INK.TEXT}; border: 1px solid {_INK.TEXT_FAINT};"
+_MAIN = f"{_SHAPE} background: {_INK.SKY}; color: {_INK.INK}; font-weight: 600; border: 1px solid {_INK.SKY};"
+_FOCUS = f"QPushButton:focus {{ border: 2px solid {_INK.TEXT}; }} QPushButton:hover {{ border-color: {_INK.TEXT}; }}"
+
+
+@dataclass(frozen=True, slots=True)
+class OfferButton:
+    """A button: its word, what it does, and a tool tip."""
+
+    name: str
+    action: Callable[[], object]
+    meaning: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """What can be done. Of several, one is shown at a time, oldest first; an offer with a known key takes the old one's place.
+
+    Attributes
+    ----------
+    text, detail : what is the matter, and a second line.
+    answers : the first one is the one that is meant, unless work goes on; pressing any of them closes the offer first.
+    share : None: no work goes on; 0..1: how much is done; negative: work goes on, nobody knows how long.
+    is_fault : something went wrong.
+    dismissed : when the cross is pressed; without one the offer only goes.
+    """
+
+    key: str
+    text: str
+    detail: str = ""
+    answers: tuple[OfferButton, ...] = ()
+    share: float | None = None
+    is_fault: bool = False
+    dismissed: Callable[[], None] | None = None
+
+
+class OfferStrip(QFrame):
+    """Lies over the lower edge of its parent. ``lifted`` carries how many px it covers there, 0 when it is closed."""
+
+    lifted = Signal(int)
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._parent = parent
+        self._offers: dict[str, Offer] = {}
+        self._shown: Offer | None = None
+        self._buttons: list[QPushButton] = []
+        self._text, self._detail, self._more = QLabel(), QLabel(), QLabel()
+        self._text.setWordWrap(True)
+        self._detail.setWordWrap(True)
+        self._text.setStyleSheet(f"color: {_INK.TEXT}; font-size: 14px; font-weight: 600; border: none; background: none;")
+        for label in (self._detail, self._more):
+            label.setStyleSheet(f"color: {_INK.TEXT_DIM}; font-size: 12px; border: none; background: none;")
+        self._bar = QProgressBar()
+        self._bar.setTextVisible(False)
+        self._bar.setFixedHeight(6)
+        self._bar.setStyleSheet(
+            f"QProgressBar {{ background: {_INK.WINDOW}; border: none; border-radius: 3px; }}"
+            f"QProgressBar::chunk {{ background: {_INK.SKY}; border-radius: 3px; }}"
+        )
+        words = QVBoxLayout()
+        words.setSpacing(2)
+        for widget in (self._text, self._detail, self._bar):
+            words.addWidget(widget)
+        self._row = QHBoxLayout()
+        self._row.setSpacing(6)
+        whole = QHBoxLayout(self)
+        whole.setContentsMargins(14, 8, 8, 8)
+        whole.setSpacing(12)
+        whole.addLayout(words, 1)
+        whole.addWidget(self._more)
+        whole.addLayout(self._row)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setCursor(Qt.CursorShape.ArrowCursor)
+        parent.installEventFilter(self)
+        self.hide()
+
+    @property
+    def text(self) -> str:
+        """What is shown, "" when nothing is."""
+        if self._shown is None:
+            return ""
+        return f"{self._shown.text} {self._shown.detail}".strip()
+
+    @property
+    def answers(self) -> dict[str, QPushButton]:
+        """The buttons that are shown, by their words."""
+        return {button.text(): button for button in self._buttons}
+
+    def offer(self, offer: Offer) -> None:
+        """Show it, after those that wait already; or renew the one of that key."""
+        self._offers[offer.key] = offer
+        self._show()
+
+    def withdraw(self, key: str) -> None:
+        """It is no longer true."""
+        if self._offers.pop(key, None) is not None:
+            self._show()
+
+    def has(self, key: str) -> bool:
+        return key in self._offers
+
+    # ---- what is shown
+
+    def _show(self) -> None:
+        before, self._shown = self._shown, next(iter(self._offers.values()), None)
+        offer = self._shown
+        if offer is None:
+            had_focus = self.isAncestorOf(self.window().focusWidget()) if self.window().focusWidget() is not None else False
+            self.hide()
+            if had_focus:
+                self._parent.setFocus()
+            self.lifted.emit(0)
+            return
+        self._text.setText(offer.text)
+        self._detail.setText(offer.detail)
+        self._detail.setVisible(bool(offer.detail))
+        self._bar.setVisible(offer.share is not None)
+        if offer.share is not None:
+            self._bar.setRange(0, 1000 if offer.share >= 0.0 else 0)
+            self._bar.setValue(round(1000 * max(0.0, offer.share)))
+        waiting = len(self._offers) - 1
+        self._more.setText(tr("+{count} more", count=waiting))
+        self._more.setVisible(waiting > 0)
+        edge = _INK.FAULT if offer.is_fault else _INK.SKY
+        self.setStyleSheet(f"OfferStrip {{ background: {_INK.RAISED}; border: 1px solid {edge}; border-radius: 8px; }}")
+        self.setAccessibleName(offer.text)
+        self.setAccessibleDescription(offer.detail)
+        names = [answer.name for answer in offer.answers]
+        if before is None or before.key != offer.key or [answer.name for answer in before.answers] != names:
+            self._make_buttons(offer)
+        self.show()
+        self._place()
+        self.raise_()
+
+    def _make_buttons(self, offer: Offer) -> None:
+        for button in self._buttons:
+            self._row.removeWidget(button)
+            button.hide()
+            button.deleteLater()
+        self._buttons = []
+        for place, answer in enumerate(offer.answers):
+            self._add_button(answer.name, answer.meaning or answer.name, place == 0 and offer.share is None)
+        cross = self._add_button("\N{MULTIPLICATION SIGN}", tr("Close this"), False)
+        cross.setAccessibleName(tr("Close this offer"))
+        cross.setFixedWidth(30)
+
+    def _add_button(self, name: str, meaning: str, is_main: bool) -> QPushButton:
+        button = _AnswerButton(name)
+        button.setStyleSheet(f"QPushButton {{ {_MAIN if is_main else _PLAIN} }} {_FOCUS}")
+        button.setToolTip(meaning)
+        button.setAccessibleDescription(meaning)
+        button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click must not take the arrows from the robot
+        button.clicked.connect(lambda _checked=False, n=name: self._on_answer(n))
+        self._row.addWidget(button)
+        self._buttons.append(button)
+        return button
+
+    def _on_answer(self, name: str) -> None:
+        offer = self._shown
+        if offer is None:
+            return
+        action = next((answer.action for answer in offer.answers if answer.name == name), offer.dismissed)
+        self.withdraw(offer.key)
+        if action is not None:
+            action()
+
+    # ---- its place
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self._place()
+        return False
+
+    def _place(self) -> None:
+        room = self._parent.rect()
+        width = min(_OFFER_WIDEST_PX, room.width() - 2 * _MARGIN_PX)
+        layout = self.layout()
+        assert layout is not None
+        layout.activate()
+        height = max(48, layout.totalHeightForWidth(width) if layout.hasHeightForWidth() else self.sizeHint().height())
+        self.setGeometry((room.width() - width) // 2, room.height() - height - _MARGIN_PX, width, height)
+        self.lifted.emit(height + _MARGIN_PX)
+
+
+class _AnswerButton(QPushButton):
+    """The second half of a double click is no answer: by then the button may be another offer's, which nobody has read."""
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        event.accept()
+
+
+_OPEN_MS = 20_000
+BUTTON_STYLE = "padding: 0 9px; min-height: 20px; font-size: 12px;"
+
+
+class QuestionStrip(QWidget):
+    """One line with the question, the answer that does it, and Cancel. Left alone for 20 s it takes itself back.
+
+    ``closed`` comes after either answer. What is asked for is done by the callback given to ``ask``.
+    """
+
+    closed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._action: Callable[[], None] | None = None
+        self._text = ""
+        self._question = QLabel()
+        theme.set_sheet(self._question, "color: @ORANGE; font-size: 12px; font-weight: 600;")
+        self._yes = QPushButton()
+        self._no = QPushButton(tr("Cancel"))
+        for button in (self._yes, self._no):
+            button.setStyleSheet(BUTTON_STYLE)
+        self._yes.clicked.connect(self._on_yes)
+        self._no.clicked.connect(self.cancel)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(_OPEN_MS)
+        self._timer.timeout.connect(self.cancel)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        row.addWidget(self._question, 1)
+        row.addWidget(self._yes)
+        row.addWidget(self._no)
+        self.setAccessibleName(tr("Question"))
+
+    @property
+    def text(self) -> str:
+        """The open question; empty when there is none."""
+        return self._text
+
+    def ask(self, question: str, answer: str, action: Callable[[], None]) -> None:
+        """Open the question; `action` is done when `answer` is pressed. A question that was open is taken back."""
+        self._action, self._text = action, question
+        self._yes.setText(answer)
+        self.setAccessibleDescription(question)
+        self._fit()
+        self._timer.start()
+        self._no.setFocus()
+
+    @Slot()
+    def cancel(self) -> None:
+        """Take the question back."""
+        if self._text:
+            self._close()
+
+    @Slot()
+    def _on_yes(self) -> None:
+        action = self._action
+        self._close()
+        if action is not None:
+            action()
+
+    def _close(self) -> None:
+        self._action, self._text = None, ""
+        self._timer.stop()
+        self.closed.emit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """The question must not push the buttons out of a narrow window; its tool tip has all of it."""
+        room = self.width() - self._yes.sizeHint().width() - self._no.sizeHint().width() - 16
+        text = f"! {self._text}" if self._text else ""
+        self._question.setText(theme.elide(theme.semi_bold(12), text, max(40, room)))
+        self._question.setToolTip(self._text)

@@ -1,0 +1,223 @@
+"""The View menu of the windows that show a scene.
+
+What the operator window and the player have in common: the widgets that show a scene, and their places.
+
+How panels stand in a window: below each other, side by side, and in two columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QLayout, QTabWidget, QVBoxLayout, QWidget
+
+from app.ui import theme
+from app.ui.actions import MenuEntry, turn_page
+from app.ui.i18n import tr
+from app.ui.texts import REASON_TEXT
+from app.ui.window_base import WindowFrame
+from app.ui.workers import Pace
+from app.widgets.advice_line import AdviceLine
+from app.widgets.basics import Card, Columns
+from app.widgets.distance_bars import ClearanceBar, DistanceBars
+from app.widgets.live_view import LiveView
+from app.widgets.mode_bar import ModeBadge
+from app.widgets.overlay_bar import OverlayBar
+from app.widgets.scene_overlay import Layer
+from app.widgets.state_badge import StateBadge
+from app.widgets.theta_gauge import ThetaGauge
+from core.calibration.camera import mm_per_working_px
+from core.config.calibration import ScaleConfig
+from core.config.models import PerceptionConfig, PoseConfig
+from core.types import PoseState, RobotStatus, Scene, Tick
+
+_TOP_PX = 4
+
+
+def column(*parts: tuple[QWidget, int], spacing: int = theme.GAP) -> QVBoxLayout:
+    """Widgets below each other, each with its stretch."""
+    layout = QVBoxLayout()
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(spacing)
+    for widget, stretch in parts:
+        layout.addWidget(widget, stretch)
+    return layout
+
+
+def row(*widgets: QWidget) -> QWidget:
+    """Widgets side by side, equally wide."""
+    layout = QHBoxLayout()
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(theme.GAP)
+    for widget in widgets:
+        layout.addWidget(widget, 1)
+    return holder(layout)
+
+
+def holder(layout: QLayout) -> QWidget:
+    """A widget that is nothing but the place of a layout."""
+    widget = QWidget()
+    widget.setLayout(layout)
+    return widget
+
+
+def side(layout: QLayout, narrowest: int, widest: int) -> QWidget:
+    """The right one of two columns: beyond a width its dials gain nothing, and the picture everything. Pixels."""
+    widget = holder(layout)
+    widget.setMinimumWidth(narrowest)
+    widget.setMaximumWidth(widest)
+    return widget
+
+
+def set_window_margins(layout: QLayout) -> None:
+    """Those of the panels to the window's edges."""
+    layout.setContentsMargins(theme.GAP, _TOP_PX, theme.GAP, theme.GAP)
+
+
+def card_note(text: str) -> QLabel:
+    """The small text at the right of a card's title, for who changes it later."""
+    label = QLabel(text)
+    label.setObjectName("card_note")
+    return label
+
+
+def page_tabs() -> QTabWidget:
+    """Pages that share a place."""
+    pages = QTabWidget()
+    pages.setDocumentMode(True)
+    pages.setAccessibleName(tr("Pages"))
+    pages.tabBar().setAccessibleName(tr("Pages"))
+    pages.tabBar().setDrawBase(False)
+    return pages
+
+
+_LEFT_SHARE = 0.62
+_RIGHT_WIDTH = (470, 660)
+
+
+class ScenePanels(QWidget):
+    """Makes the widgets of a scene; whose it is, and what else there is, says the class below it, which also lays them out.
+
+    Parameters
+    ----------
+    perception : its limits of the pose states are shown on all dials.
+    pixels_per_mm : of the picture.
+    text_every_s : texts are renewed no more often, unless the state is another one.
+    """
+
+    def __init__(self, perception: PerceptionConfig, pixels_per_mm: float, text_every_s: float) -> None:
+        super().__init__()
+        limits = perception.pose
+        self.mode = ModeBadge()
+        self.live = LiveView(pixels_per_mm)
+        self.overlay_bar = OverlayBar()
+        self.overlay_bar.toggled.connect(self.set_layer)
+        self.advice = AdviceLine()
+        self.badge = StateBadge(limits, perception.quality.confident_from)
+        self.gauge = ThetaGauge(limits.theta_allow_deg)
+        self.bars = DistanceBars(limits.d_allow_px)
+        self.clearance = ClearanceBar()
+        self.pages = page_tabs()
+        self._allowed = (card_note(""), card_note(""))
+        self._tell_allowed(limits)
+        self._scale: ScaleConfig | None = None
+        self._text_pace = Pace(text_every_s)
+        self._state: PoseState | None = None
+
+    @property
+    def views(self) -> tuple[LiveView, ...]:
+        """The pictures that the overlays are drawn in."""
+        return (self.live,)
+
+    def set_layer(self, layer: Layer, on: bool) -> None:
+        """An overlay on or off."""
+        for view in self.views:
+            view.set_layer(layer, on)
+
+    def fit(self) -> None:
+        """The whole picture."""
+        for view in self.views:
+            view.fit()
+
+    # ---- a scene
+
+    def _renews_text(self, scene: Scene, *, asked: bool = False) -> bool:
+        """A new state renews all texts together: the numbers beside it must be the ones that made it."""
+        state = scene.pose.state if scene.pose is not None else None
+        is_due = asked or self._text_pace.due() or state is not self._state
+        self._state = state
+        return is_due
+
+    def _show_dials(self, scene: Scene, status: RobotStatus | None, *, renew_text: bool) -> None:
+        self.gauge.show_pose(scene.pose, renew_text=renew_text)
+        mm_per_px = mm_per_working_px(self._scale, scene)
+        self.bars.set_scale(mm_per_px)
+        self.clearance.set_scale(1.0 / mm_per_px if mm_per_px else None)
+        self.bars.show_pose(scene.pose, renew_text=renew_text)
+        self.clearance.show_scene(scene, status)
+
+    def _show_advice(self, tick: Tick, why_none: str, *, renew_text: bool) -> None:
+        """`why_none` is said where the scene itself has no reason for being without."""
+        if tick.scene.refusal is not None:
+            why_none = tr(REASON_TEXT[tick.scene.refusal.reason].title).lower()
+        self.advice.show_advice(tick.advice, self._state, why_none, is_unsure=self.badge.is_unsure, renew_text=renew_text)
+
+    def _blank_dials(self, title: str, why: str) -> None:
+        """Nothing is known now, and why."""
+        self.badge.show_nothing(title, why)
+        self.gauge.show_pose(None)
+        self.bars.show_pose(None)
+        self.advice.show_advice(None, None, title[0].lower() + title[1:])
+        self.clearance.show_scene(None, None)
+
+    def _tell_allowed(self, limits: PoseConfig) -> None:
+        angle, distances = self._allowed
+        angle.setText(tr("allowed {limit:g}°", limit=limits.theta_allow_deg))
+        distances.setText(tr("allowed {limit:g} px", limit=limits.d_allow_px))
+
+    # ---- places
+
+    def _dials(self) -> QWidget:
+        """Angle and distances, side by side."""
+        angle, distances = self._allowed
+        return row(Card(tr("Angle to the vessel"), self.gauge, angle), Card(tr("Distances"), self.bars, distances))
+
+    def _lay_out(self, header: QHBoxLayout, left: QWidget, right: QVBoxLayout) -> QWidget:
+        """A header and two columns below it, ``columns``; returns their place: what covers that leaves the header in sight."""
+        stage = QWidget()
+        self.columns = Columns(left, side(right, *_RIGHT_WIDTH), _LEFT_SHARE)
+        room = QHBoxLayout(stage)
+        room.setContentsMargins(0, 0, 0, 0)
+        room.addWidget(self.columns)
+        rows = QVBoxLayout(self)
+        set_window_margins(rows)
+        rows.setSpacing(theme.GAP)
+        rows.addLayout(header)
+        rows.addWidget(stage, 1)
+        return stage
+
+
+def add_scene_view_menu(window: WindowFrame, panels: ScenePanels, more: Sequence[MenuEntry] = ()) -> list[QAction]:
+    """Overlays, the whole picture and `more`, pages; returns the actions in this order. Those of overlays follow their switches."""
+    bar = panels.overlay_bar
+    layers = [MenuEntry(tr(layer.value.label), partial(bar.toggle, layer), (layer.value.key,), checked=True) for layer in Layer]
+    entries = [
+        *layers,
+        MenuEntry(tr("&All overlays on or off"), partial(_toggle_all, bar), ("0",)),
+        None,
+        MenuEntry(tr("&Whole picture"), panels.fit, ("F",)),
+        *more,
+        None,
+        MenuEntry(tr("&Next page"), partial(turn_page, panels.pages, 1), ("Ctrl+Tab",)),
+        MenuEntry(tr("&Previous page"), partial(turn_page, panels.pages, -1), ("Ctrl+Shift+Tab",)),
+    ]
+    actions = window.add_view_menu(entries)
+    of_layer = dict(zip(Layer, actions, strict=False))
+    bar.toggled.connect(lambda layer, on: of_layer[layer].setChecked(on))
+    return actions
+
+
+def _toggle_all(bar: OverlayBar) -> None:
+    bar.set_all(not any(bar.is_on(layer) for layer in Layer))

@@ -1,0 +1,437 @@
+"""Files of raters who annotated at several computers become one: all of them, or none, and a second time changes nothing.
+
+Each answer comes with all its edits, as its record lies in its file, damage included. What is here stays: an answer that went on at
+the other computer goes on here, one that went on differently at both is told and left as it is here.
+
+Who the raters of one file are in another: a name alone does not tell, since two computers may both call theirs "user".
+
+What is readable of a damaged annotation file, written into a new one; the damaged file is never touched.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sqlite3
+import tempfile
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from core.annotation.model import AnnotationError
+from core.annotation.store import DEFAULT_NAME, AnnotationStore, KeptAnnotation, check_sum, has_table, read_kept
+from core.annotation.study import StudySettings, settings_from
+
+
+@dataclass(frozen=True, slots=True)
+class Persons:
+    """``names``: by their names there, what raters are called here. ``declared``: of these, who was only said to be so."""
+
+    names: Mapping[str, str]
+    declared: frozenset[str]
+
+
+def whose(there: Sequence[KeptAnnotation], here: Sequence[KeptAnnotation], names: Mapping[str, str], where: str) -> Persons:
+    """Who is who, over all studies: whose answers are in both files is the same person, whatever he is called in each of them.
+
+    Parameters
+    ----------
+    there, here : all answers of both files.
+    names : what the operator says: name there -> name here.
+    where : the other file, for messages.
+
+    Raises
+    ------
+    AnnotationError
+        A name is in both files, and nothing tells whether it is one person; or `names` contradicts the answers.
+    """
+    at: dict[tuple[str, str, int], list[KeptAnnotation]] = {}
+    for one in here:
+        at.setdefault((one.sha256, one.study, one.repeat), []).append(one)
+    seen: dict[str, Counter[str]] = {one.rater: Counter() for one in there}
+    for one in there:
+        seen[one.rater].update(own.rater for own in at.get((one.sha256, one.study, one.repeat), ()) if own.is_same_as(one))
+    taken = {one.rater for one in here}
+    found: dict[str, str] = {}
+    declared = set()
+    for rater, answers in seen.items():
+        said = names.get(rater)
+        if answers:
+            who = rater if rater in answers else answers.most_common(1)[0][0]
+            if said not in (None, who):
+                shown = f"its rater {rater!r} is {who!r} here, as answers in both files show"
+                raise AnnotationError(f"{where}: {shown}; leave --as {rater}={said} out")
+            found[rater] = who
+        elif said is not None:
+            found[rater] = said
+            declared.add(said)
+        elif rater in taken:
+            raise AnnotationError(
+                f"{where}: a rater {rater!r} is there and here, and no answer of theirs is in both files: say who it is with "
+                f"--as {rater}=NAME (somebody else), or --as {rater}={rater} (the same person)"
+            )
+        else:
+            found[rater] = rater
+    return Persons(found, frozenset(declared))
+
+
+def raters_alike(raters: Iterable[str]) -> list[str]:
+    """A line for names that may be one person's, written in two ways."""
+    ways: dict[str, set[str]] = {}
+    for rater in raters:
+        ways.setdefault(" ".join(rater.casefold().split()), set()).add(rater)
+    several = [" and ".join(map(repr, sorted(names))) for names in ways.values() if len(names) > 1]
+    return [f"raters {names} are taken for different people" for names in several]
+
+
+@dataclass(slots=True)
+class Joined:
+    """What a join did: answers that came in, that went on, that were here already; raters by file; and what is to be told."""
+
+    new: int = 0
+    grown: int = 0
+    known: int = 0
+    persons: dict[Path, dict[str, str]] = field(default_factory=dict)
+    told: list[str] = field(default_factory=list)
+
+
+def join(target: AnnotationStore, files: Sequence[Path], study: str | None, names: Mapping[str, str]) -> Joined:
+    """Take the answers of other annotation files in, one after the other and in one transaction.
+
+    Parameters
+    ----------
+    target : open for writing.
+    files : annotation files, or folders with one; they are only read.
+    study : only this one; None: all, and what lies outside studies.
+    names : what raters of the files are called here, where their names alone do not tell.
+
+    Raises
+    ------
+    AnnotationError
+        A file is damaged, open in a window, or cannot be read; a study was begun otherwise there; or it is not clear who somebody
+        is. Nothing is changed then.
+    """
+    paths = [path / DEFAULT_NAME if path.is_dir() else path for path in files]
+    for path in paths:
+        if path.exists() and path.samefile(target.path):
+            raise AnnotationError(f"{path}: cannot be joined with itself")
+    joined = Joined()
+    with ExitStack() as stack:
+        sources = [stack.enter_context(AnnotationStore(path, read_only=True)) for path in paths]
+        raters = {rater for source in sources for _, rater in source.studies()}
+        for name in names:
+            if name not in raters:
+                there = ", ".join(sorted(raters)) or "none"
+                raise AnnotationError(f"--as {name}=...: no such rater in the files; in them are: {there}")
+        opened = [(source.path, stack.enter_context(source.transaction(writing=False))) for source in sources]
+        with target.transaction() as database:
+            for path, theirs in opened:
+                _take(database, theirs, _Ask(path, study, names), joined)
+            if database.execute("PRAGMA foreign_key_check").fetchone() is not None:
+                raise AnnotationError(f"{target.path}: damaged; annotate --salvage writes what is readable into a new file")
+    joined.told += raters_alike(rater for _, rater in target.studies())
+    return joined
+
+
+@dataclass(frozen=True, slots=True)
+class _Ask:
+    """What is asked of one file: its path for messages, and as in ``join``."""
+
+    where: Path
+    study: str | None
+    names: Mapping[str, str]
+
+
+def _take(database: sqlite3.Connection, theirs: sqlite3.Connection, ask: _Ask, joined: Joined) -> None:
+    if theirs.execute("PRAGMA foreign_key_check").fetchone() is not None:
+        raise AnnotationError(f"{ask.where}: damaged; annotate --salvage writes what is readable into a new file")
+    kept, here = read_kept(theirs), read_kept(database)
+    persons = whose(kept, here, ask.names, str(ask.where))
+    wanted = [one for one in kept if ask.study in (None, one.study)]
+    if ask.study is not None and not wanted:
+        there = ", ".join(sorted({repr(one.study) if one.study else "'' (outside studies)" for one in kept})) or "nothing"
+        raise AnnotationError(f"{ask.where}: has no answer of study {ask.study!r}; in it is {there}")
+    if left := len(kept) - len(wanted):
+        joined.told.append(f"{ask.where}: {left} answers of other studies stay there; without --study they come along")
+    for name in dict.fromkeys(one.study for one in wanted if one.study):
+        _take_study(database, theirs, name, ask.where)
+    _take_images(database, theirs, {one.sha256 for one in wanted}, ask.where)
+    _take_answers(database, theirs, (wanted, here), persons, ask.where, joined)
+    if has_table(theirs, "looks"):
+        _take_looks(database, theirs, ask.study, persons)
+    joined.persons[ask.where] = dict(persons.names)
+
+
+def _take_study(database: sqlite3.Connection, theirs: sqlite3.Connection, name: str, where: Path) -> None:
+    """Its settings; raises AnnotationError when it was begun otherwise: answers to other questions are no repeats."""
+    query = "SELECT settings, made_utc FROM studies WHERE name = ?"
+    their, own = theirs.execute(query, (name,)).fetchone(), database.execute(query, (name,)).fetchone()
+    if their is None:
+        return
+    if own is None:
+        database.execute("INSERT INTO studies (name, settings, made_utc) VALUES (?, ?, ?)", (name, *their))
+        return
+    there, here = _settings(their[0], f"{where}: study {name!r}"), _settings(own[0], f"study {name!r}")
+    if (there.views, there.order, there.seed) != (here.views, here.order, here.seed):
+        raise AnnotationError(f"{where}: study {name!r} was begun otherwise there: {_said(there)}; here: {_said(here)}")
+    if others := len(set(there.images) ^ set(here.images)):
+        raise AnnotationError(f"{where}: study {name!r} was begun with other pictures there: {others} are in one of the two only")
+
+
+def _settings(text: object, where: str) -> StudySettings:
+    """The settings as the file has them; raises AnnotationError."""
+    try:
+        return settings_from(json.loads(str(text)), where)
+    except ValueError:
+        raise AnnotationError(f"{where}: the settings of the study are damaged") from None
+
+
+def _said(settings: StudySettings) -> str:
+    shown = ", ".join(view.value for view in settings.views)
+    return f"shown {settings.repeats} times ({shown}), order {settings.order.value}, seed {settings.seed}"
+
+
+def _take_images(database: sqlite3.Connection, theirs: sqlite3.Connection, wanted: set[str], where: Path) -> None:
+    sizes = {sha256: (width, height) for sha256, width, height in database.execute("SELECT sha256, width, height FROM images")}
+    for sha256, name, width, height in theirs.execute("SELECT sha256, name, width, height FROM images").fetchall():
+        if sha256 not in wanted:
+            continue
+        if sizes.setdefault(sha256, (width, height)) != (width, height):
+            raise AnnotationError(f"{where}: {name}: has another size there than here; one of the two files is damaged")
+        # The size of no file: it is looked at anew before it is taken for the file of that name here.
+        database.execute(
+            "INSERT INTO images (sha256, name, width, height, file_size, modified_ns) VALUES (?, ?, ?, ?, -1, 0)"
+            " ON CONFLICT (sha256) DO NOTHING",
+            (sha256, name, width, height),
+        )
+
+
+def _take_answers(
+    database: sqlite3.Connection,
+    theirs: sqlite3.Connection,
+    there_and_here: tuple[Sequence[KeptAnnotation], Sequence[KeptAnnotation]],
+    persons: Persons,
+    where: Path,
+    joined: Joined,
+) -> None:
+    wanted, here = there_and_here
+    own = {one.key: one for one in here}
+    for one in wanted:
+        rater = persons.names[one.rater]
+        kept = own.get((one.sha256, one.study, rater, one.repeat))
+        who = f"{where}: image {one.sha256[:12]}, rater {one.rater}, repeat {one.repeat}"
+        if kept is None:
+            _insert(database, theirs, one, rater)
+            own[one.sha256, one.study, rater, one.repeat] = one
+            joined.new += 1
+            if check_sum(one.content) != one.check_sum:
+                joined.told.append(f"{who}: damaged there; came along as it is")
+        elif not kept.is_same_as(one) and rater in persons.declared:
+            raise AnnotationError(
+                f"{who}: {rater!r} has another answer to this here, and one name cannot have both; give another one with --as"
+            )
+        elif not kept.agrees_with(one):
+            joined.told.append(f"{who}: was answered in two ways here and there; left as it is here")
+        elif one.last > kept.last and check_sum(one.content) == one.check_sum:
+            _go_on(database, theirs, kept, one)
+            joined.grown += 1
+        else:
+            joined.known += 1
+
+
+_OWN = ("id", "image_id", "rater")
+
+
+def _columns(theirs: sqlite3.Connection, table: str, without: Sequence[str]) -> list[str]:
+    return [str(row[1]) for row in theirs.execute(f"PRAGMA table_info({table})") if row[1] not in without]
+
+
+def _insert(database: sqlite3.Connection, theirs: sqlite3.Connection, one: KeptAnnotation, rater: str) -> None:
+    """The record as it lies there, with all its edits, under this file's numbers."""
+    names = _columns(theirs, "annotations", _OWN)
+    values = theirs.execute(f"SELECT {', '.join(names)} FROM annotations WHERE id = ?", (one.row_id,)).fetchone()
+    (image_id,) = database.execute("SELECT id FROM images WHERE sha256 = ?", (one.sha256,)).fetchone()
+    (row_id,) = database.execute(
+        f"INSERT INTO annotations (image_id, rater, {', '.join(names)}) VALUES (?, ?{', ?' * len(names)}) RETURNING id",
+        (image_id, rater, *values),
+    ).fetchone()
+    _add_edits(database, theirs, one, row_id, after=0)
+    if one.origin is not None:
+        database.execute("INSERT INTO origins (annotation_id, origin) VALUES (?, ?)", (row_id, one.origin))
+
+
+def _go_on(database: sqlite3.Connection, theirs: sqlite3.Connection, kept: KeptAnnotation, one: KeptAnnotation) -> None:
+    """The same answer, some edits later."""
+    names = _columns(theirs, "annotations", (*_OWN, "study", "repeat", "begun_utc"))
+    values = theirs.execute(f"SELECT {', '.join(names)} FROM annotations WHERE id = ?", (one.row_id,)).fetchone()
+    database.execute(f"UPDATE annotations SET {', '.join(f'{name} = ?' for name in names)} WHERE id = ?", (*values, kept.row_id))
+    _add_edits(database, theirs, one, kept.row_id, after=kept.last)
+
+
+def _add_edits(database: sqlite3.Connection, theirs: sqlite3.Connection, one: KeptAnnotation, row_id: int, after: int) -> None:
+    names = _columns(theirs, "journal", ("id", "annotation_id"))
+    rows = theirs.execute(
+        f"SELECT {', '.join(names)} FROM journal WHERE annotation_id = ? AND number > ? ORDER BY number", (one.row_id, after)
+    )
+    database.executemany(
+        f"INSERT INTO journal (annotation_id, {', '.join(names)}) VALUES (?{', ?' * len(names)})",
+        [(row_id, *row) for row in rows.fetchall()],
+    )
+
+
+def _take_looks(database: sqlite3.Connection, theirs: sqlite3.Connection, study: str | None, persons: Persons) -> None:
+    query = "SELECT i.sha256, l.study, l.rater, l.repeat, l.after FROM looks l JOIN images i ON i.id = l.image_id"
+    for sha256, name, rater, repeat, after in theirs.execute(query).fetchall():
+        if study is None or name == study:
+            database.execute(
+                "INSERT INTO looks (image_id, study, rater, repeat, after) SELECT id, ?, ?, ?, ? FROM images WHERE sha256 = ?"
+                " ON CONFLICT (image_id, study, rater, repeat) DO UPDATE SET after = min(after, excluded.after)",
+                (name, persons.names.get(rater, rater), repeat, after, sha256),
+            )
+
+
+_MAX_ROW = 1_000_000
+_MISSES = 2_000
+"""After so many rows in a row that cannot be read, nothing more is expected."""
+_TABLES = ("images", "studies", "annotations", "journal", "origins", "looks")
+
+
+def salvage(damaged: Path, target: Path) -> tuple[int, list[str]]:
+    """Copy all rows that can be read.
+
+    Returns
+    -------
+    tuple
+        Number of annotations in the new file, and one line for each table or record that is lost.
+
+    Raises
+    ------
+    AnnotationError
+        Nothing can be read, or the new file is there already or cannot be written.
+    """
+    if not damaged.is_file():
+        raise AnnotationError(f"{damaged}: no such annotation file")
+    if target.exists():
+        raise AnnotationError(f"{target}: is there already; choose another --out")
+    found = _read(damaged)
+    if not found.rows:
+        raise AnnotationError(f"{damaged}: nothing in it can be read{f' ({found.why})' if found.why else ''}")
+    columns, tables, problems = found.columns, found.tables, found.problems
+    with AnnotationStore(target) as store:
+        store.take_rows(columns, tables, problems)
+    with AnnotationStore(target, read_only=True) as store:
+        kept = len(store.annotations())
+        problems += store.problems
+    return kept, problems
+
+
+@dataclass(slots=True)
+class _Found:
+    """What of a file can be read; ``why`` not more of it can."""
+
+    columns: dict[str, list[str]] = field(default_factory=dict)
+    tables: dict[str, list[tuple[Any, ...]]] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+    why: str = ""
+
+    @property
+    def rows(self) -> int:
+        """Of images and annotations."""
+        return len(self.tables.get("images", [])) + len(self.tables.get("annotations", []))
+
+
+def _read(damaged: Path) -> _Found:
+    """Read copies of a file: the database itself takes back in them what a crash has left half done, as its journal says.
+
+    That may be damaged, too: then the file is read without.
+    """
+    found = _Found()
+    for endings in (("", "-journal", "-wal"), ("",)):
+        with tempfile.TemporaryDirectory() as scratch:
+            copy = Path(scratch) / "damaged.sqlite"
+            try:
+                for ending in endings:
+                    if (beside := damaged.with_name(damaged.name + ending)).is_file():
+                        shutil.copyfile(beside, copy.with_name(copy.name + ending))
+            except OSError as error:
+                raise AnnotationError(f"{error.filename or damaged}: cannot be read ({error.strerror})") from None
+            again = _read_copy(copy)
+        found = again if again.rows > found.rows or not found.tables else found
+        if not any(damaged.with_name(damaged.name + ending).is_file() for ending in endings[1:]) or not found.problems:
+            break
+    return found
+
+
+def _read_copy(path: Path) -> _Found:
+    found = _Found()
+    try:
+        with closing(sqlite3.connect(path, isolation_level=None)) as source:
+            source.execute("PRAGMA writable_schema = ON")  # without it a file that was cut short is not looked into at all
+            source.text_factory = lambda data: data.decode("utf-8", errors="replace")
+            for table in _TABLES:
+                found.columns[table], found.tables[table] = _readable(source, table, found.problems)
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        found.why = str(error)
+    return found
+
+
+def _readable(source: sqlite3.Connection, table: str, problems: list[str]) -> tuple[list[str], list[tuple[Any, ...]]]:
+    try:
+        names = [str(row[1]) for row in source.execute(f"PRAGMA table_info({table})")]
+        if not names and table in ("origins", "looks"):  # a file of an earlier version
+            return [], []
+        lost = _astray(source, table)
+        rows = [row for row in _rows(source, table, problems) if row[0] not in lost]
+        if lost:
+            problems.append(f"{len(lost)} of {table} are not what the index of their table says; left out")
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        problems.append(f"table {table} is lost ({error})")
+        return [], []
+    return names, rows
+
+
+_INDEXED = {
+    "images": ("sha256",),
+    "annotations": ("image_id", "study", "rater", "repeat"),
+    "journal": ("annotation_id", "number"),
+}
+
+
+def _astray(source: sqlite3.Connection, table: str) -> set[int]:
+    """Rows that the table's index knows otherwise: one of the two is damaged, and an answer might be given to another image."""
+    if table not in _INDEXED:
+        return set()
+    same = " AND ".join(f"b.{name} IS a.{name}" for name in ("id", *_INDEXED[table]))
+    index = f"sqlite_autoindex_{table}_1"
+    query = f"SELECT a.id FROM {table} a NOT INDEXED WHERE NOT EXISTS (SELECT 1 FROM {table} b INDEXED BY {index} WHERE {same})"
+    try:
+        return {int(row[0]) for row in source.execute(query)}
+    except (sqlite3.Error, UnicodeDecodeError):  # no index to ask
+        return set()
+
+
+def _rows(source: sqlite3.Connection, table: str, problems: list[str]) -> Iterator[tuple[Any, ...]]:
+    """All rows by row number: where a page is damaged, the numbers on it are stepped over, and named."""
+    number, misses, whole = 0, 0, 0
+    while number < _MAX_ROW and misses < _MISSES:
+        try:
+            for row in source.execute(f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid", (number,)):
+                if int(row[0]) <= number:  # damaged links between pages can lead in a circle
+                    raise sqlite3.DatabaseError("rows out of order")
+                number = int(row[0])
+                if misses:
+                    problems.append(f"{_numbers(whole + 1, number - 1)} of {table} cannot be read")
+                misses, whole = 0, number
+                yield row[1:]
+            break
+        except (sqlite3.DatabaseError, UnicodeDecodeError):
+            number, misses = number + 1, misses + 1
+    if misses:
+        problems.append(f"the rows of {table} after number {whole} cannot be read")
+
+
+def _numbers(first: int, last: int) -> str:
+    return f"row {first}" if first == last else f"rows {first} to {last}"

@@ -1,0 +1,614 @@
+"""Which servo does what, and in which direction, from what the camera saw while each was turned a little both ways. Pure.
+
+A wire can only pull: turned one way the servo bends the head, turned the other way it lets the wire go slack and nothing happens. A
+drum feeds both ways. So the direction that does something is the one that tightens, and which way the head goes tells the tendon.
+What acts out of the image plane shortens what is seen of the robot, up or down alike: one camera cannot tell these two apart.
+
+What the camera saw of the robot at rest, and how its head moved between two such looks. Pure.
+
+In which direction each tendon moves the head, as the camera sees it. Pure.
+
+The ways of a pair are taken together: what the wall, the bend or the end of the mask add to both ways alike (all of them push the
+head along its axis) falls out of their difference. A head that is bent starts at right angles to where it points, so the heading
+says the same once more, and the mean of both is kept; how far they disagree is told.
+
+Where a wire becomes taut: the head stays where it is while the wire is slack, and then goes with it. Pure.
+
+Sideways the way of the head grows with the pull; out of the picture's plane what is seen is the shortening, which grows with its
+square. The root makes a line of that, too, and where the line starts the wire is taut: no threshold for the first twitch to pass.
+
+How far the catheter's sheath covers the robot, as far as two pictures of the same robot tell. Pure.
+
+Whether the robot goes as far as the feed's servo was sent: a drum of another size than the configured one. Pure.
+
+Whether the zero that a rig file keeps still fits where its servos stand now. Pure.
+
+A servo in extended position mode counts its turns only while it has power: afterwards its position register has jumped by whole
+turns. A tendon's way is a small part of a turn, so there the jump shows; a feed goes over many turns, and a lost one may not
+show. So a kept zero is never taken over by itself: it says what has happened, and zeroing is the operator's, with slack wires.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core import geometry
+from core.calibration.camera import mm_per_px_at
+from core.config.calibration import ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
+from core.config.safety import JOINT_NAMES, TENDONS, TICKS_PER_TURN, JointConfig, JointName, ServosConfig
+from core.devices import UserError
+from core.perception.vectors import fit_robot_vector
+from core.types import Image, Point, Points
+
+_ANCHOR_PX = 90.0
+"""So far behind the head both paths are laid over each other; within 50 and 200 px it makes no difference."""
+_LEAST_ANCHOR_PX = 30.0
+_STEP_PX = 0.5
+_LINE_PX = 40.0
+_TANGENT_PX = 8.0
+_LEAST_LOOKS = 3
+
+
+class HeadNotSeen(UserError):
+    """Perception does not find the robot, or too little of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Some frames of a robot that stands still: its paths (each (N, 2), source px, tail -> head) and their mean picture.
+
+    ``scale`` is working pixels per source pixel: what is measured is told in working pixels, in which the network's noise is always
+    the same, however fine the camera's picture is.
+
+    Raises
+    ------
+    HeadNotSeen
+        Fewer than three paths were found, or they are too short to have a direction.
+    """
+
+    paths: tuple[Points, ...]
+    image: Image
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if len(self.paths) < _LEAST_LOOKS:
+            raise HeadNotSeen("the robot's head is not seen: move the robot until all of its last centimetres are in the picture")
+        if min(float(geometry.arc_length(path)[-1]) for path in self.working_paths) < _LEAST_ANCHOR_PX + _TANGENT_PX:
+            raise HeadNotSeen("too little of the robot is seen: feed it farther into the vessel")
+
+    @cached_property
+    def working_paths(self) -> tuple[Points, ...]:
+        """The paths in working px, but for the half pixel that lies between the two."""
+        return tuple(path * self.scale for path in self.paths)
+
+    @cached_property
+    def head(self) -> Point:
+        """Median over the frames, in source px."""
+        x, y = np.median([path[-1] for path in self.paths], axis=0).tolist()
+        return float(x), float(y)
+
+    @cached_property
+    def path(self) -> Points:
+        """The path whose head lies nearest to the median, in source px."""
+        return min(self.paths, key=lambda path: float(np.hypot(*(path[-1] - np.array(self.head)))))
+
+    @cached_property
+    def heading(self) -> Points:
+        """Unit vector in which the robot's end points."""
+        found = [vector.direction for path in self.working_paths if (vector := fit_robot_vector(path, _LINE_PX)) is not None]
+        if not found:
+            raise HeadNotSeen("the robot's end has no direction: feed it farther into the vessel")
+        mean = np.median(np.array(found), axis=0)
+        return np.asarray(mean / np.hypot(*mean))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadMove:
+    """How the head moved, in working px.
+
+    ``vector`` (2,) is the way of the head at the length of robot that it had; ``lateral_px`` its part to the right of the heading;
+    ``longer_px`` how much more of the robot is seen (fed forward), or less (drawn back, or bent out of the picture).
+    """
+
+    vector: Points
+    lateral_px: float
+    longer_px: float
+
+    @property
+    def size_px(self) -> float:
+        return float(np.hypot(*self.vector))
+
+
+def head_move(rest: Look, moved: Look) -> HeadMove:
+    """The head's motion between two looks.
+
+    Where the mask ends shifts by some pixels when the tip bends, and would turn the direction of a motion of ten pixels by as many
+    degrees. So the end of the mask is not believed: the robot is as long as it was, and the head is where that length ends,
+    measured along the path from where both paths still lie on each other.
+    """
+    before, after = rest.working_paths, moved.working_paths
+    pairs = [(one, other) for one in before for other in after]
+    anchor_px = min(_ANCHOR_PX, min(float(geometry.arc_length(path)[-1]) for path in (*before, *after)) - _TANGENT_PX)
+    found = np.array([_one_move(one, other, anchor_px) for one, other in pairs])
+    x, y, longer = np.median(found, axis=0).tolist()
+    along, vector = rest.heading, np.array([x, y])
+    return HeadMove(vector, float(along[0] * vector[1] - along[1] * vector[0]), longer)
+
+
+def angle_deg(vector: Sequence[float] | Points) -> float:
+    """Direction of a vector in the image, -180..180: 0 to the right, 90 down."""
+    return float(np.degrees(np.arctan2(vector[1], vector[0])))
+
+
+def turn_deg(first_deg: float, second_deg: float) -> float:
+    """The smaller turn from the first direction to the second, -180..180."""
+    return (second_deg - first_deg + 180.0) % 360.0 - 180.0
+
+
+def _one_move(rest: Points, moved: Points, anchor_px: float) -> tuple[float, float, float]:
+    length = float(geometry.arc_length(rest)[-1])
+    anchor = _at(rest, length - anchor_px)
+    fine = geometry.resample(moved, _STEP_PX)
+    along = geometry.arc_length(fine)
+    start = float(along[int(np.argmin(np.hypot(*(fine - anchor).T)))])
+    end = _at(moved, start + anchor_px)
+    longer = float(geometry.arc_length(moved)[-1]) - start - anchor_px
+    return float(end[0] - rest[-1, 0]), float(end[1] - rest[-1, 1]), longer
+
+
+def _at(path: Points, length: float) -> Points:
+    """The point at an arc length; beyond the end straight on."""
+    along = geometry.arc_length(path)
+    end = float(along[-1])
+    if length <= end:
+        return np.array([np.interp(length, along, path[:, axis]) for axis in (0, 1)])
+    back = np.array([np.interp(end - _TANGENT_PX, along, path[:, axis]) for axis in (0, 1)])
+    tangent = path[-1] - back
+    return np.asarray(path[-1] + tangent / np.hypot(*tangent) * (length - end))
+
+
+F64 = NDArray[np.float64]
+_HALF_WIDTH_PX = 8
+_SHEATH_STEP_PX = 1.0
+_HEAD_PX = 20.0
+"""The head may have moved by a hair; what changes there says nothing of the sheath."""
+_BEYOND_PX = 20
+_LEAST_LENGTH = 3
+_LEAST_CHANGE = 3.5
+_NOISE_FACTOR = 3.5
+_GAP = 6
+"""Of a ringed robot the sheath changes the dark parts much more than the light ones."""
+
+
+def sheath_growth(path: Points, first: Image, second: Image) -> float:
+    """By how many px along the robot the sheath goes farther in the second picture than in the first; 0: no difference seen.
+
+    Parameters
+    ----------
+    path : the robot (N, 2), tail -> head, the same in both pictures.
+    first, second : mean pictures (H, W, 3).
+    """
+    one, other = _band(path, first), _band(path, second)
+    change = np.abs(one - other).mean(axis=(1, 2))
+    usable = len(change) - int(_HEAD_PX / _SHEATH_STEP_PX)
+    if usable < _BEYOND_PX + _LEAST_LENGTH:
+        return 0.0
+    change = change[:usable]
+    start, end = _longest_run(change > max(_LEAST_CHANGE, _NOISE_FACTOR * float(np.median(change))))
+    if end - start < _LEAST_LENGTH:
+        return 0.0
+    # Beyond the changed place both pictures show the bare robot: the one that looks like that in the place itself is the shorter.
+    beyond = np.concatenate([band[end + 2 : min(end + 2 + _BEYOND_PX, usable)] for band in (one, other)])
+    if len(beyond) < _BEYOND_PX:
+        return 0.0
+    bare = np.median(beyond, axis=0)
+    strange = [float(np.abs(band[start:end].mean(axis=0) - bare).mean()) for band in (one, other)]
+    length_px = (end - start) * _SHEATH_STEP_PX
+    return length_px if strange[1] > strange[0] else -length_px
+
+
+def _band(path: Points, image: Image) -> F64:
+    """Colours across the robot at every step along it: (steps, places across, 3)."""
+    line = geometry.resample(path, _SHEATH_STEP_PX)
+    tangent = np.gradient(line, axis=0)
+    tangent /= np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-9)[:, None]
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    across = np.arange(-_HALF_WIDTH_PX, _HALF_WIDTH_PX + 1)
+    places = (line[:, None, :] + across[None, :, None] * normal[:, None, :]).astype(np.float32)
+    seen = cv2.remap(image, places[..., 0], places[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(seen, np.float64)
+
+
+def _longest_run(changed: NDArray[np.bool_]) -> tuple[int, int]:
+    """Start and end of the longest run, small gaps bridged."""
+    best, start, last = (0, 0), -1, -_GAP - 1
+    for place in np.flatnonzero(changed).tolist():
+        if place - last > _GAP:
+            start = place
+        last = place
+        if last + 1 - start > best[1] - best[0]:
+            best = start, last + 1
+    return best
+
+
+_CLEAR_LATERAL_PX, _CLEAR_FEED_PX, _CLEAR_PITCH_PX, _CLEAR_SHEATH_PX = 3.0, 1.5, 1.4, 3.0
+_SHEATH_FROM_MM = 1.4
+_ONE_SIDED = 2.0
+"""So much more does a wire do when it is tightened than when it is let go."""
+_STILL_PX = 0.6
+
+
+class NotIdentified(UserError):
+    """The servos' functions are not all clear; the message names what is missing."""
+
+
+class Function(StrEnum):
+    """What a servo does, as one camera can tell it."""
+
+    RIGHT = "pulls the head to the right"
+    LEFT = "pulls the head to the left"
+    PITCH = "pulls the head out of the picture's plane"
+    ADVANCE = "feeds the robot"
+    DELIVERY = "feeds the catheter"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wiggle:
+    """The robot at rest, with the servo turned in its own positive direction, and in its negative one, by so many mm each."""
+
+    amplitude_mm: float
+    rest: Look
+    plus: Look
+    minus: Look
+
+
+@dataclass(frozen=True, slots=True)
+class FeedWay:
+    """How far the robot went: source px for each mm that was sent, of ``amplitude_mm`` both ways.
+
+    ``scale``: working px in a source px. ``head``: where it was seen, source px.
+    """
+
+    px_per_mm: float
+    amplitude_mm: float
+    head: Point
+    scale: float
+
+
+@dataclass(frozen=True, slots=True)
+class ServoFinding:
+    """What a servo does. ``sign``: the servo's own direction that tightens the wire or feeds forward. ``seen`` for people."""
+
+    function: Function
+    sign: Literal[-1, 1]
+    seen: str
+    way: FeedWay | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """Who a servo is. ``assumed``: one camera cannot tell, so the order of the ids decides."""
+
+    name: JointName
+    id: int
+    sign: Literal[-1, 1]
+    seen: str
+    assumed: bool = False
+
+
+def classify(wiggle: Wiggle) -> ServoFinding | None:
+    """What the servo does; None when nothing clear was seen: turn it farther."""
+    plus, minus = head_move(wiggle.rest, wiggle.plus), head_move(wiggle.rest, wiggle.minus)
+    sides = abs(plus.lateral_px), abs(minus.lateral_px)
+    if max(sides) >= _CLEAR_LATERAL_PX:
+        if max(sides) < _ONE_SIDED * min(sides):
+            return None
+        sign: Literal[-1, 1] = 1 if sides[0] > sides[1] else -1
+        lateral_px = plus.lateral_px if sign > 0 else minus.lateral_px
+        function = Function.RIGHT if lateral_px > 0 else Function.LEFT
+        return ServoFinding(function, sign, f"head {abs(lateral_px):.0f} px to the {'right' if lateral_px > 0 else 'left'}")
+    longer = plus.longer_px, minus.longer_px
+    if longer[0] * longer[1] < 0 and min(abs(longer[0]), abs(longer[1])) >= _CLEAR_FEED_PX:
+        px_per_mm = abs(longer[0] - longer[1]) / wiggle.rest.scale / (2.0 * wiggle.amplitude_mm)
+        way = FeedWay(px_per_mm, wiggle.amplitude_mm, wiggle.rest.head, wiggle.rest.scale)
+        return ServoFinding(Function.ADVANCE, 1 if longer[0] > 0 else -1, f"head {max(longer):.0f} px forward", way)
+    shorter = -plus.longer_px, -minus.longer_px
+    if max(shorter) >= _CLEAR_PITCH_PX and max(shorter) > _ONE_SIDED * abs(min(shorter)):
+        sign = 1 if shorter[0] > shorter[1] else -1
+        return ServoFinding(Function.PITCH, sign, f"{max(shorter):.1f} px less of the robot seen")
+    if max(abs(value) for value in (*longer, *sides)) > _STILL_PX or wiggle.amplitude_mm < _SHEATH_FROM_MM:
+        return None  # a wire out of the picture's plane may just begin to show
+    grown_px = wiggle.rest.scale * sheath_growth(wiggle.rest.path, wiggle.minus.image, wiggle.plus.image)
+    if abs(grown_px) >= _CLEAR_SHEATH_PX:
+        return ServoFinding(Function.DELIVERY, 1 if grown_px > 0 else -1, f"sheath {abs(grown_px):.0f} px farther")
+    return None
+
+
+def assign(found: Mapping[int, ServoFinding]) -> tuple[Assignment, ...]:
+    """Names for seven servos by id, in the order of ``JOINT_NAMES``.
+
+    Raises
+    ------
+    NotIdentified
+        A function is missing, or several servos have the same one.
+    """
+    wanted: tuple[tuple[Function, tuple[JointName, ...]], ...] = (
+        (Function.RIGHT, ("right",)),
+        (Function.LEFT, ("left",)),
+        (Function.PITCH, ("up", "down")),
+        (Function.ADVANCE, ("advance",)),
+        (Function.DELIVERY, ("delivery_1", "delivery_2")),
+    )
+    named: dict[JointName, Assignment] = {}
+    wrong = []
+    for function, names in wanted:
+        ids = sorted(servo_id for servo_id, finding in found.items() if finding.function is function)
+        if len(ids) != len(names):
+            listed = ", ".join(map(str, ids)) or "none"
+            wrong.append(f"{len(names)} that {function} (found: {listed})")
+            continue
+        for name, servo_id in zip(names, ids, strict=True):
+            finding = found[servo_id]
+            named[name] = Assignment(name, servo_id, finding.sign, finding.seen, assumed=function is Function.PITCH)
+    if wrong:
+        raise NotIdentified(f"not all servos are clear: there should be {'; '.join(wrong)}; wiggle them again, or set them by hand")
+    return tuple(named[name] for name in JOINT_NAMES)
+
+
+_FREE_PX = 4.0
+"""A head that moves less lies against a wall."""
+_MOST_DISAGREEMENT_DEG = 15.0
+_IN_PLANE_SHARE = 0.25
+"""A pair that moves the head by a smaller share of the other one's way acts out of the picture's plane."""
+
+
+class SteeringNotSeen(UserError):
+    """The head did not move enough to tell a direction."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pull:
+    """A tendon's pull (mm beyond the other's) and what the head did."""
+
+    pull_mm: float
+    move: HeadMove
+
+
+@dataclass(frozen=True, slots=True)
+class _Pair:
+    lateral_px_mm: float
+    direction_deg: float
+    disagreement_deg: float
+
+
+def learn(pulls: Mapping[str, Pull], heading: Points) -> SteeringConfig:
+    """The steering from a pull of each of the four tendons, each from rest.
+
+    Raises
+    ------
+    SteeringNotSeen
+        The head lies against a wall, or hardly moves, in both directions.
+    """
+    heading_deg = angle_deg(heading)
+    bend, pitch = (_pair(pulls[one], pulls[other], heading_deg) for one, other in (("right", "left"), ("up", "down")))
+    if bend is None and pitch is None:
+        raise SteeringNotSeen(
+            "the head hardly moves in the picture when the tendons pull, it lies against a wall: feed the robot to a place where "
+            "it has room on both sides, then learn again"
+        )
+    gains = [0.0 if pair is None else pair.lateral_px_mm for pair in (bend, pitch)]
+    seen = [pair for pair in (bend, pitch) if pair is not None]
+    largest = max(abs(gain) for gain in gains)
+    tendons = []
+    for pair, names in ((bend, ("right", "left")), (pitch, ("up", "down"))):
+        in_plane = pair is not None and abs(pair.lateral_px_mm) >= _IN_PLANE_SHARE * largest
+        for k, name in enumerate(names):
+            pull = pulls[name]
+            direction = turn_deg(0.0, pair.direction_deg + 180.0 * k) if in_plane and pair is not None else None
+            moved = pull.move.size_px if in_plane else abs(pull.move.lateral_px)
+            tendons.append(_tendon(name, direction, moved, pull.pull_mm))
+    return SteeringConfig(
+        heading_deg=heading_deg,
+        roll_deg=math.degrees(math.atan2(gains[1], gains[0])),
+        disagreement_deg=max(pair.disagreement_deg for pair in seen),
+        tendons=tuple(tendons),
+    )
+
+
+def _pair(one: Pull, other: Pull, heading_deg: float) -> _Pair | None:
+    """Way per millimetre to the right of the heading and its direction; None when neither tendon moves the head sideways."""
+    if max(abs(one.move.lateral_px), abs(other.move.lateral_px)) < _FREE_PX:
+        return None
+    way = one.move.vector - other.move.vector
+    gain = (one.move.lateral_px - other.move.lateral_px) / (one.pull_mm + other.pull_mm)
+    measured = angle_deg(way)
+    normal = turn_deg(0.0, heading_deg + math.copysign(90.0, gain))
+    apart = turn_deg(measured, normal)
+    # Where only one side is free the difference is that side's way, bent as it is: the heading is the better witness then.
+    is_free = min(abs(one.move.lateral_px), abs(other.move.lateral_px)) >= _FREE_PX
+    believed = measured if abs(apart) > _MOST_DISAGREEMENT_DEG else measured + (0.5 if is_free else 1.0) * apart
+    return _Pair(gain, turn_deg(0.0, believed), abs(apart))
+
+
+def _tendon(name: str, direction_deg: float | None, moved_px: float, pull_mm: float) -> TendonConfig:
+    assert name in TENDONS
+    return TendonConfig.model_validate(
+        {
+            "name": name,
+            "direction_deg": direction_deg,
+            "moved_px": moved_px,
+            "px_per_mm": moved_px / pull_mm,
+        }
+    )
+
+
+_LEAST_SIDEWAYS_PX, _LEAST_SHORTENING_PX = 1.2, 0.25
+_ENOUGH_SIDEWAYS_PX, _ENOUGH_SHORTENING_PX = 5.0, 1.4
+_LEAST_POINTS = 2
+_STARTS = 401
+
+
+class NeverTaut(UserError):
+    """The head did not follow the wire, or the wire was never slack: nobody can tell where it becomes taut."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TautReading:
+    """The servo at ``position_mm`` (positive tightens), and what the head has done since the wire was slack."""
+
+    position_mm: float
+    move: HeadMove
+
+
+def is_enough(step: TautReading) -> bool:
+    """Whether the head has gone so far that the start can be told; pulling on would only strain the wire."""
+    return abs(step.move.lateral_px) >= _ENOUGH_SIDEWAYS_PX or -step.move.longer_px >= _ENOUGH_SHORTENING_PX
+
+
+def is_begun(step: TautReading) -> bool:
+    """Whether the head has begun to follow."""
+    return abs(step.move.lateral_px) >= _LEAST_SIDEWAYS_PX or -step.move.longer_px >= _LEAST_SHORTENING_PX
+
+
+def taut_at_mm(steps: Sequence[TautReading]) -> float:
+    """The position at which the wire becomes taut.
+
+    Parameters
+    ----------
+    steps : from slack to pulled, in that order.
+
+    Raises
+    ------
+    NeverTaut
+        Fewer than two steps moved the head, or all of them did: then it was taut somewhere before the first.
+    """
+    sideways = max(abs(step.move.lateral_px) for step in steps) >= _ENOUGH_SIDEWAYS_PX
+    least = _LEAST_SIDEWAYS_PX if sideways else math.sqrt(_LEAST_SHORTENING_PX)
+    ways = [abs(step.move.lateral_px) if sideways else math.sqrt(max(0.0, -step.move.longer_px)) for step in steps]
+    # From the first step on after which the head always follows: one bad look before does not count.
+    first = len(ways)
+    while first > 0 and ways[first - 1] >= least:
+        first -= 1
+    if len(ways) - first < _LEAST_POINTS:
+        raise NeverTaut("the head does not follow the wire: is it hung in, does the head lie free? Or zero it by eye")
+    if first == 0:
+        raise NeverTaut("the wire was taut before it was pulled: loosen it, then try again, or zero it by eye")
+    at = np.array([step.position_mm for step in steps])
+    if np.polyfit(at[first:], np.array(ways[first:]), 1)[0] <= 0.0:
+        raise NeverTaut("the head does not follow the wire's pull: pull it by hand, or zero it by eye")
+    # A root makes much of the little that noise does while the wire is slack; and the last step before may show some of its way.
+    slack = first - 1
+    told = np.array([0.0] * slack + ways[first:])
+    return _start_of_line(np.concatenate([at[:slack], at[first:]]), told, float(at[first]))
+
+
+def _start_of_line(at: NDArray[np.float64], ways: NDArray[np.float64], latest: float) -> float:
+    """Where the line starts that is 0 up to there and then rises, by least squares over all steps; `latest` at the latest.
+
+    The steps before tell as much as those after: seen in pixels the head goes by half a pixel at a time, and a line through the few
+    steps after the first of these would start anywhere.
+    """
+    starts = np.linspace(min(at[0], latest), latest, _STARTS)
+    beyond = np.maximum(0.0, at[None, :] - starts[:, None])
+    slopes = beyond @ ways / np.maximum((beyond**2).sum(axis=1), 1e-12)
+    left_over = ((ways[None, :] - slopes[:, None] * beyond) ** 2).sum(axis=1)
+    return float(starts[np.argmin(left_over)])
+
+
+_NOISE_PX = 1.0
+"""Of a way as two looks give it, in working pixels."""
+_LEAST_SHARE = 0.2
+
+
+def feed_disagreement(
+    findings: Mapping[int, ServoFinding],
+    assignments: Sequence[Assignment],
+    servos: ServosConfig,
+    scale: ScaleConfig,
+    size: tuple[int, int],
+) -> str:
+    """What a person must know of the feed's way; "" where camera and configuration agree as far as can be told.
+
+    While nobody knew who is who all servos were turned as if their drums were as large as the largest configured one, so what
+    was seen tells the way at one turn of the horn.
+
+    Parameters
+    ----------
+    findings : by id.
+    size : (width, height) of the pictures that were looked at.
+    """
+    (place,) = (one for one in assignments if one.name == "advance")
+    found = findings.get(place.id)
+    if found is None or found.function is not Function.ADVANCE or found.way is None:
+        return ""
+    way = found.way
+    turned_as = max(joint.mm_per_turn for joint in servos.joints)
+    configured = servos.joints[JOINT_NAMES.index("advance")].mm_per_turn
+    mm_per_px = mm_per_px_at(scale, way.head, size)
+    seen = way.px_per_mm * mm_per_px * turned_as
+    noise = _NOISE_PX / way.scale * mm_per_px / way.amplitude_mm * turned_as
+    if abs(seen - configured) <= max(_LEAST_SHARE * configured, noise):
+        return ""
+    return (
+        f"the feed goes by about {seen:.0f} mm at one turn of the servo's horn, as the camera saw it, and is configured with "
+        f"{configured:g} mm: measure it, and set servos.joints, advance, mm_per_turn"
+    )
+
+
+_OVER = "the zero of the rig file does not hold any more"
+
+
+@dataclass(frozen=True, slots=True)
+class KeptZero:
+    """One joint. ``at_mm``: where it stands from the kept zero, after ``lost_turns`` of the servo are taken off."""
+
+    name: JointName
+    lost_turns: int
+    at_mm: float
+    is_inside: bool
+
+
+def kept_zero(joint: JointConfig, zero_ticks: int, ticks: int) -> KeptZero:
+    """How a joint stands against its kept zero; turns count as lost only where they take it out of its envelope.
+
+    Parameters
+    ----------
+    zero_ticks, ticks : position registers, at the kept zero and now.
+    """
+    away = ticks - zero_ticks
+    if _is_inside(joint, away):
+        return KeptZero(joint.name, 0, away / joint.ticks_per_mm, True)
+    turns = round(away / TICKS_PER_TURN)
+    left = away - turns * TICKS_PER_TURN
+    if turns and _is_inside(joint, left):
+        return KeptZero(joint.name, turns, left / joint.ticks_per_mm, True)
+    return KeptZero(joint.name, 0, away / joint.ticks_per_mm, False)
+
+
+def zero_advice(servos: ServosConfig, zero: ZeroConfig, ticks: Sequence[int]) -> str:
+    """One sentence for somebody who wants to arm joints that are not zeroed.
+
+    Parameters
+    ----------
+    ticks : position registers now, in the order of the joints.
+    """
+    found = [kept_zero(joint, *both) for joint, *both in zip(servos.joints, zero.ticks, ticks, strict=True)]
+    if lost := [f"{one.name} by {one.lost_turns:+d}" for one in found if one.lost_turns]:
+        return f"{_OVER}: the servos were without power and lost whole turns ({', '.join(lost)})"
+    if moved := [f"{one.name} by {one.at_mm:+.1f} mm" for one in found if not one.is_inside]:
+        return f"{_OVER}: joints were moved out of their envelope ({', '.join(moved)})"
+    tendons = ", ".join(f"{one.name} {one.at_mm:+.1f}" for one in found[:4])
+    return f"no jump against the zero of the rig file is seen (mm from it: {tendons})"
+
+
+def _is_inside(joint: JointConfig, ticks: int) -> bool:
+    return joint.low_mm <= ticks / joint.ticks_per_mm <= joint.high_mm

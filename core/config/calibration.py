@@ -1,0 +1,116 @@
+"""What is known of a rig that nobody can look up: lens, scale, steering, where its wires are slack. Part of a rig file."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from core.config.safety import JOINT_NAMES, TENDONS, JointName
+
+SizePx = Annotated[tuple[int, int], Field(description="width and height of the pictures")]
+_ANGLE = Field(ge=-360.0, le=360.0)
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class LensConfig(_Section):
+    """Radial distortion: a point at radius r of the straightened picture is seen at r (1 + k1 r^2 + k2 r^4).
+
+    Radii count from ``center_px``, in halves of the picture's diagonal, so a lens holds good for every size of the same picture.
+    """
+
+    k1: float = Field(ge=-0.5, le=0.5, description="negative: barrel")
+    k2: float = Field(0.0, ge=-0.5, le=0.5)
+    center_px: tuple[float, float] = Field(description="of the distortion, in pictures of size_px")
+    size_px: SizePx
+    residual_px: float = Field(ge=0.0, description="root mean square of what the model leaves over")
+    pictures: int = Field(ge=1)
+
+    @model_validator(mode="after")
+    def _check_folds_nothing(self) -> Self:
+        """Farther out in the straight picture must be farther out in the seen one, or its corners would be mirrored content."""
+        squares = [place / 20 for place in range(21)]
+        if min(1 + 3 * self.k1 * square + 5 * self.k2 * square * square for square in squares) <= 0.0:
+            raise ValueError("k1 and k2 fold the picture's corners inwards; calibrate the lens again")
+        return self
+
+
+class ScaleConfig(_Section):
+    """Millimetres per pixel of the straightened picture, in the plane in which the robot moves.
+
+    ``plane`` maps pixels to millimetres of that plane (3x3, row by row); a camera that looks at it at an angle has another scale at
+    every place. Without it the scale is the same everywhere.
+    """
+
+    mm_per_px: float = Field(gt=0.0, le=100.0, description="in the middle of the picture")
+    size_px: SizePx
+    method: Literal["board", "two clicks"]
+    uncertainty_share: float = Field(ge=0.0, description="standard error of the scale, as a share of it")
+    plane: tuple[float, float, float, float, float, float, float, float, float] | None = None
+
+    def working_px_per_mm(self, working_size_px: int) -> float:
+        """Working pixels per millimetre in the middle of the picture, whose longer side is `working_size_px` then."""
+        return working_size_px / (self.mm_per_px * max(self.size_px))
+
+    def fits(self, size_px: tuple[int, int]) -> bool:
+        """Whether it holds for pictures of this size: those of another aspect show another part of the bench, of unknown size."""
+        return abs(self.size_px[0] * size_px[1] / (self.size_px[1] * size_px[0]) - 1.0) <= 0.01
+
+
+class TendonConfig(_Section):
+    """Where the head goes when a tendon is pulled. Angles in the image: 0 to the right, 90 down."""
+
+    name: Literal["right", "left", "up", "down"]
+    direction_deg: float | None = Field(None, ge=-360.0, le=360.0, description="None: out of the image plane")
+    moved_px: float = Field(ge=0.0, description="way of the head when it was learnt, in working pixels")
+    px_per_mm: float = Field(ge=0.0, description="way of the head per millimetre of pull, in working pixels")
+
+
+class SteeringConfig(_Section):
+    """The steering as the camera saw it."""
+
+    heading_deg: float = Field(ge=-360.0, le=360.0, description="direction of the robot's end when it was learnt")
+    roll_deg: float = Field(
+        ge=-180.0, le=180.0, description="turn of the robot about its axis; 0: right and left act in the picture"
+    )
+    disagreement_deg: float = Field(ge=0.0, description="between the way of the head and the normal of its heading")
+    tendons: tuple[TendonConfig, ...] = Field(min_length=4, max_length=4)
+
+    @model_validator(mode="after")
+    def _check_tendons(self) -> Self:
+        if tuple(tendon.name for tendon in self.tendons) != TENDONS:
+            raise ValueError(f"tendons must be these four in this order: {', '.join(TENDONS)}")
+        return self
+
+
+class ZeroConfig(_Section):
+    """Where the joints were zeroed. It holds until the servos are switched off: they forget their turns then."""
+
+    ticks: tuple[int, ...] = Field(min_length=len(JOINT_NAMES), max_length=len(JOINT_NAMES), description="position registers")
+    slack_mm: tuple[float, ...] = Field(min_length=4, max_length=4, description="how far each tendon was from taut before")
+    pretension_mm: float = Field(ge=0.0, le=5.0)
+
+
+class PortConfig(_Section):
+    """Where the robot is inserted, as shares of the (straightened) picture's width and height."""
+
+    x_share: float = Field(ge=0.0, le=1.0)
+    y_share: float = Field(ge=0.0, le=1.0)
+
+
+class CalibrationConfig(_Section):
+    """All that was calibrated; None: it was not."""
+
+    made_utc: datetime
+    assumed: tuple[JointName, ...] | None = Field(
+        None, description="joints whose servos one camera cannot tell apart, and nobody has confirmed: their ids decided"
+    )
+    lens: LensConfig | None = None
+    scale: ScaleConfig | None = None
+    steering: SteeringConfig | None = None
+    zero: ZeroConfig | None = None
+    port: PortConfig | None = None

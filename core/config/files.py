@@ -1,0 +1,441 @@
+"""Settings files: what differs from the defaults, as TOML. Nothing that a user wrote is ever lost.
+
+Comments and unknown keys stay where they are. Before anything else would be lost (a file that is no TOML, a value that is not
+allowed, a change that somebody else made meanwhile) the old file is kept beside the new one, as ``NAME.bad-<time>``.
+
+Reading settings files of the user: what can be used of them is used, what cannot is told and kept.
+
+The user's own settings and named profiles, as TOML files in the user's configuration folder.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import time
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import platformdirs
+import tomlkit
+from pydantic import ValidationError
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import AoT, Table
+from tomlkit.toml_document import TOMLDocument
+
+from core.config.models import RESOURCES, Config, ConfigError, load_config, merge
+from core.config.schema import JOINTS, FieldKind, settings_by_key, value_at
+from core.devices import UserError
+from core.files import write_whole
+
+UNKNOWN = "unknown key, kept but not used"
+_TOO_MUCH = "too much is wrong"
+_MOST_ROUNDS = 500
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsFile:
+    """What a settings file says.
+
+    ``data`` is what can be used, as nested dictionaries; ``text`` the file as it was read, None where there was none; ``problems``
+    are one line each, for people.
+    """
+
+    path: Path
+    data: dict[str, Any]
+    text: str | None
+    problems: tuple[str, ...] = ()
+
+    @property
+    def config(self) -> Config:
+        """With the defaults where the file says nothing."""
+        return load_config(overrides=self.data)
+
+
+def read_settings(path: Path, *, may_move: bool = True) -> SettingsFile:
+    """What can be used of a settings file; a missing one is empty.
+
+    A file that is no TOML is set aside at once (unless it may not be moved), so that the next change does not overwrite it. Unknown
+    keys and values that are not allowed are left out here and stay in the file.
+    """
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+        data = tomllib.loads(text)
+    except FileNotFoundError:
+        return SettingsFile(path, {}, None)
+    except OSError as error:
+        return SettingsFile(path, {}, None, (f"{path}: cannot be read ({error.strerror}); the defaults are used",))
+    except (ValueError, RecursionError) as error:  # not TOMLDecodeError alone: a number of 5000 digits is none
+        why = f"is no TOML ({_first_line(error)})"
+        return SettingsFile(path, {}, None, (_move_aside(path, why) if may_move else f"{path}: {why}; the defaults are used",))
+    data, problems = usable_part(data)
+    return SettingsFile(path, data, text, tuple(f"{path}: {problem}" for problem in problems))
+
+
+def aside_name(path: Path) -> Path:
+    """A free name beside `path`, with the time."""
+    stem = f"{path.name}.bad-{time.strftime('%Y%m%d-%H%M%S')}"
+    names = (path.with_name(stem if k == 0 else f"{stem}-{k}") for k in range(10_000))
+    return next(name for name in names if not name.exists())
+
+
+def usable_part(data: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """The part of `data` that is allowed, and a line for each part that is not."""
+    problems: list[str] = []
+    base = load_config().model_dump(mode="json")
+    for _ in range(_MOST_ROUNDS):
+        try:
+            Config.model_validate(merge(base, data))
+        except ValidationError as error:
+            first: Any = error.errors()[0]
+            data, key = _without(data, first["loc"])
+            if first["type"] == "extra_forbidden":
+                problems.append(f"{key}: {UNKNOWN}")
+            else:
+                problems.append(f"{key}: {_message(error)}; the default is used")
+        else:
+            return data, problems
+    return {}, [*problems, f"{_TOO_MUCH}; the defaults are used"]
+
+
+def _without(data: dict[str, Any], location: tuple[Any, ...]) -> tuple[dict[str, Any], str]:
+    """`data` without what is at `location`, or without the nearest thing around it that the file does say."""
+    if not location or location[0] not in data:
+        return {}, "file"
+    name, inner = str(location[0]), data[location[0]]
+    if isinstance(inner, dict) and len(location) > 1 and location[1] in inner:
+        rest, key = _without(inner, location[1:])
+        return {**data, name: rest}, f"{name}.{key}"
+    return {key: value for key, value in data.items() if key != name}, name
+
+
+def _message(error: ValidationError) -> str:
+    first: Any = error.errors()[0]
+    return str(first["msg"]).removeprefix("Value error, ")
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
+
+
+def _move_aside(path: Path, why: str) -> str:
+    aside = aside_name(path)
+    try:
+        path.rename(aside)
+    except OSError as error:
+        return f"{path}: {why}, and cannot be set aside ({error.strerror}); the defaults are used"
+    return f"{path}: {why}; it is kept as {aside.name}, and the defaults are used"
+
+
+_HEAD = "# LumenPilot's settings: only what differs from the defaults. Every key, its range and its meaning: core/config/models.py."
+
+
+def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
+    """Write what differs from the defaults; whenever the process or the power goes, the old or the new file is there.
+
+    Parameters
+    ----------
+    path : the file, made if it is missing; a link is followed.
+    config : what the file is to say.
+    seen : the text that the file had when `config` was begun; None: nobody looked.
+
+    Returns
+    -------
+    str
+        Empty, or one line about where the old file is kept.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be written; the old one is as it was.
+    """
+    path = Path(os.path.realpath(path))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        old, note = _old_text(path, seen)
+        text, is_lossless = settings_text(old, config)
+        if not is_lossless and not note:
+            note = _kept(path, "had values that are not allowed")
+        write_whole(path, text.encode("utf-8"), durable=True)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written ({error.strerror}); nothing was changed") from None
+    return note
+
+
+def settings_text(old: str, config: Config) -> tuple[str, bool]:
+    """The text of a settings file that says `config`, made from its `old` text.
+
+    Returns
+    -------
+    text : comments, order and unknown keys as in `old`.
+    is_lossless : False when `old` held something at a known place that nobody can read back from `text`.
+    """
+    try:
+        document = tomlkit.parse(old)
+    except TOMLKitError:
+        return _fresh(config), not old.strip()
+    _, problems = usable_part(tomllib.loads(old))
+    is_lossless = all(UNKNOWN in problem for problem in problems)
+    if not old.strip():
+        return _fresh(config), True
+    _update(document, config)
+    text = tomlkit.dumps(document)
+    # Rare forms (a table in three places, dotted keys) can outwit the editor: what it wrote is read back before it counts.
+    if _says(text, config, {problem for problem in problems if UNKNOWN in problem}):
+        return text, is_lossless
+    return _fresh(config), False
+
+
+def changed_keys(first: Config, second: Config) -> tuple[str, ...]:
+    """Dotted paths of all settings that differ."""
+    one, other = first.model_dump(mode="json"), second.model_dump(mode="json")
+    return tuple(key for key in settings_by_key() if value_at(one, key) != value_at(other, key))
+
+
+def _old_text(path: Path, seen: str | None) -> tuple[str, str]:
+    """The file's text, empty where there is none that can be edited, and a line when it had to be set aside."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return "", ""
+    try:
+        text = data.decode("utf-8-sig")
+        tomllib.loads(text)
+    except (ValueError, RecursionError):
+        return "", _kept(path, "was no TOML")
+    note = _kept(path, "was changed meanwhile") if seen is not None and text != seen else ""
+    return text, note
+
+
+def _kept(path: Path, why: str) -> str:
+    """Copy the old file beside itself."""
+    aside = aside_name(path)
+    shutil.copy2(path, aside)
+    return f"{path.name} {why}: the old one is kept as {aside.name}"
+
+
+def _says(text: str, config: Config, unknown: set[str]) -> bool:
+    """Whether the text, read back, means `config` and still has its unknown keys."""
+    try:
+        data, problems = usable_part(tomllib.loads(text))
+    except ValueError:
+        return False
+    return load_config(overrides=data) == config and set(problems) == unknown
+
+
+def _fresh(config: Config) -> str:
+    document = tomlkit.document()
+    document.add(tomlkit.comment(_HEAD.removeprefix("# ")))
+    _update(document, config)
+    return tomlkit.dumps(document)
+
+
+def _update(document: TOMLDocument, config: Config) -> None:
+    """Make the document say `config`: what differs from the default is set, what is a default again goes out of it."""
+    said = document.unwrap()
+    base, new = load_config().model_dump(mode="json"), config.model_dump(mode="json")
+    for key, setting in settings_by_key().items():
+        if key.startswith(JOINTS):
+            continue
+        value = value_at(new, key)
+        if not _agrees(said, key, value, is_switch=setting.kind is FieldKind.SWITCH):
+            if value == value_at(base, key):
+                _drop(document, key.split("."))
+            else:
+                _put(document, key.split("."), value)
+    joints = value_at(new, JOINTS)
+    usable, _ = usable_part(said)
+    is_said = load_config(overrides=usable).model_dump(mode="json")["servos"]["joints"] == joints
+    if joints == value_at(base, JOINTS):
+        if not is_said or not _is_at(usable, JOINTS):
+            _drop(document, JOINTS.split("."))
+    elif not is_said:
+        _put_joints(document, joints)
+
+
+def _agrees(said: dict[str, Any], key: str, value: Any, *, is_switch: bool) -> bool:
+    """Whether the file says so already; a whole number may stand for a number, but not for a switch."""
+    if not _is_at(said, key):
+        return False
+    found = value_at(said, key)
+    return bool(found == value) and isinstance(found, bool) is is_switch
+
+
+def _is_at(data: dict[str, Any], key: str) -> bool:
+    try:
+        value_at(data, key)
+    except KeyError:
+        return False
+    return True
+
+
+def _put(table: Any, parts: list[str], value: Any) -> None:
+    name = parts[0]
+    if len(parts) == 1:
+        if value is not None:
+            table[name] = value
+        elif name in table:
+            del table[name]
+        return
+    if not isinstance(table.get(name), dict):
+        table[name] = tomlkit.table(is_super_table=len(parts) > 2)
+    _put(table[name], parts[1:], value)
+
+
+def _drop(table: Any, parts: list[str]) -> None:
+    name = parts[0]
+    if name not in table:
+        return
+    inner = table[name]
+    if len(parts) > 1 and isinstance(inner, dict):
+        _drop(inner, parts[1:])
+        is_bare = isinstance(inner, Table) and not inner and "#" not in inner.as_string()
+        if not is_bare:
+            return
+    del table[name]
+
+
+def _put_joints(document: TOMLDocument, joints: list[dict[str, Any]]) -> None:
+    """All seven; those that stand there already are edited, so that unknown keys and comments stay."""
+    if not isinstance(document.get("servos"), dict):
+        document["servos"] = tomlkit.table(is_super_table=True)
+    servos: Any = document["servos"]
+    old = servos.get("joints")
+    if isinstance(old, AoT) and len(old) == len(joints):
+        for table, joint in zip(old, joints, strict=True):
+            for name, value in joint.items():
+                if table.get(name) != value:
+                    table[name] = value
+        return
+    tables = tomlkit.aot()
+    for joint in joints:
+        entry = tomlkit.table()
+        entry.update(joint)
+        tables.append(entry)
+    servos["joints"] = tables
+
+
+_NAME = re.compile(r"^[\w][\w .()+-]{0,59}$")
+_ENDING = ".toml"
+
+
+class ProfileError(UserError):
+    """A profile cannot be saved, found or deleted; one line says what to do."""
+
+
+def settings_folder() -> Path:
+    """Where the program keeps what the user set; it need not exist."""
+    return Path(platformdirs.user_config_dir("LumenPilot", appauthor=False))
+
+
+def own_settings_path() -> Path:
+    """The settings of the windows when no other file is named."""
+    return settings_folder() / "settings.toml"
+
+
+def settings_of_windows(named: Path | None = None) -> SettingsFile:
+    """The settings that a window begins with and its dialog writes: of a file that was named, else the user's own.
+
+    What is wrong with the user's own is among its problems; a named file is left where it is, whatever is wrong with it.
+    """
+    return read_settings(named or own_settings_path(), may_move=named is None)
+
+
+def own_config() -> Config:
+    """The user's own configuration, for a window that has no settings to change; no file is touched."""
+    return read_settings(own_settings_path(), may_move=False).config
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A named set of settings. Presets come with the program and cannot be changed."""
+
+    name: str
+    path: Path
+    is_preset: bool = False
+
+
+class Profiles:
+    """The profiles in a folder, and the presets that come with the program."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._folder = folder if folder is not None else settings_folder() / "profiles"
+
+    @property
+    def folder(self) -> Path:
+        """Where the user's profiles are."""
+        return self._folder
+
+    def all(self) -> tuple[Profile, ...]:
+        """Presets first, then the user's by name; a folder that cannot be read has none."""
+        presets = sorted((RESOURCES / "config").glob(f"preset_*{_ENDING}"))
+        try:
+            own = sorted((p for p in self._folder.glob(f"*{_ENDING}") if p.is_file()), key=lambda p: p.stem.casefold())
+        except OSError:
+            own = []
+        shipped = [Profile(path.stem.removeprefix("preset_"), path, is_preset=True) for path in presets]
+        return (*shipped, *(Profile(path.stem, path) for path in own if _NAME.match(path.stem)))
+
+    def load(self, profile: Profile) -> SettingsFile:
+        """Its settings. Raises ProfileError when it is gone; what else is wrong with it is among the file's problems."""
+        if not profile.path.is_file():
+            raise ProfileError(f"profile {profile.name}: it is no longer there ({profile.path})")
+        return read_settings(profile.path)
+
+    def save(self, name: str, config: Config) -> tuple[Profile, str]:
+        """Save under a name, over an older one of that name.
+
+        Returns
+        -------
+        profile : as saved.
+        note : empty, or one line about where a damaged older file is kept.
+
+        Raises
+        ------
+        ProfileError
+            No usable name, or the disk does not take it.
+        """
+        name = check_name(name)
+        if any(profile.is_preset and profile.name.casefold() == name.casefold() for profile in self.all()):
+            raise ProfileError(f"profile {name}: a preset has this name; choose another one")
+        profile = Profile(name, self._folder / f"{name}{_ENDING}")
+        try:
+            return profile, write_settings(profile.path, config)
+        except ConfigError as error:
+            raise ProfileError(str(error)) from None
+
+    def delete(self, profile: Profile) -> None:
+        """Delete one of the user's. Raises ProfileError."""
+        if profile.is_preset:
+            raise ProfileError(f"profile {profile.name}: it comes with the program and cannot be deleted")
+        try:
+            profile.path.unlink()
+        except FileNotFoundError:
+            pass
+        except OSError as error:
+            raise ProfileError(f"profile {profile.name}: cannot be deleted ({error.strerror})") from None
+
+    def exists(self, name: str) -> bool:
+        """Whether the user has one of this name."""
+        return (self._folder / f"{name.strip()}{_ENDING}").is_file()
+
+    def matching(self, config: Config) -> Profile | None:
+        """The first profile that says exactly `config`, None when none does."""
+        for profile in self.all():
+            try:
+                if load_config(profile.path) == config:
+                    return profile
+            except ConfigError:  # it says so when it is chosen
+                continue
+        return None
+
+
+def check_name(name: str) -> str:
+    """The name without blanks around it. Raises ProfileError for one that makes no good file name."""
+    name = name.strip()
+    if not _NAME.match(name):
+        raise ProfileError("a profile's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit")
+    return name

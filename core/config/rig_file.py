@@ -1,0 +1,335 @@
+"""Rig files: camera, servos and calibration of one bench in one TOML file, in the user's configuration folder.
+
+A file that cannot be used is told in one line and left as it is; a rig that is saved again keeps its older file beside the new one.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import tomllib
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Any, Literal, Self
+
+import tomlkit
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from core.config.calibration import CalibrationConfig, PortConfig
+from core.config.files import settings_folder
+from core.config.models import CameraConfig, Config, PerceptionConfig, RigConfig, TwinConfig
+from core.config.safety import ServosConfig
+from core.devices import UserError
+from core.files import write_whole
+
+FORMAT = 1
+RESERVED = ("twin", "realsense", "webcam")
+"""What ``--rig`` means without a rig file."""
+_NAME = re.compile(r"^[\w][\w .()+-]{0,59}$")
+_ENDING, _OLDER = ".toml", ".older.toml"
+_MAX_BYTES = 200_000
+_HEADER = "A rig of LumenPilot: camera, servos, calibration. Made by the rig wizard (menu Rig, or main.py rig calibrate)."
+
+
+class RigFileError(UserError):
+    """A rig file cannot be read, found or saved; one line names file, key and what is wrong."""
+
+
+class RigFile(BaseModel):
+    """One bench. ``twin`` is there when its camera is the twin's."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    format: int = Field(FORMAT, ge=1)
+    name: str = Field(min_length=1, max_length=60)
+    made_utc: datetime
+    kind: Literal["twin", "realsense", "webcam"]
+    robot: Literal["twin", "servos", "none"]
+    camera: CameraConfig = CameraConfig()
+    twin: TwinConfig | None = None
+    servos: ServosConfig = ServosConfig()
+    calibration: CalibrationConfig | None = None
+
+    @model_validator(mode="after")
+    def _check_parts(self) -> Self:
+        check_rig_name(self.name)
+        if (self.kind == "twin") is not (self.twin is not None):
+            raise ValueError("a twin needs the section twin, and no other rig has one")
+        if (self.robot == "twin") and self.kind != "twin":
+            raise ValueError("a real camera does not see the twin's robot: robot must be servos or none")
+        if self.robot == "servos" and (self.kind == "twin" or self.servos.port is None):
+            raise ValueError("robot servos needs a real camera and servos.port")
+        if self.robot == "servos" and self.servos.too_loose:
+            raise ValueError(f"servos: {self.servos.too_loose}")
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class ListedRig:
+    """A rig file in the folder; ``rig`` is None when it cannot be used, and ``problem`` says why."""
+
+    name: str
+    path: Path
+    rig: RigFile | None
+    problem: str = ""
+
+
+def rigs_folder() -> Path:
+    """Where rig files are; it need not exist."""
+    return settings_folder() / "rigs"
+
+
+def check_rig_name(name: str) -> str:
+    """The name without blanks around it. Raises ValueError for one that makes no good file name, or means something else."""
+    name = name.strip()
+    if not _NAME.match(name):
+        raise ValueError("a rig's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit")
+    if name.casefold() in RESERVED or name.casefold().endswith(".older"):
+        raise ValueError(f"a rig cannot be called {name}: choose another name")
+    return name
+
+
+def rig_path(name: str, folder: Path | None = None) -> Path:
+    """The file of a rig of this name: one that is there in other letters, or a new one."""
+    folder = folder if folder is not None else rigs_folder()
+    path = folder / f"{name.strip()}{_ENDING}"
+    if path.exists():
+        return path
+    alike = (one.path for one in list_rigs(folder) if one.path.name.casefold() == path.name.casefold())
+    return next(alike, path)
+
+
+def list_rigs(folder: Path | None = None) -> tuple[ListedRig, ...]:
+    """All rigs by name; those that cannot be used, too. A folder that cannot be read has none."""
+    try:
+        paths = [path for path in (folder or rigs_folder()).glob(f"*{_ENDING}") if not path.name.endswith(_OLDER)]
+    except OSError:
+        paths = []
+    found = []
+    for path in sorted(paths, key=lambda path: path.stem.casefold()):
+        try:
+            rig = read_rig(path)
+        except RigFileError as error:
+            found.append(ListedRig(path.stem, path, None, str(error)))
+        else:
+            found.append(ListedRig(path.stem, path, rig))  # the name inside is that of another one where the file is a copy
+    return tuple(found)
+
+
+def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
+    """The rig of this name, whatever its case. Raises RigFileError, with those that there are.
+
+    The file's name goes before the one inside, which a copy of the file keeps, and the exact one before one in other letters.
+    """
+    listed, wanted = list_rigs(folder), name.strip()
+    folded = wanted.casefold()
+    for rank in range(4):
+        for rig in listed:
+            stem = rig.path.stem
+            inside = rig.rig.name if rig.rig is not None else stem
+            if (stem == wanted, inside == wanted, stem.casefold() == folded, inside.casefold() == folded)[rank]:
+                if rig.rig is None:
+                    raise RigFileError(rig.problem)
+                return rig.path, rig.rig
+    if name.strip().casefold() in RESERVED:
+        raise RigFileError(f"{name}: is built in and has no file; rigs with one: {', '.join(rig.name for rig in listed) or 'none'}")
+    known = ", ".join((*RESERVED, *(rig.name for rig in listed)))
+    raise RigFileError(f"unknown rig {name!r}; known: {known}")
+
+
+def has_rig(name: str, folder: Path | None = None) -> bool:
+    """Whether there is a file of this name, in order or not, whatever its case."""
+    wanted = name.strip().casefold()
+    return any(wanted in {rig.name.casefold(), (rig.rig.name if rig.rig else "").casefold()} for rig in list_rigs(folder))
+
+
+def read_rig(path: Path) -> RigFile:
+    """Read and check a rig file; raises RigFileError. The file is never changed."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise RigFileError(f"{path}: no such rig file; main.py rig list names those that there are") from None
+    except OSError as error:
+        raise RigFileError(f"{path}: cannot be read ({error.strerror})") from None
+    if len(data) > _MAX_BYTES:
+        raise RigFileError(f"{path}: too large for a rig file")
+    try:
+        content = tomllib.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:  # not TOMLDecodeError alone: a number of 5000 digits is none
+        raise RigFileError(
+            f"{path}: no TOML ({' '.join(str(error).split())}); the file is kept: mend it, or calibrate anew"
+        ) from None
+    version = content.get("format")
+    if type(version) is int and version > FORMAT:
+        raise RigFileError(f"{path}: format {version} is of a newer version (this one knows {FORMAT}); update the program")
+    try:
+        return RigFile.model_validate(content)
+    except ValidationError as error:
+        raise RigFileError(f"{path}: {_first_problem(error)}; the file is kept: mend it, or calibrate anew") from None
+
+
+def write_rig(rig: RigFile, path: Path | None = None, *, keeps_older: bool = True) -> Path:
+    """Save a rig atomically; an older file of that name, whatever its case, stays beside it as NAME.older.toml.
+
+    Without `keeps_older` what lies there stays: the calibration before the present one outlives small changes of this.
+
+    Raises
+    ------
+    RigFileError
+        The disk does not take it.
+    """
+    target = path if path is not None else rig_path(rig.name)
+    document = tomlkit.document()
+    document.add(tomlkit.comment(_HEADER))
+    document.update(rig.model_dump(mode="json", exclude_none=True))
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        older = target.with_name(target.stem + _OLDER) if keeps_older else None
+        write_whole(target, tomlkit.dumps(document).encode(), durable=True, older=older)
+    except OSError as error:
+        raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
+    return target
+
+
+def check_can_save(name: str) -> None:
+    """Raise RigFileError when a rig of this name could not be saved: said before minutes of calibration, and not after them."""
+    target = rig_path(name)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=target.parent):
+            pass  # permissions alone do not tell of a disk that is mounted to be read only
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    except OSError as error:
+        raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
+
+
+def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -> RigFile:
+    """What a configuration says of its bench, as a rig file.
+
+    Raises
+    ------
+    RigFileError
+        A recording is no bench, or the name is none.
+    """
+    kind = config.rig.camera
+    if kind not in RESERVED or config.rig.source is not None:
+        raise RigFileError(f"rig {config.rig.name} plays a recording: it cannot be saved as a rig")
+    port = None if kind == "twin" or config.rig.robot == "none" else config.servos.port
+    try:
+        return RigFile.model_validate(
+            {
+                "name": name.strip(),
+                "made_utc": datetime.now(UTC).replace(microsecond=0),
+                "kind": kind,
+                "robot": config.rig.robot,
+                "camera": config.camera,
+                "twin": config.twin if kind == "twin" else None,
+                "servos": config.servos.model_copy(update={"port": port}),
+                "calibration": calibration,
+            }
+        )
+    except ValidationError as error:
+        raise RigFileError(f"rig {name}: {_first_problem(error)}") from None
+
+
+def with_rig(base: Config, rig: RigFile, path: Path) -> Config:
+    """The configuration with the rig's camera, servos and twin in the place of its own. Its name is the file's."""
+    chosen = RigConfig(name=path.stem, camera=rig.kind, robot=rig.robot, file=str(path))
+    update: dict[str, Any] = {"rig": chosen, "camera": rig.camera, "servos": rig.servos}
+    if rig.twin is not None:
+        update["twin"] = rig.twin
+    return base.model_copy(update=update)
+
+
+def sections_of_rig(running: Config, settings: Config) -> frozenset[str]:
+    """The sections of `running` that its rig file keeps: what the settings say there is not in force.
+
+    Settings that name the file themselves (`rig.file`) take its calibration only.
+    """
+    if running.rig.file is None or running.rig == settings.rig:
+        return frozenset()
+    return frozenset({"camera", "servos", "twin"} if running.rig.camera == "twin" else {"camera", "servos"})
+
+
+def read_again(running: Config, settings: Config) -> Config:
+    """The running configuration with camera, servos and twin as its rig file has them now: somebody may have edited it.
+
+    A phantom that was picked stays. Settings that name the file themselves keep their own sections, and so does whoever was chosen
+    instead of them: the twin, another camera, a recording.
+
+    Raises
+    ------
+    RigFileError
+    """
+    if running.rig.file is None or not sections_of_rig(running, settings):
+        return running
+    path = Path(running.rig.file)
+    if running.rig.source is not None or running.rig.name != path.stem:
+        return running
+    rig = read_rig(path)
+    if rig.twin is not None and running.rig.camera == "twin":
+        rig = rig.model_copy(update={"twin": rig.twin.model_copy(update={"phantom": running.twin.phantom})})
+    return with_rig(running, rig, path)
+
+
+def calibration_of(config: Config) -> CalibrationConfig | None:
+    """The calibration of the configured rig; None without a rig file, and for recordings, whose pictures are straight already.
+
+    Raises
+    ------
+    RigFileError
+    """
+    if config.rig.file is None or config.rig.source is not None or config.rig.camera not in RESERVED:
+        return None
+    return read_rig(Path(config.rig.file)).calibration
+
+
+def scaled(config: Config, known: CalibrationConfig | None) -> Config:
+    """The configuration with the measured scale in the place of ``policy.pursuit.pixels_per_mm``; unchanged without one for such
+    pictures."""
+    camera, twin = config.camera, config.twin
+    is_twin = config.rig.camera == "twin"
+    size = (twin.image_width_px, twin.image_height_px) if is_twin else (camera.width_px, camera.height_px)
+    if known is None or known.scale is None or not known.scale.fits(size):
+        return config
+    zoom = known.scale.working_px_per_mm(config.perception.working_size_px)
+    pursuit = config.policy.pursuit.model_copy(update={"pixels_per_mm": zoom})
+    return config.model_copy(update={"policy": config.policy.model_copy(update={"pursuit": pursuit})})
+
+
+def ported(perception: PerceptionConfig, known: CalibrationConfig | None) -> PerceptionConfig:
+    """Perception that knows the rig's insertion port; unchanged where the rig does not tell it."""
+    if known is None or known.port is None:
+        return perception
+    place = {"port_x_share": known.port.x_share, "port_y_share": known.port.y_share}
+    return perception.model_copy(update={"path": perception.path.model_copy(update=place)})
+
+
+def as_calibrated(config: Config) -> Config:
+    """The configuration with what the rig file knows better: scale and insertion port.
+
+    Raises
+    ------
+    RigFileError
+    """
+    known = calibration_of(config)
+    return scaled(config, known).model_copy(update={"perception": ported(config.perception, known)})
+
+
+def set_port(path: Path, port: PortConfig | None) -> None:
+    """Keep the insertion port in a rig file; None: nobody knows it. Raises RigFileError."""
+    rig = read_rig(path)
+    known = rig.calibration or CalibrationConfig(made_utc=datetime.now(UTC).replace(microsecond=0))
+    write_rig(rig.model_copy(update={"calibration": known.model_copy(update={"port": port})}), path, keeps_older=False)
+
+
+def _first_problem(error: ValidationError) -> str:
+    first: Any = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    text = str(first["msg"]).removeprefix("Value error, ")
+    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    return f"{key + ': ' if key else ''}{text}{more}"

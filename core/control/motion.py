@@ -1,0 +1,171 @@
+"""The operator's hands: held keys and sticks are rates, and become the motion that is asked of the robot.
+
+Advice -> command, for autonomous driving: turns of the head become bend, speeds become feed. Time is injected.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from core.config.models import DriveConfig, JogConfig
+from core.config.safety import JointConfig, ServosConfig
+from core.types import Advice, Command
+
+_LONGEST_STEP_S = 0.1
+_AHEAD = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Jog:
+    """How the controls are held, each -1..1 of full speed; ``straighten`` brings bend and pitch back to the middle."""
+
+    bend: float = 0.0
+    pitch: float = 0.0
+    advance: float = 0.0
+    delivery: float = 0.0
+    straighten: bool = False
+
+    @property
+    def is_rest(self) -> bool:
+        return self == AT_REST
+
+
+AT_REST = Jog()
+
+
+@dataclass(frozen=True, slots=True)
+class JogSpeeds:
+    """What a held key makes of the joints, mm/s: robot and catheter are fed, tendons pulled by ``bend_mm_s`` and ``pitch_mm_s``."""
+
+    advance_mm_s: float
+    delivery_mm_s: float
+    bend_mm_s: float
+    pitch_mm_s: float
+
+
+def hand_speeds(hand: JogConfig, servos: ServosConfig, share: float = 1.0) -> JogSpeeds:
+    """As fast as `hand` asks for at `share` (0..1) of full speed, and not faster than the slowest joint that takes part may go."""
+    right, left, up, down, advance, *delivery = servos.joints
+    pull_mm_s = share * hand.bend_rate_per_s * servos.max_pull_mm
+    return JogSpeeds(
+        _as_they_may(share * hand.advance_mm_s, advance),
+        _as_they_may(share * hand.delivery_mm_s, *delivery),
+        _as_they_may(pull_mm_s, right, left),
+        _as_they_may(pull_mm_s, up, down),
+    )
+
+
+def combined(jogs: Iterable[Jog]) -> Jog:
+    """Several controls held at once: their sum, limited. A number that is not finite counts as rest."""
+    jogs = list(jogs)
+
+    def total(values: Iterable[float]) -> float:
+        return _limited(sum(value for value in values if math.isfinite(value)), 1.0)
+
+    return Jog(
+        total(jog.bend for jog in jogs),
+        total(jog.pitch for jog in jogs),
+        total(jog.advance for jog in jogs),
+        total(jog.delivery for jog in jogs),
+        any(jog.straighten for jog in jogs),
+    )
+
+
+class JogIntegrator:
+    """Bend and pitch move while they are held and stay when let go; advance and delivery are speeds, zero when nothing is held.
+
+    What is asked for runs ahead of the robot by ``_AHEAD`` at most, so that letting go of a robot that does not follow ends it.
+    """
+
+    def __init__(self, config: JogConfig) -> None:
+        self._config = config
+        self.take_over(0.0, 0.0)
+
+    def take_over(self, bend: float, pitch: float) -> None:
+        """Start from where the robot is now (-1..1 of full pull): the first command moves nothing."""
+        self._bend, self._pitch = _limited(bend, 1.0), _limited(pitch, 1.0)
+        self._last_s: float | None = None
+
+    def command(self, jog: Jog, now_s: float, at: Command | None = None, speed: float = 1.0) -> Command:
+        """The motion for this moment; `now_s` is monotonic, `at` where the robot was told to be last (None: not known).
+
+        `speed` is the share of full speed, 0..1, of whatever is held.
+        """
+        config = self._config
+        elapsed_s = 0.0 if self._last_s is None else min(max(0.0, now_s - self._last_s), _LONGEST_STEP_S)
+        self._last_s = now_s
+        step = speed * config.bend_rate_per_s * elapsed_s
+        if jog.straighten:
+            self._bend -= _limited(self._bend, step)
+            self._pitch -= _limited(self._pitch, step)
+        else:
+            self._bend = _limited(self._bend + step * _limited(jog.bend, 1.0), 1.0)
+            self._pitch = _limited(self._pitch + step * _limited(jog.pitch, 1.0), 1.0)
+        if at is not None:
+            self._bend = at.bend + _limited(self._bend - at.bend, _AHEAD)
+            self._pitch = at.pitch + _limited(self._pitch - at.pitch, _AHEAD)
+        return Command(
+            bend=self._bend,
+            pitch=self._pitch,
+            advance_mm_s=speed * config.advance_mm_s * _limited(jog.advance, 1.0),
+            delivery_mm_s=speed * config.delivery_mm_s * _limited(jog.delivery, 1.0),
+        )
+
+
+def _as_they_may(speed_mm_s: float, *joints: JointConfig) -> float:
+    return min(speed_mm_s, *(joint.max_speed_mm_s for joint in joints))
+
+
+def _limited(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))
+
+
+class AdviceController:
+    """Follows advice with a rate-limited PI loop.
+
+    Advice says by how much the head is to *turn from where it is now*; the bend that holds a vessel's curve is not part of it. So
+    the bend is mainly the integral of the advice, which also takes up slack and set of the wires, with a small part that acts at
+    once. The loop is closed by the camera. While there is no advice the bend is kept and the feed stops at once.
+    """
+
+    def __init__(self, config: DriveConfig, bend: float = 0.0) -> None:
+        self._config = config
+        self.take_over(bend)
+
+    def take_over(self, bend: float, pitch: float = 0.0) -> None:
+        """Start from the bend (-1..1) that the robot has now, at rest; the first command moves nothing."""
+        self._bend = self._integral = _limited(bend, 1.0)
+        self._pitch = _limited(pitch, 1.0)
+        self._advance_mm_s = 0.0
+        self._last_s: float | None = None
+
+    def command(self, advice: Advice | None, now_s: float) -> Command:
+        """The command for this moment; `now_s` is on any monotonic clock, the same for all calls."""
+        config = self._config
+        elapsed_s = 0.0 if self._last_s is None else min(max(0.0, now_s - self._last_s), config.max_gap_s)
+        self._last_s = now_s
+        if advice is None or not math.isfinite(advice.steer_deg + advice.advance_mm_s):
+            self._advance_mm_s, self._integral = 0.0, self._bend
+            return Command(bend=self._bend, pitch=self._pitch)
+        turn = advice.steer_deg / config.turn_deg
+        integral = self._integral + turn * elapsed_s / config.integral_s
+        wanted = integral + config.proportional * turn
+        reach = config.max_bend_rate_per_s * elapsed_s
+        bend = _limited(self._bend + _limited(wanted - self._bend, reach), 1.0)
+        # While rate or range hold the bend back, the integral waits, so that it need not unwind later.
+        held_back = (wanted - bend) * turn > 0.0
+        self._integral = self._integral if held_back else _limited(integral, 1.0)
+        self._bend = bend
+        self._advance_mm_s = self._feed(advice.advance_mm_s, elapsed_s)
+        return Command(bend=bend, pitch=self._pitch, advance_mm_s=self._advance_mm_s)
+
+    def _feed(self, wanted_mm_s: float, elapsed_s: float) -> float:
+        """Speeding up is gradual; slowing down, and stopping before a reversal, is not."""
+        before = self._advance_mm_s
+        if wanted_mm_s * before < 0.0:
+            before = 0.0
+        if abs(wanted_mm_s) <= abs(before):
+            return wanted_mm_s
+        return before + _limited(wanted_mm_s - before, self._config.max_acceleration_mm_s2 * elapsed_s)

@@ -1,0 +1,54 @@
+"""What the pilot needs of a robot: every command passes the gate, and it stops by itself when the program falls silent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from core.config.safety import JointName
+from core.control.gate import Rejection, RejectReason, Source
+from core.control.health import BusReport
+from core.devices import Robot
+from core.types import Command
+
+
+@dataclass(frozen=True, slots=True)
+class SentMotion:
+    """What left the gate in the newest cycle.
+
+    ``motion`` holds where the robot was told to be; ``source`` whose order it was (None: a hold) and ``captured_s`` the capture of
+    the frame behind it; ``rejection`` why an order was not followed; ``at_end`` the joints at the end of their envelope.
+    """
+
+    cycle: int
+    time_s: float
+    motion: Command
+    source: Source | None = None
+    captured_s: float | None = None
+    rejection: RejectReason | None = None
+    at_end: tuple[JointName, ...] = ()
+
+
+class GuardedRobot(Robot, Protocol):
+    """All methods may be called from any thread. ``stop`` never waits and never fails.
+
+    ``connect``, ``arm``, ``disarm``, ``acknowledge``, ``zero``, ``reboot`` and ``torque_off`` may take seconds and raise
+    ``DeviceError``; all the others are quick. ``kept_back`` is why nothing at all has left the gate since arming, not even a hold:
+    while it is not None there is no ``sent_motion`` either, and nobody can drive.
+    """
+
+    @property
+    def failure(self) -> str | None: ...
+    def beat(self, permitted: Source | None) -> None: ...
+    def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command: ...
+    def stop(self) -> None: ...
+    def arm(self) -> None: ...
+    def disarm(self) -> None: ...
+    def acknowledge(self) -> None: ...
+    def zero(self, names: Sequence[JointName] | None = None) -> None: ...
+    def reboot(self, servo_id: int) -> None: ...
+    def torque_off(self) -> None: ...
+    def report(self) -> BusReport | None: ...
+    def sent_motion(self) -> SentMotion | None: ...
+    def kept_back(self) -> Rejection | None: ...

@@ -1,0 +1,411 @@
+"""From a table of manual and algorithmic measures to the figures of the paper's evaluation (METHOD section 7).
+
+What a reader should know of the rows that are evaluated: what is missing in them, and which angles go to the other side.
+
+Where the columns of a table stand, however their headings are spelt: Angle 1, ANGLE-1, angle_1 (deg) are one.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import difflib
+import io
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.devices import UserError
+from core.evaluation.metrics import (
+    RANGE_DEG,
+    SHARE_EDGES_PERCENT,
+    angle_metrics,
+    are_too_few,
+    members,
+    repeat_metrics,
+    state_metrics,
+    too_few_words,
+)
+from core.types import PoseState
+
+_APART_DEG = 15.0
+_ALIKE_DEG = SHARE_EDGES_PERCENT[1] / 100 * RANGE_DEG
+_NAMED = 5
+
+
+def missing_notes(rows: Sequence[Measurement]) -> list[str]:
+    """How many rows are not among the figures because a measure is missing, and how many name no image."""
+    columns = {
+        "angle": [(row.manual_angle_deg is not None, row.algorithm_angle is not None) for row in rows],
+        "state": [(row.state is not None, row.algorithm_state is not None) for row in rows],
+    }
+    notes = []
+    for what, having in columns.items():
+        both = having.count((True, True))
+        if 0 < both < len(rows):
+            lacks = {
+                "the algorithmic one": having.count((True, False)),
+                "the manual one": having.count((False, True)),
+                "both": having.count((False, False)),
+            }
+            told = ", ".join(f"{which}: {count}" for which, count in lacks.items() if count)
+            notes.append(f"Rows with a manual and an algorithmic {what}: {both} of {len(rows)}; without {told}.")
+    once = sum((row.angle_1 is None) is not (row.angle_2 is None) for row in rows)
+    if once and any(row.angle_1 is not None and row.angle_2 is not None for row in rows):
+        notes.append(f"Images that were measured once by hand, and not twice: {once}.")
+    nameless = sum(not row.image for row in rows)
+    if nameless:
+        notes.append(f"Rows that name no image: {nameless}; whether one is there twice cannot be seen.")
+    return notes
+
+
+def other_side_notes(rows: Sequence[Measurement]) -> list[str]:
+    """Angles that are alike as soon as one of them is measured to the other side: 180 degrees minus it, or with the other sign.
+
+    They are told and not turned: an algorithm that takes the tail for the head errs in just this way.
+    """
+    pairs = {
+        "manual and algorithmic angle": [(row.image, row.manual_angle_deg, row.algorithm_angle) for row in rows],
+        "the two manual angles": [(row.image, row.angle_1, row.angle_2) for row in rows],
+    }
+    notes = []
+    for what, measures in pairs.items():
+        turned = [image for image, a, b in measures if a is not None and b is not None and _is_other_side(a, b)]
+        if turned:
+            named = ", ".join(image or "without a name" for image in turned[:_NAMED]) + (", ..." if len(turned) > _NAMED else "")
+            notes.append(
+                f"Images on which {what} are more than {_APART_DEG:g}° apart, but alike with one of them measured to the "
+                f"other side (180° minus it, or its sign changed): {len(turned)} ({named}). They are taken as they are; "
+                "look at them."
+            )
+    return notes
+
+
+def _is_other_side(one_deg: float, other_deg: float) -> bool:
+    apart = abs(one_deg - other_deg)
+    turned = min(abs(one_deg + other_deg), abs(RANGE_DEG - one_deg - other_deg))
+    return apart > _APART_DEG and turned <= _ALIKE_DEG
+
+
+_UNIT = re.compile(r"[(\[][^)\]]*[)\]]|°")
+
+
+def places(header: Sequence[str], needed: Sequence[str], may_be: Sequence[str]) -> dict[str, int]:
+    """By column its place in the header, of `needed` all and of `may_be` those that there are.
+
+    Raises ValueError with what is wrong, and what is expected.
+    """
+    known = {_plain(name): name for name in (*needed, *may_be)}
+    found: dict[str, list[int]] = {}
+    for place, heading in enumerate(header):
+        plain = _plain(heading)
+        name = known.get(plain) or known.get(re.sub(r"deg(rees?)?$", "", plain))
+        if name is not None:
+            found.setdefault(name, []).append(place)
+    expected = f"needs the columns {', '.join(needed)} (blank where not measured)"
+    for name, at in found.items():
+        if len(at) > 1:
+            spelt = "" if len({header[place] for place in at}) == 1 else f" ({', '.join(repr(header[place]) for place in at)})"
+            raise ValueError(f"column {name!r} occurs {len(at)} times{spelt}; {expected}")
+    for name in needed:
+        if name not in found:
+            others = [heading for place, heading in enumerate(header) if [place] not in found.values()]
+            alike = difflib.get_close_matches(name, others, 1, cutoff=0.75)
+            raise ValueError(f"column {name!r} is missing{f'; is {alike[0]!r} meant?' if alike else ''}; {expected}")
+    return {name: at[0] for name, at in found.items()}
+
+
+def _plain(heading: str) -> str:
+    """Letters and digits alone, small, without a unit in brackets."""
+    return re.sub(r"[\W_]+", "", _UNIT.sub("", heading.casefold()))
+
+
+_FULL_TURN_DEG = 360.0
+_MOST_DIGITS = 6
+"""Of how many measures an angle is the mean."""
+
+
+class EvaluationError(UserError):
+    """Measures cannot be evaluated; the message is one line and says what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """One image, measured by hand (once or twice) and by the algorithm; None = not measured. Field names are the CSV's columns.
+
+    ``group`` is the session or phantom that the image is of; images of one group are alike. None: not known. ``counts``: of how
+    many single measures ``angle_1`` and ``angle_2`` are the means.
+    """
+
+    image: str
+    angle_1: float | None
+    angle_2: float | None
+    state: str | None
+    algorithm_angle: float | None
+    algorithm_state: str | None
+    group: str | None = None
+    counts: tuple[int, int] = (1, 1)
+
+    @property
+    def manual_angle_deg(self) -> float | None:
+        """The mean of all single measures that there are."""
+        measured = [(a, n) for a, n in zip((self.angle_1, self.angle_2), self.counts, strict=True) if a is not None]
+        return sum(a * n for a, n in measured) / sum(n for _, n in measured) if measured else None
+
+
+GROUP = "group"
+COUNTS = ("count_1", "count_2")
+COLUMNS = tuple(column.name for column in fields(Measurement) if column.name not in (GROUP, "counts"))
+_MAY_BE = (GROUP, *COUNTS)
+
+
+def read_measurements(path: Path) -> list[Measurement]:
+    """Rows of a CSV file with the columns ``COLUMNS`` in any order, and ``group``, ``count_1`` and ``count_2`` if there are such.
+
+    Others are ignored, blank cells mean "not measured". Headings may be spelt with capitals, spaces and units.
+
+    Commas, semicolons or tabs separate cells, as the header shows; where it is not the comma, numbers may have a decimal comma.
+
+    Raises
+    ------
+    EvaluationError
+        With file, line and column in one line. An image that is there twice is refused: it would count twice.
+    """
+    text = _text_of(path)
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise EvaluationError(f"{path}: empty; needs the columns {', '.join(COLUMNS)}")
+    # Spreadsheets may say in a line before the header what separates the cells.
+    said = re.fullmatch(r"sep=([,;\t])", lines[0].strip(' "'))
+    separator = said[1] if said else max(",;\t", key=lines[0].count)
+    table = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+    try:
+        filled = ((table.line_num, cells) for cells in table if any(map(str.strip, cells)))
+        if said:
+            next(filled, None)
+        place = _places(path, [cell.strip() for cell in next(filled, (0, [""]))[1]])
+        rows = {line: _measurement(f"{path}: line {line}", cells, place, separator) for line, cells in filled}
+    except csv.Error as error:
+        raise EvaluationError(f"{path}: line {table.line_num}: not valid CSV ({error})") from None
+    if not rows:
+        raise EvaluationError(f"{path}: has a header but no rows")
+    _check_once(path, rows)
+    return list(rows.values())
+
+
+def _text_of(path: Path) -> str:
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise EvaluationError(f"{path}: no such file") from None
+    except OSError as error:
+        raise EvaluationError(f"{path}: cannot be read ({error.strerror})") from None
+    try:
+        # UTF-16 is what spreadsheets call Unicode text.
+        return data.decode("utf-16" if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig")
+    except UnicodeDecodeError:
+        raise EvaluationError(f"{path}: not a text file in UTF-8; save the table as CSV (UTF-8)") from None
+
+
+def _places(path: Path, header: list[str]) -> dict[str, int]:
+    """Where each column stands, and under "" how many there are."""
+    try:
+        return places(header, COLUMNS, _MAY_BE) | {"": len(header)}
+    except ValueError as error:
+        raise EvaluationError(f"{path}: {error}") from None
+
+
+def _check_once(path: Path, rows: Mapping[int, Measurement]) -> None:
+    """Raise EvaluationError where an image has two rows; pictures of several sessions may be called alike."""
+    first: dict[tuple[str | None, str], int] = {}
+    for line, row in rows.items():
+        before = first.setdefault((row.group, row.image), line)
+        if row.image and before != line:
+            raise EvaluationError(
+                f"{path}: line {line}: image {row.image!r} is in line {before} already; give it one row, with a second manual "
+                "measure as angle_2, and images of one name different groups"
+            )
+
+
+def _measurement(where: str, cells: list[str], place: dict[str, int], separator: str) -> Measurement:
+    if len(cells) > place[""] and any(map(str.strip, cells[place[""] :])):
+        raise EvaluationError(f"{where}: {len(cells)} cells under {place['']} columns")
+    text = {name: cells[at].strip() if at < len(cells) else "" for name, at in place.items() if name}
+
+    def angle(name: str) -> float | None:
+        if not text[name]:
+            return None
+        try:
+            plain = text[name].removesuffix("°").replace("\N{MINUS SIGN}", "-")
+            value = float(plain if separator == "," else plain.replace(",", ".")) if "_" not in plain else math.nan
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= _FULL_TURN_DEG:
+            raise EvaluationError(f"{where}: {name} is {text[name]!r}; must be an angle in degrees, or blank where not measured")
+        return value
+
+    def state(name: str) -> str | None:
+        label = text[name].upper()
+        if label and label not in set(PoseState):
+            known = ", ".join(PoseState)
+            raise EvaluationError(f"{where}: {name} is {text[name]!r}; must be one of {known}, or blank where not measured")
+        return label or None
+
+    def count(name: str) -> int:
+        said = text.get(name) or "1"
+        if not said.isdecimal() or len(said) > _MOST_DIGITS or int(said) < 1:
+            raise EvaluationError(
+                f"{where}: {name} is {said[:20]!r}; must be of how many measures the angle is the mean, 1 or more"
+            )
+        return int(said)
+
+    return Measurement(
+        text["image"],
+        angle("angle_1"),
+        angle("angle_2"),
+        state("state"),
+        angle("algorithm_angle"),
+        state("algorithm_state"),
+        text.get(GROUP) or None,
+        (count("count_1"), count("count_2")),
+    )
+
+
+def write_measurements(path: Path, rows: Iterable[Measurement]) -> None:
+    """The rows as a CSV file that ``read_measurements`` reads, with groups and counts where they say something; raises OSError."""
+    rows = list(rows)
+    columns = (*COLUMNS, GROUP) if any(row.group is not None for row in rows) else COLUMNS
+    counts = COUNTS if any(row.counts != (1, 1) for row in rows) else ()
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow((*columns, *counts))
+        for row in rows:
+            values = (*(getattr(row, name) for name in columns), *(row.counts if counts else ()))
+            table.writerow(["" if value is None else value for value in values])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnglePairs:
+    """Images with a manual and an algorithmic angle: arrays of shape (n,), degrees."""
+
+    manual_deg: np.ndarray
+    algorithm_deg: np.ndarray
+
+
+def angle_pairs(rows: Sequence[Measurement]) -> AnglePairs:
+    """The rows that have both; of the manual measures the mean."""
+    pairs = [(row.manual_angle_deg, row.algorithm_angle) for row in rows]
+    both = np.array([(m, a) for m, a in pairs if m is not None and a is not None], np.float64).reshape(-1, 2)
+    return AnglePairs(both[:, 0], both[:, 1])
+
+
+def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
+    """The content of ``metrics.json``.
+
+    Parameters
+    ----------
+    rows : images, measured by hand and by the algorithm; each statistic takes those that have what it needs.
+    seed : of the bootstrap intervals.
+
+    Returns
+    -------
+    dict
+        ``images``, ``intervals`` (what the bootstrap draws), ``angle``, ``state``, ``manual`` (the two manual measures against
+        each other) and ``notes``: one sentence for each thing that a reader should know. Undefined figures are None, and a note
+        says why.
+    """
+    pairs = angle_pairs(rows)
+    twice_rows = [row for row in rows if row.angle_1 is not None and row.angle_2 is not None]
+    twice = np.array([(row.angle_1, row.angle_2) for row in twice_rows], np.float64).reshape(-1, 2)
+    counts = np.array([row.counts for row in twice_rows], np.float64).reshape(-1, 2)
+    labelled = [row for row in rows if row.state is not None and row.algorithm_state is not None]
+    measured = [row for row in rows if row.manual_angle_deg is not None and row.algorithm_angle is not None]
+    manual, algorithm = [str(row.state) for row in labelled], [str(row.algorithm_state) for row in labelled]
+    metrics = {
+        "images": _counts(rows),
+        "intervals": _drawn(measured if measured else labelled),
+        "angle": angle_metrics(pairs.manual_deg, pairs.algorithm_deg, seed, _members(measured)),
+        "state": state_metrics(manual, algorithm, seed, _members(labelled)),
+        "manual": repeat_metrics(twice[:, 0], twice[:, 1], seed, _members(twice_rows), counts),
+    }
+    parts = {"angle": measured, "state": labelled, "manual": twice_rows}
+    notes = _interval_notes({name: part for name, part in parts.items() if are_too_few(_members(part))})
+    notes += missing_notes(rows) + other_side_notes(rows)
+    return metrics | {"notes": notes + _angle_notes(metrics, rows) + _state_notes(metrics["state"])}
+
+
+def _members(rows: Sequence[Measurement]) -> NDArray[np.int64] | None:
+    return members([row.group for row in rows])
+
+
+def _drawn(rows: Sequence[Measurement]) -> dict[str, Any]:
+    """What the bootstrap draws ("nothing": too few groups for an interval), and how many groups are known (0: none)."""
+    group = _members(rows)
+    drawn = "images" if group is None else "nothing" if are_too_few(group) else "groups"
+    return {"drawn": drawn, "groups": len({row.group for row in rows if row.group is not None})}
+
+
+_OF = {"angle": "angles", "state": "states", "manual": "manual measures"}
+
+
+def _interval_notes(without: Mapping[str, Sequence[Measurement]]) -> list[str]:
+    """Why there are no intervals, and of what."""
+    if not without:
+        return []
+    known = max(len({row.group for row in rows if row.group is not None}) for rows in without.values())
+    return [too_few_words(f"intervals of {_listed([_OF[name] for name in without])}", known)]
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _counts(rows: Sequence[Measurement]) -> dict[str, int]:
+    manual = [row for row in rows if row.manual_angle_deg is not None or row.state is not None]
+    answered = sum(row.algorithm_angle is not None or row.algorithm_state is not None for row in manual)
+    return {"n": len(rows), "measured": len(manual), "answered": answered, "unanswered": len(manual) - answered}
+
+
+def _angle_notes(metrics: dict[str, Any], rows: Sequence[Measurement]) -> list[str]:
+    angle, manual, counts, notes = metrics["angle"], metrics["manual"], metrics["images"], []
+    if counts["unanswered"]:
+        notes.append(
+            f"The algorithm gave no answer for {counts['unanswered']} of {counts['measured']} images that were measured by hand; "
+            "they are in none of the figures."
+        )
+    outside = sum(not 0 <= a <= RANGE_DEG for r in rows for a in (r.angle_1, r.angle_2, r.algorithm_angle) if a is not None)
+    if outside:
+        notes.append(f"{outside} angles lie outside 0° to 180°; they are taken as they are.")
+    if angle["n"] == 0:
+        notes.append("No image has both a manual and an algorithmic angle: no angle statistics.")
+    elif angle["n"] == 1:
+        notes.append("One image with angles: spread, correlation and intervals are undefined.")
+    elif angle["pearson"] is None:
+        notes.append("All manual or all algorithmic angles are equal: their correlation is undefined.")
+    if angle["n"] > 1 and manual["n"] < 2:
+        notes.append("Fewer than two images were measured twice by hand: repeatability and the manual ICC are undefined.")
+    elif any(r.counts != (1, 1) for r in rows):
+        notes.append("The two manual angles are means over several raters: the manual ICC is that of means, not of one measure.")
+    return notes
+
+
+def _state_notes(state: dict[str, Any]) -> list[str]:
+    if state["n"] == 0:
+        return ["No image has both a manual and an algorithmic state: no state statistics."]
+    notes = []
+    if state["kappa"] is None:
+        notes.append("Only one state occurs on both sides: kappa is undefined.")
+    if state["fowlkes_mallows_pairs"] is None:
+        notes.append("No two images share a state on one of the sides: the pair-counting Fowlkes-Mallows index is undefined.")
+    for label, row in state["per_class"].items():
+        if row["precision"] is None:
+            notes.append(f"The algorithm never gave state {label}: its precision is undefined and counts as 0 in the averages.")
+        if row["recall"] is None:
+            notes.append(f"No image has the manual state {label}: its recall is undefined and left out of the averages.")
+    return notes

@@ -1,0 +1,301 @@
+"""The paper's own figures, and a study built like its test from a labelled set (METHOD section 7).
+
+The paper's method as it is written down, for comparison only: base-64 dual-decoder U-Net in fp32 at 256x256, thinning,
+Algorithm 1, recursive path tracing. ``benchmark`` compares with its time; its weights are random, which costs the same.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from time import perf_counter
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+from skimage.morphology import remove_small_holes, remove_small_objects, skeletonize
+
+from core.evaluation.metrics import LIMITS_SD, RANGE_DEG
+from core.perception.unet import DualUNet, UNetShape
+from core.types import Image, Mask
+
+PAPER_IMAGES = 48
+"""Images in the paper's test; all its shares and its confusion matrix need n = 44, so four of them are not in its figures."""
+PAPER_LABELS = ("B", "C", "D")
+PAPER_CONFUSION = ((12, 1, 0), (2, 23, 1), (0, 1, 4))
+"""Rows manual, columns algorithm: the only table that gives all of the paper's figures of states."""
+MANUAL_SD_DEG = 1.5
+"""Assumed standard deviation of one manual measure: the paper measured twice, but gives no repeatability."""
+
+PAPER: dict[str, Any] = {
+    "angle": {
+        "mean_error_deg": 2.25,
+        "sd_deg": 5.68,
+        "median_deg": 2.14,
+        "pearson": 0.869,
+        "spearman": 0.870,
+        "share_0_4": 0.75,
+        "share_4_8": 0.227,
+        "share_0_8": 0.977,
+        # not printed in the paper; from its mean and standard deviation
+        "loa_low_deg": 2.25 - LIMITS_SD * 5.68,
+        "loa_high_deg": 2.25 + LIMITS_SD * 5.68,
+    },
+    "state": {
+        "accuracy": 0.886,
+        "kappa": 0.796,
+        "fowlkes_mallows_pairs": 0.801,
+        "per_class": {
+            "B": {"precision": 0.86, "recall": 0.92, "f1": 0.89},
+            "C": {"precision": 0.92, "recall": 0.88, "f1": 0.90},
+            "D": {"precision": 0.80, "recall": 0.80, "f1": 0.80},
+        },
+        "macro": {"precision": 0.86, "recall": 0.87, "f1": 0.86},
+        "weighted": {"precision": 0.89, "recall": 0.89, "f1": 0.89},
+    },
+}
+
+
+class Better(StrEnum):
+    """Which way a figure gets better."""
+
+    LARGER = "larger"
+    NEARER_ZERO = "nearer zero"
+    NEITHER = "neither"
+
+
+class FigureFormat(StrEnum):
+    """How a figure is written; the digits are the paper's."""
+
+    DEGREES = "degrees"
+    COEFFICIENT = "coefficient"
+    PERCENT = "percent"
+    RATIO = "ratio"
+
+    def write(self, value: float | None, *, unit: bool = True) -> str:
+        """The figure as text, an en dash where there is none."""
+        if value is None:
+            return "–"
+        if self is FigureFormat.PERCENT:
+            return f"{100 * value:.1f}" + (" %" if unit else "")
+        digits = 3 if self is FigureFormat.COEFFICIENT else 2
+        return f"{round(value, digits) + 0.0:.{digits}f}" + ("°" if self is FigureFormat.DEGREES and unit else "")
+
+    def rounded(self, value: float) -> float:
+        return round(value, 2 if self in {FigureFormat.DEGREES, FigureFormat.RATIO} else 3)
+
+
+class Verdict(StrEnum):
+    """A figure against the paper's, at the paper's digits."""
+
+    BETTER = "better"
+    EQUAL = "equal"
+    WORSE = "worse"
+
+
+@dataclass(frozen=True, slots=True)
+class FigureKind:
+    """A figure of the evaluation: where it stands in ``metrics.json``, what it is called, how it is written."""
+
+    section: str
+    name: str
+    label: str
+    kind: FigureFormat
+    better: Better = Better.NEITHER
+
+
+_D, _C, _P = FigureFormat.DEGREES, FigureFormat.COEFFICIENT, FigureFormat.PERCENT
+ANGLE_FIGURES = (
+    FigureKind("angle", "mean_error_deg", "Mean error", _D, Better.NEARER_ZERO),
+    FigureKind("angle", "sd_deg", "Standard deviation of the error", _D, Better.NEARER_ZERO),
+    FigureKind("angle", "median_deg", "Median error", _D, Better.NEARER_ZERO),
+    FigureKind("angle", "mean_abs_error_deg", "Mean absolute error", _D),
+    FigureKind("angle", "median_abs_error_deg", "Median absolute error", _D),
+    FigureKind("angle", "pearson", "Pearson correlation r", _C, Better.LARGER),
+    FigureKind("angle", "spearman", "Spearman correlation ρ", _C, Better.LARGER),
+    FigureKind("angle", "icc", "ICC(2,1) with the manual mean", _C),
+    FigureKind("manual", "icc", "ICC(2,1) of two manual measures", _C),
+    FigureKind("manual", "repeatability_sd_deg", "SD of one manual measure", _D),
+    FigureKind("angle", "loa_low_deg", "Lower limit of agreement", _D, Better.NEARER_ZERO),
+    FigureKind("angle", "loa_high_deg", "Upper limit of agreement", _D, Better.NEARER_ZERO),
+    FigureKind("angle", "share_0_4", "Errors within 0–4 % of 180°", _P, Better.LARGER),
+    FigureKind("angle", "share_4_8", "Errors within 4–8 %", _P),
+    FigureKind("angle", "share_0_8", "Errors within 0–8 %", _P, Better.LARGER),
+    FigureKind("angle", "share_8_12", "Errors within 8–12 %", _P),
+    FigureKind("angle", "share_12_16", "Errors within 12–16 %", _P),
+    FigureKind("angle", "share_over_16", "Errors over 16 %", _P),
+)
+STATE_FIGURES = (
+    FigureKind("state", "accuracy", "Accuracy", _P, Better.LARGER),
+    FigureKind("state", "kappa", "Cohen’s kappa", _C, Better.LARGER),
+    FigureKind("state", "fowlkes_mallows_pairs", "Fowlkes–Mallows, pair counting", _C, Better.LARGER),
+    FigureKind("state", "fowlkes_mallows_macro", "Fowlkes–Mallows, mean over states", _C),
+)
+CLASS_SCORES = ("precision", "recall", "f1")
+
+
+def verdict(kind: FigureFormat, better: Better, ours: float | None, paper: float | None) -> Verdict | None:
+    """`ours` against `paper`, both rounded to the digits that the paper prints; None where they cannot be compared."""
+    if ours is None or paper is None or better is Better.NEITHER:
+        return None
+    a, b = kind.rounded(ours), kind.rounded(paper)
+    if better is Better.NEARER_ZERO:
+        a, b = -abs(a), -abs(b)
+    return Verdict.EQUAL if a == b else Verdict.BETTER if a > b else Verdict.WORSE
+
+
+def against_paper(metrics: Mapping[str, Any]) -> dict[str, str | None]:
+    """Verdict on each figure that the paper gives, by its place in ``metrics.json``; None: undefined here."""
+    found: dict[str, str | None] = {}
+    for figure in (*ANGLE_FIGURES, *STATE_FIGURES):
+        paper = PAPER.get(figure.section, {}).get(figure.name)
+        if paper is not None and figure.better is not Better.NEITHER:
+            ours = metrics[figure.section][figure.name]
+            found[f"{figure.section}.{figure.name}"] = verdict(figure.kind, figure.better, ours, paper)
+    state, papers = metrics["state"], PAPER["state"]
+    rows = {f"per_class.{label}": (state["per_class"].get(label), papers["per_class"][label]) for label in PAPER_LABELS}
+    rows |= {average: (state[average], papers[average]) for average in ("macro", "weighted")}
+    for name, (ours_row, paper_row) in rows.items():
+        for score in CLASS_SCORES:
+            ours = ours_row[score] if ours_row else None
+            found[f"state.{name}.{score}"] = verdict(FigureFormat.RATIO, Better.LARGER, ours, paper_row[score])
+    return found
+
+
+def choose_images(states: Mapping[str, str], seed: int, count: int = PAPER_IMAGES) -> list[str]:
+    """Images of states B, C and D in the paper's shares (13 : 26 : 5), drawn by `seed`, sorted by name.
+
+    Parameters
+    ----------
+    states : true state by image.
+    count : images wanted; a state of which the set has too few gives all it has, and the others are not filled up.
+    """
+    rng = np.random.default_rng(seed)
+    chosen: list[str] = []
+    for label, wanted in wanted_images(count).items():
+        having = sorted(image for image, state in states.items() if state == label)
+        chosen += [having[place] for place in rng.permutation(len(having))[:wanted]]
+    return sorted(chosen)
+
+
+def wanted_images(count: int = PAPER_IMAGES) -> dict[str, int]:
+    """`count` images in the paper's shares, whole by largest remainder: of 48, 14 B, 28 C and 6 D."""
+    support = np.array(PAPER_CONFUSION).sum(1)
+    exact = count * support / support.sum()
+    whole = np.floor(exact).astype(int)
+    whole[np.argsort(whole - exact, kind="stable")[: count - whole.sum()]] += 1
+    return dict(zip(PAPER_LABELS, whole.tolist(), strict=True))
+
+
+def measure_twice(theta_deg: Sequence[float], sd_deg: float, seed: int) -> list[tuple[float, float]]:
+    """Two manual measures of each true angle, with independent normal errors; like theta itself, they stay in 0 to 180 degrees."""
+    # The second stream of the seed: the first one draws the images.
+    noise = np.random.default_rng([seed, 1]).normal(0.0, sd_deg, (len(theta_deg), 2))
+    measured = np.abs(np.asarray(theta_deg, np.float64)[:, None] + noise)
+    folded = RANGE_DEG - np.abs(RANGE_DEG - measured)
+    return [(float(first), float(second)) for first, second in folded]
+
+
+_SIDE = 256
+_NEIGHBOURS = tuple((dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx)
+_MAX_DEPTH = 5000
+
+
+@dataclass(frozen=True, slots=True)
+class BaselineTiming:
+    """Milliseconds of one frame."""
+
+    network_ms: float
+    after_network_ms: float
+
+    @property
+    def total_ms(self) -> float:
+        return self.network_ms + self.after_network_ms
+
+
+class PaperBaseline:
+    """The baseline with its network loaded. ``threads``: CPU threads for torch, 0 = all cores."""
+
+    def __init__(self, threads: int = 0) -> None:
+        torch.set_num_threads(threads or os.cpu_count() or 1)
+        torch.manual_seed(0)
+        self._network = DualUNet(UNetShape.of_base(64)).eval()
+
+    def time(self, image: Image, vessel: Mask, robot: Mask) -> BaselineTiming:
+        """Time one frame: the network on `image`, what follows on the given masks (a random network gives none worth thinning)."""
+        start = perf_counter()
+        small = cv2.resize(image, (_SIDE, _SIDE), interpolation=cv2.INTER_AREA)
+        with torch.inference_mode():
+            batch = torch.from_numpy(small.transpose(2, 0, 1).astype(np.float32) / 255)[None]
+            torch.sigmoid(self._network(batch)).numpy()
+        middle = perf_counter()
+        masks = [cv2.resize(m.astype(np.uint8), (_SIDE, _SIDE), interpolation=cv2.INTER_NEAREST) > 0 for m in (vessel, robot)]
+        trace_paper(masks[0], masks[1])
+        return BaselineTiming((middle - start) * 1e3, (perf_counter() - middle) * 1e3)
+
+
+def trace_paper(vessel: Mask, robot: Mask) -> list[tuple[int, int]]:
+    """Cleaning, thinning, Algorithm 1 and recursive tracing on both masks; the robot's path as (row, column) pixels."""
+    skeletons = []
+    for mask in (vessel, robot):
+        clean = remove_small_holes(remove_small_objects(mask, max_size=63), max_size=63)
+        skeletons.append(skeletonize(clean))
+    robot_skeleton = connect_gaps(skeletons[1], 20.0)
+    starts = end_points(robot_skeleton)
+    pixels = {(int(y), int(x)) for y, x in np.argwhere(robot_skeleton)}
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(limit, _MAX_DEPTH + 1000))
+    try:
+        paths = [_longest(start, pixels, set(), 0) for start in starts]
+    finally:
+        sys.setrecursionlimit(limit)
+    return max(paths, key=_score, default=[])
+
+
+def end_points(skeleton: Mask) -> list[tuple[int, int]]:
+    """Pixels (row, column) where the convolution with [[1, 1, 1], [1, 10, 1], [1, 1, 1]] gives 11."""
+    kernel = np.array([[1, 1, 1], [1, 10, 1], [1, 1, 1]], np.float32)
+    count = cv2.filter2D(skeleton.astype(np.float32), -1, kernel, borderType=cv2.BORDER_CONSTANT)
+    return [(int(y), int(x)) for y, x in np.argwhere((count == 11) & skeleton)]
+
+
+def connect_gaps(skeleton: Mask, gap_threshold: float) -> Mask:
+    """The paper's Algorithm 1, literally: every pair of end points closer than the threshold is joined."""
+    joined = skeleton.astype(np.uint8)
+    ends = end_points(skeleton)
+    for i, first in enumerate(ends):
+        for second in ends[i + 1 :]:
+            if np.hypot(first[0] - second[0], first[1] - second[1]) < gap_threshold:
+                cv2.line(joined, first[::-1], second[::-1], 1)
+    return np.asarray(joined > 0)
+
+
+def _longest(
+    pixel: tuple[int, int], pixels: set[tuple[int, int]], visited: set[tuple[int, int]], depth: int
+) -> list[tuple[int, int]]:
+    visited.add(pixel)
+    best: list[tuple[int, int]] = []
+    if depth < _MAX_DEPTH:
+        for dy, dx in _NEIGHBOURS:
+            step = (pixel[0] + dy, pixel[1] + dx)
+            if step in pixels and step not in visited:
+                branch = _longest(step, pixels, visited, depth + 1)
+                if len(branch) > len(best):
+                    best = branch
+    return [pixel, *best]
+
+
+def _score(path: list[tuple[int, int]]) -> float:
+    points = np.array(path, np.float64)
+    if len(points) < 3:
+        return 0.0
+    steps = np.diff(points, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    main = points[-1] - points[0]
+    consistency = np.abs(steps @ main) / (lengths * max(float(np.linalg.norm(main)), 1e-9))
+    smooth = np.abs(np.einsum("ij,ij->i", steps[1:], steps[:-1])) / (lengths[1:] * lengths[:-1])
+    return float(len(points) / _SIDE + smooth.mean() + consistency.mean())

@@ -1,0 +1,405 @@
+"""Random changes of labelled frames during training: geometry for image and masks alike, looks for the image alone.
+
+What a network is shown in training: cut-outs of labelled frames, changed at random.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from numpy.random import Generator
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from core.learning.dataset import WORKING_SIZE_PX, KeptFrames, Sample
+from core.learning.training_plan import TrainingPlan
+from core.perception.compiled import loops
+from core.perception.segmentation import Probability, Segmenter, window_around
+from core.perception.skeleton import end_pixels, thin
+from core.perception.tip_refinement import WINDOW_PX, look_again, places_to_look
+from core.types import Image, Mask, Point
+
+
+def random_crop(image: Image, vessel: Mask, robot: Mask, size: tuple[int, int], rng: Generator) -> tuple[Image, Mask, Mask]:
+    """A turned, scaled, perhaps mirrored cut-out of `size` (height, width), in one warp so that nothing is blurred twice.
+
+    Most cuts are centred near the robot's ends or body: the robot is one or two percent of the pixels.
+    """
+    height, width = size
+    center = _center(robot, rng)
+    scale = float(np.exp(rng.uniform(np.log(0.75), np.log(1.35))))
+    angle = rng.choice((0.0, 90.0, 180.0, 270.0)) + (rng.uniform(-45, 45) if rng.random() < 0.5 else 0.0)
+    matrix = cv2.getRotationMatrix2D((float(center[0]), float(center[1])), angle, scale)
+    if rng.random() < 0.5:
+        matrix[0, :2] = -matrix[0, :2]  # the shift is set below
+    target = np.array([width, height]) * (0.5 + rng.uniform(-0.25, 0.25, 2))
+    moved = matrix @ np.array([center[0], center[1], 1.0])
+    matrix[:, 2] += target - moved
+    # What lies beyond the picture is one colour without labels; mirrored, robots would meet their own reflection.
+    fill = tuple(float(v) for v in image[int(rng.integers(image.shape[0])), int(rng.integers(image.shape[1]))])
+    cut = cv2.warpAffine(image, matrix, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=fill)
+    masks = [
+        cv2.warpAffine(m.astype(np.uint8) * 255, matrix, (width, height), flags=cv2.INTER_LINEAR) > 127 for m in (vessel, robot)
+    ]
+    return np.asarray(cut, np.uint8), np.asarray(masks[0]), np.asarray(masks[1])
+
+
+def _center(robot: Mask, rng: Generator) -> tuple[float, float]:
+    height, width = robot.shape
+    if rng.random() < 0.65:
+        rows, columns = np.nonzero(robot)
+        if len(rows):
+            pick = int(rng.integers(len(rows)))
+            return float(columns[pick]), float(rows[pick])
+    return float(rng.uniform(0.2, 0.8) * width), float(rng.uniform(0.2, 0.8) * height)
+
+
+def with_strips(image: Image, vessel: Mask, robot: Mask, rng: Generator) -> Image:
+    """`image` with one or two clips across the lumen, most of them over the robot and more often near its ends than on its body.
+
+    The labels stay: robot and lumen go on beneath. Of the twin's own clips few lie where the robot happens to be.
+    """
+    painted = image.copy()
+    for _ in range(int(rng.integers(1, 3))):
+        under = robot if rng.random() < 0.75 and robot.any() else vessel
+        found = np.argwhere(under)[:, ::-1]
+        if not len(found):
+            break
+        some = found[rng.integers(len(found), size=6)].astype(float)
+        far = np.linalg.norm(some - found.mean(axis=0), axis=1)
+        middle = some[int(np.argmax(far))] if rng.random() < 0.5 else some[0]
+        _strip(painted, middle + rng.normal(0, 4, 2), _across(found, middle) + rng.normal(0, 0.3), rng)
+    return painted
+
+
+def _across(found: np.ndarray, middle: np.ndarray) -> float:
+    """The angle in radians at a right angle to what lies near `middle`; `found` (N, 2) in px."""
+    near = found[np.linalg.norm(found - middle, axis=1) < 25] - middle
+    if len(near) < 3:
+        return 0.0
+    along = np.linalg.eigh(near.T @ near)[1][:, 1]
+    return float(np.arctan2(along[0], -along[1]))
+
+
+def _strip(image: Image, middle: np.ndarray, angle: float, rng: Generator) -> None:
+    """Paint a half see-through rectangle with a rim, a raised middle and a bit of shadow into `image`."""
+    tone = rng.uniform(0.1, 1.0) * np.ones(3) if rng.random() < 0.7 else rng.uniform(0.1, 0.95, 3)
+    opacity, shade = rng.uniform(0.35, 0.92), rng.uniform(0.6, 1.0)
+    half = np.array([rng.uniform(14, 40), rng.uniform(4, 12)])
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+    def corners(share: tuple[float, float], shift: float = 0.0) -> np.ndarray:
+        box = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half * share @ turn + middle + shift
+        return np.asarray(np.rint(box * 16).astype(np.int32))
+
+    shadow = np.ones(image.shape[:2], np.float32)
+    cv2.fillPoly(shadow, [corners((1, 1), rng.uniform(-3, 3))], float(shade), cv2.LINE_AA, 4)
+    paint: np.ndarray = image * shadow[:, :, None]
+    cover = np.zeros(image.shape[:2], np.float32)
+    color = np.zeros(image.shape, np.float32)
+    for share, lightness in (((1.0, 1.0), 1.0), ((0.96, 0.45), rng.uniform(0.9, 1.2))):
+        level = tuple(float(v) for v in np.clip(255 * tone * lightness, 0, 255))
+        cv2.fillPoly(cover, [corners(share)], opacity, cv2.LINE_AA, 4)
+        cv2.fillPoly(color, [corners(share)], level, cv2.LINE_AA, 4)
+    cv2.polylines(color, [corners((1, 1))], True, tuple(float(v) for v in 150 * tone), 1, cv2.LINE_AA, 4)
+    paint += (color - paint) * cover[:, :, None]
+    image[:] = np.clip(paint, 0, 255).astype(np.uint8)
+
+
+def random_look(image: Image, rng: Generator) -> Image:
+    """Exposure, contrast, gamma, white balance, uneven light, blur, noise and compression, each now and then."""
+    pixels: np.ndarray = image.astype(np.float32) / 255.0
+    if rng.random() < 0.7:
+        mean = float(pixels.mean())
+        pixels = (pixels - mean) * rng.uniform(0.65, 1.4) + mean + rng.uniform(-0.15, 0.15)
+    if rng.random() < 0.5:
+        pixels = pixels * rng.uniform(0.85, 1.15, 3).astype(np.float32)
+    if rng.random() < 0.12:
+        pixels = np.repeat(pixels.mean(axis=2, keepdims=True), 3, axis=2)
+    elif rng.random() < 0.12:
+        pixels = pixels[:, :, rng.permutation(3)]
+    if rng.random() < 0.4:
+        pixels = np.clip(pixels, 0, 1) ** np.float32(np.exp(rng.uniform(-0.5, 0.5)))
+    if rng.random() < 0.3:
+        pixels = pixels * _uneven_light(pixels.shape[:2], rng)[:, :, None]
+    if rng.random() < 0.25:
+        pixels = cv2.GaussianBlur(pixels, (0, 0), float(rng.uniform(0.4, 1.3)))
+    if rng.random() < 0.35:
+        pixels = pixels + rng.normal(0, rng.uniform(0.005, 0.04), pixels.shape).astype(np.float32)
+    result = np.asarray((np.clip(pixels, 0, 1) * 255).astype(np.uint8))
+    if rng.random() < 0.15:
+        data = cv2.imencode(".jpg", result, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(35, 90))])[1]
+        result = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))
+    return result
+
+
+def _uneven_light(shape: tuple[int, int], rng: Generator) -> np.ndarray:
+    coarse = rng.uniform(0.6, 1.3, (4, 4)).astype(np.float32)
+    return np.asarray(cv2.resize(coarse, (shape[1], shape[0]), interpolation=cv2.INTER_CUBIC))
+
+
+def random_clutter(size: tuple[int, int], rng: Generator) -> Image:
+    """A picture with neither vessel nor robot: plain, noisy or striped boards, blobs, cables, boxes. Its masks are empty."""
+    height, width = size
+    image = np.full((height, width, 3), rng.integers(0, 256, 3), np.float32)
+    if rng.random() < 0.6:
+        image += cv2.resize(
+            rng.normal(0, rng.uniform(5, 60), (6, 6, 3)).astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC
+        )
+    for _ in range(int(rng.integers(0, 9))):
+        color = tuple(float(c) for c in rng.integers(0, 256, 3))
+        points = np.cumsum(rng.normal(0, 60, (8, 2)), axis=0) + rng.uniform(0, (width, height))
+        kind = rng.random()
+        if kind < 0.5:
+            curve = cv2.resize(points.astype(np.float32).reshape(8, 1, 2), (1, 160), interpolation=cv2.INTER_CUBIC).reshape(
+                -1, 1, 2
+            )
+            cv2.polylines(image, [curve.astype(np.int32)], False, color, int(rng.integers(1, 14)), cv2.LINE_AA)
+        elif kind < 0.75:
+            cv2.fillPoly(image, [points.astype(np.int32)], color, cv2.LINE_AA)
+        else:
+            cv2.circle(
+                image,
+                (int(points[0, 0]), int(points[0, 1])),
+                int(rng.integers(3, 90)),
+                color,
+                int(rng.choice([-1, 2, 5])),
+                cv2.LINE_AA,
+            )
+    image += rng.normal(0, rng.uniform(0, 12), image.shape)
+    return np.asarray(np.clip(image, 0, 255).astype(np.uint8))
+
+
+MISSED_SHARE = 0.35
+"""Of the second look's windows: as many show a pixel that the first look got wrong. The others show what it would look at."""
+LAST_SHARE = 0.5
+JITTER_PX = 10.0
+EDGE_PX = 4
+"""What is wrong farther than this from the robot's outline is no blur of it: a piece was missed or invented."""
+WALL_PX = 3
+"""Nor is what of a vessel is wrong farther than this from its wall: the line between the walls may lie more than a pixel aside."""
+WALL_REACH_PX = 60.0
+"""So near to the robot's ends: the vessel's vector is fitted to 20 px to each side of the head."""
+_WRONG_PLACES = 32
+WRONG_JITTER_PX = 30.0
+END_REACH_PX = 20.0
+"""Standard deviation of what counts as near to a robot's end: half of the 40 px that its vector and the vessel's are fitted to."""
+BORDER_PX = 8.0
+
+Crop = tuple[Tensor, Tensor]
+"""uint8 (planes, h, w) and its labels uint8 (2 or 3, h, w): vessel, robot (0, 1), and where the plan weighs the robot's ends, how
+near they are (0..255)."""
+
+
+class _Order:
+    """Epochs without repetition: a place in a permutation that is drawn anew for every pass."""
+
+    def __init__(self, seed: int, count: int) -> None:
+        self._seed, self._count = seed, count
+        self._drawn: tuple[int, NDArray[np.int64]] | None = None
+
+    def __getitem__(self, index: int) -> int:
+        epoch, place = divmod(index, self._count)
+        if self._drawn is None or self._drawn[0] != epoch:
+            rng = np.random.default_rng((self._seed, 7919, epoch))
+            self._drawn = (epoch, rng.permutation(self._count))
+        return int(self._drawn[1][place])
+
+
+class FrameCrops(Dataset[Crop]):
+    """For the first look: cut-outs of ``plan.crop``, turned, scaled and mirrored, most of them near the robot.
+
+    Crop `i` depends on the seed and `i` alone, so that a run can be repeated with any number of workers. `difficulty` (one weight
+    > 0 per sample, ``difficulty.py``) says where ``plan.focus_share`` of the crops come from.
+    """
+
+    def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
+        self._plan = plan
+        self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
+        self._samples, self._kept = samples, KeptFrames(len(samples))
+        self._order = _Order(plan.seed, len(samples))
+        _load_for_workers(plan)
+
+    def __len__(self) -> int:
+        return self._plan.steps * self._plan.batch
+
+    def __getitem__(self, index: int) -> Crop:
+        rng = np.random.default_rng((self._plan.seed, index))
+        size = self._plan.crop
+        if rng.random() < self._plan.clutter_share:
+            image, vessel, robot = random_clutter(size, rng), np.zeros(size, bool), np.zeros(size, bool)
+        else:
+            place = self._order[index]
+            if self._chances is not None and rng.random() < self._plan.focus_share:
+                place = int(np.searchsorted(self._chances, rng.random(), side="right"))
+            image, vessel, robot = random_crop(*self._kept.frame(self._samples[place]), size, rng)
+            if self._plan.strip_share > 0 and rng.random() < self._plan.strip_share:
+                image = with_strips(image, vessel, robot, rng)
+        if rng.random() < self._plan.look_share:
+            image = random_look(image, rng)
+        return _tensors(image, vessel, robot, self._plan)
+
+
+@dataclass(frozen=True, slots=True)
+class PriorView:
+    """What a frame was taken for: both probabilities as PNG, 0..255, and the places that a second look would go to then."""
+
+    vessel_png: bytes
+    robot_png: bytes
+    places: tuple[Point, ...]
+
+    @classmethod
+    def of(cls, vessel: Probability, robot: Probability) -> PriorView:
+        packed = [cv2.imencode(".png", np.rint(seen * 255).astype(np.uint8))[1].tobytes() for seen in (vessel, robot)]
+        return cls(packed[0], packed[1], tuple(places_to_look(robot)))
+
+    def probabilities(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Vessel and robot (h, w), 0..255."""
+        packed = (np.frombuffer(data, np.uint8) for data in (self.vessel_png, self.robot_png))
+        vessel, robot = (np.asarray(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE), np.uint8) for data in packed)
+        return vessel, robot
+
+
+@dataclass(frozen=True, slots=True)
+class Looks:
+    """What a model saw in a frame at its first look, and in the end, where it has a second one.
+
+    ``wrong`` are places on pieces of robot, and of vessel beside the robot's ends, that it missed or invented in the end.
+    """
+
+    first: PriorView
+    last: PriorView
+    wrong: tuple[Point, ...] = ()
+
+    @classmethod
+    def at(cls, sample: Sample, segment: Segmenter, near: Segmenter | None = None) -> Looks:
+        """Look at a frame, with a second look by `near`; raises DatasetError."""
+        image, vessel, robot = sample.load(WORKING_SIZE_PX)
+        probabilities = segment(image)
+        first = last = PriorView.of(*probabilities)
+        if near is not None:
+            probabilities = look_again(image, probabilities, near)
+            last = PriorView.of(*probabilities)
+        found_vessel, found_robot = (probability >= np.float32(0.5) for probability in probabilities)
+        shifted = _wrong(found_vessel, vessel, WALL_PX) & (_end_distances(robot) <= WALL_REACH_PX)
+        return cls(first, last, tuple(_some_of(_wrong(found_robot, robot, EDGE_PX)) + _some_of(shifted)))
+
+
+class NearCrops(Dataset[Crop]):
+    """For the second look: windows as it is shown them, with what the first look (`looks`, one per sample) says there.
+
+    Half of them come with what was seen in the end instead: a second look may be followed by another one (``SecondLook``).
+    ``plan.focus_share`` of them show a piece that was missed or invented, of any frame with one.
+    """
+
+    def __init__(self, samples: list[Sample], looks: list[Looks], plan: TrainingPlan) -> None:
+        self._plan, self._looks = plan, looks
+        self._failed = [place for place, look in enumerate(looks) if look.wrong]
+        self._samples, self._kept = samples, KeptFrames(len(samples))
+        self._order = _Order(plan.seed, len(samples))
+        _load_for_workers(plan)
+
+    def __len__(self) -> int:
+        return self._plan.steps * self._plan.batch
+
+    def __getitem__(self, index: int) -> Crop:
+        rng = np.random.default_rng((self._plan.seed, index))
+        focused = self._plan.focus_share > 0 and bool(self._failed) and rng.random() < self._plan.focus_share
+        place = self._failed[int(rng.integers(len(self._failed)))] if focused else self._order[index]
+        sample, looks = self._samples[place], self._looks[place]
+        image, vessel, robot = self._kept.frame(sample)
+        seen = looks.last if rng.random() < LAST_SHARE else looks.first
+        seen_vessel, seen_robot = self._kept.get((sample.image, seen is not looks.first), seen.probabilities)
+        center = _beside(looks.wrong, WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, seen.places, rng)
+        x, y, width, height = window_around(center, (image.shape[1], image.shape[0]), WINDOW_PX)
+        part = np.s_[y : y + height, x : x + width]
+        cut = _filled(np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]]))
+        # Quarter turns and mirror images cost no sharpness; the first look has seen all other angles and sizes.
+        cut = np.rot90(cut, int(rng.integers(4)))
+        cut = cut[:, ::-1] if rng.random() < 0.5 else cut
+        cut = np.ascontiguousarray(cut)
+        if rng.random() < self._plan.look_share:
+            cut[:, :, :3] = random_look(cut[:, :, :3], rng)
+        return _tensors(cut[:, :, :5], cut[:, :, 5] > 0, cut[:, :, 6] > 0, self._plan)
+
+
+def _load_for_workers(plan: TrainingPlan) -> None:
+    """The robot's ends are found with the compiled loops, which workers that are forked from here need not load each."""
+    if plan.end_weight > 0:
+        loops.load()
+
+
+def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...], rng: Generator) -> Point:
+    """Where the first look went wrong, or where the second one would look, a bit beside it."""
+    if rng.random() < MISSED_SHARE:
+        rows, columns = np.nonzero((seen_robot > 127) != robot)
+        if len(rows):
+            pick = int(rng.integers(len(rows)))
+            return float(columns[pick]), float(rows[pick])
+    return _beside(places, JITTER_PX, robot, rng)
+
+
+def _beside(places: tuple[Point, ...], jitter_px: float, robot: Mask, rng: Generator) -> Point:
+    """Near one of the places, or anywhere in the picture where there is none."""
+    height, width = robot.shape
+    x, y = places[int(rng.integers(len(places)))] if places else (rng.uniform(0, width), rng.uniform(0, height))
+    across, down = rng.normal(0, jitter_px, 2)
+    return min(max(x + across, 0.0), width - 1.0), min(max(y + down, 0.0), height - 1.0)
+
+
+def _wrong(found: Mask, true: Mask, edge_px: int) -> Mask:
+    """What was missed farther than `edge_px` from all that was found, or invented farther than that from all that is true."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * edge_px + 1, 2 * edge_px + 1))
+    near_found, near_true = (cv2.dilate(mask.view(np.uint8), disc) > 0 for mask in (found, true))
+    return np.asarray((true & ~near_found) | (found & ~near_true))
+
+
+def _some_of(mask: Mask) -> list[Point]:
+    """Places (x, y) evenly over a mask, ``_WRONG_PLACES`` or some more."""
+    rows, columns = np.nonzero(mask)
+    step = max(1, len(rows) // _WRONG_PLACES)
+    return list(zip(columns[::step].astype(float).tolist(), rows[::step].astype(float).tolist(), strict=True))
+
+
+def _filled(cut: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A window of a small picture brought to full size, its edge going on."""
+    down, right = WINDOW_PX - cut.shape[0], WINDOW_PX - cut.shape[1]
+    return np.pad(cut, ((0, down), (0, right), (0, 0)), mode="edge") if down or right else cut
+
+
+def _tensors(image: NDArray[np.uint8], vessel: Mask, robot: Mask, plan: TrainingPlan) -> Crop:
+    labels = [vessel.astype(np.uint8), robot.astype(np.uint8)]
+    if plan.end_weight > 0:
+        labels.append(_nearness(robot))
+    return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(np.stack(labels))
+
+
+def _nearness(robot: Mask) -> NDArray[np.uint8]:
+    """How near each pixel is to an end of the true robot, 255 there; where the cut-out's border cuts it off it does not end."""
+    return np.asarray(np.rint(255 * np.exp(-0.5 * (_end_distances(robot) / np.float32(END_REACH_PX)) ** 2)), np.uint8)
+
+
+def _end_distances(robot: Mask) -> NDArray[np.float32]:
+    """How far each pixel is from the nearest end of the true robot; infinite where it has none."""
+    rows, columns = np.ogrid[: robot.shape[0], : robot.shape[1]]
+    nearest = np.full(robot.shape, np.inf, np.float32)
+    for x, y in true_ends(robot):
+        np.minimum(nearest, (rows - y) ** 2 + (columns - x) ** 2, out=nearest)
+    return np.sqrt(nearest)
+
+
+def true_ends(robot: Mask) -> list[tuple[int, int]]:
+    """Ends (x, y) of a true mask's skeleton inside the cut-out: farther from its border than thinning draws back an end."""
+    left, top, across, down = cv2.boundingRect(robot.view(np.uint8))
+    if not across:
+        return []
+    box = np.ascontiguousarray(robot[top : top + down, left : left + across])
+    half_width = float(cv2.distanceTransform(np.pad(box, 1).view(np.uint8), cv2.DIST_L2, 3).max())
+    margin = max(BORDER_PX, half_width + 3.0)
+    height, width = robot.shape
+    ends = ((x + left, y + top) for x, y in end_pixels(thin(box)))
+    return [(x, y) for x, y in ends if min(x, y, width - 1 - x, height - 1 - y) >= margin]

@@ -1,0 +1,378 @@
+"""A rig that is being calibrated: every step by itself, in any order that makes sense, by a window or by a command."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+
+from core.calibration.camera import (
+    BoardError,
+    BoardSpec,
+    BoardView,
+    LensError,
+    distort,
+    find_board,
+    fit_lens,
+    scale_of_board,
+    scale_of_clicks,
+    straighten,
+)
+from core.calibration.servos import Assignment, HeadNotSeen, NotIdentified, ServoFinding, SteeringNotSeen, assign, feed_disagreement
+from core.config.calibration import CalibrationConfig, LensConfig, ScaleConfig, SteeringConfig, ZeroConfig
+from core.config.models import Config
+from core.config.rig_file import RigFile, make_rig
+from core.config.safety import JOINT_NAMES, JointName, ServosConfig
+from core.devices import DeviceError
+from core.types import Image, Point
+from hardware.calibration import servo_identification
+from hardware.calibration.bench import CalibrationBench
+from hardware.calibration.servo_probe import ProcedureStopped
+from hardware.servos.discovery import BAUDS, FoundServos, find_servos
+from hardware.servos.dynamixel_port import ServoError
+
+_NOTICEABLE_PX = 1.0
+"""A lens that moves nothing farther than this in a picture 640 px wide is left alone: straightening costs a millisecond a frame."""
+
+_BOARD_MISSES = 6
+"""So many looks in a row without the board, three seconds: who only lays a hand on it must not find that things begin to move."""
+_BOARD_LOOK_S, _BOARD_GONE_WITHIN_S = 0.5, 180.0
+
+Say = Callable[[str], object]
+
+
+class RigDraft:
+    """What is known so far. Each step replaces what it found before; ``rig_file`` puts all of it together.
+
+    The steps that move servos (``identify``, ``identify_one``, ``find_zeros``, ``learn_steering``) need ``search_servos`` before,
+    and are ended by ``bench.stop``. They raise DeviceError or a UserError of ``core.calibration``, one line that says what to do.
+
+    Parameters
+    ----------
+    bench : open; whoever opened it closes it.
+    config : the configuration to start from, with the rig's camera and servos.
+    known : what was calibrated earlier, and stays where nothing new is found.
+    """
+
+    def __init__(
+        self, bench: CalibrationBench, config: Config, known: CalibrationConfig | None = None, say: Say = lambda _: None
+    ) -> None:
+        self.bench, self.say = bench, say
+        self.config = config
+        self.spec = BoardSpec()
+        self.views: list[BoardView] = []
+        self.lens: LensConfig | None = known.lens if known is not None else None
+        self.scale: ScaleConfig | None = known.scale if known is not None else None
+        self.steering: SteeringConfig | None = known.steering if known is not None else None
+        self.zero: ZeroConfig | None = known.zero if known is not None else None
+        self.found: FoundServos | None = None
+        self.findings: dict[int, ServoFinding] = {}
+        self.assignments: tuple[Assignment, ...] = ()
+        self.port = known.port if known is not None else None
+        self._assumed_earlier = known.assumed if known is not None else None
+        self.zeros: servo_identification.Zeros | None = None
+        self.notes: list[str] = []
+        self._is_displaced = False
+        self._nudged: set[str] = set()
+        self._head_px: Point | None = None
+        self._begun_with = self._findings()
+        bench.set_lens(self.lens)
+
+    @property
+    def servos(self) -> ServosConfig:
+        """As found out so far, on the bench's port."""
+        return self.bench.servos_config(self.config.servos)
+
+    @property
+    def has_news(self) -> bool:
+        """Whether something was found since, or set by hand, that is gone if ``rig_file`` is not saved."""
+        return self._findings() != self._begun_with
+
+    def _findings(self) -> tuple[object, ...]:
+        known = (self.lens, self.scale, self.steering, self.zero, self.zeros, self.port)
+        return (self.config, *known, self.assignments, len(self.views), len(self.findings))
+
+    # ---- lens and scale
+
+    def take_board(self) -> tuple[Image, BoardView]:
+        """Take one picture of the board and keep its corners; raises BoardError when there is no board in it."""
+        image = self.bench.board_picture(self.spec)
+        view = find_board(image, self.spec)
+        self.views.append(view)
+        self.say(f"board {len(self.views)}: {len(view.pixels)} of {(self.spec.columns - 1) * (self.spec.rows - 1)} corners")
+        return image, view
+
+    def forget_boards(self) -> None:
+        """Begin anew."""
+        self.views.clear()
+
+    def wait_for_no_board(self, within_s: float = _BOARD_GONE_WITHIN_S) -> None:
+        """Until the board is out of sight: no robot is seen under it. Raises BoardError when nobody takes it away."""
+        ends_s, misses, is_told = time.monotonic() + within_s, 0, False
+        while misses < _BOARD_MISSES:
+            try:
+                find_board(self.bench.board_picture(self.spec), self.spec)
+            except BoardError:
+                misses += 1
+                self.bench.stop.sleep(_BOARD_LOOK_S)
+                continue
+            if time.monotonic() > ends_s:
+                raise BoardError("the board is still in the picture: take it away, then go on")
+            if not is_told:
+                self.say("take the board away: the servos move when it is out of sight")
+            misses, is_told = 0, True
+            self.bench.stop.sleep(_BOARD_LOOK_S)
+
+    def solve_boards(self) -> tuple[LensConfig | None, ScaleConfig]:
+        """Lens and scale from the pictures taken; no lens where it hardly bends anything. Raises LensError, ScaleError."""
+        if not self.views:
+            raise LensError("no picture of the board was taken yet")
+        size = self._picture_size()
+        lens = fit_lens(self.views, size)
+        bent_px = _most_bent_px(lens)
+        straight: Sequence[BoardView] = self.views
+        if bent_px * 640.0 / max(size) > _NOTICEABLE_PX:
+            self.lens = lens
+            straight = [BoardView(straighten(view.pixels, lens), view.board_mm) for view in self.views]
+            self.say(f"lens: up to {bent_px:.1f} px at the border, {lens.residual_px:.2f} px left over")
+        else:
+            self.lens = None
+            self.say(f"lens: straight enough ({bent_px:.1f} px at the border)")
+        self.scale = scale_of_board(straight, size)
+        self.bench.set_lens(self.lens)
+        self._tell_scale()
+        return self.lens, self.scale
+
+    def solve_clicks(self, first: Point, second: Point, length_mm: float) -> ScaleConfig:
+        """The scale from two places of the (straightened) picture that are so far apart; raises ScaleError."""
+        self.scale = scale_of_clicks(first, second, length_mm, self._picture_size())
+        self._tell_scale()
+        return self.scale
+
+    def _tell_scale(self) -> None:
+        assert self.scale is not None
+        self.say(f"scale: {self.scale.mm_per_px:.4f} mm/px, \N{PLUS-MINUS SIGN}{100 * self.scale.uncertainty_share:.2f} %")
+
+    def _picture_size(self) -> tuple[int, int]:
+        frame = self.bench.feed.newest or self.bench.feed.take(1, 5.0)[0]
+        return frame.image.shape[1], frame.image.shape[0]
+
+    # ---- servos
+
+    def search_servos(self, bauds: Sequence[int] | None = None) -> FoundServos:
+        """Find the servos on the bench's port, and take over their speed and model.
+
+        Raises
+        ------
+        DeviceError
+            No port, nobody answers, or not seven of one model.
+        """
+        servos = self.servos
+        assert servos.port is not None
+        chosen = bauds if bauds is not None else (servos.baud, *(baud for baud in BAUDS if baud != servos.baud))
+        found = find_servos(servos.port, chosen, self.say, self.bench.stop.check)
+        listed = ", ".join(f"{servo.id} (model {servo.model})" for servo in found.servos)
+        if found.elsewhere and len(found.servos) < len(JOINT_NAMES):
+            others = "; ".join(f"{', '.join(map(str, ids))} at {baud} baud" for baud, ids in found.elsewhere)
+            raise DeviceError(
+                f"servos at several speeds: {', '.join(map(str, found.ids))} at {found.baud} baud; {others}; set all seven to one"
+            )
+        if len(found.servos) != len(JOINT_NAMES):
+            raise DeviceError(
+                f"{len(found.servos)} servos answer, seven are needed: {listed}; check cables, and that no id is used twice"
+            )
+        models = {servo.model for servo in found.servos}
+        if len(models) != 1:
+            raise DeviceError(f"servos of several models: {listed}; all seven must be of one")
+        self.say(f"seven servos at {found.baud} baud: {', '.join(map(str, found.ids))}")
+        self.found = found
+        self.findings = {servo_id: finding for servo_id, finding in self.findings.items() if servo_id in found.ids}
+        if any(one.id not in found.ids for one in self.assignments):  # a servo was changed for another one
+            self.assignments = ()
+        self._set_servos(servos.model_copy(update={"baud": found.baud, "model": models.pop()}))
+        return found
+
+    def wiggle(self, servo_id: int) -> None:
+        """Turn one servo both ways, for somebody who watches."""
+        with self._moving():
+            servo_identification.wiggle(self.bench.bench, self.servos, self._ids(), servo_id)
+
+    def identify_one(self, servo_id: int) -> ServoFinding | None:
+        """What one servo does, as the camera sees it; None when nothing is clear."""
+        with self._moving():
+            finding = servo_identification.identify_servo(self.bench.bench, self.servos, self._ids(), servo_id, self.say)
+        self.findings.pop(servo_id, None)
+        if finding is not None:
+            self.findings[servo_id] = finding
+        return finding
+
+    def identify(self) -> tuple[Assignment, ...]:
+        """Who is who; raises NotIdentified when not all are clear."""
+        for servo_id in self._ids():
+            self.identify_one(servo_id)
+        return self.take_findings()
+
+    def take_findings(self) -> tuple[Assignment, ...]:
+        """Name the servos after what was found; raises NotIdentified."""
+        assigned = assign(self.findings)
+        self.set_assignments(assigned)
+        if self.scale is not None:
+            feed = feed_disagreement(self.findings, assigned, self.servos, self.scale, self._picture_size())
+            if feed:
+                self.say(feed)
+                self.notes.append(feed)
+        if any(one.assumed for one in assigned):
+            self.notes.append(
+                "up and down are assumed by the order of their ids: one camera cannot tell them apart; swap them if it is wrong"
+            )
+        return assigned
+
+    @property
+    def assumed(self) -> tuple[JointName, ...]:
+        """Joints whose servos nobody has told apart: the order of their ids decided."""
+        if not self.assignments:
+            return self._assumed_earlier or ()
+        return tuple(one.name for one in self.assignments if one.assumed)
+
+    def confirm(self) -> None:
+        """Somebody has looked: what was assumed is right."""
+        self.set_assignments([replace(one, seen="seen by eye", assumed=False) if one.assumed else one for one in self.assignments])
+
+    def set_assignments(self, assignments: Sequence[Assignment]) -> None:
+        """Take over who is who. Raises NotIdentified when a servo has two names, or a name no servo.
+
+        Zero and steering are those of joints: where another servo is one of them, or turns the other way, they are unknown again.
+        """
+        names = [one.name for one in assignments]
+        ids = {one.id for one in assignments}
+        if sorted(names) != sorted(JOINT_NAMES) or len(ids) != len(JOINT_NAMES):
+            raise NotIdentified("every servo must have one name, and every name one servo")
+        self.assignments = tuple(assignments)
+        before = _wiring(self.config.servos)
+        self._set_servos(servo_identification.identified(self.servos, assignments))
+        if _wiring(self.config.servos) != before:
+            self._forget_motion()
+
+    def _forget_motion(self) -> None:
+        """What was found out by moving the servos, with others in their places."""
+        had = (self.zero, self.zeros, self.steering)
+        self.zero = self.zeros = self.steering = self._head_px = None
+        if any(one is not None for one in had):
+            self.say("zero and steering were found with the servos in other places: find them anew")
+
+    def find_zeros(self) -> servo_identification.Zeros:
+        """Leave every tendon where it just becomes taut."""
+        with self._moving():
+            zeros = servo_identification.find_zeros(self.bench.bench, self.servos, self.say)
+        self.zeros, self.zero = zeros, None
+        self._is_displaced = False
+        self._nudged.clear()
+        self.notes += zeros.problems
+        self._keep_zero()
+        return zeros
+
+    def _keep_zero(self) -> None:
+        """Remember where the servos stand, if all tendons are known to be at their zeros: the steering need not be learnt anew."""
+        if not self.are_zeros_known:
+            return
+        try:
+            self._set_zero(servo_identification.standing_ticks(self.bench.bench, self.servos))
+        except ProcedureStopped:
+            raise
+        except ServoError as error:  # nothing has turned: the steering can be learnt all the same
+            self.zero = None
+            self.say(f"where the servos stand could not be kept ({error}): learn the steering, which keeps it, too")
+
+    def _set_zero(self, ticks: tuple[int, ...]) -> None:
+        slack = self.zeros.slack_mm if self.zeros is not None else (0.0, 0.0, 0.0, 0.0)
+        self.zero = ZeroConfig(ticks=ticks, slack_mm=slack, pretension_mm=self.config.servos.pretension_mm)
+
+    @property
+    def are_zeros_known(self) -> bool:
+        """Whether all tendons are where they become taut: found so, or put there by hand."""
+        return self.zeros is not None and all(problem.partition(":")[0] in self._nudged for problem in self.zeros.problems)
+
+    @contextmanager
+    def _moving(self) -> Iterator[None]:
+        """A step that turns servos, and turns them back. After one that was stopped half way nobody knows where the wires are."""
+        try:
+            yield
+        except BaseException as error:
+            went_back = isinstance(error, (HeadNotSeen, SteeringNotSeen, DeviceError))
+            if went_back and not isinstance(error, ServoError):
+                raise  # the wires went back
+            self.zero = self.zeros = None
+            self._is_displaced = True
+            raise
+
+    def learn_steering(self) -> SteeringConfig:
+        """Zero the joints where they stand, and learn in which direction each tendon moves the head."""
+        if self._is_displaced:
+            raise DeviceError("a step was stopped half way and the wires are where it left them: find the zeros anew")
+        with self._moving():
+            learnt = servo_identification.learn_steering(self.bench.bench, self.servos, self.say)
+        steering = learnt.steering
+        self.steering, self._head_px = steering, learnt.head_px
+        self._set_zero(learnt.zero_ticks)
+        self.say(f"steering: roll {steering.roll_deg:+.0f}°, way and heading {steering.disagreement_deg:.1f}° from a right angle")
+        return steering
+
+    def nudge(self, name: str, way_mm: float) -> None:
+        """Tighten one tendon by so much, or let it go (negative), for somebody who watches."""
+        with self._moving():  # a wire that strains lets all of them go
+            servo_identification.nudge(self.bench.bench, self.servos, name, way_mm)
+            self.zero = None
+            self._nudged.add(name)
+        self._keep_zero()
+
+    @property
+    def head_px(self) -> Point | None:
+        """Where the head was when the steering was learnt; None when it was not, or earlier."""
+        return self._head_px
+
+    def set_pretension(self, pretension_mm: float) -> None:
+        """Pull of every tendon at zero bend."""
+        self._set_servos(ServosConfig.model_validate({**self.config.servos.model_dump(), "pretension_mm": pretension_mm}))
+        if self.zero is not None:
+            self.zero = self.zero.model_copy(update={"pretension_mm": pretension_mm})
+
+    def _ids(self) -> tuple[int, ...]:
+        if self.found is None:
+            raise DeviceError("search the servos first")
+        return self.found.ids
+
+    def _set_servos(self, servos: ServosConfig) -> None:
+        self.config = self.config.model_copy(update={"servos": servos})
+
+    # ---- the end
+
+    def calibration(self) -> CalibrationConfig:
+        """All that was found."""
+        return CalibrationConfig(
+            made_utc=datetime.now(UTC).replace(microsecond=0),
+            assumed=self.assumed or None,
+            lens=self.lens,
+            scale=self.scale,
+            steering=self.steering,
+            zero=self.zero,
+            port=self.port,
+        )
+
+    def rig_file(self, name: str) -> RigFile:
+        """The rig under this name, not saved yet; raises RigFileError."""
+        return make_rig(self.config, name, self.calibration())
+
+
+def _wiring(servos: ServosConfig) -> tuple[tuple[int, int], ...]:
+    """Which servo each joint has, and which way it turns."""
+    return tuple((joint.id, joint.sign) for joint in servos.joints)
+
+
+def _most_bent_px(lens: LensConfig) -> float:
+    width, height = lens.size_px
+    border = np.array([(x, y) for x in (0.0, (width - 1) / 2, width - 1.0) for y in (0.0, (height - 1) / 2, height - 1.0)])
+    return float(np.hypot(*(distort(border, lens) - border).T).max())

@@ -1,0 +1,337 @@
+"""What is found out about servos by moving them a little and watching: who is who, where wires are taut, where the head goes.
+
+The procedures know neither window nor command line. Every motion is a probe's (one servo, bounded) or a robot's (all seven,
+zeroed); both go through driver and gate, and STOP ends every procedure within one period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from core.calibration.servos import (
+    Assignment,
+    Function,
+    HeadNotSeen,
+    Look,
+    NeverTaut,
+    Pull,
+    ServoFinding,
+    TautReading,
+    Wiggle,
+    assign,
+    classify,
+    head_move,
+    is_begun,
+    is_enough,
+    learn,
+    taut_at_mm,
+)
+from core.config.calibration import SteeringConfig
+from core.config.safety import JOINT_NAMES, TENDONS, ServosConfig
+from core.devices import DeviceError
+from core.types import Command, Point
+from hardware.calibration.servo_probe import MAX_CURRENT_MA, ProbeLimits, StopSwitch
+from hardware.servos.dynamixel_port import ServoError
+
+_AMPLITUDES_MM = (0.75, 1.5, 3.0)
+_SETTLE_S = 0.5
+_SLACK_MM, _STEP_MM, _FINE_MM, _REACH_MM = 1.25, 0.25, 0.06, 4.0
+_BELOW_MM, _PARK_MM = 0.3, 1.0
+_PAIRS = (("right", "left"), ("up", "down"))
+_PULLS_MM = (0.3, 0.5, 0.8, 1.2)
+_ENOUGH_PX = 6.5
+
+Say = Callable[[str], object]
+
+
+class Probe(Protocol):
+    """One servo that can be moved; positions from where it was when the probe was opened."""
+
+    @property
+    def position_mm(self) -> float: ...
+    def move_to(self, target_mm: float) -> None: ...
+    def pause(self, seconds: float) -> None: ...
+    def alive(self) -> None: ...
+
+
+class Steered(Protocol):
+    """The robot with all its servos, zeroed where they stood; bends and holds them while it is looked at."""
+
+    def bend_to(self, command: Command) -> None: ...
+    def pause(self, seconds: float) -> None: ...
+    def alive(self) -> None: ...
+    def ticks(self) -> tuple[int, ...]: ...
+
+
+class RobotObserver(Protocol):
+    """Looks at the robot while it stands still; `alive` is called meanwhile. Raises HeadNotSeen, DeviceError."""
+
+    def look(self, alive: Callable[[], None]) -> Look: ...
+
+
+class ServoMover(Protocol):
+    """Moves servos. Raises ServoError."""
+
+    def probe(
+        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], ids: tuple[int, ...] | None = None
+    ) -> AbstractContextManager[Probe]: ...
+    def steered(self, servos: ServosConfig) -> AbstractContextManager[Steered]: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What the procedures work with."""
+
+    eyes: RobotObserver
+    hands: ServoMover
+    stop: StopSwitch
+
+
+@dataclass(frozen=True, slots=True)
+class Zeros:
+    """How far each tendon was from taut (mm; positive: it was slack), and those that could not be told, with why."""
+
+    slack_mm: tuple[float, float, float, float]
+    problems: tuple[str, ...] = ()
+
+
+def wiggle(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, amplitude_mm: float = 1.5) -> None:
+    """Turn one servo a little both ways and back, for somebody who watches."""
+    with bench.hands.probe(servos, servo_id, ProbeLimits(-amplitude_mm, amplitude_mm), 1, ids) as probe:
+        for target_mm in (amplitude_mm, 0.0, -amplitude_mm, 0.0):
+            probe.move_to(target_mm)
+            probe.pause(_SETTLE_S / 2)
+
+
+@contextmanager
+def _or_back(back: Callable[[], None]) -> Iterator[None]:
+    """A look that fails, or a camera that is lost, in the middle of a step leaves nothing turned: a retry would go on from there.
+
+    Whatever is wrong with the servos themselves, STOP included, moves nothing more.
+    """
+    try:
+        yield
+    except ServoError:
+        raise
+    except (HeadNotSeen, DeviceError):
+        back()
+        raise
+
+
+def identify_servo(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, say: Say) -> ServoFinding | None:
+    """What one servo does; None when nothing clear was seen. It is turned no farther than it needs.
+
+    Raises
+    ------
+    ServoError, DeviceError, HeadNotSeen
+    """
+    most_mm = _AMPLITUDES_MM[-1]
+    limits = ProbeLimits(-most_mm, most_mm)
+    with bench.hands.probe(servos, servo_id, limits, 1, ids) as probe, _or_back(lambda: probe.move_to(0.0)):
+        for amplitude_mm in _AMPLITUDES_MM:
+            say(f"servo {servo_id}: {amplitude_mm:g} mm both ways")
+            finding = classify(_wiggled(bench, probe, amplitude_mm))
+            if finding is not None and finding.function is Function.ADVANCE and amplitude_mm < most_mm:
+                # It is clear who this is; how far it goes is clear only after a longer way.
+                say(f"servo {servo_id}: {most_mm:g} mm both ways")
+                farther = _farther(bench, probe, most_mm)
+                if farther is not None and (farther.function, farther.sign) == (finding.function, finding.sign):
+                    finding = farther
+            if finding is not None:
+                say(f"servo {servo_id} {finding.function} ({finding.seen}), direction {'+' if finding.sign > 0 else '-'}")
+                return finding
+    say(f"servo {servo_id}: nothing clear was seen")
+    return None
+
+
+def _farther(bench: Bench, probe: Probe, amplitude_mm: float) -> ServoFinding | None:
+    """What is seen over a longer way; None, and the servo where it stood, when the head leaves the picture there."""
+    try:
+        return classify(_wiggled(bench, probe, amplitude_mm))
+    except HeadNotSeen:
+        probe.move_to(0.0)
+        return None
+
+
+def _wiggled(bench: Bench, probe: Probe, amplitude_mm: float) -> Wiggle:
+    """What is seen at rest, so far one way and so far the other; the servo stands where it stood then."""
+    rest = _look(bench, probe)
+    seen = []
+    for target_mm in (amplitude_mm, -amplitude_mm):
+        probe.move_to(target_mm)
+        seen.append(_look(bench, probe))
+    probe.move_to(0.0)
+    return Wiggle(amplitude_mm, rest, *seen)
+
+
+def identify_servos(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], say: Say) -> tuple[Assignment, ...]:
+    """Who is who, of seven servos.
+
+    Raises
+    ------
+    NotIdentified
+        With what is missing.
+    """
+    found = {servo_id: identify_servo(bench, servos, ids, servo_id, say) for servo_id in ids}
+    return assign({servo_id: finding for servo_id, finding in found.items() if finding is not None})
+
+
+def identified(servos: ServosConfig, assignments: Sequence[Assignment]) -> ServosConfig:
+    """The bus with every servo in its place, turning the right way; raises ValueError when two have the same id."""
+    by_name = {one.name: one for one in assignments}
+    joints = [
+        {**joint.model_dump(), "id": by_name[joint.name].id, "sign": by_name[joint.name].sign} if joint.name in by_name else joint
+        for joint in servos.joints
+    ]
+    return ServosConfig.model_validate({**servos.model_dump(), "joints": joints})
+
+
+def find_zeros(bench: Bench, servos: ServosConfig, say: Say, max_current_ma: float = MAX_CURRENT_MA) -> Zeros:
+    """Let each tendon go slack, pull it until the head follows, and leave it where it just became taut.
+
+    A tendon that cannot be told is left where it was, and named in ``problems``.
+
+    Raises
+    ------
+    ServoError
+        Strained, stopped, or the bus is not in order: nothing goes on.
+    DeviceError
+        The camera is lost; the pair of tendons in hand is as it was.
+    """
+    slack: dict[str, float] = dict.fromkeys(TENDONS, 0.0)
+    problems = []
+    for first, second in _PAIRS:
+        # Two taut wires share every pull: while one is looked at the other hangs slack.
+        _move(bench, servos, second, -_PARK_MM, max_current_ma)
+        for name, hangs_mm, then_mm in ((first, 0.0, -_PARK_MM), (second, _PARK_MM, 0.0)):
+            try:
+                taut_mm = _find_zero(bench, servos, name, then_mm, max_current_ma)
+            except ServoError:
+                raise
+            except DeviceError:
+                for hanging in (second, first)[: 1 if name == first else 2]:
+                    _move(bench, servos, hanging, _PARK_MM, max_current_ma)
+                raise
+            except (NeverTaut, HeadNotSeen) as error:
+                problems.append(f"{name}: {error}")
+                say(problems[-1])
+                _move(bench, servos, name, hangs_mm + then_mm, max_current_ma)
+            else:
+                slack[name] = taut_mm - hangs_mm
+                say(f"{name}: taut {abs(slack[name]):.2f} mm {'farther' if slack[name] >= 0 else 'back'}")
+        _move(bench, servos, first, _PARK_MM, max_current_ma)
+    return Zeros((slack["right"], slack["left"], slack["up"], slack["down"]), tuple(problems))
+
+
+def _move(bench: Bench, servos: ServosConfig, name: str, way_mm: float, max_current_ma: float = MAX_CURRENT_MA) -> None:
+    joint = servos.joints[JOINT_NAMES.index(name)]
+    limits = ProbeLimits(-_PARK_MM, _PARK_MM, max_current_ma=max_current_ma)
+    with bench.hands.probe(servos, joint.id, limits, joint.sign) as probe:
+        probe.move_to(way_mm)
+        probe.pause(_SETTLE_S / 2)
+
+
+def _find_zero(bench: Bench, servos: ServosConfig, name: str, then_mm: float, max_current_ma: float) -> float:
+    """Where a tendon becomes taut, from where it stands; it is left `then_mm` from there.
+
+    Raises NeverTaut, HeadNotSeen, DeviceError: it is where it was.
+    """
+    joint = servos.joints[JOINT_NAMES.index(name)]
+    # A wire that stood too tight is taut below where it was let go to, and hangs lower still: a probe stops at its limits.
+    limits = ProbeLimits(-_SLACK_MM - 2.0 * _PARK_MM, _REACH_MM, max_current_ma=max_current_ma)
+    with bench.hands.probe(servos, joint.id, limits, joint.sign) as probe, _or_back(lambda: probe.move_to(0.0)):
+        probe.move_to(-_SLACK_MM)
+        rest = _look(bench, probe)
+        begun = _steps(bench, probe, rest, -_SLACK_MM, _STEP_MM, is_begun)[-1].position_mm
+        # Once more from slack, in small steps: a fraction of a millimetre takes the head through its whole way. And with another
+        # look at rest: the head does not come back to where it was by itself. From three steps before, because out of the picture's
+        # plane the first one beyond taut shows next to nothing, and steps before it tell where it begins, too.
+        slack_mm = begun - 3.0 * _STEP_MM
+        probe.move_to(slack_mm - _BELOW_MM)
+        rest = _look(bench, probe)
+        steps = _steps(bench, probe, rest, slack_mm - _FINE_MM, _FINE_MM, is_enough)
+        try:
+            taut_mm = taut_at_mm(steps)
+        except NeverTaut:
+            probe.move_to(0.0)
+            raise
+        probe.move_to(taut_mm - _BELOW_MM)
+        probe.move_to(taut_mm + then_mm)
+    return taut_mm
+
+
+def _steps(
+    bench: Bench, probe: Probe, rest: Look, from_mm: float, step_mm: float, ends: Callable[[TautReading], bool]
+) -> list[TautReading]:
+    """Tighten step by step, until one of them ends it or there is no room left."""
+    steps: list[TautReading] = []
+    at_mm = from_mm
+    while at_mm < _REACH_MM - 1e-9 and not (steps and ends(steps[-1])):
+        at_mm = min(at_mm + step_mm, _REACH_MM)
+        probe.move_to(at_mm)
+        steps.append(TautReading(at_mm, head_move(rest, _look(bench, probe))))
+    return steps
+
+
+def nudge(bench: Bench, servos: ServosConfig, name: str, way_mm: float) -> None:
+    """Tighten one tendon by `way_mm`, 1 mm at most, or let it go (negative); it stays there."""
+    _move(bench, servos, name, way_mm)
+
+
+def standing_ticks(bench: Bench, servos: ServosConfig) -> tuple[int, ...]:
+    """Position registers of the seven joints, armed for a moment where they stand; nothing turns. Raises ServoError."""
+    with bench.hands.steered(servos.model_copy(update={"pretension_mm": 0.0})) as robot:
+        return robot.ticks()
+
+
+@dataclass(frozen=True, slots=True)
+class LearnedSteering:
+    """The steering, where the head was, and the position registers of the seven joints at zero."""
+
+    steering: SteeringConfig
+    head_px: Point
+    zero_ticks: tuple[int, ...]
+
+
+def learn_steering(bench: Bench, servos: ServosConfig, say: Say) -> LearnedSteering:
+    """Pull each tendon a little, as far as the head needs to show its way.
+
+    The tendons must be taut and without tension where they stand: that becomes zero, and there they are in the end. Whoever drives
+    pulls them by their pretension; here that would be kept, and be added once more with each time this is done.
+
+    Raises
+    ------
+    SteeringNotSeen, HeadNotSeen, ServoError, DeviceError
+    """
+    pulls: dict[str, Pull] = {}
+    ways: Mapping[str, Callable[[float], Command]] = {
+        "right": lambda share: Command(bend=share),
+        "left": lambda share: Command(bend=-share),
+        "up": lambda share: Command(pitch=share),
+        "down": lambda share: Command(pitch=-share),
+    }
+    first: Look | None = None
+    slack = servos.model_copy(update={"pretension_mm": 0.0})
+    with bench.hands.steered(slack) as robot, _or_back(lambda: robot.bend_to(Command())):
+        ticks = robot.ticks()
+        for name in TENDONS:
+            for pull_mm in _PULLS_MM:
+                robot.bend_to(Command())
+                rest = _look(bench, robot)
+                first = first or rest
+                robot.bend_to(ways[name](pull_mm / servos.max_pull_mm))
+                pulls[name] = Pull(pull_mm, head_move(rest, _look(bench, robot)))
+                if pulls[name].move.size_px >= _ENOUGH_PX:
+                    break
+            say(f"{name}: {pulls[name].pull_mm:g} mm of pull, {pulls[name].move.size_px:.1f} px of way")
+        robot.bend_to(Command())
+    assert first is not None
+    return LearnedSteering(learn(pulls, first.heading), first.head, ticks)
+
+
+def _look(bench: Bench, mover: Probe | Steered) -> Look:
+    mover.pause(_SETTLE_S)
+    return bench.eyes.look(mover.alive)

@@ -1,0 +1,399 @@
+"""One servo moved by itself, for finding out what it does: through the same process, gate and driver as every other motion.
+
+The servo under test plays the part of the joint "advance", whose envelope is what it may do at most; the six others hold where they
+stand. So its bounds are enforced where all bounds are, in a process of its own that holds when this program falls silent, and there
+is no second way to the servos.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.control.faults import Cause, Fault
+from core.system import SLEPT_S, slept_s
+from core.types import Command
+from hardware.servos.bus_ipc import BusStatus
+from hardware.servos.dynamixel_port import NoAnswer, ServoError
+from hardware.servos.registers import ServoState
+from hardware.servos.servo_robot import ServoRobot
+
+MAX_CURRENT_MA = 300.0
+"""Of an XM430 about 80 N at a drum of 40 mm a turn: less than a jam, more than friction."""
+_log = logging.getLogger(__name__)
+
+_UNDER_TEST: JointName = "advance"
+_PLACE = JOINT_NAMES.index(_UNDER_TEST)
+_PERIOD_S = 0.02
+_ARRIVED_MM, _SETTLED_MM = 0.02, 0.25
+_EXTRA_S = 3.0
+_SILENCE_S = 1.0
+_GAIN_PER_S = 10.0
+_MARGIN_MM = 0.3
+_OF_THE_LINE = frozenset({Cause.SERVO_SILENT, Cause.BUS_NOISE, Cause.WATCHDOG, Cause.WORKER_DEAD})
+_HICCUPS, _BREATH_S = 3, 0.5
+_CALM_HZ, _CALM_WATCHDOG_S, _CALM_HEARTBEAT_S = 20.0, 0.4, 1.5
+_STRAINED_CYCLES = 4
+"""Starting a motor takes more current than moving it: strain lasts."""
+
+
+class ProcedureStopped(ServoError):
+    """STOP was pressed."""
+
+
+class Strained(ServoError):
+    """The servo drew more current than it may, and its torque was switched off: something holds the wire."""
+
+
+class ProbeFailed(ServoError):
+    """The servo did not do what it was told."""
+
+
+class Stoppable(Protocol):
+    """What STOP reaches."""
+
+    def stop(self) -> None: ...
+
+
+class StopSwitch:
+    """STOP for a procedure that moves servos: reaches whatever is moving now, and everything that would move next.
+
+    ``press`` may come from any thread, never waits and never fails.
+    """
+
+    def __init__(self) -> None:
+        self._pressed = threading.Event()
+        self._lock = threading.Lock()
+        self._robot: Stoppable | None = None
+
+    @property
+    def is_pressed(self) -> bool:
+        return self._pressed.is_set()
+
+    def press(self) -> None:
+        """Stop."""
+        self._pressed.set()
+        with self._lock:
+            robot = self._robot
+        if robot is not None:
+            robot.stop()
+
+    def release(self) -> None:
+        """The operator has seen it, and wants to go on."""
+        self._pressed.clear()
+
+    def check(self) -> None:
+        """Raise Stopped after a STOP that was not released."""
+        if self._pressed.is_set():
+            raise ProcedureStopped("stopped: nothing moves before you go on")
+
+    def sleep(self, seconds: float) -> None:
+        """Wait; raise Stopped as soon as STOP comes."""
+        self._pressed.wait(seconds)
+        self.check()
+
+    @contextmanager
+    def guarding(self, robot: Stoppable) -> Iterator[None]:
+        """While inside, STOP reaches `robot`."""
+        with self._lock:
+            self._robot = robot
+        try:
+            self.check()
+            yield
+        finally:
+            with self._lock:
+                self._robot = None
+
+
+@dataclass(frozen=True, slots=True)
+class ProbeLimits:
+    """What a servo may do while nobody knows yet what hangs on it."""
+
+    low_mm: float = -3.0
+    high_mm: float = 3.0
+    speed_mm_s: float = 4.0
+    max_current_ma: float = MAX_CURRENT_MA
+
+
+def probe_config(
+    servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1] = 1, ids: tuple[int, ...] | None = None
+) -> ServosConfig:
+    """The bus with `servo_id` in the place of the joint under test, of which it takes nothing but the place.
+
+    Parameters
+    ----------
+    servos : port, speed, model, millimetres per turn.
+    sign : the servo's direction that counts as positive.
+    ids : all seven on the line while nobody knows which is which; default those of `servos`, which are known by their joints.
+
+    Notes
+    -----
+    A servo that is known turns its own joint's millimetres per turn. One that is not may drive any of the seven: with the largest
+    of theirs its wire or screw never moves farther, nor faster, than it is asked to.
+
+    Raises
+    ------
+    ProbeFailed
+        There are not seven, or `servo_id` is not among them.
+    """
+    every = list(ids if ids is not None else (joint.id for joint in servos.joints))
+    if len(every) != len(JOINT_NAMES) or servo_id not in every:
+        raise ProbeFailed(f"servo {servo_id} cannot be moved: seven servos are needed, there are {', '.join(map(str, every))}")
+    every.remove(servo_id)
+    every.insert(_PLACE, servo_id)
+    known = {} if ids is not None else {joint.id: joint.mm_per_turn for joint in servos.joints}
+    largest = max(joint.mm_per_turn for joint in servos.joints)
+    joints = tuple(
+        _joint(joint, one, sign if one == servo_id else 1, known.get(one, largest), limits)
+        for joint, one in zip(servos.joints, every, strict=True)
+    )
+    return patient(servos).model_copy(update={"joints": joints, "pretension_mm": 0.0})
+
+
+def patient(servos: ServosConfig) -> ServosConfig:
+    """The bus as a slow procedure needs it, beside a network and a window: fewer turns, and a pause of the program is no fault.
+
+    A goal is at most one step away all the same, so a longer watchdog lets nothing run farther.
+    """
+    calm = {
+        "bus_hz": min(_CALM_HZ, servos.bus_hz),
+        "watchdog_s": max(_CALM_WATCHDOG_S, servos.watchdog_s),
+        "heartbeat_timeout_s": max(_CALM_HEARTBEAT_S, servos.heartbeat_timeout_s),
+    }
+    return servos.model_copy(update=calm)
+
+
+def _joint(joint: JointConfig, servo_id: int, sign: Literal[-1, 1], mm_per_turn: float, limits: ProbeLimits) -> JointConfig:
+    return joint.model_copy(
+        update={
+            "id": servo_id,
+            "sign": sign,
+            "mm_per_turn": mm_per_turn,
+            "low_mm": limits.low_mm - _MARGIN_MM,
+            "high_mm": limits.high_mm + _MARGIN_MM,
+            "warn_margin_mm": _MARGIN_MM / 2,
+            "max_speed_mm_s": limits.speed_mm_s,
+            "max_acceleration_mm_s2": 25.0 * limits.speed_mm_s,
+            "max_step_mm": 0.6,
+        }
+    )
+
+
+@contextmanager
+def armed(robot: ServoRobot, stop: StopSwitch) -> Iterator[None]:
+    """Connect, zero where the servos stand, arm; in the end hold and let go. A line that hiccups meanwhile is tried again.
+
+    Raises
+    ------
+    ServoError
+        Port or servos are not in order, or STOP came.
+    """
+    with stop.guarding(robot):
+        for attempt in range(_HICCUPS):
+            try:
+                robot.connect()
+                robot.zero()
+                stop.check()
+                robot.arm()
+                break
+            except NoAnswer:
+                robot.close()
+                if attempt + 1 == _HICCUPS:
+                    raise
+                stop.sleep(_BREATH_S)
+            except ServoError:
+                robot.close()
+                raise
+        try:
+            yield
+        finally:
+            robot.close()
+
+
+def _by_id(text: str, config: ServosConfig) -> str:
+    """A message about servos by their ids: what the bus calls them here is not what they are."""
+    for joint in config.joints:
+        text = text.replace(f"{joint.name} (id {joint.id})", str(joint.id))
+        text = re.sub(rf"\b{joint.name}\b", f"servo {joint.id}", text)
+    return text
+
+
+class Hiccups:
+    """What to do when the bus process has ended a motion.
+
+    The operator who started the procedure has asked for all its motions, one after the other. A line that was silent or a machine
+    that was busy for a moment is tried again, three times at most, after a full check; STOP, a jam, a strain or a hardware error
+    never is, and nothing after the computer has slept, which is a moment to all clocks but one.
+    """
+
+    def __init__(self, robot: ServoRobot, stop: StopSwitch, who: str) -> None:
+        self._robot, self._stop, self._who = robot, stop, who
+        self._count = 0
+        self._slept_s = slept_s()
+
+    def settle(self, status: BusStatus) -> None:
+        """Return when the servos are armed, again or still; raise ProbeFailed, ServoError or Stopped when they are not to be."""
+        if status.latched is not None:
+            self._again(status.latched)
+        elif not status.armed:
+            raise ProbeFailed(f"{self._who}: the servos are no longer armed, try again")
+
+    def _again(self, fault: Fault) -> None:
+        self._count += 1
+        if slept_s() - self._slept_s > SLEPT_S:
+            raise ProbeFailed(f"{self._who} was stopped, as the computer slept: look at the robot, then try again")
+        if fault.cause not in _OF_THE_LINE or self._count > _HICCUPS:
+            why = f"{fault.cause}: {fault.detail}".rstrip(": ")
+            raise ProbeFailed(f"{self._who} was stopped ({why}): find the cause, then try again")
+        _log.warning("%s: %s, trying again", self._who, fault.cause)
+        self._stop.sleep(_BREATH_S)
+        self._robot.status()  # a sign of life: only then is the line looked at
+        self._stop.sleep(_BREATH_S)
+        self._robot.acknowledge()
+        self._stop.check()
+        self._robot.arm()
+        self._stop.sleep(_PERIOD_S)
+
+
+class ServoProbe:
+    """A servo that can be moved; ``opened`` makes one. One thread uses it; STOP may come from anywhere."""
+
+    def __init__(self, robot: ServoRobot, servo_id: int, limits: ProbeLimits, stop: StopSwitch) -> None:
+        self._robot, self.servo_id, self._limits, self._stop = robot, servo_id, limits, stop
+        self._strained = 0
+        self._strain_seen_s = 0.0
+        self._hiccups = Hiccups(robot, stop, f"servo {servo_id}")
+        self._last: ServoState | None = None
+
+    @classmethod
+    @contextmanager
+    def opened(cls, config: ServosConfig, safety: SafetyConfig, limits: ProbeLimits, stop: StopSwitch) -> Iterator[ServoProbe]:
+        """Connect and arm, with ``probe_config``'s bus; where the servo stands now is 0. At the end it holds, disarmed.
+
+        Raises
+        ------
+        ServoError
+            Port or servos are not in order, or STOP came.
+        """
+        servo_id = config.joints[_PLACE].id
+        robot = ServoRobot(config, safety, name=f"servo {servo_id}")
+        try:
+            with armed(robot, stop):
+                yield cls(robot, servo_id, limits, stop)
+        except ServoError as error:
+            raise type(error)(_by_id(str(error), config)) from None
+
+    @property
+    def position_mm(self) -> float:
+        """Where the servo is, from where it was when the probe was opened."""
+        state = self._checked()
+        return state.position_mm or 0.0
+
+    @property
+    def current_ma(self) -> float | None:
+        """The motor's current now; None for models that tell none."""
+        return self._checked().current_ma
+
+    def ticks(self) -> dict[int, int]:
+        """Position registers by id, of those that answered last."""
+        status = self._robot.bus_status()
+        readings = () if status is None else status.servos
+        return {reading.id: reading.ticks for reading in readings if isinstance(reading, ServoState)}
+
+    def alive(self) -> None:
+        """A sign of life while nothing is to move; raises what is wrong."""
+        self._checked()
+        self._robot.hold()
+
+    def move_to(self, target_mm: float) -> None:
+        """Go there at the probe's speed, and wait until it is there.
+
+        Raises
+        ------
+        Stopped
+            STOP came; the servos hold.
+        Strained
+            Too much current; the torque is off.
+        ProbeFailed
+            The bus stopped the servo, or it does not get there.
+        """
+        target_mm = max(self._limits.low_mm, min(self._limits.high_mm, target_mm))
+        until_s = time.monotonic() + abs(target_mm - self.position_mm) / self._limits.speed_mm_s + _EXTRA_S
+        while time.monotonic() < until_s:
+            state = self._checked()
+            at_mm = state.position_mm or 0.0
+            goal_mm = self._goal_mm(at_mm)
+            left_mm = target_mm - goal_mm
+            if abs(left_mm) <= _ARRIVED_MM and abs(at_mm - goal_mm) <= _SETTLED_MM:
+                self._robot.hold()
+                return
+            speed = max(-self._limits.speed_mm_s, min(self._limits.speed_mm_s, _GAIN_PER_S * left_mm))
+            self._robot.send(Command(advance_mm_s=speed))
+            self._stop.sleep(_PERIOD_S)
+        raise ProbeFailed(f"servo {self.servo_id} does not get to {target_mm:.2f} mm: is it held, is its supply strong enough?")
+
+    def pause(self, seconds: float) -> None:
+        """Stand still for a while."""
+        until_s = time.monotonic() + seconds
+        while time.monotonic() < until_s:
+            self.alive()
+            self._stop.sleep(_PERIOD_S)
+
+    def _goal_mm(self, at_mm: float) -> float:
+        """Where it was sent last; where it is, before it was sent anywhere."""
+        status = self._robot.bus_status()
+        if status is None or status.sent is None or status.rejection is not None:
+            return at_mm
+        return status.sent.goals_mm[_PLACE]
+
+    def _checked(self) -> ServoState:
+        """The servo's newest state; raises when anything forbids to go on."""
+        self._stop.check()
+        status = self._robot.bus_status()
+        if (failure := self._robot.failure) is not None:
+            raise ProbeFailed(failure)
+        if status is None or time.monotonic() - status.time_s > _SILENCE_S:
+            raise ProbeFailed("the servo bus is silent: check port and supply")
+        self._hiccups.settle(status)
+        state = self._newest(status)
+        self._watch_current(state)
+        return state
+
+    def _newest(self, status: BusStatus) -> ServoState:
+        """What the servo told last; before it has told anything it is waited for."""
+        until_s = time.monotonic() + _SILENCE_S
+        newest: BusStatus | None = status
+        while True:
+            readings = () if newest is None else newest.servos
+            reading = readings[_PLACE] if len(readings) > _PLACE else None
+            if isinstance(reading, ServoState):
+                self._last = reading
+            if self._last is not None:
+                return self._last
+            if time.monotonic() > until_s:
+                raise ProbeFailed(f"servo {self.servo_id} does not tell where it is: check its cable")
+            self._robot.hold()
+            self._stop.sleep(_PERIOD_S)
+            newest = self._robot.bus_status()
+
+    def _watch_current(self, state: ServoState) -> None:
+        if state.time_s == self._strain_seen_s:
+            return  # the same reading once more
+        self._strain_seen_s = state.time_s
+        is_over = state.current_ma is not None and abs(state.current_ma) > self._limits.max_current_ma
+        self._strained = self._strained + 1 if is_over else 0
+        if self._strained >= _STRAINED_CYCLES:
+            self._robot.hold()
+            self._robot.torque_off()
+            drawn_ma = abs(state.current_ma or 0.0)
+            raise Strained(
+                f"servo {self.servo_id} drew {drawn_ma:.0f} mA (at most {self._limits.max_current_ma:.0f} mA) and was let go: "
+                "something holds its wire"
+            )

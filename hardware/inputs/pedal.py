@@ -1,0 +1,380 @@
+"""Foot pedal: deadman and STOP over a serial line. It finds its port again by itself after the plug was pulled.
+
+The serial port of a foot pedal: opening, locking, reading, and what can go wrong, each with one line that says what to do.
+
+What a foot pedal says, and what that means. Pure: bytes and times in, reports out.
+
+A report is seven bytes of ASCII, sent every 20 ms without being asked:
+
+======  ==============================================================================================================
+byte    meaning
+======  ==============================================================================================================
+0       ``P``
+1       number of the report, 0 to 31 and then 0 again, as ``0x40 + number`` (``@ A B ... _``)
+2       ``D``: the deadman switch (normally open) is closed, the foot is on it; ``-``: it is open, or its wire is broken
+3       ``S``: the STOP switch (normally closed) is open, it is pressed, or its wire is broken; ``-``: it is closed
+4, 5    CRC-8 (polynomial 0x07, start 0) of bytes 0 to 3, its upper and lower half as ``0x40 + half`` (``@ A B ... O``)
+6       line feed
+======  ==============================================================================================================
+
+As every varying bit stands for itself, the CRC finds any one, two or three wrong bits. ``D`` and ``-``, and ``S`` and ``-``, differ
+in four and six bits anyway.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import termios
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import serial
+
+from core.config.models import PedalConfig
+from core.devices import DeviceError
+from hardware.processes import DeviceThread
+
+_CHUNK = 4096
+
+
+class PedalError(DeviceError):
+    """Root of the foot pedal's errors."""
+
+
+class PedalPortError(PedalError):
+    """The port cannot be opened."""
+
+
+class PedalPortTaken(PedalPortError):
+    """Another program holds the port."""
+
+
+class PedalLost(PedalError):
+    """The port vanished while it was open."""
+
+
+class PedalUnheard(PedalError):
+    """The port is open, and no report comes."""
+
+
+class PedalPort:
+    """An open serial port that only this program holds. Made by ``open_pedal_port``."""
+
+    def __init__(self, name: str, port: serial.Serial) -> None:
+        self.name = name
+        self._port = port
+        self.fd: int = port.fileno()
+
+    def read(self) -> bytes:
+        """What has come; at least one byte when the port is readable.
+
+        Raises
+        ------
+        PedalLost
+            An adapter that was pulled out reads as an error, or as readable without a byte.
+        """
+        try:
+            data = os.read(self.fd, _CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise PedalLost(f"the pedal at {self.name} is gone ({error.strerror}): plug its USB cable in") from None
+        if not data:
+            raise PedalLost(f"the pedal at {self.name} is gone: plug its USB cable in")
+        return data
+
+    def close(self) -> None:
+        """Give the port back at once: a plug that comes back while it is held gets another name. Never fails."""
+        with contextlib.suppress(OSError, termios.error):  # a vanished port raises termios.error, which is no OSError
+            self._port.close()
+
+
+def open_pedal_port(config: PedalConfig) -> PedalPort:
+    """Open and lock the pedal's port; what has come before is dropped.
+
+    Raises
+    ------
+    PedalPortError
+        None set, missing, not permitted, not a serial port, not this speed; ``PedalPortTaken`` when another program holds it.
+    """
+    if config.port is None:
+        raise PedalPortError("no pedal is configured: set pedal.port to its path in /dev/serial/by-id")
+    try:
+        port = serial.Serial(config.port, config.baud, timeout=0, exclusive=True)
+    except (OSError, ValueError, termios.error) as error:  # SerialException is an OSError
+        raise _port_error(config, error) from None
+    # An FTDI chip keeps bytes back for 16 ms otherwise. Not every port is one: a pseudo-terminal has no such mode.
+    with contextlib.suppress(ValueError, NotImplementedError, OSError):
+        port.set_low_latency_mode(True)
+    return PedalPort(config.port, port)
+
+
+def _port_error(config: PedalConfig, error: Exception) -> PedalPortError:
+    port, code = config.port, getattr(error, "errno", None)
+    if code == errno.ENOENT:
+        return PedalPortError(f"pedal port {port} does not exist: plug the pedal in, or set pedal.port")
+    if code in {errno.EACCES, errno.EPERM}:
+        return PedalPortError(f"no permission for pedal port {port}: add your user to the group dialout, then log in again")
+    if code in {errno.EAGAIN, errno.EBUSY}:
+        return PedalPortTaken(
+            f"pedal port {port} is in use by another program, or by the servos: close it there, or set pedal.port"
+        )
+    if code in {errno.ENODEV, errno.ENXIO, errno.EIO}:
+        return PedalPortError(f"pedal port {port} has no device behind it: unplug the pedal and plug it in again")
+    reason = " ".join(str(error).split())[:120]
+    return PedalPortError(f"{port} cannot be used as pedal port at {config.baud} baud ({reason}): set pedal.port and pedal.baud")
+
+
+PERIOD_S = 0.02
+NUMBERS = 32
+_LENGTH = 6
+"""Of a line, without its end."""
+
+
+@dataclass(frozen=True, slots=True)
+class PedalLine:
+    """One whole report. ``down``: foot on the deadman; ``stop``: STOP pressed, or its wire broken."""
+
+    number: int
+    down: bool
+    stop: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PedalReport:
+    """What the pedal means now, at ``time_s`` on the monotonic clock.
+
+    ``deadman`` is True only while unbroken reports say so, False only when a whole one in its turn says that the foot is up, and
+    None otherwise: the foot may be up or down. ``stop`` is what a whole report said; it is never guessed.
+    """
+
+    deadman: bool | None
+    stop: bool
+    time_s: float
+
+
+def crc8(data: bytes) -> int:
+    """CRC-8/SMBUS: polynomial 0x07, start 0, not reflected."""
+    crc = 0
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x07) & 0xFF if crc & 0x80 else crc << 1
+    return crc
+
+
+def line_bytes(line: PedalLine) -> bytes:
+    """The seven bytes of a report."""
+    body = bytes([ord("P"), 0x40 | line.number % NUMBERS, ord("D" if line.down else "-"), ord("S" if line.stop else "-")])
+    crc = crc8(body)
+    return body + bytes([0x40 | crc >> 4, 0x40 | crc & 0x0F, ord("\n")])
+
+
+_LINES = {
+    line_bytes(line)[:-1]: line
+    for line in (PedalLine(n, d, s) for n in range(NUMBERS) for d in (False, True) for s in (False, True))
+}
+"""All 128 lines that there are: what is not among them, letter for letter, is damaged."""
+
+
+class PedalParser:
+    """Finds lines in whatever comes, in any pieces."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+        self._skipping = False
+
+    def feed(self, data: bytes) -> list[PedalLine | None]:
+        """The lines that end in `data`, in order; None for a damaged one. What cannot become a line is told at once, and once."""
+        *whole, rest = (self._rest + data).split(b"\n")
+        found: list[PedalLine | None] = []
+        for line in whole:
+            if self._skipping:  # the end of what has been told already
+                self._skipping = False
+            else:
+                found.append(_LINES.get(line))
+        if self._skipping:
+            rest = b""
+        elif len(rest) > _LENGTH:
+            found.append(None)
+            self._skipping, rest = True, b""
+        self._rest = rest
+        return found
+
+
+class PedalWatch:
+    """From lines and silences to reports.
+
+    A press counts from the second whole report in a row on (``press_reports``), so that one line that is wrong in spite of its CRC,
+    or a touch shorter than a report, moves nothing. It ends with the first report that says so, and with anything else than the
+    next number in time: damage, silence, a number again or left out. After that it takes two reports in a row again, and after an
+    interruption longer than ``resume_s``, or a new connection, a lifted foot first: who has looked away may have stepped down.
+
+    What ends a press without a lifted foot is no release: nobody knows, and that holds the robot as well. Told as a release, it
+    would make a new press of a pedal that has been down all the time, since before arming for instance.
+
+    A STOP counts at once, from any whole line, even one that comes late or with a wrong number: a false STOP costs a restart, a
+    missed one more. But damage and silence are none. They say that nobody knows, and a deadman that nobody holds is the answer to
+    that: it holds the robot. A STOP is latched and may switch the torque off, so an unplugged cable must not cause it.
+    """
+
+    def __init__(self, config: PedalConfig) -> None:
+        self._config = config
+        self._number: int | None = None
+        self._heard_s = 0.0
+        self._sound_s = 0.0
+        self._lifted = False
+        self._run = 0
+
+    def hear(self, line: PedalLine | None, now_s: float, *, late: bool = False) -> PedalReport:
+        """A line, or a damaged one (None), has come; `late`: it has waited somewhere, so nobody knows when it was true."""
+        if line is None:
+            return self.silence(now_s)
+        in_order = (
+            self._number is not None
+            and line.number == (self._number + 1) % NUMBERS
+            and now_s - self._heard_s <= self._config.silence_s
+            and not late
+        )
+        self._number, self._heard_s = line.number, now_s
+        if not in_order:
+            self._run = 0
+            return PedalReport(None, line.stop, now_s)
+        if now_s - self._sound_s > self._config.resume_s:
+            self._lifted = False
+        self._sound_s = now_s
+        self._lifted = self._lifted or not line.down
+        self._run = self._run + 1 if line.down and self._lifted else 0
+        is_press = self._run >= self._config.press_reports
+        return PedalReport((is_press or None) if line.down else False, line.stop, now_s)
+
+    def silence(self, now_s: float) -> PedalReport:
+        """Nothing whole has come for too long."""
+        self._run = 0
+        return PedalReport(None, False, now_s)
+
+
+__all__ = ["Pedal", "PedalError", "PedalReport"]
+
+_START_UP_S = 3.0
+"""Opening the port resets many boards; they talk again when their boot loader has waited in vain."""
+_PATIENCE_S = 0.5
+"""Silence of a pedal that has talked before, until people are told. Nobody holds its deadman long before that."""
+_PAUSE_S = PERIOD_S / 10
+"""Who had to wait so long for bytes has read all that waited."""
+
+
+class Pedal:
+    """Reads the pedal in a thread of its own, from ``start`` to ``close``.
+
+    Parameters
+    ----------
+    config : section `pedal`; its port must be set.
+    on_report : gets every report, in order, from the pedal's thread, some 50 a second while the pedal talks and one every
+        ``silence_s`` while it is silent; one with a deadman of which nobody knows comes first after every opening, and last before
+        the port is given up. It should return within some milliseconds, and must not call ``close``. Without a pedal nothing is
+        reported: nobody holds a silent deadman either.
+    on_problem : gets the newest ``problem`` when it changes, from the same thread.
+
+    Notes
+    -----
+    A report with ``stop`` is repeated while STOP is pressed, so that a latched stop cannot be acknowledged before it is let go.
+
+    Reports that have waited in the port while this program stood still say nothing about now: of those only STOP counts, until
+    the port is read empty.
+    """
+
+    def __init__(
+        self,
+        config: PedalConfig,
+        on_report: Callable[[PedalReport], None],
+        on_problem: Callable[[PedalError | None], None] | None = None,
+    ) -> None:
+        if config.port is None:
+            raise PedalPortError("no pedal is configured: set pedal.port to its path in /dev/serial/by-id")
+        self._config = config
+        self._on_report = on_report
+        self._on_problem = on_problem
+        self._thread = DeviceThread("pedal", self._serve, self._fail)
+        self._problem: PedalError | None = PedalUnheard(f"the pedal at {config.port} has not reported yet")
+
+    @property
+    def problem(self) -> PedalError | None:
+        """Why the pedal is not heard, in one line that says what to do; None while it is."""
+        return self._problem
+
+    def start(self) -> None:
+        """Start reading. It never raises: what hinders is the ``problem``, and it is tried again and again."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Report that nobody knows of the deadman any more, give the port back; may be called twice."""
+        self._thread.close()
+
+    def _serve(self) -> None:
+        while not self._thread.stopping:
+            try:
+                self._listen_to_next()
+            except PedalError as error:
+                self._set_problem(error)
+                self._thread.wait(None, self._config.reconnect_s)
+
+    def _listen_to_next(self) -> None:
+        with contextlib.closing(open_pedal_port(self._config)) as port:
+            try:
+                self._listen(port)
+            finally:
+                self._on_report(PedalReport(None, False, time.monotonic()))
+
+    def _listen(self, port: PedalPort) -> None:
+        """From opening to the loss of the port, or to ``close``."""
+        silence_s = self._config.silence_s
+        parser, watch = PedalParser(), PedalWatch(self._config)
+        opened_s = read_s = time.monotonic()
+        self._on_report(watch.silence(opened_s))
+        due_s, complain_s = opened_s + silence_s, opened_s + _START_UP_S
+        behind = True
+        damaged = 0
+        while True:
+            asked_s = time.monotonic()
+            ready = self._thread.wait(port.fd, due_s - asked_s)
+            if self._thread.stopping:
+                return
+            now_s = time.monotonic()
+            if ready:
+                if now_s - read_s > silence_s:
+                    behind = True  # even when that was the pedal's silence: it costs one report
+                elif now_s - asked_s >= _PAUSE_S:
+                    behind = False
+                read_s = now_s
+                for line in parser.feed(port.read()):
+                    self._on_report(watch.hear(line, now_s, late=behind))
+                    if line is None:
+                        damaged += 1
+                    else:
+                        damaged = 0
+                        due_s, complain_s = now_s + silence_s, now_s + _PATIENCE_S
+                        self._set_problem(None)
+            if now_s >= due_s:
+                self._on_report(watch.silence(now_s))
+                due_s = now_s + silence_s
+            if now_s >= complain_s:
+                self._set_problem(_unheard(port.name, damaged))
+
+    def _set_problem(self, problem: PedalError | None) -> None:
+        if str(problem) != str(self._problem):
+            self._problem = problem
+            if self._on_problem is not None:
+                self._on_problem(problem)
+
+    def _fail(self, error: Exception) -> None:
+        self._set_problem(PedalError(f"the pedal is no longer read ({type(error).__name__}: {error}): start the program again"))
+
+
+def _unheard(port: str, damaged: int) -> PedalUnheard:
+    if damaged:
+        return PedalUnheard(f"what comes from {port} is no pedal's report: check pedal.baud, the cable, and that it is the pedal")
+    return PedalUnheard(f"the pedal at {port} is silent: check its power and firmware, then plug it in again")

@@ -1,0 +1,543 @@
+"""The seven DYNAMIXEL X servos through the real SDK: who they are, arming, goals, state, and recovery.
+
+Getting seven servos ready: who they are, what they must be set to. Functions on an open line.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import time
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from core.config.safety import JointConfig, JointName, ServosConfig
+from hardware.servos import registers
+from hardware.servos.dynamixel_port import (
+    LineCounts,
+    Miss,
+    NoAnswer,
+    NotReady,
+    PortLost,
+    ServoError,
+    ServoLine,
+    TorqueStillOn,
+    WriteRefused,
+    WrongServo,
+)
+from hardware.servos.registers import (
+    ANSWERS_ALL,
+    BLOCK_BYTES,
+    INDIRECT_ADDRESS,
+    TAG_BYTES,
+    HardwareError,
+    MissingServo,
+    ServoReading,
+    ServoState,
+    describe,
+    indirect_addresses,
+    indirect_data,
+    state_of,
+)
+
+EXTENDED_POSITION = 4
+TORQUE, WATCHDOG, GOAL, POSITION = 64, 98, 116, 132
+_RETURN_DELAY, _DRIVE_MODE, _MODE, _HOMING_OFFSET, _VELOCITY_LIMIT, _PROFILE = 9, 10, 11, 20, 44, 108
+_EEPROM_BYTES = 48
+_COUNTING = frozenset({_DRIVE_MODE, _MODE, _HOMING_OFFSET})
+_SPEEDS = (57600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
+
+
+@dataclass(frozen=True, slots=True)
+class ServoIdentity:
+    """Who answered. ``firmware`` is the servo's version number."""
+
+    name: JointName
+    id: int
+    model: int
+    firmware: int
+
+
+def identify(line: ServoLine, config: ServosConfig) -> tuple[ServoIdentity, ...]:
+    """Ping all seven and compare them with the configuration.
+
+    Raises
+    ------
+    NoAnswer, WrongServo
+        Naming the servo. After a silence of all seven the line may have been closed.
+    """
+    models = {joint.id: line.ping(joint.id) for joint in config.joints}
+    for _ in range(2):
+        models |= {servo_id: line.ping(servo_id) for servo_id, model in models.items() if model is None}
+    silent = [joint for joint in config.joints if models[joint.id] is None]
+    if silent:
+        raise _silence(line, config, silent)
+    return tuple(identity_of(line, joint, config) for joint in config.joints)
+
+
+def identity_of(line: ServoLine, joint: JointConfig, config: ServosConfig) -> ServoIdentity:
+    """Who answers for a joint, by its own words.
+
+    Raises
+    ------
+    NoAnswer, WrongServo
+        Naming the servo.
+    """
+    table = line.read(joint.id, 0, 8)
+    model = int.from_bytes(table[:2], "little")
+    check_model(joint, model, config.model)
+    if table[7] != joint.id:
+        raise WrongServo(f"{call(joint)} says that its id is {table[7]}: give every servo an id of its own")
+    return ServoIdentity(joint.name, joint.id, model, table[6])
+
+
+def check_model(joint: JointConfig, model: int | None, expected: int) -> None:
+    """Raise WrongServo when a servo is not of the configuration's model."""
+    if model != expected:
+        raise WrongServo(f"{call(joint)} is model {model}, not {expected}: swap the servo, or set servos.model or the joint's id")
+
+
+def _silence(line: ServoLine, config: ServosConfig, silent: list[JointConfig]) -> NoAnswer:
+    """The error for servos that do not answer, after looking where they might be."""
+    if len(silent) < len(config.joints):
+        others = ", ".join(map(str, line.others())) or "none"
+        names = ", ".join(call(joint) for joint in silent)
+        return NoAnswer(f"{names}: no answer; ids on the line: {others}. Check the cable, or set the joint's id")
+    line.close()
+    for baud in _SPEEDS:
+        if baud != config.baud:
+            other = ServoLine(line.port, baud)
+            other.open()
+            try:
+                if other.ping(config.joints[0].id) is not None:
+                    return NoAnswer(f"the servos talk at {baud} baud: set servos.baud = {baud}")
+            finally:
+                other.close()
+    return NoAnswer(f"no servo answers on {line.port} at {config.baud} baud: check the servos' power and the cable")
+
+
+def holds(line: ServoLine, joint: JointConfig) -> bool:
+    """Whether its torque is on: then it may hold a wire under tension, which only the operator lets go."""
+    return line.read(joint.id, TORQUE, 1) != b"\0"
+
+
+def differences(line: ServoLine, joint: JointConfig) -> dict[int, bytes]:
+    """Registers of the EEPROM that are not as we need them, with what they must be."""
+    wanted = {
+        _RETURN_DELAY: b"\0",
+        _DRIVE_MODE: b"\0",  # not reversed, and the profile in velocities
+        _MODE: bytes([EXTENDED_POSITION]),
+        _HOMING_OFFSET: bytes(4),  # with one, a tripped watchdog can move the motor
+        _VELOCITY_LIMIT: registers.profile_velocity(joint).to_bytes(4, "little"),
+    }
+    table = line.read(joint.id, 0, _EEPROM_BYTES)
+    return {address: data for address, data in wanted.items() if table[address : address + len(data)] != data}
+
+
+def counts_anew(wrong: Collection[int]) -> bool:
+    """Whether positions mean something else once these registers were set."""
+    return not _COUNTING.isdisjoint(wrong)
+
+
+def configure(line: ServoLine, joint: JointConfig) -> bool:
+    """EEPROM as we need it, written only where it differs, because it wears; that takes the torque off. True: positions count anew.
+
+    Raises
+    ------
+    WrongServo
+        When a register keeps its value.
+    """
+    wrong = differences(line, joint)
+    if wrong:
+        line.write(joint.id, TORQUE, b"\0")
+    for address, data in wrong.items():
+        line.write(joint.id, address, data)
+        if line.read(joint.id, address, len(data)) != data:
+            raise WrongServo(f"{call(joint)} keeps register {address} as it is: it is no servo that this program can use")
+    return counts_anew(wrong)
+
+
+def map_block(line: ServoLine, joint: JointConfig) -> bool:
+    """Gather the status block; not written when it is in place already. True: it was not, so that the servo has restarted."""
+    wanted = indirect_addresses()
+    if line.read(joint.id, INDIRECT_ADDRESS, len(wanted)) == wanted:
+        return False
+    line.write(joint.id, INDIRECT_ADDRESS, wanted)
+    return True
+
+
+def set_profile(line: ServoLine, joint: JointConfig) -> None:
+    """Greatest acceleration and speed on the way to a goal, read back.
+
+    Raises
+    ------
+    Refused
+        When the servo goes by others.
+    """
+    profile = registers.profile_acceleration(joint).to_bytes(4, "little") + registers.profile_velocity(joint).to_bytes(4, "little")
+    line.write(joint.id, _PROFILE, profile)
+    if line.read(joint.id, _PROFILE, len(profile)) != profile:
+        raise WriteRefused(f"{call(joint)} did not take its greatest speed and acceleration: reboot it")
+
+
+def start_watchdogs(line: ServoLine, config: ServosConfig) -> None:
+    """From now on a servo that hears nothing for so long holds."""
+    for joint in config.joints:
+        line.write(joint.id, WATCHDOG, bytes([registers.watchdog_units(config.watchdog_s)]))
+
+
+def send_goals(line: ServoLine, goals: dict[int, int]) -> None:
+    """Goal ticks by id, in one packet."""
+    line.group_write(GOAL, {servo_id: ticks.to_bytes(4, "little", signed=True) for servo_id, ticks in goals.items()})
+
+
+def goal_to_position(line: ServoLine, config: ServosConfig) -> None:
+    """Goal = present position of all, proven by reading it back."""
+    goals = {joint.id: registers.signed(line.read(joint.id, POSITION, 4)) for joint in config.joints}
+    send_goals(line, goals)
+    for joint in config.joints:
+        if registers.signed(line.read(joint.id, GOAL, 4)) != goals[joint.id]:
+            raise WriteRefused(f"{call(joint)} did not take its own position as goal: reboot it")
+
+
+def call(joint: JointConfig) -> str:
+    """How messages name a servo."""
+    return f"servo {joint.name} (id {joint.id})"
+
+
+_STATUS_RETURN, _HARDWARE_ERROR = 68, 70
+_REBOOT_S = 1.5
+_log = logging.getLogger(__name__)
+
+
+class ServoBus:
+    """Seven servos on one line, in the order of the configuration's joints. One thread opens, uses and closes it.
+
+    Parameters
+    ----------
+    config : identities, conversion and speeds. Envelope and step limits are the gate's business, not the driver's.
+    port : serial device; default is the configuration's.
+
+    Notes
+    -----
+    Positions are joint millimetres from where ``set_zero`` was called. Every method but ``close`` may raise ``PortLost``; then the
+    bus is closed, and ``open`` starts anew: disarmed, without zeros.
+    """
+
+    def __init__(self, config: ServosConfig, port: str | None = None) -> None:
+        chosen = port or config.port
+        if chosen is None:
+            raise NotReady("no servo port is configured: set servos.port")
+        self.config = config
+        self._joints = config.joints
+        self._line = ServoLine(chosen, config.baud)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._armed = False
+        self._identities: tuple[ServoIdentity, ...] = ()
+        self._zeros: dict[int, int] = {}
+        self._put_off: set[int] = set()
+        self._misses = dict.fromkeys((joint.id for joint in self._joints), 0)
+        self._silences = dict(self._misses)
+        self._turn = 0
+
+    @property
+    def is_open(self) -> bool:
+        return self._line.is_open
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether goals are taken. Nothing but ``arm`` makes it true; a restart, a lost torque or a lost port make it false."""
+        return self._armed and self._line.is_open
+
+    @property
+    def identities(self) -> tuple[ServoIdentity, ...]:
+        return self._identities
+
+    @property
+    def zero_ticks(self) -> tuple[int | None, ...]:
+        """Position register at zero, by joint; None where the joint has not been zeroed since it was switched on."""
+        return tuple(self._zeros.get(joint.id) for joint in self._joints)
+
+    @property
+    def counts(self) -> LineCounts:
+        """Silent, damaged, late answers and retries since ``open``."""
+        return self._line.counts
+
+    def open(self) -> None:
+        """Open and lock the port, and make sure that the seven servos are those of the configuration. Nothing moves, none lets go.
+
+        A servo whose torque is on is not set up, which takes the torque off: it may hold a wire. ``arm`` does it.
+
+        Raises
+        ------
+        PortError, PortTaken
+            The port cannot be opened.
+        NoAnswer, WrongServo
+            A servo is missing, or not the one that the configuration names. The port is closed again.
+        """
+        self._line.open()
+        self._forget()
+        try:
+            self._line.broadcast(_STATUS_RETURN, bytes([ANSWERS_ALL]))  # else a servo may be set not to answer writes
+            self._identities = identify(self._line, self.config)
+            for joint in self._joints:
+                if not holds(self._line, joint):
+                    self._configure(joint)
+                elif differences(self._line, joint):
+                    self._put_off.add(joint.id)
+                    _log.warning("%s holds, so it is not set up before the servos are switched on", call(joint))
+                map_block(self._line, joint)
+        except ServoError:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Hold if armed, and give the port back. Never fails. The torque stays on: releasing the wires is a decision of its own."""
+        if self.is_armed:
+            with contextlib.suppress(ServoError):
+                self.hold()
+                self.read()  # whoever answers has heard the hold: it is not lost with the port
+        self._armed = False
+        self._line.close()
+
+    def set_zero(self, names: Sequence[JointName] | None = None) -> None:
+        """The present positions become zero, of all joints or of those named. Tendons must be without tension there.
+
+        Raises
+        ------
+        NotReady
+            When armed: goals would jump. When a servo holds and counts otherwise than it will when it is set up.
+        NoAnswer
+        """
+        if self.is_armed:
+            raise NotReady("the servos are armed: disarm before zeroing")
+        chosen = [joint for joint in self._joints if names is None or joint.name in names]
+        self._set_up_late(chosen)
+        found = {joint.id: registers.signed(self._line.read(joint.id, POSITION, 4)) for joint in chosen}
+        self._zeros.update(found)
+
+    def arm(self) -> None:
+        """Torque on, each servo holding where it stands.
+
+        The order: watchdog off, torque off, mode and limits, profile, position read, goal = position, torque on, watchdog on.
+
+        Raises
+        ------
+        NotReady
+            A joint has no zero, has lost it by a restart, or a servo reports a hardware error.
+        WrongServo, NoAnswer, Refused
+            Before the torque is touched: a servo is missing or another one. Later, the torque of all servos is off again.
+        TorqueStillOn
+            It could not be switched on everywhere, nor proven to be off again.
+        """
+        self._armed = False
+        self._check_ready()
+        try:
+            for joint in self._joints:
+                self._line.write(joint.id, WATCHDOG, b"\0")
+            for joint in self._joints:
+                self._line.write(joint.id, TORQUE, b"\0")
+            for joint in self._joints:
+                self._configure(joint)
+                if map_block(self._line, joint):  # else nobody would ever know: it counts from another turn now
+                    self._zeros.pop(joint.id, None)
+                set_profile(self._line, joint)
+            self._check_zeroed()
+            goal_to_position(self._line, self.config)
+            for joint in self._joints:
+                self._line.write(joint.id, TORQUE, b"\1")
+            start_watchdogs(self._line, self.config)
+        except PortLost:
+            raise
+        except ServoError as error:
+            try:
+                self.torque_off()
+            except PortLost:
+                raise
+            except ServoError as still_on:
+                raise TorqueStillOn(f"{error}; {still_on}") from error
+            raise
+        self._armed = True
+
+    def disarm(self) -> None:
+        """Hold, and take no more goals. The torque stays on; the servos' watchdogs trip when nobody talks to them."""
+        self._armed = False
+        self.hold()
+
+    def read(self) -> tuple[ServoReading, ...]:
+        """State of all seven, in the order of the joints; a servo without a usable answer is a ``MissingServo``.
+
+        Takes 3 ms at 1 Mbps, and at most 80 ms when servos are silent.
+        """
+        length = BLOCK_BYTES + self._turn % (TAG_BYTES + 1)
+        # Those that were silent come last, where they cannot silence others.
+        ids = sorted(self._misses, key=lambda servo_id: self._silences[servo_id])
+        answer = self._line.group_read(ids, indirect_data(self.config.model), length)
+        now = time.monotonic()
+        if answer.data or any(miss is not Miss.WAITING for miss in answer.missed.values()):
+            self._turn += 1  # of what was really asked: else the next request would look like the one before
+        readings: list[ServoReading] = []
+        for joint in self._joints:
+            if joint.id in answer.data:
+                readings.append(self._reading(joint, answer.data[joint.id], now))
+            else:
+                readings.append(self._missing(joint, answer.missed[joint.id], now))
+        return tuple(readings)
+
+    def write(self, goals_mm: Sequence[float]) -> tuple[float, ...]:
+        """Send the seven goals in one packet; returns the goals in mm as the servos count them.
+
+        No servo answers: ``ServoState.goal_mm`` of the next read tells what was taken.
+
+        Raises
+        ------
+        NotReady
+            When not armed.
+        ValueError
+            When a goal is not finite or beyond what a servo counts; nothing is sent.
+        """
+        if not self.is_armed:
+            raise NotReady("the servos are not armed: zero and arm them first")
+        goals = {
+            joint.id: registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
+            for joint, goal_mm in zip(self._joints, goals_mm, strict=True)
+        }
+        send_goals(self._line, goals)
+        return tuple(registers.to_mm(joint, goals[joint.id], self._zeros[joint.id]) for joint in self._joints)
+
+    def hold(self) -> tuple[ServoReading, ...]:
+        """Goal = present position, of every servo that tells its own; returns the readings. Needs no arming."""
+        readings = self.read()
+        goals = {reading.id: reading.ticks for reading in readings if isinstance(reading, ServoState)}
+        if goals:
+            send_goals(self._line, goals)
+        return readings
+
+    def torque_off(self) -> None:
+        """Switch all torque off: one packet to all, three times, read back. It releases the tension of the wires.
+
+        Raises
+        ------
+        TorqueStillOn
+            When a servo still has torque, or does not tell.
+        """
+        self._armed = False
+        for _ in range(3):
+            self._line.broadcast(TORQUE, b"\0")
+        answer = self._line.group_read([joint.id for joint in self._joints], TORQUE, 1)
+        doubtful = [joint.name for joint in self._joints if answer.data.get(joint.id) != b"\0"]
+        if doubtful:
+            raise TorqueStillOn(f"torque of {', '.join(doubtful)} is not proven to be off: cut the servos' power")
+
+    def let_go(self) -> None:
+        """``torque_off`` on a closed bus that cannot be opened because not all seven answer: whoever hears it obeys.
+
+        Raises
+        ------
+        PortError, PortTaken
+            The port cannot be opened.
+        TorqueStillOn
+            When a servo still has torque, or does not tell.
+        """
+        self._line.open()
+        try:
+            self.torque_off()
+        finally:
+            self._line.close()
+
+    def reboot(self, servo_id: int) -> None:
+        """Restart one servo, which clears its hardware error. Afterwards the bus is disarmed, and the joint must be zeroed.
+
+        Raises
+        ------
+        NoAnswer
+            When it does not come back within 1.5 s.
+        """
+        joint = self._joint(servo_id)
+        self._armed = False
+        self._zeros.pop(servo_id, None)
+        self._line.reboot(servo_id)
+        until = time.monotonic() + _REBOOT_S
+        time.sleep(0.1)  # it answers for a moment before it goes down
+        while (model := self._line.ping(servo_id)) is None:
+            if time.monotonic() > until:
+                raise NoAnswer(f"{call(joint)} did not come back after its reboot: switch the servos' power off and on")
+        check_model(joint, model, self.config.model)
+        self._configure(joint)
+        map_block(self._line, joint)
+
+    def clear_watchdog(self) -> None:
+        """Let servos whose bus watchdog tripped take goals again, starting where they stand.
+
+        Raises
+        ------
+        NotReady
+            When not armed: ``arm`` clears it, too.
+        """
+        if not self.is_armed:
+            raise NotReady("the servos are not armed: arming clears the bus watchdog")
+        for joint in self._joints:
+            set_profile(self._line, joint)  # a trip forgets it, and without one the servo moves as fast as it can
+            self._line.write(joint.id, WATCHDOG, b"\0")
+        goal_to_position(self._line, self.config)
+        start_watchdogs(self._line, self.config)
+
+    def _set_up_late(self, chosen: Sequence[JointConfig]) -> None:
+        """Those that held when the port was opened, if they do not any more."""
+        for joint in chosen:
+            if joint.id not in self._put_off:
+                continue
+            if not holds(self._line, joint):
+                self._configure(joint)
+            elif counts_anew(differences(self._line, joint)):
+                raise NotReady(
+                    f"{call(joint)} holds in a mode of another program: switch the torque off (the wires go slack), then zero"
+                )
+
+    def _check_ready(self) -> None:
+        if not self.is_open:
+            raise NotReady("the servo port is not open: open it first")
+        # again, since a servo may have been changed meanwhile
+        self._identities = tuple(identity_of(self._line, joint, self.config) for joint in self._joints)
+        self._check_zeroed()
+        for joint in self._joints:
+            error = HardwareError(self._line.read(joint.id, _HARDWARE_ERROR, 1)[0])
+            if error:
+                raise NotReady(f"{call(joint)} reports {describe(error)}: find the cause, then reboot the servo")
+
+    def _check_zeroed(self) -> None:
+        missing = [joint.name for joint in self._joints if joint.id not in self._zeros]
+        if missing:
+            names = ", ".join(missing)
+            raise NotReady(f"not zeroed: {names} (or restarted since then): slacken the wires and zero before arming")
+
+    def _configure(self, joint: JointConfig) -> None:
+        self._put_off.discard(joint.id)
+        if configure(self._line, joint):
+            self._zeros.pop(joint.id, None)
+
+    def _reading(self, joint: JointConfig, block: bytes, time_s: float) -> ServoReading:
+        self._misses[joint.id] = self._silences[joint.id] = 0
+        state = state_of(joint, self.config.model, self._zeros.get(joint.id), block, time_s)
+        if state is None:
+            self._armed = False
+            self._zeros.pop(joint.id, None)
+            with contextlib.suppress(NoAnswer, WriteRefused):
+                map_block(self._line, joint)
+            return MissingServo(joint.name, joint.id, time_s, 0, "restarted: zero and arm again", restarted=True)
+        if not state.torque:
+            self._armed = False
+        return state
+
+    def _missing(self, joint: JointConfig, miss: Miss, time_s: float) -> MissingServo:
+        self._misses[joint.id] += miss is not Miss.WAITING
+        self._silences[joint.id] += miss is Miss.SILENT
+        return MissingServo(joint.name, joint.id, time_s, self._misses[joint.id], miss.value)
+
+    def _joint(self, servo_id: int) -> JointConfig:
+        for joint in self._joints:
+            if joint.id == servo_id:
+                return joint
+        raise WrongServo(f"there is no servo with id {servo_id} in the configuration")

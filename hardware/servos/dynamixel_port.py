@@ -1,0 +1,488 @@
+"""Requests and answers on the servo line, with every trap of the vendor's SDK between them and us handled.
+
+One thread owns a line. A request ends in bounded time with the bytes, or with a typed error.
+
+The vendor's port and packet handlers with their traps mended (dynamixel-sdk 4.1.0).
+
+What can go wrong on the servo bus, each with one line that says what to do.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import termios
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import serial
+from dynamixel_sdk import (
+    BROADCAST_ID,
+    COMM_RX_CORRUPT,
+    COMM_RX_TIMEOUT,
+    COMM_SUCCESS,
+    GroupSyncWrite,
+    PortHandler,
+    Protocol2PacketHandler,
+)
+
+from core.devices import DeviceError
+from hardware.servos.registers import TAG_BYTES
+
+
+class ServoError(DeviceError):
+    """Root of the servo bus's errors."""
+
+
+class PortError(ServoError):
+    """The serial port cannot be opened."""
+
+
+class PortTaken(PortError):
+    """Another program holds the port."""
+
+
+class PortLost(ServoError):
+    """The port vanished while it was open. The driver has closed it; ``open`` starts anew, disarmed and without zeros."""
+
+
+class NoAnswer(ServoError):
+    """A servo, or all of them, did not answer a request."""
+
+
+class WrongServo(ServoError):
+    """A servo is not the one that the configuration names, or cannot be set up as needed."""
+
+
+class WriteRefused(ServoError):
+    """A servo answered a write with an error."""
+
+
+class NotReady(ServoError):
+    """Something has to be done first: open, zero or arm."""
+
+
+class TorqueStillOn(ServoError):
+    """The torque could not be proven to be off."""
+
+
+class BusProcessLost(ServoError):
+    """The process that owns the servo bus cannot be started, is gone, or does not answer."""
+
+
+_BODY = 7
+"""Where instruction and parameters begin, behind header, id and length."""
+_READ_SLICE_S = 0.0005
+
+
+class LockedPort(PortHandler):  # type: ignore[misc]
+    """A serial port that only one program can hold, timed by the monotonic clock."""
+
+    is_open: bool
+    _late_bytes: int | None = None
+    """What may still be read after the time for an answer is over: what had come by then. None: it is not over."""
+
+    def getCurrentTime(self) -> float:  # noqa: N802 - the vendor's name
+        """Milliseconds. The vendor takes the wall clock, which may jump."""
+        return time.monotonic() * 1000.0
+
+    def setupPort(self, cflag_baud: int) -> bool:  # noqa: N802
+        """Open the port; called by ``openPort`` and ``setBaudRate``.
+
+        Raises
+        ------
+        PortError
+            With the reason and what to do.
+        """
+        if self.is_open:
+            self.closePort()
+        try:
+            self.ser = serial.Serial(
+                port=self.port_name,
+                baudrate=self.baudrate,
+                bytesize=serial.EIGHTBITS,
+                # A short wait instead of the vendor's none: its loop around read() costs 15 % of a core else.
+                timeout=_READ_SLICE_S,
+                exclusive=True,
+            )
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise _port_error(self.port_name, error) from None
+        self.is_open = True
+        self.is_using = False
+        # Not every port is a USB adapter: a pseudo-terminal has no such mode.
+        with contextlib.suppress(ValueError, NotImplementedError):
+            self.ser.set_low_latency_mode(True)
+        self.ser.reset_input_buffer()
+        self.tx_time_per_byte = 10_000.0 / self.baudrate
+        return True
+
+    def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
+        self._late_bytes = None
+        super().setPacketTimeout(packet_length)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:  # noqa: N802
+        self._late_bytes = None
+        super().setPacketTimeoutMillis(msec)
+
+    def readPort(self, length: int) -> bytes:  # noqa: N802
+        """What has come, at most `length` bytes; after the time for an answer only what is in the buffer already.
+
+        The vendor's loop looks at the clock only when too little has come: on a line with noise it would never end, and this
+        thread also has to stop the robot. A process that was kept waiting still finds its answer in the buffer.
+        """
+        if self.getTimeSinceStart() > self.packet_timeout:
+            if self._late_bytes is None:
+                self._late_bytes = self.ser.in_waiting
+            length = min(length, self._late_bytes)
+            self._late_bytes -= length
+        return bytes(super().readPort(length)) if length > 0 else b""
+
+    def writePort(self, packet: list[int]) -> int:  # noqa: N802
+        """Write without waiting: a stuck adapter must not stop the thread that also has to stop the robot.
+
+        pyserial's own write waits for ever, or with a time limit takes a stall of this process for a stuck port.
+
+        Raises
+        ------
+        OSError
+            When the port is gone, or does not take the packet whole though its buffer has room for many.
+        """
+        written = os.write(self.ser.fileno(), bytes(packet))
+        if written != len(packet):
+            raise OSError(errno.EIO, "the adapter takes no more bytes")
+        return written
+
+
+class StuffingHandler(Protocol2PacketHandler):  # type: ignore[misc]
+    """Sends packets stuffed and reads them unstuffed."""
+
+    def addStuffing(self, packet: list[int]) -> list[int]:  # noqa: N802
+        """Stuff in place. The vendor's sender drops the list that the vendor's method returns."""
+        packet[:] = super().addStuffing(packet)
+        return packet
+
+    def removeStuffing(self, packet: list[int]) -> list[int]:  # noqa: N802
+        """Unstuff. The vendor's method compares with bytes that it has already overwritten, after the first FF FF FD FD."""
+        end = _BODY + (packet[5] | packet[6] << 8) - 2
+        body, kept = packet[_BODY:end], []
+        for index, byte in enumerate(body):
+            if not (byte == 0xFD and index >= 3 and body[index - 3 : index] == [0xFF, 0xFF, 0xFD]):
+                kept.append(byte)
+        length = len(kept) + 2
+        return [*packet[:5], length & 0xFF, length >> 8, *kept, *packet[end : end + 2]]
+
+
+def _port_error(port: str, error: Exception) -> PortError:
+    code = getattr(error, "errno", None)
+    if code == errno.ENOENT:
+        return PortError(f"servo port {port} does not exist: plug the USB adapter in, or set servos.port")
+    if code in {errno.EACCES, errno.EPERM}:
+        return PortError(f"no permission for servo port {port}: add your user to the group dialout, then log in again")
+    if code in {errno.EAGAIN, errno.EBUSY}:
+        return PortTaken(f"servo port {port} is in use by another program: close that program first")
+    if code in {errno.ENODEV, errno.ENXIO, errno.EIO}:
+        return PortError(f"servo port {port} has no device behind it: unplug the USB adapter and plug it in again")
+    return PortError(f"{port} cannot be used as servo port ({' '.join(str(error).split())}): set servos.port to the USB adapter")
+
+
+LATE_S = 0.04
+"""An answer may come so much later than the request that gave up on it; who asks again before takes it for the new answer."""
+ALERT_BIT = 0x80
+_ERROR_TEXT = {
+    1: "could not process it",
+    2: "does not know the instruction",
+    3: "received it damaged",
+    4: "refused the value (bus watchdog tripped, or value out of range)",
+    5: "refused its length",
+    6: "refused the value as beyond its limits",
+    7: "refused the access (torque on, or read-only)",
+}
+_STATUS_BODY = 9
+"""Where a status packet's data begin: header, id, length, instruction, error."""
+_ATTEMPTS = 3
+
+
+class Miss(StrEnum):
+    """Why a request has no answer."""
+
+    SILENT = "no answer"
+    CORRUPT = "damaged answer"
+    WAITING = "a late answer may still come"
+    BEHIND = "no answer, behind two silent servos"
+
+
+@dataclass(slots=True)
+class LineCounts:
+    """What went wrong since the line was opened."""
+
+    silent: int = 0
+    corrupt: int = 0
+    late: int = 0
+    retries: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class GroupAnswer:
+    """Data by id and reason by id of those without; every id asked for is in one of them."""
+
+    data: dict[int, bytes]
+    missed: dict[int, Miss]
+
+
+@dataclass(slots=True)
+class _Round:
+    """One group request: who still has to answer."""
+
+    waiting: list[int]
+    length: int
+    data: dict[int, bytes] = field(default_factory=dict)
+    corrupt: int = 0
+
+
+class ServoLine:
+    """The port with the packet handler. All methods but the constructor raise ``PortLost`` when the port vanishes."""
+
+    def __init__(self, port: str, baud: int) -> None:
+        self.port, self.baud = port, baud
+        self.counts = LineCounts()
+        self._port: LockedPort | None = None
+        self._handler = StuffingHandler()
+        self._quiet_until: dict[int, float] = {}
+        self._owner: int | None = None
+
+    @property
+    def is_open(self) -> bool:
+        return self._port is not None
+
+    def open(self) -> None:
+        """Open and lock the port.
+
+        Raises
+        ------
+        PortError
+            Missing, not permitted, not a serial port, not this speed; ``PortTaken`` when another program holds it.
+        """
+        self.close()
+        port = LockedPort(self.port)
+        with self._guard_new(port):
+            if not port.setBaudRate(self.baud):
+                raise PortError(f"servos.baud {self.baud} is not a speed of these servos: use 57600, 115200, 1000000, 2000000 ...")
+        self._port, self._owner = port, threading.get_ident()
+        self.counts = LineCounts()
+        self._quiet_until.clear()
+
+    def close(self) -> None:
+        """Give the port back; never fails, and may be called twice."""
+        port, self._port = self._port, None
+        if port is not None:
+            # A vanished port raises termios.error, which is no OSError.
+            with contextlib.suppress(OSError, termios.error):
+                port.closePort()
+
+    @contextlib.contextmanager
+    def _guard_new(self, port: LockedPort) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, termios.error) as error:
+            with contextlib.suppress(OSError, termios.error, AttributeError):
+                port.closePort()
+            raise PortError(f"servo port {self.port} vanished while it was opened ({error}): check the USB cable") from None
+
+    @contextlib.contextmanager
+    def _exchange(self) -> Iterator[LockedPort]:
+        """The open port for one request. Whatever happens, its busy flag is reset, and a lost port is closed."""
+        port = self._port
+        if port is None:
+            raise NotReady("the servo port is not open: open it first")
+        if threading.get_ident() != self._owner:
+            raise RuntimeError("the servo line belongs to the thread that opened it")
+        try:
+            yield port
+        except (OSError, termios.error) as error:  # SerialException is an OSError, termios.error is none
+            self.close()
+            raise PortLost(f"servo port {self.port} is lost ({_short(error)}): check the USB cable, then connect again") from None
+        finally:
+            port.is_using = False
+
+    def ping(self, servo_id: int) -> int | None:
+        """Model number, or None without a (whole) answer."""
+        self._let_late_answers_pass(servo_id)
+        with self._exchange() as port:
+            try:
+                model, result, _ = self._handler.ping(port, servo_id)
+            except IndexError:
+                self.counts.corrupt += 1
+                return None
+        self._note(servo_id, result)
+        return int(model) if result == COMM_SUCCESS else None
+
+    def others(self) -> list[int]:
+        """Ids of all servos that answer a broadcast ping; takes 0.8 s at 1 Mbps, so only for error messages."""
+        with self._exchange() as port:
+            try:
+                found, _ = self._handler.broadcastPing(port)
+            except IndexError:  # a damaged answer
+                return []
+        return sorted(found)
+
+    def read(self, servo_id: int, address: int, length: int) -> bytes:
+        """`length` bytes of the control table; two retries.
+
+        Raises
+        ------
+        NoAnswer, Refused
+        """
+        data, error = self._request(servo_id, lambda port: self._handler.readTxRx(port, servo_id, address, length), length)
+        if error & ~ALERT_BIT:
+            raise WriteRefused(f"servo {servo_id} answered a read of register {address}: it {_error_text(error)}")
+        return data
+
+    def write(self, servo_id: int, address: int, data: bytes) -> None:
+        """Write and wait for the servo's consent; two retries (a register write may be repeated).
+
+        Raises
+        ------
+        NoAnswer, Refused
+        """
+
+        def once(port: LockedPort) -> tuple[list[int], int, int]:
+            result, error = self._handler.writeTxRx(port, servo_id, address, len(data), list(data))
+            return [], result, error
+
+        _, error = self._request(servo_id, once, 0)
+        if error & ~ALERT_BIT:
+            raise WriteRefused(f"servo {servo_id} did not take a write of register {address}: it {_error_text(error)}")
+
+    def reboot(self, servo_id: int) -> None:
+        """Restart a servo. Its answer is not waited for twice: a second request would restart it again."""
+        self._let_late_answers_pass(servo_id)
+        with self._exchange() as port, contextlib.suppress(IndexError):
+            self._handler.reboot(port, servo_id)
+
+    def broadcast(self, address: int, data: bytes) -> None:
+        """Write to all servos in one packet; nobody answers."""
+        with self._exchange() as port:
+            self._handler.writeTxOnly(port, BROADCAST_ID, address, len(data), list(data))
+
+    def group_write(self, address: int, data: dict[int, bytes]) -> None:
+        """One packet with a register for each id; nobody answers, so read what was taken."""
+        length = len(next(iter(data.values())))
+        with self._exchange() as port:
+            group = GroupSyncWrite(port, self._handler, address, length)
+            for servo_id, value in data.items():
+                group.addParam(servo_id, list(value))
+            group.txPacket()
+
+    def group_read(self, ids: list[int], address: int, length: int) -> GroupAnswer:
+        """`length` bytes of each servo, in one request; at most two silences (35 ms each) are waited for, and one retry is made.
+
+        A silent servo may also silence those after it in the list: the rest is asked again without it. A servo that was silent is
+        left alone until its answer cannot come any more.
+        """
+        now = time.monotonic()
+        data: dict[int, bytes] = {}
+        missed = {i: Miss.WAITING for i in ids if self._quiet_until.get(i, 0.0) > now}
+        rest = [i for i in ids if i not in missed]
+        silences = retries = 0
+        while rest:
+            turn = self._group_round(rest, address, length)
+            data.update(turn.data)
+            rest = [i for i in rest if i not in turn.data]
+            if rest and turn.corrupt:
+                self.counts.corrupt += turn.corrupt
+                if retries:
+                    missed.update(dict.fromkeys(rest, Miss.CORRUPT))
+                    break
+                retries += 1
+                self.counts.retries += 1
+            elif rest:
+                missed[rest[0]] = Miss.SILENT
+                self._note(rest.pop(0), COMM_RX_TIMEOUT)
+                silences += 1
+                if silences == 2:
+                    for servo_id in rest:
+                        missed[servo_id] = Miss.BEHIND
+                        self._note(servo_id, COMM_RX_TIMEOUT)
+                    break
+        return GroupAnswer(data, missed)
+
+    def _group_round(self, ids: list[int], address: int, length: int) -> _Round:
+        """Ask once and take what comes, until all have answered, or none comes any more.
+
+        After a damaged answer the others are still taken: asking again at once would talk into them.
+        """
+        turn = _Round(list(ids), length)
+        with self._exchange() as port:
+            if self._handler.syncReadTx(port, address, length, turn.waiting, len(ids), False) != COMM_SUCCESS:
+                return turn
+            # The vendor's group read drops the error byte, stops at the first fault, and then reads as 0.
+            while len(turn.data) + turn.corrupt < len(ids):
+                try:
+                    packet, result = self._handler.rxPacket(port, False)
+                except IndexError:
+                    turn.corrupt += 1
+                    continue
+                if result == COMM_RX_TIMEOUT:
+                    break
+                if result == COMM_SUCCESS:
+                    self._take(turn, packet)
+                else:
+                    turn.corrupt += 1
+        return turn
+
+    def _take(self, turn: _Round, packet: list[int]) -> None:
+        servo_id, data = packet[4], packet[_STATUS_BODY:-2]
+        if servo_id not in turn.waiting or servo_id in turn.data:
+            self.counts.late += 1
+        elif packet[8] & ~ALERT_BIT or len(data) < turn.length - TAG_BYTES:
+            turn.corrupt += 1
+        elif len(data) != turn.length:
+            self.counts.late += 1  # an answer to an earlier request: those ask for other lengths
+        else:
+            turn.data[servo_id] = bytes(data)
+
+    def _request(self, servo_id: int, ask: Callable[[LockedPort], tuple[list[int], int, int]], length: int) -> tuple[bytes, int]:
+        """A single servo's `length` bytes and error byte, asked for at most three times: nobody waits for these."""
+        miss = Miss.SILENT
+        for attempt in range(_ATTEMPTS):
+            self.counts.retries += attempt > 0
+            self._let_late_answers_pass(servo_id)
+            with self._exchange() as port:
+                try:
+                    data, result, error = ask(port)
+                except IndexError:
+                    data, result, error = [], COMM_RX_CORRUPT, 0
+            if result == COMM_SUCCESS and (len(data) == length or error & ~ALERT_BIT):
+                return bytes(data), error
+            result = COMM_RX_CORRUPT if result == COMM_SUCCESS else result
+            self._note(servo_id, result)
+            miss = Miss.SILENT if result == COMM_RX_TIMEOUT else Miss.CORRUPT
+        raise NoAnswer(
+            f"servo {servo_id}: {miss}, {_ATTEMPTS} times: check its supply and cable, and that no two servos have the same id"
+        )
+
+    def _note(self, servo_id: int, result: int) -> None:
+        if result == COMM_RX_TIMEOUT:
+            self.counts.silent += 1
+            self._quiet_until[servo_id] = time.monotonic() + LATE_S
+        elif result != COMM_SUCCESS:
+            self.counts.corrupt += 1
+
+    def _let_late_answers_pass(self, servo_id: int) -> None:
+        """Before a single request: the sender drops what has come until then."""
+        wait = self._quiet_until.get(servo_id, 0.0) - time.monotonic()
+        if wait > 0:
+            time.sleep(wait)
+
+
+def _error_text(error: int) -> str:
+    return _ERROR_TEXT.get(error & ~ALERT_BIT, f"answered with error {error & ~ALERT_BIT}")
+
+
+def _short(error: BaseException) -> str:
+    """One line of an error's text."""
+    return " ".join(str(error).split())[:80]

@@ -1,0 +1,164 @@
+"""Seven ideal servos and the bus process's decisions on a clock that the caller turns: no port, no process, no waiting.
+
+What decides is the real thing, ``BusGuard`` with the gate inside. Only line and motors are left out: a servo is where the cycle
+before sent it. For tests and studies in which the clock must not be the wall's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig
+from core.control.faults import Cause, Fault
+from core.control.gate import Rejection, Source
+from core.control.health import BusReport
+from core.control.robot import SentMotion
+from core.types import Command, RobotStatus
+from hardware.servos.bus_guard import BusGuard, report_of
+from hardware.servos.bus_ipc import BusOrder, Heartbeat
+from hardware.servos.registers import HardwareError, ServoState
+
+_VOLTAGE_V, _TEMPERATURE_C = 12.0, 30.0
+
+
+class LockStepServos:
+    """A guarded robot for one thread. ``cycle`` does what the bus process does fifty times a second."""
+
+    def __init__(self, servos: ServosConfig, safety: SafetyConfig, clock: Callable[[], float]) -> None:
+        self._servos, self._clock = servos, clock
+        self._guard = BusGuard(servos, safety, clock())
+        self._at_mm: tuple[float, ...] = (0.0,) * len(JOINT_NAMES)
+        self._order: BusOrder | None = None
+        self._beat: Heartbeat | None = None
+        self._torque = self._let_go = False
+        self._cycle = self._told = 0
+        self.sent: list[tuple[float, tuple[float, ...]]] = []
+        """Time and goals (mm) of every cycle that sent some, oldest first."""
+
+    @property
+    def name(self) -> str:
+        return "lock-step servos"
+
+    @property
+    def failure(self) -> str | None:
+        return None
+
+    @property
+    def armed(self) -> bool:
+        return self._guard.armed
+
+    def positions_mm(self) -> tuple[float, ...]:
+        """Where the joints are."""
+        return self._at_mm
+
+    def cycle(self) -> None:
+        """Read, decide, move."""
+        now_s = self._clock()
+        self._cycle += 1
+        fault = self._guard.see(self._readings(now_s), 0, self._beat, now_s)
+        if fault is not None:
+            self._guard.end_motion(fault)
+        elif self._guard.armed:
+            step = self._guard.step(self._order, self._beat, now_s)
+            if step.goals_mm is not None:
+                self._at_mm = step.goals_mm
+                self._guard.wrote(step.goals_mm, self._guard.followed, now_s)
+                self.sent.append((now_s, step.goals_mm))
+
+    def _readings(self, now_s: float) -> tuple[ServoState, ...]:
+        return tuple(
+            ServoState(
+                name=joint.name,
+                id=joint.id,
+                time_s=now_s,
+                ticks=0,
+                goal_ticks=0,
+                position_mm=at_mm,
+                goal_mm=at_mm,
+                velocity_mm_s=0.0,
+                current_ma=None,
+                voltage_v=_VOLTAGE_V,
+                temperature_c=_TEMPERATURE_C,
+                error=HardwareError(0),
+                torque=self._torque,
+                watchdog_tripped=False,
+            )
+            for joint, at_mm in zip(self._servos.joints, self._at_mm, strict=True)
+        )
+
+    def connect(self) -> None:
+        """There is nothing to connect."""
+
+    def close(self) -> None:
+        self._guard.disarm()
+
+    def beat(self, permitted: Source | None) -> None:
+        self._beat = Heartbeat(self._clock(), permitted)
+
+    def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
+        self._order = BusOrder(command, source, self._clock(), captured_s)
+        return self._guard.sent.motion if self._guard.armed and self._guard.sent is not None else Command()
+
+    def hold(self) -> None:
+        self._order = BusOrder(None, Source.OPERATOR, self._clock())
+
+    def stop(self) -> None:
+        self._guard.end_motion(Fault(Cause.STOP_PRESSED))
+
+    def arm(self) -> None:
+        """Raises NotReady."""
+        if not self._guard.armed:
+            now_s = self._clock()
+            self._guard.see(self._readings(now_s), 0, self._beat, now_s)
+        self._guard.check_arming()
+        self._torque = True
+        self._guard.set_armed(self._clock())
+
+    def disarm(self) -> None:
+        self._guard.disarm()
+
+    def acknowledge(self) -> None:
+        self._guard.acknowledge()
+
+    def zero(self, names: Sequence[JointName] | None = None) -> None:
+        self._at_mm = tuple(
+            0.0 if names is None or name in names else at for name, at in zip(JOINT_NAMES, self._at_mm, strict=True)
+        )
+
+    def reboot(self, servo_id: int) -> None:
+        """They never need it."""
+
+    def torque_off(self) -> None:
+        self._guard.disarm()
+        self._torque, self._let_go = False, True
+
+    def report(self) -> BusReport | None:
+        if self._cycle == self._told:
+            return None
+        self._told = self._cycle
+        report = report_of(self._readings(self._clock()), armed=self._guard.armed, errors=0)
+        let_go, self._let_go = self._let_go, False
+        return replace(report, armed=self._guard.armed, ended=self._guard.latched, torque_off=let_go)
+
+    def sent_motion(self) -> SentMotion | None:
+        sent = self._guard.sent
+        if sent is None or not self._guard.armed:
+            return None
+        order, rejection = sent.order, self._guard.rejection
+        return SentMotion(
+            cycle=self._cycle,
+            time_s=sent.time_s,
+            motion=sent.motion,
+            source=order.source if order is not None and order.command is not None else None,
+            captured_s=order.captured_s if order is not None else None,
+            rejection=rejection.reason if rejection is not None else None,
+            at_end=self._guard.at_end,
+        )
+
+    def kept_back(self) -> Rejection | None:
+        return self._guard.rejection if self._guard.armed and self._guard.sent is None else None
+
+    def status(self) -> RobotStatus:
+        at = self._at_mm
+        return RobotStatus(self._clock(), at[4], (at[5] + at[6]) / 2.0, (at[0], at[1], at[2], at[3]), (0.0,) * 4)

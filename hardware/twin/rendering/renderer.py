@@ -1,0 +1,175 @@
+"""The twin's camera picture with its exact labels: the background once, then the robot into it, frame by frame.
+
+Only a window around the robot is painted, blurred and developed again for each frame; the rest is copied. Labels never come from
+the painting: they are exact distances of pixel centres, in mm on the board, to the robot's line and to the lumen's discs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.types import Image, Mask, Points
+from hardware.twin.phantom import BOARD_MM, Phantom
+from hardware.twin.rendering.appearance import Appearance, make_view
+from hardware.twin.rendering.background import light_field, paint_board, stroke
+from hardware.twin.rendering.camera_effects import CameraEffects
+from hardware.twin.rendering.robot import Band, measure_band, paint_robot, paint_sheath
+from hardware.twin.rendering.scene_objects import add_board_clutter, add_fittings
+from hardware.twin.rendering.vessel import paint_vessel, surface_of
+from hardware.twin.view import CameraView, measure_lumen
+
+F32 = NDArray[np.float32]
+
+_REACH_MM = 2.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderedFrame:
+    """One rendered frame: ``image`` (H, W, 3) RGB uint8; exact labels ``vessel`` and ``robot``, each (H, W)."""
+
+    image: Image
+    vessel: Mask
+    robot: Mask
+
+
+class Renderer:
+    """Pictures of one phantom in one appearance through one view.
+
+    Parameters
+    ----------
+    phantom : the vessel.
+    appearance : all looks; the same appearance and `seed` give the same pictures.
+    size : (width, height) in px.
+    seed : chooses textures, clutter and the sensor's noise.
+    view : how the camera stands; None takes ``make_view(appearance, size, phantom)``.
+    """
+
+    def __init__(
+        self,
+        phantom: Phantom,
+        appearance: Appearance,
+        size: tuple[int, int] = (640, 480),
+        seed: int = 0,
+        view: CameraView | None = None,
+    ) -> None:
+        self.phantom, self.appearance = phantom, appearance
+        self.view = view if view is not None else make_view(appearance, size, phantom)
+        rng = np.random.default_rng([seed, appearance.clutter_seed])
+        self._grid = self.view.grid_mm().astype(np.float32)
+        self._scale = self.view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
+        self._lamp = _lamp_in_image(self.view, appearance.light_deg)
+        self.lumen = measure_lumen(phantom.graph, self.view, self._grid, appearance.wall_mm, appearance.wall_mm + _REACH_MM)
+        self._vessel = self.lumen.inside
+        self._camera = CameraEffects(appearance, self.view.size, rng)
+        self._under, self._front, self._front_keep = self._paint_background(rng)
+        whole = slice(0, self.view.size[1]), slice(0, self.view.size[0])
+        self._empty = self._camera.expose(self._under * self._front_keep + self._front, whole)
+
+    @property
+    def robot_radius_mm(self) -> float:
+        """Radius of the robot as seen and as labelled."""
+        return self.appearance.robot_radius_mm
+
+    def render(self, robot_points_mm: Points | None, sheath_mm: float = 0.0, noise_seed: int = 0) -> RenderedFrame:
+        """The picture with the robot's line at `robot_points_mm` (N, 2), tail -> head (None or one point: no robot).
+
+        Everything of the line that lies in the picture is painted and labelled, outside the port too. `sheath_mm` of catheter
+        sheath, measured from the port, cover its proximal part; the label goes on beneath.
+        """
+        shape = self._vessel.shape
+        robot = np.zeros(shape, bool)
+        image = self._empty
+        if robot_points_mm is not None and len(robot_points_mm) >= 2:
+            points = np.asarray(robot_points_mm, np.float64)
+            reach = self.robot_radius_mm + max(self.appearance.sheath_extra_mm if sheath_mm > 0 else 0.0, 1.0 / self._scale) + 0.3
+            band = measure_band(points, self.robot_radius_mm, reach, self.view, self._grid)
+            if len(band.pixel):
+                robot.reshape(-1)[band.pixel] = band.distance_mm < np.float32(self.robot_radius_mm)
+                image = self._with_robot(points, band, sheath_mm)
+        return RenderedFrame(self._camera.add_noise(image, noise_seed), self._vessel.copy(), robot)
+
+    def _paint_background(self, rng: np.random.Generator) -> tuple[F32, F32, F32]:
+        appearance, view = self.appearance, self.view
+        board = paint_board(appearance, self._grid, self._scale, rng)
+        board = add_board_clutter(appearance, board, view, self.phantom, self.lumen, rng)
+        surface = surface_of(self.lumen, self._scale, self._lamp)
+        layers = paint_vessel(appearance, board, surface, rng)
+        add_fittings(appearance, layers, self.phantom, view, rng)
+        light = light_field(appearance, self._grid, rng)
+        self._light = light
+        return layers.under * light[..., None], layers.front, (1 - layers.front_alpha)[..., None]
+
+    def _with_robot(self, points: Points, band: Band, sheath_mm: float) -> Image:
+        """The noise-free image: the window around the robot painted anew, from the scene's colours to the tone curve."""
+        appearance = self.appearance
+        outer, inner = self._windows(band)
+        scene = self._under[outer].copy()
+        if appearance.robot_shadow:
+            self._shade(scene, points, outer)
+        local = _local(band, outer, self.view.size[0])
+        canvas = scene.reshape(-1, 3)
+        lit = band.side * (band.normal @ np.asarray(self._lamp, np.float32))
+        coverage = np.clip((np.float32(self.robot_radius_mm) - band.distance_mm) * np.float32(self._scale) + np.float32(0.5), 0, 1)
+        veil = np.float32(appearance.robot_veil) * self._vessel.reshape(-1)[band.pixel]
+        paint_robot(canvas, local, coverage * (1 - veil), lit.astype(np.float32), appearance, self._light.reshape(-1)[band.pixel])
+        if sheath_mm > 0:
+            covered = np.clip((self._port_mm(points) + np.float32(sheath_mm) - band.from_tail_mm) * np.float32(self._scale), 0, 1)
+            outside = np.float32(self.robot_radius_mm + appearance.sheath_extra_mm)
+            coverage = np.clip((outside - band.distance_mm) * np.float32(self._scale) + np.float32(0.5), 0, 1) * covered
+            paint_sheath(canvas, local, coverage.astype(np.float32), appearance)
+        scene *= self._front_keep[outer]
+        scene += self._front[outer]
+        image = self._empty.copy()
+        developed = self._camera.expose(scene, outer)
+        offset_y, offset_x = inner[0].start - outer[0].start, inner[1].start - outer[1].start
+        height, width = inner[0].stop - inner[0].start, inner[1].stop - inner[1].start
+        image[inner] = developed[offset_y : offset_y + height, offset_x : offset_x + width]
+        return image
+
+    def _windows(self, band: Band) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+        """The window to paint, and within it the window where blur saw only painted pixels."""
+        width, height = self.view.size
+        shadow = int(np.ceil((1.5 * self.appearance.shadow_mm + 2) * self._scale)) if self.appearance.robot_shadow else 0
+        y, x = band.pixel // width, band.pixel % width
+        windows = []
+        for pad in (shadow + 2 * self._camera.reach_px, shadow + self._camera.reach_px):
+            rows = slice(max(int(y.min()) - pad, 0), min(int(y.max()) + pad + 1, height))
+            columns = slice(max(int(x.min()) - pad, 0), min(int(x.max()) + pad + 1, width))
+            windows.append((rows, columns))
+        return windows[0], windows[1]
+
+    def _shade(self, scene: F32, points: Points, window: tuple[slice, slice]) -> None:
+        """The robot's soft shadow on the floor of the lumen, away from the lamp."""
+        pixels = self.view.project(points) - (window[1].start, window[0].start)
+        pixels = pixels - np.asarray(self._lamp) * 0.5 * self.appearance.shadow_mm * self._scale
+        mask = np.zeros(scene.shape[:2], np.uint8)
+        stroke(mask, pixels, 255, 2 * self.robot_radius_mm * self._scale)
+        soft = cv2.blur(mask, (3, 3) if self._scale < 2 else (5, 5))
+        soft = cv2.blur(soft, (5, 5))
+        scene *= (1 - np.float32(self.appearance.robot_shadow / 255) * soft.astype(np.float32))[..., None]
+
+    def _port_mm(self, points: Points) -> np.float32:
+        """Arc length from the robot's tail to the point of its line nearest to the port."""
+        port = self.phantom.graph.nodes[self.phantom.port]
+        index = int(np.argmin(np.sum((points - port) ** 2, axis=1)))
+        return np.float32(np.sum(np.linalg.norm(np.diff(points[: index + 1], axis=0), axis=1)))
+
+
+def _lamp_in_image(view: CameraView, light_deg: float) -> tuple[float, float]:
+    """The direction to the lamp as a unit vector on screen."""
+    angle, middle = np.deg2rad(light_deg), np.array(BOARD_MM) / 2
+    ends = view.project(np.array([middle, middle + (np.cos(angle), np.sin(angle))]))
+    step = ends[1] - ends[0]
+    x, y = step / np.linalg.norm(step)
+    return float(x), float(y)
+
+
+def _local(band: Band, window: tuple[slice, slice], width: int) -> Band:
+    """The same band with pixel indices into the window."""
+    y, x = band.pixel // width, band.pixel % width
+    inside = (y - window[0].start) * (window[1].stop - window[1].start) + (x - window[1].start)
+    return Band(inside, band.distance_mm, band.from_tip_mm, band.from_tail_mm, band.side, band.normal)

@@ -1,0 +1,379 @@
+"""Seven software servos on a pseudo-terminal: the real driver talks to them over the real protocol, at the real port's speed.
+
+Switches for what goes wrong on a servo line: between a servo's answer and the computer.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import heapq
+import logging
+import os
+import random
+import select
+import shutil
+import tempfile
+import termios
+import threading
+import time
+import tty
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from core.config.safety import ServosConfig
+from hardware.twin.servos.device import SoftServo, StatusReply
+from hardware.twin.servos.protocol import BROADCAST, Instruction, InstructionPacket, PacketParser, status_packet
+
+
+@dataclass(frozen=True, slots=True)
+class TransmittedAnswer:
+    """What really goes onto the line, and how much later than it should."""
+
+    data: bytes
+    delay_s: float = 0.0
+
+
+class LineFaults:
+    """Which answers are lost, late or damaged. Switches may be thrown from any thread while the bus runs."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self._random = random.Random(seed)
+        self.clear()
+
+    def clear(self) -> None:
+        """All faults off."""
+        self._muted: set[int] = set()
+        self._delay_s: dict[int, float] = {}
+        self._truncate: dict[int, int] = {}
+        self._short: dict[int, int] = {}
+        self._crc = 0
+        self._garbage = 0
+
+    def mute(self, servo_id: int, on: bool = True) -> None:
+        """The servo hears and obeys, but does not answer."""
+        (self._muted.add if on else self._muted.discard)(servo_id)
+
+    def delay(self, servo_id: int, seconds: float) -> None:
+        """All answers of the servo come later by so much; 0 ends it."""
+        self._delay_s[servo_id] = seconds
+
+    def crc(self, count: int) -> None:
+        """The next `count` answers have a wrong CRC."""
+        self._crc = count
+
+    def garbage(self, count: int) -> None:
+        """The next answer comes behind `count` random bytes."""
+        self._garbage = count
+
+    def truncate(self, servo_id: int, count: int = 1) -> None:
+        """The next `count` answers of the servo break off in the middle."""
+        self._truncate[servo_id] = count
+
+    def short(self, servo_id: int, count: int = 1) -> None:
+        """The next `count` answers of the servo are whole packets without data."""
+        self._short[servo_id] = count
+
+    def silences(self, servo_id: int) -> bool:
+        return servo_id in self._muted
+
+    def shape(self, servo_id: int, answer: bytes) -> TransmittedAnswer:
+        """What becomes of an answer."""
+        if self._short.get(servo_id, 0) > 0:
+            self._short[servo_id] -= 1
+            answer = status_packet(servo_id, 0)
+        if self._truncate.get(servo_id, 0) > 0:
+            self._truncate[servo_id] -= 1
+            answer = answer[: len(answer) // 2 + 1]
+        if self._crc > 0:
+            self._crc -= 1
+            answer = answer[:-1] + bytes([answer[-1] ^ 0x55])
+        if self._garbage > 0:
+            answer = self._random.randbytes(self._garbage) + answer
+            self._garbage = 0
+        return TransmittedAnswer(answer, self._delay_s.get(servo_id, 0.0))
+
+
+_log = logging.getLogger(__name__)
+
+BAUD_OF_CODE = {0: 9600, 1: 57600, 2: 115_200, 3: 1_000_000, 4: 2_000_000, 5: 3_000_000, 6: 4_000_000}
+_SPEEDS = {getattr(termios, f"B{baud}"): baud for baud in BAUD_OF_CODE.values()}
+_IDLE_S = 0.02
+_PACKET_PAUSE_S = 0.1
+_BITS_PER_BYTE = 10
+_PRIORITY = -10
+
+
+class SoftServoBus:
+    """The servos with their line; ``start`` opens ``port`` and answers there from a thread of its own.
+
+    Parameters
+    ----------
+    config : ids, model, speed and conversion of the seven.
+    clock : seconds for motion, heat and the servos' watchdogs; the line itself lives in real time.
+    wire_time : let answers take the time that they need at the port's speed.
+    positions : ticks of each servo's horn at the start; None draws them within one turn, from `seed`.
+
+    Notes
+    -----
+    Strict: what is not stuffed, of a wrong CRC or speed, or of a wrong length is not heard. As the vendor's protocol has it, the
+    answers to a group read follow one another, so a silent servo also silences those behind it.
+    """
+
+    def __init__(
+        self,
+        config: ServosConfig,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        wire_time: bool = False,
+        positions: Sequence[int] | None = None,
+        seed: int = 0,
+    ) -> None:
+        self._joints = config.joints
+        self._clock = clock
+        self._wire_time = wire_time
+        draw = random.Random(seed)
+        start = positions if positions is not None else [draw.randrange(4096) for _ in self._joints]
+        code = next((code for code, baud in BAUD_OF_CODE.items() if baud == config.baud), 3)
+        self._servos = {
+            joint.id: SoftServo(joint.id, config.model, ticks, code) for joint, ticks in zip(self._joints, start, strict=True)
+        }
+        self._mounted = {servo.id: servo.mechanical_ticks for servo in self._servos.values()}
+        self.faults = LineFaults(seed)
+        self.log: deque[InstructionPacket] = deque(maxlen=10_000)
+        """Packets that were heard, oldest first."""
+        self.rejected = 0
+        """What looked like a packet, and was not heard."""
+        self.failure: str | None = None
+        self._lock = threading.RLock()
+        self._parser = PacketParser()
+        self._due: list[tuple[float, int, bytes]] = []
+        self._order = 0
+        self._heard_s = 0.0
+        self._folder: Path | None = None
+        self._pty: tuple[int, int] | None = None
+        self._plugged = False
+        self._settled = threading.Event()
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._wake: tuple[int, int] = (-1, -1)
+
+    @property
+    def port(self) -> str:
+        """Path of the serial port; the same after ``vanish`` and ``reappear``.
+
+        Raises
+        ------
+        RuntimeError
+            When the bus has not been started.
+        """
+        if self._folder is None:
+            raise RuntimeError("start the bus first")
+        return str(self._folder / "servos")
+
+    def servo(self, servo_id: int) -> SoftServo:
+        """One servo, to look at or to alter; use ``stir`` where the bus may be at work on it."""
+        return self._servos[servo_id]
+
+    def stir(self, servo_id: int, action: Callable[[SoftServo], object]) -> None:
+        """Do something to a servo at the present moment, while the bus waits: ``bus.stir(3, lambda s: s.alert(32))``."""
+        with self._lock:
+            self._advance()
+            action(self._servos[servo_id])
+
+    def positions_mm(self) -> tuple[float, ...]:
+        """Where the seven joints are now, in mm from where they were at the start, by their mechanics."""
+        with self._lock:
+            self._advance()
+            return tuple(
+                (self._servos[joint.id].mechanical_ticks - self._mounted[joint.id]) / joint.ticks_per_mm for joint in self._joints
+            )
+
+    def set_loads_mn(self, forces_mn: Sequence[float]) -> None:
+        """What pulls at each joint against its positive direction, in mN: the servos' currents show it."""
+        with self._lock:
+            for joint, force_mn in zip(self._joints, forces_mn, strict=True):
+                radius_m = joint.mm_per_turn / 6.283185307179586 / 1000.0
+                self._servos[joint.id].motor.load_mnm = joint.sign * force_mn * radius_m
+
+    def start(self) -> None:
+        """Open the pseudo-terminal and answer on it."""
+        if self._thread is None:
+            self._folder = Path(tempfile.mkdtemp(prefix="lumenpilot_servos_"))
+            self._stop.clear()
+            self.failure = None
+            self._wake = os.pipe()
+            self._plug(True)
+            self._thread = threading.Thread(target=self._run, name="twin-servos", daemon=True)
+            self._thread.start()
+
+    def stop(self) -> None:
+        """Close the line; the servos keep their state, and the bus can be started again."""
+        if self._thread is not None:
+            self._stop.set()
+            self._poke()
+            self._thread.join()
+            self._thread = None
+            self._plug(False)
+            for end in self._wake:
+                os.close(end)
+            if self._folder is not None:
+                shutil.rmtree(self._folder, ignore_errors=True)
+                self._folder = None
+
+    def vanish(self) -> None:
+        """Pull the USB plug: the port is gone. The servos live on."""
+        self._replug(False)
+
+    def reappear(self) -> None:
+        """Plug it in again, at the same path."""
+        self._replug(True)
+
+    def _replug(self, plugged: bool) -> None:
+        self._settled.clear()
+        self._plugged = plugged
+        self._poke()
+        self._settled.wait(5.0)
+
+    def _poke(self) -> None:
+        os.write(self._wake[1], b"!")
+
+    def _plug(self, plugged: bool) -> None:
+        """Make or close the pseudo-terminal. The own end of it keeps the line alive between two programs."""
+        link = Path(self.port)
+        if plugged and self._pty is None:
+            master, slave = os.openpty()
+            tty.setraw(slave)
+            os.set_blocking(master, False)
+            link.symlink_to(os.ttyname(slave))
+            self._pty = master, slave
+        elif not plugged and self._pty is not None:
+            link.unlink(missing_ok=True)
+            for end in self._pty:
+                os.close(end)
+            self._pty = None
+            self._due.clear()
+        self._plugged = plugged
+        self._parser.reset()
+
+    def _run(self) -> None:
+        with contextlib.suppress(OSError):  # they stand for hardware, which does not wait for a busy computer
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _PRIORITY)
+        try:
+            while not self._stop.is_set():
+                self._turn()
+        except Exception as error:  # noqa: BLE001 - top of the thread: the driver sees silent servos, and this says why
+            _log.exception("the twin's servos stopped")
+            self.failure = f"the twin's servos stopped ({type(error).__name__}: {error}); start the rig again"
+            self._settled.set()
+
+    def _turn(self) -> None:
+        """Wait for bytes, the next answer's time or a poke; then let the servos live and talk."""
+        wait_s = min(_IDLE_S, self._due[0][0] - time.monotonic()) if self._due else _IDLE_S
+        ends = [self._wake[0], *([self._pty[0]] if self._pty else [])]
+        ready, _, _ = select.select(ends, [], [], max(0.0, wait_s))
+        if self._wake[0] in ready:
+            os.read(self._wake[0], 64)
+        with self._lock:
+            if self._plugged != (self._pty is not None) and not self._stop.is_set():
+                self._plug(self._plugged)
+                self._settled.set()
+            elif self._pty is not None and self._pty[0] in ready:
+                self._receive(self._pty[0])
+            self._settled.set()
+            self._advance()
+            self._send()
+
+    def _receive(self, master: int) -> None:
+        with contextlib.suppress(BlockingIOError):
+            data = os.read(master, 4096)
+            now = time.monotonic()
+            if self._parser.is_midway and now - self._heard_s > _PACKET_PAUSE_S:
+                self._parser.reset()
+            self._heard_s = now
+            baud = _SPEEDS.get(termios.tcgetattr(master)[5])
+            for packet in self._parser.feed(data):
+                self._hear(packet, baud, now + self._on_wire_s(len(packet.parameters) + 10, baud))
+            self.rejected = self._parser.rejected
+
+    def _on_wire_s(self, length: int, baud: int | None) -> float:
+        return length * _BITS_PER_BYTE / baud if self._wire_time and baud else 0.0
+
+    def _advance(self) -> None:
+        now = self._clock()
+        for servo in self._servos.values():
+            servo.advance(now)
+
+    def _hear(self, packet: InstructionPacket, baud: int | None, now_s: float) -> None:
+        """One packet, by all servos that listen at this speed."""
+        self._advance()
+        awake = {i: s for i, s in self._servos.items() if not s.is_booting and BAUD_OF_CODE.get(s.table["baud_rate"]) == baud}
+        if not awake:
+            self._parser.rejected += 1
+            return
+        self.log.append(packet)
+        for servo in awake.values():
+            servo.hear()
+        if packet.instruction == Instruction.SYNC_WRITE:
+            self._group_write(packet.parameters, awake)
+        elif packet.instruction == Instruction.SYNC_READ:
+            self._group_read(packet.parameters, awake, baud, now_s)
+        else:
+            self._single(packet, awake, baud, now_s)
+
+    def _single(self, packet: InstructionPacket, awake: dict[int, SoftServo], baud: int | None, now_s: float) -> None:
+        to_all = packet.id == BROADCAST
+        for servo in sorted(awake.values(), key=lambda servo: servo.id):
+            if to_all or servo.id == packet.id:
+                answer = _do(servo, packet)
+                talks = packet.instruction == Instruction.PING if to_all else servo.answers_to(packet.instruction)
+                if talks and not self.faults.silences(servo.id):
+                    now_s = self._queue(servo, answer, baud, now_s)
+
+    def _group_read(self, parameters: bytes, awake: dict[int, SoftServo], baud: int | None, now_s: float) -> None:
+        if len(parameters) < 5:
+            return
+        address, length = int.from_bytes(parameters[:2], "little"), int.from_bytes(parameters[2:4], "little")
+        for servo_id in parameters[4:]:
+            servo = awake.get(servo_id)
+            if servo is None or self.faults.silences(servo_id) or not servo.answers_to(Instruction.READ):
+                return  # those behind wait for their turn in vain
+            now_s = self._queue(servo, servo.answer(Instruction.READ, address, length), baud, now_s)
+
+    @staticmethod
+    def _group_write(parameters: bytes, awake: dict[int, SoftServo]) -> None:
+        address, length = int.from_bytes(parameters[:2], "little"), int.from_bytes(parameters[2:4], "little")
+        items = parameters[4:]
+        if length == 0 or len(items) % (length + 1):
+            return
+        for at in range(0, len(items), length + 1):
+            servo = awake.get(items[at])
+            if servo is not None:
+                servo.answer(Instruction.WRITE, address, data=items[at + 1 : at + 1 + length])
+
+    def _queue(self, servo: SoftServo, answer: StatusReply, baud: int | None, now_s: float) -> float:
+        """Put an answer onto the line; returns when it will have passed."""
+        packet = status_packet(servo.id, answer.error, answer.data)
+        sent = self.faults.shape(servo.id, packet)
+        pause_s = 2e-6 * servo.table["return_delay"] if self._wire_time else 0.0
+        now_s += pause_s + self._on_wire_s(len(packet), baud)
+        self._order += 1
+        heapq.heappush(self._due, (now_s + sent.delay_s, self._order, sent.data))
+        return now_s
+
+    def _send(self) -> None:
+        now = time.monotonic()
+        while self._due and self._due[0][0] <= now and self._pty is not None:
+            data = heapq.heappop(self._due)[2]
+            with contextlib.suppress(BlockingIOError):  # nobody reads: the line's buffer is full, and the bytes are lost
+                os.write(self._pty[0], data)
+
+
+def _do(servo: SoftServo, packet: InstructionPacket) -> StatusReply:
+    """A single servo's instruction with its parameters taken apart."""
+    parameters = packet.parameters
+    address = int.from_bytes(parameters[:2], "little")
+    if packet.instruction == Instruction.READ:
+        return servo.answer(packet.instruction, address, int.from_bytes(parameters[2:4], "little"))
+    return servo.answer(packet.instruction, address, data=parameters[2:])

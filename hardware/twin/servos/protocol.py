@@ -1,0 +1,313 @@
+"""DYNAMIXEL Protocol 2.0 as a strict servo understands it: header, stuffing, length, CRC. Pure; no bytes make it fail.
+
+Written from the protocol's description (Robotis e-Manual), not from the vendor's SDK, so that driver and twin check each other.
+
+The control table of a DYNAMIXEL X servo (XM430), as far as a robot like this uses it: registers, access rights, indirection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cache
+
+HEADER = b"\xff\xff\xfd"
+BROADCAST = 0xFE
+MAX_PACKET = 1024
+_BODY = 7
+_STATUS = 0x55
+
+
+class Instruction(IntEnum):
+    PING = 0x01
+    READ = 0x02
+    WRITE = 0x03
+    REBOOT = 0x08
+    SYNC_READ = 0x82
+    SYNC_WRITE = 0x83
+
+
+class ErrorCode(IntEnum):
+    """What a status packet's error byte says, beside the alert bit."""
+
+    NONE = 0
+    RESULT_FAIL = 1
+    INSTRUCTION = 2
+    DATA_RANGE = 4
+    DATA_LENGTH = 5
+    DATA_LIMIT = 6
+    ACCESS = 7
+
+
+ALERT = 0x80
+
+
+@dataclass(frozen=True, slots=True)
+class InstructionPacket:
+    """A whole, valid, unstuffed packet."""
+
+    id: int
+    instruction: int
+    parameters: bytes
+
+
+def crc16(data: bytes) -> int:
+    """CRC-16 with polynomial 0x8005, start 0, no reflection."""
+    crc = 0
+    for byte in data:
+        crc = (crc << 8 & 0xFFFF) ^ _CRC_TABLE[(crc >> 8) ^ byte]
+    return crc
+
+
+def _crc_of_byte(byte: int) -> int:
+    crc = byte << 8
+    for _ in range(8):
+        crc = (crc << 1 ^ 0x8005) & 0xFFFF if crc & 0x8000 else crc << 1
+    return crc
+
+
+_CRC_TABLE = tuple(_crc_of_byte(byte) for byte in range(256))
+
+
+def stuff(body: bytes) -> bytes:
+    """Put FD behind every FF FF FD."""
+    return body.replace(HEADER, HEADER + b"\xfd")
+
+
+def unstuff(body: bytes) -> bytes | None:
+    """Take the stuffing out; None when a bare FF FF FD shows that the sender did not stuff."""
+    plain = body.replace(HEADER + b"\xfd", HEADER)
+    return plain if stuff(plain) == body else None
+
+
+def packet(servo_id: int, body: bytes) -> bytes:
+    """A packet with header, id, length, `body` (instruction first) and CRC."""
+    stuffed = stuff(body)
+    head = HEADER + bytes([0, servo_id]) + (len(stuffed) + 2).to_bytes(2, "little") + stuffed
+    return head + crc16(head).to_bytes(2, "little")
+
+
+def status_packet(servo_id: int, error: int, data: bytes = b"") -> bytes:
+    """A servo's answer."""
+    return packet(servo_id, bytes([_STATUS, error]) + data)
+
+
+class PacketParser:
+    """Finds packets in a stream of bytes. ``rejected`` counts what looked like a packet and was none."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self.rejected = 0
+
+    def reset(self) -> None:
+        """Forget half a packet, as a servo does after a pause on the line."""
+        self._buffer.clear()
+
+    @property
+    def is_midway(self) -> bool:
+        return bool(self._buffer)
+
+    def feed(self, data: bytes) -> list[InstructionPacket]:
+        """All packets that are complete with `data`."""
+        self._buffer += data
+        found = []
+        while self._find_header():
+            end = _BODY + int.from_bytes(self._buffer[5:7], "little")
+            if not _BODY + 3 <= end <= MAX_PACKET or self._buffer[4] > BROADCAST:
+                self._skip(len(HEADER))
+                continue
+            if len(self._buffer) < end:
+                break
+            whole = bytes(self._buffer[:end])
+            body = unstuff(whole[_BODY:-2])
+            if body is None:
+                # A bare header inside: the line's word for the start of a packet.
+                self._skip(whole.index(HEADER, _BODY) if HEADER in whole[_BODY:-2] else len(HEADER))
+            elif crc16(whole[:-2]) != int.from_bytes(whole[-2:], "little"):
+                self._skip(len(HEADER))
+            else:
+                del self._buffer[:end]
+                found.append(InstructionPacket(whole[4], body[0], body[1:]))
+        return found
+
+    def _find_header(self) -> bool:
+        """Drop what comes before a header; True when one is there with id and length."""
+        while (at := self._buffer.find(HEADER)) >= 0:
+            del self._buffer[:at]
+            if bytes(self._buffer[3:4]) in {b"", b"\0"}:
+                return len(self._buffer) >= _BODY
+            del self._buffer[: len(HEADER)]  # stuffed data, or no header of this protocol
+        del self._buffer[: max(0, len(self._buffer) - 2)]  # a header's beginning may be there
+        return False
+
+    def _skip(self, size: int) -> None:
+        del self._buffer[:size]
+        self.rejected += 1
+
+
+SIZE = 662
+INDIRECT_ADDRESS, INDIRECT_DATA, INDIRECT_COUNT = 168, 224, 28
+WATCHDOG_TRIPPED = -1
+EXTENDED_POSITION = 4
+MAX_TICKS = 256 * 4096 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """``eeprom`` registers are locked while the torque is on. ``low`` and ``high`` bound what is written; None: read-only."""
+
+    name: str
+    address: int
+    size: int
+    initial: int
+    low: int | None = None
+    high: int | None = None
+    eeprom: bool = False
+
+    @property
+    def writable(self) -> bool:
+        return self.low is not None
+
+
+_REGISTERS = (
+    Register("model_number", 0, 2, 1020, eeprom=True),
+    Register("model_information", 2, 4, 0, eeprom=True),
+    Register("firmware", 6, 1, 46, eeprom=True),
+    Register("id", 7, 1, 1, 0, 252, eeprom=True),
+    Register("baud_rate", 8, 1, 3, 0, 7, eeprom=True),
+    Register("return_delay", 9, 1, 250, 0, 254, eeprom=True),
+    Register("drive_mode", 10, 1, 0, 0, 13, eeprom=True),
+    Register("operating_mode", 11, 1, 3, 0, 16, eeprom=True),
+    Register("secondary_id", 12, 1, 255, 0, 255, eeprom=True),
+    Register("protocol", 13, 1, 2, 1, 2, eeprom=True),
+    Register("homing_offset", 20, 4, 0, -1_044_479, 1_044_479, eeprom=True),
+    Register("moving_threshold", 24, 4, 10, 0, 1023, eeprom=True),
+    Register("temperature_limit", 31, 1, 80, 0, 100, eeprom=True),
+    Register("max_voltage_limit", 32, 2, 160, 95, 160, eeprom=True),
+    Register("min_voltage_limit", 34, 2, 95, 95, 160, eeprom=True),
+    Register("pwm_limit", 36, 2, 885, 0, 885, eeprom=True),
+    Register("current_limit", 38, 2, 1193, 0, 1193, eeprom=True),
+    Register("velocity_limit", 44, 4, 200, 0, 1023, eeprom=True),
+    Register("max_position", 48, 4, 4095, 0, 4095, eeprom=True),
+    Register("min_position", 52, 4, 0, 0, 4095, eeprom=True),
+    Register("shutdown", 63, 1, 52, 0, 255, eeprom=True),
+    Register("torque", 64, 1, 0, 0, 1),
+    Register("led", 65, 1, 0, 0, 1),
+    Register("status_return", 68, 1, 2, 0, 2),
+    Register("registered", 69, 1, 0),
+    Register("hardware_error", 70, 1, 0),
+    Register("watchdog", 98, 1, 0, 0, 127),
+    Register("goal_pwm", 100, 2, 885, -885, 885),
+    Register("goal_current", 102, 2, 1193, -1193, 1193),
+    Register("goal_velocity", 104, 4, 0, -1023, 1023),
+    Register("profile_acceleration", 108, 4, 0, 0, 32767),
+    Register("profile_velocity", 112, 4, 0, 0, 32767),
+    Register("goal_position", 116, 4, 0, -MAX_TICKS, MAX_TICKS),
+    Register("tick_ms", 120, 2, 0),
+    Register("moving", 122, 1, 0),
+    Register("moving_status", 123, 1, 0),
+    Register("present_pwm", 124, 2, 0),
+    Register("present_current", 126, 2, 0),
+    Register("present_velocity", 128, 4, 0),
+    Register("present_position", 132, 4, 0),
+    Register("velocity_trajectory", 136, 4, 0),
+    Register("position_trajectory", 140, 4, 0),
+    Register("voltage", 144, 2, 120),
+    Register("temperature", 146, 1, 25),
+    *(
+        Register(f"indirect_address_{n + 1}", INDIRECT_ADDRESS + 2 * n, 2, INDIRECT_DATA + n, 64, SIZE - 1)
+        for n in range(INDIRECT_COUNT)
+    ),
+)
+BY_NAME = {register.name: register for register in _REGISTERS}
+GOALS = frozenset({"goal_pwm", "goal_current", "goal_velocity", "goal_position"})
+
+
+@cache
+def _by_address() -> dict[int, Register]:
+    return {register.address: register for register in _REGISTERS}
+
+
+class ControlTable:
+    """One servo's registers. Values go in and out as signed numbers by name, or as bytes over the line."""
+
+    def __init__(self) -> None:
+        self._bytes = bytearray(SIZE)
+        for register in _REGISTERS:
+            self[register.name] = register.initial
+
+    def __getitem__(self, name: str) -> int:
+        register = BY_NAME[name]
+        value = int.from_bytes(self._bytes[register.address : register.address + register.size], "little")
+        signed = name in _SIGNED or (register.low is not None and register.low < 0)
+        return value - (1 << 8 * register.size) if signed and value >> (8 * register.size - 1) else value
+
+    def __setitem__(self, name: str, value: int) -> None:
+        """The servo itself sets a register; no rights are asked."""
+        register = BY_NAME[name]
+        bits = value & (1 << 8 * register.size) - 1
+        self._bytes[register.address : register.address + register.size] = bits.to_bytes(register.size, "little")
+
+    def forget(self) -> None:
+        """RAM as after power-up; the EEPROM stays."""
+        for register in _REGISTERS:
+            if not register.eeprom:
+                self[register.name] = register.initial
+        self._bytes[INDIRECT_DATA : INDIRECT_DATA + INDIRECT_COUNT] = bytes(INDIRECT_COUNT)
+
+    def read(self, address: int, length: int) -> tuple[ErrorCode, bytes]:
+        """Bytes of the table; those at indirect data come from where their indirect address points."""
+        if length == 0:
+            return ErrorCode.DATA_LENGTH, b""
+        if address + length > SIZE:
+            return ErrorCode.ACCESS, b""
+        return ErrorCode.NONE, bytes(self._bytes[self._resolved(at)] for at in range(address, address + length))
+
+    def _resolved(self, at: int) -> int:
+        if not INDIRECT_DATA <= at < INDIRECT_DATA + INDIRECT_COUNT:
+            return at
+        pointer = INDIRECT_ADDRESS + 2 * (at - INDIRECT_DATA)
+        return min(SIZE - 1, int.from_bytes(self._bytes[pointer : pointer + 2], "little"))
+
+    def write(self, address: int, data: bytes) -> tuple[ErrorCode, list[str]]:
+        """Check and write whole registers; nothing is written when one is refused. Returns the names of those written.
+
+        Writing through indirect data is not supported, and refused.
+        """
+        values: list[tuple[Register, int]] = []
+        at = 0
+        while at < len(data):
+            register = _by_address().get(address + at)
+            if register is None:
+                return ErrorCode.ACCESS, []
+            part = data[at : at + register.size]
+            if len(part) < register.size:
+                return ErrorCode.DATA_LENGTH, []
+            error, value = self._check(register, part)
+            if error:
+                return error, []
+            values.append((register, value))
+            at += register.size
+        if not values:
+            return ErrorCode.DATA_LENGTH, []
+        for register, value in values:
+            self[register.name] = value
+        return ErrorCode.NONE, [register.name for register, _ in values]
+
+    def _check(self, register: Register, part: bytes) -> tuple[ErrorCode, int]:
+        if register.low is None or register.high is None or (register.eeprom and self["torque"]):
+            return ErrorCode.ACCESS, 0
+        value = int.from_bytes(part, "little", signed=register.low < 0)
+        if register.name in GOALS and self["watchdog"] == WATCHDOG_TRIPPED:
+            return ErrorCode.DATA_RANGE, 0
+        if not register.low <= value <= register.high:
+            return ErrorCode.DATA_RANGE, 0
+        if register.name == "profile_velocity" and value > self["velocity_limit"]:
+            return ErrorCode.DATA_LIMIT, 0
+        return ErrorCode.NONE, value
+
+
+_SIGNED = frozenset({"watchdog", "present_pwm", "present_current", "present_velocity", "present_position"}) | {
+    "velocity_trajectory",
+    "position_trajectory",
+}

@@ -1,0 +1,526 @@
+"""``annotate`` as a user calls it: studies, agreement, export, import, salvage, and the way on to ``evaluate``."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from app.annotator.sources import AnnotateOptions, StudyOptions, _names_of, asked_files, default_store, groups_of, image_files
+from app.commands.annotate import _config, queue_of, run_annotate
+from app.commands.evaluate import run_evaluate
+from core.annotation.model import Annotation, History, ImageView, MaskPolygon, MaskTarget, measure_lines
+from core.annotation.store import DEFAULT_NAME, AnnotationStore, ItemKey, find_images
+from core.config.models import Config, TwinConfig
+from core.devices import UserError
+from core.evaluation.evaluation import read_measurements
+from core.learning.dataset import find_labelled, write_png
+from core.types import PoseState
+from hardware.twin.world import TwinWorld
+from tests.core.session_data import QUICK, number_in, record, tick_of
+
+pytestmark = pytest.mark.usefixtures("looked_at_once")
+
+MAIN = Path(__file__).resolve().parents[3] / "main.py"
+BOXES = (
+    MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (200.0, 10.0), (200.0, 200.0), (10.0, 200.0))),
+    MaskPolygon(MaskTarget.ROBOT, ((10.0, 10.0), (200.0, 10.0), (200.0, 50.0), (10.0, 50.0))),
+)
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three pictures of the twin, as its camera sees them."""
+    folder = tmp_path_factory.mktemp("pictures")
+    world = TwinWorld(TwinConfig(phantom="tree"))
+    for k in range(3):
+        world.insert(50.0 + 8.0 * k)
+        write_png(folder / f"{k}.png", world.frame().image)
+    return folder
+
+
+@pytest.fixture
+def folder(pictures: Path, tmp_path: Path) -> Path:
+    for path in pictures.glob("*.png"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    return tmp_path
+
+
+def annotate(folder: Path, study: str = "", raters: tuple[str, ...] = ("ann", "bob")) -> None:
+    """Each rater answers each image twice (once outside a study); Bob turns the robot by a degree or so more."""
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        images, _ = find_images(sorted(folder.glob("*.png")), store)
+        for place, rater in enumerate(raters):
+            for repeat in (1, 2) if study else (1,):
+                for k, image in enumerate(images):
+                    bent = 190.0 + 12 * k + place + repeat
+                    content = Annotation(((250.0, 180.0), (300.0, bent)), ((200.0, 200.0), (400.0, 200.0)), masks=BOXES)
+                    measured = measure_lines(content, image.record.size, Config().perception)
+                    assert measured.pose is not None
+                    content = replace(content, state=measured.pose.state)
+                    entry = History().edit("draw", content)
+                    assert entry is not None
+                    store.save(ItemKey(image.sha256, study, rater, repeat), ImageView.AS_IS, entry, content, measured, 9.0)
+
+
+def run(folder: Path, **more: object) -> int:
+    return run_annotate(AnnotateOptions(paths=(folder,), **more))  # type: ignore[arg-type]
+
+
+def queue(folder: Path, **more: object) -> list[tuple[str, int, ImageView]]:
+    options = StudyOptions(**more)  # type: ignore[arg-type]
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        images, _ = find_images(sorted(folder.glob("*.png")), store)
+        return [
+            (i.image.path.name, i.key.repeat, i.view) for i in queue_of(store, images, options.rater or "ann", options, Config())
+        ]
+
+
+def test_the_agreement_is_printed_and_written(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    annotate(folder, "pilot")
+    assert run(folder, report=True, out=tmp_path / "report") == 0
+    printed = capsys.readouterr().out
+    assert "Study pilot: 12 answers on 3 images" in printed
+    assert "ann, bob" in printed
+    assert max(map(len, printed.splitlines())) <= 80
+    report = json.loads((tmp_path / "report" / "agreement.json").read_text())
+    assert set(report["raters"]) == {"ann", "bob"}
+    assert report["between"]["n"] == 3
+    assert len((tmp_path / "report" / "measures.csv").read_text().splitlines()) == 13
+    run(folder, report=True, as_json=True)
+    assert json.loads(capsys.readouterr().out)["study"] == "pilot"
+
+
+def test_a_report_tells_that_angles_were_drawn_under_other_lengths(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Angles that had been fitted to other lengths went into one figure with the others, and nothing said so."""
+    annotate(folder)
+    assert run(folder, report=True, as_json=True) == 0
+    before = capsys.readouterr()
+    assert "fitted otherwise" not in before.err
+    config = tmp_path / "other.toml"
+    config.write_text("[perception.vectors]\nvessel_half_length_px = 10.0\nrobot_length_px = 20.0\n")
+    assert run(folder, report=True, as_json=True, config_path=config) == 0
+    after = capsys.readouterr()
+    assert [row["theta_deg"] for row in json.loads(after.out)["measures"]] == pytest.approx(
+        [row["theta_deg"] for row in json.loads(before.out)["measures"]]
+    ), "straight lines have one angle whatever their length"
+    assert "fitted otherwise" not in after.err
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        (image, *_), _ = find_images(sorted(folder.glob("*.png")), store)
+        robot = ((200.0, 240.0), (270.0, 240.0), (290.0, 220.0))
+        content = Annotation(robot, ((150.0, 200.0), (400.0, 200.0)), PoseState.C)
+        entry = History().edit("draw", content)
+        assert entry is not None
+        measured = measure_lines(content, image.record.size, Config().perception)
+        store.save(ItemKey(image.sha256, "", "cleo"), ImageView.AS_IS, entry, content, measured, 9.0)
+    assert run(folder, report=True, as_json=True, config_path=config) == 0
+    told = capsys.readouterr()
+    assert "Of the manual angles 1 were fitted otherwise" in told.err
+    (row,) = [row for row in json.loads(told.out)["measures"] if row["rater"] == "cleo"]
+    assert row["theta_deg"] == pytest.approx(45.0)
+
+
+def test_annotations_become_a_training_set_a_coco_file_and_come_back(folder: Path, tmp_path: Path) -> None:
+    annotate(folder)
+    run(folder, export="dataset", out=tmp_path / "set")
+    samples, truth = find_labelled(tmp_path / "set")
+    assert [sample.stem for sample in samples] == ["0", "1", "2"]
+    assert truth["0"]["theta_deg"] is not None
+    run(folder, export="coco", out=tmp_path / "coco.json")
+    other = tmp_path / "other.sqlite"
+    run(folder, imports=(tmp_path / "coco.json",), store=other, study=StudyOptions(rater="eve"))
+    with AnnotationStore(other, read_only=True) as store:
+        assert [(one.key.rater, len(one.content.masks)) for one in store.annotations()] == [("eve", 2)] * 3
+    with pytest.raises(UserError, match="nothing was imported"):
+        run(folder, imports=(tmp_path / "coco.json",), store=other, study=StudyOptions(rater="eve"))
+
+
+def test_a_training_set_has_the_angles_of_one_study_and_masks_from_anywhere(folder: Path, tmp_path: Path) -> None:
+    """A study is blind, so that masks are drawn outside it: with --study they were left out, and said not to be there."""
+    annotate(folder, raters=("ann",))
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        images, _ = find_images(sorted(folder.glob("*.png")), store)
+        for image in images:
+            content = Annotation(((250.0, 180.0), (300.0, 180.0)), ((200.0, 200.0), (400.0, 200.0)), PoseState.C)
+            measured = measure_lines(content, image.record.size, Config().perception)
+            entry = History().edit("draw", content)
+            assert entry is not None
+            store.save(ItemKey(image.sha256, "first", "ann"), ImageView.AS_IS, entry, content, measured, 9.0)
+    with pytest.raises(UserError, match="several studies"):
+        run(folder, export="dataset", out=tmp_path / "any")
+    run(folder, export="dataset", out=tmp_path / "first", study=StudyOptions("first"))
+    samples, truth = find_labelled(tmp_path / "first")
+    assert [truth[sample.stem]["theta_deg"] for sample in samples] == pytest.approx([0.0] * 3, abs=1e-6)
+    run(folder, export="dataset", out=tmp_path / "outside", study=StudyOptions(""))
+    assert find_labelled(tmp_path / "outside")[1]["0"]["theta_deg"] > 5.0
+    with pytest.raises(UserError, match="nobody has answered in study 'fisrt'"):
+        run(folder, export="dataset", out=tmp_path / "misspelt", study=StudyOptions("fisrt"))
+
+
+def test_pictures_that_nobody_answered_say_nothing_of_the_groups(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A look at another folder took all intervals away, and nothing said why."""
+    annotate(folder)
+    elsewhere = folder / "elsewhere"
+    elsewhere.mkdir()
+    write_png(elsewhere / "other.png", np.full((480, 640, 3), 90, np.uint8))
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        find_images([elsewhere / "other.png"], store)
+    assert run(folder, report=True, as_json=True) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out)["pairs"][0]["angle"]["ci95"]["mean_difference_deg"] is not None
+    assert "No intervals" not in told.err
+
+
+def test_an_import_goes_on_from_the_journal_where_the_answer_itself_is_damaged(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The imported mask took the place of the lines that were in force."""
+    annotate(folder, raters=("ann",))
+    coco, bare = tmp_path / "coco.json", tmp_path / "bare.sqlite"
+    run(folder, export="coco", out=coco)
+    with AnnotationStore(bare) as store:
+        image = find_images([folder / "0.png"], store)[0][0]
+        lines = Annotation(((250.0, 180.0), (300.0, 190.0)), ((200.0, 200.0), (400.0, 200.0)), PoseState.C)
+        entry = History().edit("draw", lines)
+        assert entry is not None
+        measured = measure_lines(lines, image.record.size, Config().perception)
+        store.save(ItemKey(image.sha256, "", "ann"), ImageView.AS_IS, entry, lines, measured, 9.0)
+    with closing(sqlite3.connect(bare)) as database:
+        database.execute("UPDATE annotations SET content = replace(content, '300.0', '333.0')")
+        database.commit()
+    run(folder, imports=(coco,), store=bare, study=StudyOptions(rater="ann"))
+    assert "damaged" in capsys.readouterr().err
+    with AnnotationStore(bare, read_only=True) as store:
+        (one,) = [a for a in store.annotations() if a.key.sha256 == image.sha256]
+    assert (one.content.robot, one.content.state, len(one.content.masks)) == (lines.robot, PoseState.C, 2)
+
+
+def test_one_rater_alone_is_exported_and_reported(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    annotate(folder)
+    for name in ("ann", "bob"):
+        run(folder, export="csv", out=tmp_path / f"{name}.csv", study=StudyOptions(rater=name))
+    first, second = (read_measurements(tmp_path / f"{name}.csv") for name in ("ann", "bob"))
+    assert len(first) == len(second) == 3
+    assert [row.angle_1 for row in first] != [row.angle_1 for row in second]
+    capsys.readouterr()
+    run(folder, report=True, as_json=True, study=StudyOptions(rater="bob"))
+    assert "ann" not in json.loads(capsys.readouterr().out)["raters"]
+    for what in ({"export": "csv", "out": tmp_path / "eve.csv"}, {"report": True}):
+        with pytest.raises(UserError, match="--rater eve: has annotated nothing here; who has: ann, bob"):
+            run(folder, study=StudyOptions(rater="eve"), **what)
+    with pytest.raises(UserError, match=r"bob\.csv: is there already"):
+        run(folder, export="csv", out=tmp_path / "bob.csv")
+
+
+def test_an_annotated_folder_is_evaluated_as_its_table_is(folder: Path, tmp_path: Path) -> None:
+    annotate(folder)
+    run(folder, export="csv", out=tmp_path / "table.csv")
+    rows = read_measurements(tmp_path / "table.csv")
+    assert [row.image for row in rows] == ["0.png", "1.png", "2.png"]
+    assert all(row.angle_1 is not None and row.angle_2 is not None and row.state is not None for row in rows)
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        store.keep_look(store.annotations()[0].key, 0)
+    nothing = {"as_json": False, "model": None, "preset": None, "config_path": None, "like_paper": None, "seed": 0}
+    run_evaluate(None, tmp_path / "table.csv", tmp_path / "by_table", **nothing)  # type: ignore[arg-type]
+    run_evaluate(folder, None, tmp_path / "by_folder", **nothing)  # type: ignore[arg-type]
+    first, second = (json.loads((tmp_path / name / "metrics.json").read_text()) for name in ("by_table", "by_folder"))
+    assert (first["angle"], first["state"], first["manual"]) == (second["angle"], second["state"], second["manual"])
+    assert second["source"]["kind"] == "annotated by hand"
+    looked = "Of the manual answers 1 were given, or changed, after the algorithm's lines had been shown (key H)"
+    assert any(note.startswith(looked) for note in second["notes"])
+
+
+def test_annotated_images_that_are_elsewhere_are_counted(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    annotate(folder)
+    (folder / "2.png").unlink()
+    run(folder, export="csv", out=tmp_path / "table.csv")
+    assert f"1 of 3 annotated images are not in {folder}: left out" in capsys.readouterr().err
+
+
+def test_a_study_is_gone_on_with_as_it_was_begun(folder: Path) -> None:
+    first = queue(folder, asked="pilot", turn=True, seed=4)
+    assert len(first) == 6
+    assert {view for _, repeat, view in first if repeat == 2} == {ImageView.TURNED}
+    assert queue(folder, asked="pilot") == first
+    for other in ({"mirror": True}, {"repeats": 3}, {"seed": 5}, {"order": "even"}):
+        with pytest.raises(UserError, match=r"was begun otherwise: shown 2 times \(as is, turned\), order random, seed 4"):
+            queue(folder, asked="pilot", **other)
+
+
+def test_a_study_goes_on_without_an_image_that_vanished(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    queue(folder, asked="pilot")
+    (folder / "1.png").unlink()
+    assert {name for name, _, _ in queue(folder, asked="pilot")} == {"0.png", "2.png"}
+    assert "1.png: belongs to the study, but is not here; left out" in capsys.readouterr().err
+
+
+def test_queues_outside_studies(folder: Path) -> None:
+    names = ["0.png", "1.png", "2.png"]
+    assert [name for name, _, _ in queue(folder)] == names
+    assert [name for name, _, _ in queue(folder, order="even")] == ["0.png", "2.png", "1.png"]
+    assert sorted(name for name, _, _ in queue(folder, order="worst")) == names
+    assert queue(folder, order="random", seed=1) == queue(folder, order="random", seed=1)
+    with pytest.raises(UserError, match="belong to a study: give it a name with --study"):
+        queue(folder, mirror=True)
+    with pytest.raises(UserError, match="--order bad: must be one of listed, random, worst, even"):
+        queue(folder, order="bad")
+
+
+def test_a_damaged_file_is_salvaged_into_a_new_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    annotate(folder)
+    path = folder / DEFAULT_NAME
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(UserError, match="damaged; annotate --salvage writes what is readable into a new file"):
+        run(folder, report=True)
+    run(folder, salvage=True)
+    assert "the damaged file is as it was" in capsys.readouterr().err
+    assert path.read_bytes() == data[: len(data) // 2]
+    with pytest.raises(UserError, match="is there already; choose another --out"):
+        run(folder, salvage=True)
+
+
+def test_two_raters_files_are_joined(folder: Path, pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Ann's file comes from another computer, whose folder has the same pictures; Bob is there, too, and his name tells nothing."""
+    there = tmp_path / "there"
+    shutil.copytree(pictures, there)
+    annotate(folder, "pilot", raters=("bob",))
+    annotate(there, "pilot")
+    with pytest.raises(UserError, match=r"a rater 'bob' is there and here, .*--as bob=NAME \(somebody else\)") as raised:
+        run(folder, joins=(there,))
+    assert "\n" not in str(raised.value)
+    assert run(folder, joins=(there / DEFAULT_NAME,), names=("bob=robert",)) == 0
+    told = capsys.readouterr().err
+    assert f"{there / DEFAULT_NAME}: ann, robert (there: bob)\n" in told
+    assert f"12 answers are new in {folder / DEFAULT_NAME}, 0 went on, 0 were there already\n" in told
+    run(folder, joins=(there,))
+    assert "0 answers are new" in capsys.readouterr().err
+    run(folder, report=True, as_json=True)
+    assert set(json.loads(capsys.readouterr().out)["raters"]) == {"ann", "bob", "robert"}
+
+
+def test_raters_files_may_be_joined_into_a_new_one(folder: Path, tmp_path: Path) -> None:
+    annotate(folder, "pilot")
+    new = tmp_path / "all.sqlite"
+    with pytest.raises(UserError, match="has no answer of study 'other'"):
+        run(folder, store=new, joins=(folder,), study=StudyOptions("other"))
+    assert not new.exists(), "what was refused leaves nothing behind"
+    run(folder, store=new, joins=(folder,))
+    with AnnotationStore(new, read_only=True) as store:
+        assert len(store.annotations()) == 12
+
+
+def test_a_link_that_leads_nowhere_keeps_nobody_from_the_rest(pictures: Path, tmp_path: Path) -> None:
+    some, labelled = tmp_path / "some", tmp_path / "labelled"
+    some.mkdir()
+    shutil.copy(sorted(pictures.glob("*.png"))[0], some / "a.png")
+    for name in ("clip.mp4", "b.png"):
+        (some / name).symlink_to(tmp_path / "gone")
+    assert image_files([some], 4) == [some / "a.png"]
+    shutil.copytree(some, labelled / "images", symlinks=True)
+    (labelled / "c.png").symlink_to(tmp_path / "gone")
+    assert image_files([labelled], 4) == [labelled / "images" / "a.png"]
+    with pytest.raises(UserError, match="no such file or folder"):
+        image_files([some / "b.png"], 4)
+
+
+def test_an_empty_name_is_no_model() -> None:
+    with pytest.raises(UserError, match=r"segmentation\.model"):
+        _config(AnnotateOptions(paths=(), model=""))
+
+
+def film(video: Path, greys: Sequence[int], options: dict[str, str] | None = None) -> Path:
+    with av.open(str(video), "w") as container:
+        stream = container.add_stream("libx264", rate=30, options=options or {})
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for grey in greys:
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), grey, np.uint8), format="rgb24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return video
+
+
+def grey_of(path: Path) -> float:
+    return float(cv2.imread(str(path)).mean())
+
+
+def test_videos_whose_names_differ_in_their_endings_have_pictures_of_their_own(tmp_path: Path) -> None:
+    film(tmp_path / "run.mkv", [40] * 5)
+    film(tmp_path / "run.mp4", [200] * 5)
+    files = image_files([tmp_path], 2)
+    assert [path.parent.name for path in files] == ["run.mkv_frames"] * 2 + ["run.mp4_frames"] * 2
+    assert [round(grey_of(path), -1) for path in files] == [40, 40, 200, 200]
+
+
+def test_a_video_that_pictures_were_taken_of_is_gone_on_with_those(tmp_path: Path) -> None:
+    """The second rater's call does not say how many: a study of 500 must not become one of 48."""
+    video = film(tmp_path / "run.mp4", [4 * k for k in range(60)])
+    assert len(asked_files([video], 55)) == 55
+    assert len(asked_files([video], None)) == 55
+    other = film(tmp_path / "other.mp4", [4 * k for k in range(60)])
+    assert len(asked_files([other], None)) == 48
+
+
+def test_a_session_in_several_files_is_one_recording(tmp_path: Path) -> None:
+    """The last minute of an hour must not count as much as the hour."""
+    config = QUICK.model_copy(update={"split_s": 1.4})
+    session = record(tmp_path, [tick_of(index, 1000.0 + index / 30.0) for index in range(60)], config)
+    assert len(list(session.glob("video_*.mkv"))) == 2
+    files = image_files([session], 7)
+    assert [path.parent.name for path in files] == ["video_0000_frames"] * 5 + ["video_0001_frames"] * 2
+    assert asked_files([session], None) == files
+
+
+def test_pictures_of_an_older_video_of_its_name_are_not_taken_for_its_own(tmp_path: Path) -> None:
+    video = film(tmp_path / "take.mp4", [40] * 5)
+    files = image_files([video], 2)
+    film(video, [200] * 5)
+    for taken in (False, True):
+        with pytest.raises(UserError, match=r"take_frames: holds pictures of another video than take.mp4 is now; move it away"):
+            image_files([video], 2, taken=taken)
+    assert round(grey_of(files[0]), -1) == 40
+    (video.with_name("take_frames") / "video.json").unlink()  # as folders were before they knew whose they are
+    with pytest.raises(UserError, match="holds pictures of another video"):
+        image_files([video], 2)
+    film(video, [40] * 5)
+    assert image_files([video], 2) == files
+    assert (files[0].parent / "video.json").is_file()
+
+
+def test_a_damaged_frame_is_left_out_and_no_neighbour_taken_for_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    video = film(tmp_path / "run.mkv", [8 * k for k in range(31)], {"g": "1", "bf": "0"})
+    with av.open(str(video)) as container:
+        packets = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
+    data = bytearray(video.read_bytes())
+    position, size = packets[10]
+    data[position + 4 : position + size] = bytes(size - 4)
+    video.write_bytes(data)
+    assert [path.name for path in image_files([video], 4)] == ["run_000000.png", "run_000020.png", "run_000030.png"]
+    assert "run.mkv: 1 of 4 chosen frames are lost or damaged: left out" in capsys.readouterr().err
+
+
+def test_what_a_decoder_conceals_in_a_session_is_not_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    session = record(tmp_path, (tick_of(index, 100.0 + index / 30) for index in range(60)))
+    video = session / "video_0000.mkv"
+    with av.open(str(video)) as container:
+        packets = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
+    data = bytearray(video.read_bytes())
+    position, size = packets[20]
+    data[position + size // 2] ^= 0xFF
+    video.write_bytes(data)
+    files = image_files([session], 60)
+    assert 20 <= len(files) < 60
+    assert {path.stem for path in files} & {f"video_0000_{place:06d}" for place in range(20, 30)} == set()
+    assert "chosen frames are lost or damaged: left out" in capsys.readouterr().err
+    for path in files:
+        assert number_in(cv2.imread(str(path))[:, :, ::-1]) == int(path.stem[-6:])
+
+
+def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
+    video = film(tmp_path / "run.mkv", [8 * k for k in range(31)])
+    files = image_files([video], 4)
+    assert [path.name for path in files] == ["run_000000.png", "run_000010.png", "run_000020.png", "run_000030.png"]
+    assert image_files([video], 4) == files, "written once"
+    assert [round(grey_of(path) / 8) for path in files] == [0, 10, 20, 30]
+    assert default_store([video]) == tmp_path / DEFAULT_NAME
+    assert image_files([video], 48, taken=True) == files, "who evaluates finds what was annotated, however many those are"
+    for path in files:
+        path.unlink()
+    assert image_files([video], 4, taken=True) == files
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"report": True}, "no such annotation file; annotate the images first"),
+        ({"export": "xml", "out": Path("x")}, "--export xml: must be one of dataset, csv, coco"),
+        ({"export": "csv"}, "--export needs --out"),
+        ({"report": True, "salvage": True}, "give one of them"),
+        ({"imports": (Path("nowhere.json"),)}, "nothing was imported"),
+        ({"joins": (Path("nowhere.sqlite"),)}, "nowhere.sqlite: no such annotation file"),
+        ({"joins": (Path("a.sqlite"),), "names": ("ben",)}, "--as ben: must be THERE=HERE"),
+        ({"joins": (Path("a.sqlite"),), "names": ("user=ben", "user=eva")}, "--as user=eva: must be THERE=HERE"),
+        ({"joins": (Path("a.sqlite"),), "study": StudyOptions(rater="ben")}, "--join takes all raters of a file"),
+        ({"joins": (Path("a.sqlite"),), "report": True}, "give one of them"),
+        ({"names": ("user=ben",)}, "give --join FILE, too"),
+        ({"study": StudyOptions("first", rater="b\udcff")}, r"--rater 'b\\udcff': is no UTF-8; give the name in plain letters"),
+    ],
+)
+def test_wrong_calls_end_in_one_line(folder: Path, options: dict[str, object], message: str) -> None:
+    with pytest.raises(UserError, match=message) as raised:
+        run(folder, **options)
+    assert "\n" not in str(raised.value)
+    assert not (folder / DEFAULT_NAME).exists(), "what was refused leaves nothing behind"
+
+
+def test_the_command_ends_with_one_line_and_code_2(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, MAIN, "annotate", tmp_path / "nowhere"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"error: {tmp_path / 'nowhere'}: no such file or folder\n"
+
+
+def test_the_states_given_count_and_not_those_of_the_lines(folder: Path, tmp_path: Path) -> None:
+    annotate(folder, raters=("ann",))
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        (one, *_) = store.annotations()
+        history = store.history(one.key)
+        content = replace(one.content, state=PoseState.A)
+        entry = history.edit("state A", content)
+        assert entry is not None
+        store.save(one.key, one.view, entry, content, measure_lines(content, (640, 480), Config().perception), 9.0)
+    run(folder, export="csv", out=tmp_path / "table.csv")
+    assert read_measurements(tmp_path / "table.csv")[0].state == "A"
+
+
+@pytest.mark.usefixtures("all_orientations")
+def test_worst_first_looks_at_disagreement_too(folder: Path) -> None:
+    """An image whose manual angle is 60 degrees off the algorithm's comes before those that nobody has measured."""
+    first, *_, last = [name for name, _, _ in queue(folder, order="worst")]
+    assert first != last
+    with AnnotationStore(folder / DEFAULT_NAME) as store:
+        images, _ = find_images([folder / last], store)
+        content = Annotation(((300.0, 100.0), (300.0, 200.0)), ((280.0, 190.0), (340.0, 215.0)), PoseState.D)
+        measured = measure_lines(content, images[0].record.size, Config().perception)
+        assert measured.pose is not None
+        assert measured.pose.theta_deg > 60
+        entry = History().edit("draw", content)
+        assert entry is not None
+        store.save(ItemKey(images[0].sha256, "", "ann"), ImageView.AS_IS, entry, content, measured, 9.0)
+    assert [name for name, _, _ in queue(folder, order="worst")].index(last) < 2
+
+
+def test_sessions_that_are_called_alike_inside_are_told_apart() -> None:
+    one, other = Path("data/run_1/images"), Path("data/run_2/images")
+    assert _names_of({one, other}) == {one: "run_1/images", other: "run_2/images"}
+    assert _names_of({one}) == {one: "."}
+
+
+def test_pictures_of_one_recording_are_one_group(tmp_path: Path) -> None:
+    """Whatever folders its files have; of plain pictures in one folder nobody knows what they show."""
+    session, video, plain = (tmp_path / name for name in ("session_1", "run_frames", "pictures"))
+    parts = [session / f"video_000{k}_frames" for k in range(2)]
+    for place in (*parts, video, plain):
+        place.mkdir(parents=True)
+    (session / "frames.jsonl").touch()
+    (video / "video.json").touch()
+    of_session = [part / "a.png" for part in parts]
+    assert set(groups_of(of_session).values()) == {"session_1"}
+    assert groups_of([video / "a.png", video / "b.png"]) == {video / "a.png": "run_frames", video / "b.png": "run_frames"}
+    assert groups_of([plain / "a.png", plain / "b.png"]) == {plain / "a.png": None, plain / "b.png": None}
+    mixed = groups_of([*of_session, plain / "a.png"])
+    assert list(mixed.values()) == ["session_1", "session_1", "pictures"]

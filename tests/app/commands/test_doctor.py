@@ -1,0 +1,140 @@
+"""``doctor`` as a script and as a person call it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.commands.rig import run_doctor
+from app.operator.startup import window_config
+from core.config.models import Config
+from core.config.rig_file import RigFileError
+from hardware.preflight import checks as program
+from hardware.preflight.checks import Check
+from hardware.rig import RigKind
+
+MAIN = Path(__file__).resolve().parents[3] / "main.py"
+
+
+def _doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"QT_QPA_PLATFORM": "offscreen"}
+    command = [sys.executable, str(MAIN), "doctor", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    path = tmp_path / "bench.toml"
+    path.write_text(
+        "[gamepad]\nenabled = false\n"
+        f'[record]\nfolder = "{tmp_path}"\nwarn_free_mb = 0\nwarn_free_share = 0\n'
+        '[perception.segmentation]\ndevice = "openvino"\nthreads = 1\n'
+    )
+    return path
+
+
+def test_a_script_gets_one_json_object_and_the_exit_code(config: Path) -> None:
+    done = _doctor("--json", "--config", config)
+    checks = json.loads(done.stdout)["checks"]
+    assert all(check.keys() == {"name", "ok", "detail", "fix"} for check in checks)
+    assert done.returncode == (0 if all(check["ok"] for check in checks) else 1)
+    found = {check["name"]: check for check in checks}
+    assert found["self-test"]["ok"], found["self-test"]
+    assert found["servos"] == {"name": "servos", "ok": True, "detail": "not configured", "fix": ""}
+
+
+@pytest.mark.parametrize("arguments", [("--rig", "moon"), ("--config", "gone.toml")])
+def test_bad_input_is_one_line_and_exit_code_2(arguments: tuple[str, ...]) -> None:
+    done = _doctor("--json", *arguments)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_people_get_a_table_and_what_to_do(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    long = "echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer   # and so on, far beyond the width of a terminal"
+    checks = [Check("clock", True, "monotonic"), Check("adapter latency", False, "16 ms", long)]
+    monkeypatch.setattr("hardware.preflight.preflight.run_checks", lambda _config: iter(checks))
+    assert run_doctor(None, None, as_json=False) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.split() == ["NOT", "OK", "adapter", "latency", "16", "ms"] for line in lines)
+    assert any(line.split() == ["ok", "clock", "monotonic"] for line in lines)
+    assert lines[-2:] == ["What to do:", f"  adapter latency: {long}"]
+    checks.pop()
+    assert run_doctor(None, None, as_json=False) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "All is well."
+
+
+def test_an_opencv_that_ends_its_process_is_told_without_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    binaries = program._binaries()
+    (tmp_path / "cv2.so").write_bytes(b"\x7fELF but no more")
+    monkeypatch.setattr(program, "_binaries", lambda: [*binaries, (program.OPENCV, tmp_path / "cv2.so")])
+    monkeypatch.setattr("hardware.preflight.preflight.run_checks", None)
+    assert run_doctor(None, None, as_json=True) == 1
+    checks = json.loads(capsys.readouterr().out)["checks"]
+    assert [check["name"] for check in checks[:4]] == ["python", "packages", "system libraries", "vendor libraries"]
+    assert "OpenCV: " in checks[3]["detail"]
+    assert checks[4]["name"] == "all others"
+    assert "does not load: OpenCV: " in checks[4]["detail"]
+    assert checks[4]["fix"] == "make clean && make setup"
+
+
+def test_a_package_that_does_not_load_is_told_without_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "hardware.preflight.preflight", None)
+    assert run_doctor(None, None, as_json=False) == 1
+    told = " ".join(capsys.readouterr().out.split())
+    assert "NOT OK all others not made, since the program does not load: import of hardware.preflight.preflight halted" in told
+
+
+# --- which rig a command means ---------------------------------------------------------------------------------------------------
+
+
+def _bench(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "rig.toml"
+    path.write_text(text)
+    return path
+
+
+def test_without_a_name_the_configured_rig_is_meant(tmp_path: Path) -> None:
+    config, kind = window_config(None, None, None)
+    assert (config.rig.camera, kind) == ("twin", RigKind.SIM)
+    path = _bench(tmp_path, '[rig]\nname = "bench 2"\ncamera = "webcam"\nrobot = "none"\n')
+    config, kind = window_config(None, path, None)
+    assert (config.rig.name, kind) == ("bench 2", RigKind.LIVE)
+    assert window_config("webcam", path, None)[0] == config
+
+
+@pytest.mark.parametrize("name", ["realsense", "webcam"])
+def test_a_real_camera_drives_servos_only_when_their_port_is_known(name: str, tmp_path: Path) -> None:
+    config, kind = window_config(name, None, None)
+    assert (config.rig.name, config.rig.camera, config.rig.robot, kind) == (name, name, "none", RigKind.LIVE)
+    config, kind = window_config(name, _bench(tmp_path, '[servos]\nport = "/dev/ttyUSB7"\n'), None)
+    assert (config.rig.robot, config.servos.port, kind) == ("servos", "/dev/ttyUSB7", RigKind.LIVE)
+
+
+def test_the_twin_never_touches_the_bench(tmp_path: Path) -> None:
+    path = _bench(tmp_path, '[rig]\ncamera = "realsense"\nrobot = "servos"\n[servos]\nport = "/dev/ttyUSB7"\n')
+    config, kind = window_config("twin", path, None)
+    assert (config.rig.camera, config.rig.robot, config.servos.port, kind) == ("twin", "twin", None, RigKind.SIM)
+
+
+def test_a_realsense_recording_is_played(tmp_path: Path) -> None:
+    (tmp_path / "run.bag").touch()
+    config, kind = window_config(None, None, tmp_path / "run.bag")
+    assert (config.rig.camera, config.rig.robot, kind) == ("realsense", "none", RigKind.PLAYBACK)
+
+
+def test_an_unknown_rig_names_the_known_ones() -> None:
+    with pytest.raises(RigFileError, match="unknown rig 'moon'; known: twin, realsense, webcam"):
+        window_config("moon", None, None)
+    assert Config().rig.camera == "twin"

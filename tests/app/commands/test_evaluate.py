@@ -1,0 +1,541 @@
+"""``evaluate`` as a user calls it: the paper's table from the paper's labels, files, report, labelled sets, and bad input."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from math import atan, degrees
+from pathlib import Path
+from xml.etree import ElementTree
+
+import cv2
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from tests.core.test_classification import label_pairs
+
+from app.commands.evaluate import LikePaper, run_evaluate
+from app.commands.figures import save_figure
+from core.config.models import TwinConfig
+from core.devices import UserError
+from core.evaluation.evaluation import Measurement, read_measurements, write_measurements
+from core.evaluation.paper import PAPER_CONFUSION
+from core.learning.dataset import write_png
+from hardware.twin.world import TwinWorld
+from tests.app.annotated import measure, tube
+from tests.app.commands import MAIN, run, run_apart
+
+pytestmark = pytest.mark.usefixtures("looked_at_once")
+
+FIGURES = {"error_distribution", "bland_altman", "scatter", "confusion"}
+
+
+def evaluate(folder: Path | None = None, csv: Path | None = None, *, out: Path, **more: object) -> dict:
+    options = {"as_json": False, "model": None, "preset": None, "config_path": None, "like_paper": None, "seed": 0}
+    run_evaluate(folder, csv, out, **(options | more))  # type: ignore[arg-type]
+    return json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def drawing() -> None:
+    """Asked for by tests that are about figures."""
+
+
+@pytest.fixture(autouse=True)
+def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All others leave out what takes most of an evaluation's time."""
+    if "drawing" not in request.fixturenames:
+        monkeypatch.setattr("app.commands.figures.drawn", lambda _figure, _ending: b"<svg></svg>")
+
+
+@pytest.fixture(scope="module")
+def paper_csv(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The 44 label pairs of METHOD section 7, with made-up angles."""
+    rng = np.random.default_rng(0)
+    rows = []
+    for place, (manual, algorithm) in enumerate(zip(*label_pairs(PAPER_CONFUSION), strict=True)):
+        theta = rng.uniform(0, 60)
+        angles = [round(theta + error, 1) for error in rng.normal(0, 1.5, 3)]
+        rows.append(Measurement(f"{place}.png", angles[0], angles[1], manual, angles[2], algorithm))
+    path = tmp_path_factory.mktemp("table") / "paper.csv"
+    write_measurements(path, rows)
+    return path
+
+
+def test_the_papers_labels_print_the_papers_table(paper_csv: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    evaluate(csv=paper_csv, out=tmp_path)
+    printed = [re.split(r" {2,}", line.strip()) for line in capsys.readouterr().out.splitlines()]
+    rows = {cells[0]: cells[1:] for cells in printed if len(cells) > 1}
+    assert [rows["Accuracy"][0], rows["Accuracy"][-1]] == ["88.6 %", "88.6 %"]
+    assert [rows["Cohen’s kappa"][0], rows["Cohen’s kappa"][-1]] == ["0.796", "0.796"]
+    assert [rows["Fowlkes–Mallows, pair counting"][0], rows["Fowlkes–Mallows, pair counting"][-1]] == ["0.801", "0.801"]
+    assert rows["Fowlkes–Mallows, mean over states"][0] == "0.864"
+    table = [cells for cells in printed if cells[0] in {"B", "C", "D"} and len(cells) > 5]
+    assert [cells[1:5] for cells in table] == [
+        ["13", "0.86", "0.92", "0.89"],
+        ["26", "0.92", "0.88", "0.90"],
+        ["5", "0.80", "0.80", "0.80"],
+    ]
+    assert [cells[-3:] for cells in table] == [cells[2:5] for cells in table], "the paper's beside ours"
+    assert rows["Macro average"][1:4] == ["0.86", "0.87", "0.86"]
+    assert rows["Weighted average"][1:4] == ["0.89", "0.89", "0.89"]
+    assert ["B", "12", "1", "0"] in printed
+    assert ["C", "2", "23", "1"] in printed
+    assert ["D", "0", "1", "4"] in printed
+
+
+def test_json_is_all_there_is_on_standard_output(paper_csv: Path, tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "out"
+    done = run_apart("evaluate", "--csv", paper_csv, "--out", out, "--json")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert json.loads(done.stdout) == json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+    assert json.loads(done.stdout)["state"]["confusion"] == [list(row) for row in PAPER_CONFUSION]
+    wanted = {"metrics.json", "measurements.csv", "report.html"} | {f"{name}{end}" for name in FIGURES for end in (".svg", ".pdf")}
+    assert {path.name for path in out.iterdir()} == wanted
+    assert (out / "scatter.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.usefixtures("drawing")
+def test_the_same_input_gives_the_same_files(paper_csv: Path, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        evaluate(csv=paper_csv, out=tmp_path / name)
+    for path in (tmp_path / "one").iterdir():
+        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
+
+
+class _Page(HTMLParser):
+    """Ids, references and outside addresses of a page; every opened element must be closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.references: list[str] = []
+        self.loads: list[str] = []
+        self.open: list[str] = []
+        self.counts: dict[str, int] = {}
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        if tag not in {"meta", "br"}:
+            self.open.append(tag)
+        self._note(dict(attributes))
+
+    def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self._note(dict(attributes))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def _note(self, attributes: dict[str, str | None]) -> None:
+        self.ids += [attributes["id"] or ""] if "id" in attributes else []
+        links = [value for name, value in attributes.items() if name in {"src", "href", "xlink:href"}]
+        self.references += [link[1:] for link in links if link and link.startswith("#")]
+        self.references += re.findall(r"url\(#([^)]*)\)", " ".join(value or "" for value in attributes.values()))
+        self.loads += [link for link in links if link and not link.startswith("#")]
+
+
+@pytest.mark.usefixtures("drawing")
+def test_the_report_is_one_page_that_needs_nothing_else(paper_csv: Path, tmp_path: Path) -> None:
+    evaluate(csv=paper_csv, out=tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = _Page()
+    page.feed(text)
+    assert page.open == []
+    assert page.loads == []
+    assert not re.search(r"https?:|//[a-z]|@import|<script", text)
+    assert page.counts["svg"] == len(FIGURES)
+    assert len(page.ids) == len(set(page.ids)), "ids of the figures do not collide"
+    assert set(page.references) <= set(page.ids)
+    for words in ("0.796", "0.801", "0.86", "Evaluation of paper.csv", "n = 44", "95 % interval"):
+        assert words in text
+
+
+def test_the_report_says_that_whole_sessions_are_drawn(paper_csv: Path, tmp_path: Path) -> None:
+    evaluate(csv=paper_csv, out=tmp_path / "alone")
+    assert "Images are taken as independent" in (tmp_path / "alone" / "report.html").read_text(encoding="utf-8")
+    rows = [replace(row, group=f"session {place % 11}") for place, row in enumerate(read_measurements(paper_csv))]
+    write_measurements(tmp_path / "grouped.csv", rows)
+    evaluate(csv=tmp_path / "grouped.csv", out=tmp_path / "out")
+    assert "Whole groups (sessions or phantoms; 11 of them) are drawn" in (tmp_path / "out" / "report.html").read_text(
+        encoding="utf-8"
+    )
+    assert read_measurements(tmp_path / "out" / "measurements.csv") == rows
+
+
+@pytest.mark.usefixtures("drawing")
+def test_figures_carry_units_and_are_valid_svg(paper_csv: Path, tmp_path: Path) -> None:
+    from app.commands.figures import draw_figures
+    from core.evaluation.evaluation import angle_pairs
+    from core.evaluation.evaluation import evaluate as measure
+
+    rows = read_measurements(paper_csv)
+    figures = draw_figures(angle_pairs(rows), measure(rows))
+    assert set(figures) == FIGURES
+    axes = {name: figure.axes[0] for name, figure in figures.items()}
+    assert axes["error_distribution"].get_xlabel() == "Error, algorithm − manual (°)"
+    assert "(°)" in axes["bland_altman"].get_xlabel() and "(°)" in axes["bland_altman"].get_ylabel()
+    assert axes["scatter"].get_xlim() == axes["scatter"].get_ylim()
+    assert sum(bar.get_height() for bar in axes["error_distribution"].patches if bar.get_facecolor()[2] > 0.5) >= 44
+    evaluate(csv=paper_csv, out=tmp_path)
+    for name in FIGURES:
+        assert ElementTree.parse(tmp_path / f"{name}.svg").getroot().tag.endswith("svg")
+
+
+@pytest.mark.usefixtures("drawing")
+def test_a_figure_of_an_earlier_evaluation_does_not_stay(paper_csv: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    evaluate(csv=paper_csv, out=out)
+    write_measurements(tmp_path / "states.csv", [Measurement("a", None, None, "B", None, "B")])
+    found = evaluate(csv=tmp_path / "states.csv", out=out)
+    assert found["angle"]["mean_error_deg"] is None
+    assert {path.stem for path in out.glob("*.svg")} == {"confusion"}
+
+
+@pytest.mark.usefixtures("drawing")
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [Measurement("a", 10.0, None, "B", 12.0, "B")],
+        [Measurement(name, 10.0, 10.0, "B", 10.0, "B") for name in "abc"],
+        [Measurement(name, 0.0, 0.0, None, 0.0, None) for name in "ab"],
+        [Measurement("a", 5.0, 6.0, "D", 179.0, "A"), Measurement("b", -170.0, None, "A", 180.0, "D")],
+    ],
+)
+def test_small_and_constant_tables_still_make_a_report(rows: list[Measurement], tmp_path: Path) -> None:
+    write_measurements(tmp_path / "t.csv", rows)
+    found = evaluate(csv=tmp_path / "t.csv", out=tmp_path / "out")
+    assert found["notes"]
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_names_in_a_table_cannot_change_the_report(tmp_path: Path) -> None:
+    path = tmp_path / "<script>x.csv"
+    write_measurements(path, [Measurement("<script>", 1.0, None, "B", 2.0, "B")])
+    evaluate(csv=path, out=tmp_path / "out")
+    assert "<script" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_errors_are_one_line_and_exit_code_2(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text("image,angle_1\na,1\n")
+    done = run("evaluate", "--csv", bad, "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
+    assert "'angle_2' is missing" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_cannot_be_evaluated_says_so(paper_csv: Path, tmp_path: Path) -> None:
+    blank = tmp_path / "blank.csv"
+    write_measurements(blank, [Measurement("a", 1.0, 1.0, "B", None, None)])
+    (tmp_path / "taken").write_text("a file")
+    (tmp_path / "folder").mkdir()
+    out = tmp_path / "out"
+    cases = [
+        ({"csv": blank, "out": out}, "nothing to compare"),
+        ({"csv": paper_csv, "out": tmp_path / "taken"}, "cannot be made"),
+        ({"csv": paper_csv, "out": tmp_path / "taken" / "in"}, "cannot be made"),
+        ({"out": out}, "give either"),
+        ({"folder": tmp_path, "csv": paper_csv, "out": out}, "give either"),
+        ({"csv": paper_csv, "out": out, "like_paper": LikePaper(1.5)}, "need a labelled set"),
+        ({"csv": paper_csv, "out": out, "model": "default"}, "need a labelled set"),
+        ({"folder": tmp_path / "folder", "out": out}, "not a labelled set"),
+        ({"folder": tmp_path / "nowhere", "out": out}, "no such folder"),
+        ({"folder": paper_csv, "out": out}, "not a labelled set"),
+    ]
+    for arguments, words in cases:
+        with pytest.raises(UserError, match=words) as caught:
+            evaluate(**arguments)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_may_not_be_written_to(paper_csv: Path, tmp_path: Path) -> None:
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o500)
+    with pytest.raises(UserError, match="cannot be"):
+        evaluate(csv=paper_csv, out=locked)
+
+
+# labelled sets
+
+
+@pytest.fixture(scope="module")
+def labelled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Four frames of the twin and a black one without a pose, as synth lays them out."""
+    folder = tmp_path_factory.mktemp("data") / "set"
+    for part in ("images", "masks"):
+        (folder / part).mkdir(parents=True)
+    world = TwinWorld(TwinConfig(phantom="tree"))
+    rows = []
+    for place in range(4):
+        world.insert(50.0 + 8.0 * place)
+        truth = world.truth()
+        assert truth.pose is not None
+        image = world.frame().image
+        state = "BCDC"[place]  # a label by hand; what the algorithm makes of it is not the matter here
+        rows.append({"stem": f"{place:06d}", "theta_deg": truth.pose.theta_deg, "state": state})
+        _write_frame(folder, rows[-1]["stem"], image)
+    rows.append({"stem": "000004", "theta_deg": None, "state": None})
+    _write_frame(folder, "000004", np.zeros_like(image))
+    (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    yield folder
+
+
+def _write_frame(folder: Path, stem: str, image: np.ndarray) -> None:
+    cv2.imwrite(str(folder / "images" / f"{stem}.png"), image[:, :, ::-1])
+    for task in ("vessel", "robot"):
+        cv2.imwrite(str(folder / "masks" / f"{stem}_{task}.png"), np.zeros(image.shape[:2], np.uint8))
+
+
+@pytest.mark.usefixtures("all_orientations")
+def test_a_labelled_set_is_perceived_and_its_truth_is_the_manual_measure(labelled: Path, tmp_path: Path) -> None:
+    found = evaluate(labelled, out=tmp_path / "out")
+    truth = [json.loads(line) for line in (labelled / "truth.jsonl").read_text().splitlines()]
+    rows = read_measurements(tmp_path / "out" / "measurements.csv")
+    assert [(row.image, row.angle_1, row.state) for row in rows] == [(t["stem"], t["theta_deg"], t["state"]) for t in truth]
+    assert all(row.angle_2 is None for row in rows)
+    assert rows[4].algorithm_state is None
+    assert found["images"]["measured"] == 4
+    assert found["angle"]["n"] == found["images"]["answered"] >= 1
+    assert sum(found["source"]["refused"].values()) == found["images"]["unanswered"]
+    assert any("1 images show no pose" in note for note in found["notes"])
+    again = evaluate(csv=tmp_path / "out" / "measurements.csv", out=tmp_path / "again")
+    assert (again["angle"], again["state"]) == (found["angle"], found["state"]), "the table can be evaluated by itself"
+
+
+def test_a_study_like_the_papers(labelled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = evaluate(labelled, out=tmp_path / "out", like_paper=LikePaper(2.0), seed=7)
+    rows = read_measurements(tmp_path / "out" / "measurements.csv")
+    assert [row.state for row in rows] == ["B", "C", "D", "C"]
+    assert all(row.angle_1 != row.angle_2 for row in rows)
+    assert found["manual"]["n"] == 4
+    assert found["source"]["wanted"] == {"B": 14, "C": 28, "D": 6}
+    assert found["source"]["manual_sd_deg"] == 2.0
+    assert "The set has 2 of the 28 wanted images of state C." in found["notes"]
+    assert set(found["against_paper"].values()) <= {"better", "equal", "worse", None}
+    assert "of the paper’s 27 figures are bettered" in capsys.readouterr().out
+    assert "Against it" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_damaged_picture_does_not_cost_the_others(labelled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    damaged = Path(shutil.copytree(labelled, tmp_path / "set"))
+    cut = damaged / "images" / "000003.png"
+    cut.write_bytes(cut.read_bytes()[:500])
+    found = evaluate(damaged, out=tmp_path / "out")
+    assert [row.image for row in read_measurements(tmp_path / "out" / "measurements.csv")] == [
+        "000000",
+        "000001",
+        "000002",
+        "000004",
+    ]
+    assert "1 images could not be read and are left out." in found["notes"]
+    assert f"note: 1 of 5 frames could not be read and are left out; the first: {cut}" in capsys.readouterr().err
+    for path in (damaged / "images").glob("*.png"):
+        path.write_bytes(b"")
+    with pytest.raises(UserError, match=r"none of 5 frames could be read; the first: .*000000\.png: empty file"):
+        evaluate(damaged, out=tmp_path / "out")
+
+
+def test_an_interrupted_evaluation_keeps_what_was_perceived(
+    labelled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from core import files
+
+    read = files.read_image
+
+    def third_is_interrupted(path: Path) -> np.ndarray:
+        if path.stem == "000002":
+            raise KeyboardInterrupt
+        return read(path)
+
+    monkeypatch.setattr(files, "read_image", third_is_interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(labelled, out=tmp_path / "out")
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    assert "Interrupted after 2 of 5 images." in metrics["notes"]
+    assert [row.image for row in read_measurements(tmp_path / "out" / "measurements.csv")] == ["000000", "000001"]
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_a_set_with_a_hole_is_one_clear_line(labelled: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    (broken / "images").mkdir(parents=True)
+    (broken / "masks").mkdir()
+    _write_frame(broken, "a", np.zeros((120, 160, 3), np.uint8))
+    for text, words in (
+        ('{"stem": "b"}\n', "1 of 1 frames lack a truth"),
+        ('{"stem": "a", "theta_deg": "x", "state": "B"}\n', "line 1: theta_deg: "),
+        ('{"stem": "a", "theta_deg": 3, "state": "E"}\n', "line 1: state: "),
+    ):
+        (broken / "truth.jsonl").write_text(text)
+        with pytest.raises(UserError, match=words):
+            evaluate(broken, out=tmp_path / "out")
+    (broken / "truth.jsonl").write_text('{"stem": "a", "theta_deg": 3, "state": "A"}\n')
+    with pytest.raises(UserError, match="no image of the states B, C and D"):
+        evaluate(broken, out=tmp_path / "out", like_paper=LikePaper(1.5))
+
+
+def test_the_window_does_not_load_matplotlib_or_scikit_learn() -> None:
+    code = "import sys, app.cli, app.operator.window; print([m for m in ('matplotlib', 'sklearn', 'jinja2') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=MAIN.parent)
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_a_study_is_evaluated_with_its_raters_and_repeats(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two raters measure two images twice: bo always two degrees more than al, and the second measure is as the first."""
+    images = [tmp_path / f"frame_{index}.png" for index in range(2)]
+    for index, image in enumerate(images):
+        write_png(image, tube(index)[0])
+    store = tmp_path / "annotations.lumenpilot.sqlite"
+    for repeat in (1, 2):
+        measure(store, images, [0.0, 10.0], study="main", rater="al", repeat=repeat)
+        measure(store, images, [2.0, 12.0], study="main", rater="bo", repeat=repeat)
+    measure(store, images, [5.0, 5.0], study="pilot", rater="al")
+    out = tmp_path / "out"
+    with pytest.raises(UserError, match=r"holds several studies.*choose one with --study NAME"):
+        evaluate(tmp_path, out=out)
+    metrics = evaluate(tmp_path, out=out, study_name="main")
+    agreement = metrics["agreement"]
+    assert agreement["within"]["n"] == 2
+    assert metrics["manual"]["repeatability_sd_deg"] == agreement["within"]["sd_deg"] == pytest.approx(0.0, abs=1e-6)
+    assert agreement["annotations"] == 8
+    assert sorted(agreement["raters"]) == ["al", "bo"]
+    assert agreement["raters"]["al"]["sd_deg"] == pytest.approx(0.0, abs=1e-6)
+    wanted = (degrees(atan(2 / 40)) + degrees(atan(12 / 40)) - degrees(atan(10 / 40))) / 2
+    assert agreement["pairs"][0]["angle"]["mean_difference_deg"] == pytest.approx(wanted, abs=0.05)
+    report = (out / "report.html").read_text()
+    for part in ("<h2>Raters</h2>", "First against second", "al, bo", "ICC(2,1)"):
+        assert part in report
+    printed = capsys.readouterr().out
+    assert "Rater against rater" in printed
+    assert printed.count("SD of one") == report.count("<td>SD of one") == 1, "one figure, in one place"
+    assert len((out / "raters.csv").read_text().splitlines()) == 9
+
+
+def test_images_of_other_folders_are_found_where_they_were_annotated(tmp_path: Path) -> None:
+    """Sessions beside each other, one file: only those in the file's own folder were found, and the others said to be gone."""
+    images = [tmp_path / f"session_{index // 2}" / f"frame_{index}.png" for index in range(4)]
+    for index, image in enumerate(images):
+        image.parent.mkdir(exist_ok=True)
+        write_png(image, tube(index)[0])
+    store = images[0].parent / "annotations.lumenpilot.sqlite"
+    for rater, tilts in (("al", [0.0, 10.0, 5.0, 2.0]), ("bo", [2.0, 12.0, 9.0, 6.0])):
+        measure(store, images, tilts, study="main", rater=rater)
+    metrics = evaluate(store.parent, out=tmp_path / "out", study_name="main")
+    assert not any("not where they were" in note for note in metrics["notes"])
+    assert metrics["agreement"]["annotations"] == 8
+    rows = read_measurements(tmp_path / "out" / "measurements.csv")
+    assert [(row.image, row.group) for row in rows] == [(image.name, image.parent.name) for image in images]
+
+
+def test_raters_are_compared_on_the_images_that_are_here_only(tmp_path: Path) -> None:
+    """Those that are gone were told to be in none of the figures, and were in the raters' agreement, by their hashes."""
+    images = [tmp_path / f"frame_{index}.png" for index in range(3)]
+    for index, image in enumerate(images):
+        write_png(image, tube(index)[0])
+    store = tmp_path / "annotations.lumenpilot.sqlite"
+    for repeat, tilts in ((1, [0.0, 10.0, 5.0]), (2, [0.0, 10.0, 25.0])):
+        measure(store, images, tilts, study="main", rater="al", repeat=repeat)
+    images[2].unlink()
+    metrics = evaluate(tmp_path, out=tmp_path / "out", study_name="main")
+    assert "Of the annotated images 1 are not where they were; they are in none of the figures." in metrics["notes"]
+    within = metrics["agreement"]["within"]
+    assert (within["n"], within["sd_deg"]) == (2, pytest.approx(0.0, abs=1e-6))
+    lines = (tmp_path / "out" / "raters.csv").read_text().splitlines()[1:]
+    assert {line.partition(",")[0] for line in lines} == {"frame_0.png", "frame_1.png"}
+
+
+def test_what_was_measured_outside_studies_can_be_chosen(tmp_path: Path) -> None:
+    images = [tmp_path / f"frame_{index}.png" for index in range(2)]
+    for index, image in enumerate(images):
+        write_png(image, tube(index)[0])
+    store = tmp_path / "annotations.lumenpilot.sqlite"
+    measure(store, images, [0.0, 10.0])
+    measure(store, images, [5.0, 5.0], study="main")
+    done = run("evaluate", tmp_path, "--out", tmp_path / "out", "--json", "--study", "")
+    assert done.returncode == 0, done.stderr
+    rows = read_measurements(tmp_path / "out" / "measurements.csv")
+    assert [row.angle_1 for row in rows] == pytest.approx([0.0, degrees(atan(10 / 40))], abs=0.05)
+    done = run("annotate", tmp_path, "--report", "--json", "--study=")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["study"] == ""
+
+
+def test_an_interrupted_evaluation_of_annotated_images_keeps_what_was_perceived(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from core import files as image_files
+
+    paths = [tmp_path / f"frame_{index}.png" for index in range(3)]
+    for index, path in enumerate(paths):
+        write_png(path, tube(index)[0])
+    measure(tmp_path / "annotations.lumenpilot.sqlite", paths, [0.0, 10.0, 5.0], study="main", rater="al")
+    read, calls = image_files.read_image, []
+
+    def third_is_interrupted(path: Path) -> np.ndarray:
+        calls.append(path)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return read(path)
+
+    monkeypatch.setattr(image_files, "read_image", third_is_interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(tmp_path, out=tmp_path / "out")
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    assert "Interrupted after 2 of 3 images." in metrics["notes"]
+    assert len(read_measurements(tmp_path / "out" / "measurements.csv")) == 2
+
+
+def test_a_study_needs_images_annotated_by_hand(paper_csv: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="--study needs images annotated by hand"):
+        evaluate(csv=paper_csv, out=tmp_path / "out", study_name="main")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UserError, match="begin the study with: annotate"):
+        evaluate(tmp_path / "empty", out=tmp_path / "out", study_name="main")
+
+
+def test_a_study_goes_before_the_truth_of_its_set(tmp_path: Path) -> None:
+    images = [tmp_path / f"frame_{index}.png" for index in range(3)]
+    for index, image in enumerate(images):
+        write_png(image, tube(index)[0])
+    measure(tmp_path / "annotations.lumenpilot.sqlite", images, [0.0, 10.0, 5.0], study="main")
+    images[2].unlink()
+    (tmp_path / "truth.jsonl").write_text("")
+    result = evaluate(tmp_path, out=tmp_path / "out", study_name="main")
+    assert result["source"]["kind"] == "annotated by hand"
+    assert result["notes"][0] == "Of the annotated images 1 are not where they were; they are in none of the figures."
+    with pytest.raises(UserError, match="not a labelled set"):
+        evaluate(tmp_path, out=tmp_path / "out")
+
+
+def test_names_that_are_no_utf8_are_shown_as_bytes(paper_csv: Path, labelled: Path, tmp_path: Path) -> None:
+    """As archives from old systems have them."""
+    name = os.fsdecode(b"caf\xe9")
+    table = tmp_path / f"{name}.csv"
+    shutil.copy(paper_csv, table)
+    assert evaluate(csv=table, out=tmp_path / "out")["source"]["name"] == r"caf\xe9.csv"
+    folder = Path(shutil.copytree(labelled, tmp_path / name))
+    for path in (*folder.glob("*/000000*.png"),):
+        path.rename(path.with_name(path.name.replace("000000", name)))
+    truth = folder / "truth.jsonl"
+    truth.write_text(truth.read_text().replace('"000000"', json.dumps(name)))
+    assert evaluate(folder, out=tmp_path / "of_set")["source"]["name"] == r"caf\xe9"
+    assert read_measurements(tmp_path / "of_set" / "measurements.csv")[-1].image == r"caf\xe9"
+
+
+@pytest.mark.usefixtures("drawing")
+@pytest.mark.parametrize("ending", [".svg", ".pdf", ".png"])
+def test_a_figure_that_the_disk_does_not_take_is_an_error_of_the_disk(tmp_path: Path, ending: str) -> None:
+    full = tmp_path / f"figure{ending}"
+    full.symlink_to("/dev/full")
+    with pytest.raises(OSError, match="No space left"):
+        save_figure(Figure(), full)

@@ -1,0 +1,293 @@
+"""``perceive`` as scripts and studies rely on it, on pictures that the twin renders now; and what bad input gives."""
+
+from __future__ import annotations
+
+import json
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from core.config.models import TwinConfig
+from core.files import read_image
+from hardware.twin.world import TwinWorld
+from tests.app.commands import MAIN, run, run_apart
+
+pytestmark = pytest.mark.usefixtures("looked_at_once")
+
+KEYS = set(
+    "image width height head_xy tail_xy robot_path_xy robot_vector vessel_vector theta_deg theta_signed_deg d_head_px d_tail_px "
+    "crossed state confidence reason latency_ms".split()
+)
+
+
+def rows(path: Path) -> list[dict]:
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def world() -> TwinWorld:
+    world = TwinWorld(TwinConfig(phantom="tree"))
+    world.insert(70.0)
+    return world
+
+
+@pytest.fixture(scope="module")
+def picture(world: TwinWorld, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("in") / "photo.png"
+    cv2.imwrite(str(path), world.frame().image[:, :, ::-1])
+    return path
+
+
+def test_a_picture_gives_the_contracts_object_masks_and_overlay(picture: Path, world: TwinWorld, tmp_path: Path) -> None:
+    done = run_apart("perceive", picture, "--jsonl", tmp_path / "o.jsonl", "--masks", tmp_path / "m", "--overlay", tmp_path / "s")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    (row,) = rows(tmp_path / "o.jsonl")
+    assert set(row) == KEYS
+    truth = world.truth()
+    assert truth.pose is not None
+    assert truth.head_xy is not None
+    assert row["reason"] is None
+    assert row["state"] in {"A", "B", "C", "D"}
+    assert np.hypot(*(np.array(row["head_xy"]) - truth.to_source(truth.head_xy))) < 6.0
+    assert abs(row["theta_deg"] - truth.pose.theta_deg) < 6.0
+    assert row["theta_deg"] == abs(row["theta_signed_deg"])
+    assert row["robot_path_xy"][-1] == pytest.approx(row["head_xy"], abs=0.01)
+    assert set(row["robot_vector"]) == {"start", "center", "end"}
+    assert 0 < row["confidence"] <= 1
+    assert row["latency_ms"]["total"] > 0
+    for name in ("vessel", "robot"):
+        mask = read_image(tmp_path / "m" / f"photo_{name}.png")
+        assert mask.shape == (480, 640, 3)
+        assert set(np.unique(mask)) == {0, 255}
+    assert read_image(tmp_path / "s" / "photo_overlay.png").shape[1] >= 640
+
+
+def test_points_are_source_pixels_and_distances_working_pixels(picture: Path, tmp_path: Path) -> None:
+    image = cv2.imread(str(picture))
+    cv2.imwrite(str(tmp_path / "double.png"), cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC))
+    assert run("perceive", picture, tmp_path / "double.png", "--jsonl", tmp_path / "o.jsonl").returncode == 0
+    one, two = rows(tmp_path / "o.jsonl")
+    assert (two["width"], two["height"]) == (1280, 960)
+    np.testing.assert_allclose(np.array(two["head_xy"]), np.array(one["head_xy"]) * 2 + 0.5, atol=6.0)
+    assert abs(two["d_head_px"] - one["d_head_px"]) < 3.0
+
+
+def test_bad_files_are_objects_with_a_reason_and_the_rest_goes_on(picture: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "mixed"
+    folder.mkdir()
+    data = picture.read_bytes()
+    (folder / "a_cut.png").write_bytes(data[: len(data) // 2])
+    (folder / "b_empty.png").write_bytes(b"")
+    (folder / "c_good.png").write_bytes(data)
+    (folder / "notes.txt").write_text("other files are left alone")
+    grey16 = cv2.imread(str(picture), cv2.IMREAD_GRAYSCALE).astype(np.uint16) * 257
+    cv2.imwrite(str(folder / "d_grey16.png"), grey16)
+    (folder / "e_gone.png").symlink_to(tmp_path / "moved away.png")
+    done = run("perceive", folder, "--jsonl", tmp_path / "o.jsonl")
+    assert done.returncode == 0, done.stderr
+    cut, empty, good, grey, gone = rows(tmp_path / "o.jsonl")
+    assert "cut short" in cut["reason"]
+    assert cut["state"] is None
+    assert cut["confidence"] == 0
+    assert "empty file" in empty["reason"]
+    assert good["state"] is not None
+    assert grey["state"] is not None
+    assert "No such file" in gone["reason"]
+    assert "3 pictures could not be read" in done.stderr
+
+
+def test_pictures_of_nothing_have_no_pose_and_a_named_reason(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    folder = tmp_path / "nothing"
+    folder.mkdir()
+    made = {
+        "black": np.zeros((480, 640, 3), np.uint8),
+        "white": np.full((480, 640, 3), 255, np.uint8),
+        "grey": np.full((480, 640, 3), 128, np.uint8),
+        "noise": rng.integers(0, 255, (480, 640, 3), np.uint8),
+        "tiny": np.full((3, 2, 3), 90, np.uint8),
+        "strip": np.full((4, 900, 3), 90, np.uint8),
+    }
+    for name, image in made.items():
+        cv2.imwrite(str(folder / f"{name}.png"), image)
+    assert run("perceive", folder, "--jsonl", tmp_path / "o.jsonl").returncode == 0
+    found = {Path(row["image"]).stem: row for row in rows(tmp_path / "o.jsonl")}
+    assert set(found) == set(made)
+    for row in found.values():
+        assert row["state"] is None
+        assert row["theta_deg"] is None
+        assert row["reason"]
+    assert found["black"]["reason"].startswith("image black")
+    assert found["white"]["reason"].startswith("image overexposed")
+
+
+def test_without_a_robot_there_is_no_pose(world: TwinWorld, tmp_path: Path) -> None:
+    empty = TwinWorld(TwinConfig(phantom="tree"))
+    image = empty._renderer.render(None).image
+    cv2.imwrite(str(tmp_path / "empty.png"), image[:, :, ::-1])
+    assert run("perceive", tmp_path / "empty.png", "--jsonl", tmp_path / "o.jsonl").returncode == 0
+    (row,) = rows(tmp_path / "o.jsonl")
+    assert row["state"] is None
+    assert row["reason"]
+
+
+def test_a_video_is_perceived_frame_by_frame(picture: Path, tmp_path: Path) -> None:
+    import av
+
+    image = read_image(picture)
+    with av.open(str(tmp_path / "v.mkv"), "w") as container:
+        stream = container.add_stream("mpeg4", rate=30, options={"qscale": "2"})
+        stream.width, stream.height, stream.pix_fmt, stream.bit_rate = 640, 480, "yuv420p", 8_000_000
+        for _ in range(3):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode())
+    assert run("perceive", tmp_path / "v.mkv", "--jsonl", tmp_path / "o.jsonl").returncode == 0
+    found = rows(tmp_path / "o.jsonl")
+    assert [row["image"].rsplit("#")[-1] for row in found] == ["0", "1", "2"]
+    assert all(row["state"] for row in found)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's full device")
+def test_a_full_disk_is_one_clear_error(picture: Path) -> None:
+    done = run("perceive", picture, "--jsonl", "/dev/full")
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (
+        2,
+        "error: /dev/full: cannot be written (No space left on device); choose another file",
+    )
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, str(MAIN), "perceive", str(picture)]
+        to_output = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        assert (to_output.returncode, "Traceback" in to_output.stderr) == (2, False)
+        assert "error: standard output: cannot be written" in to_output.stderr
+        asked = subprocess.run([sys.executable, str(MAIN), "--help"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        assert (asked.returncode, asked.stderr) == (2, "error: output: the disk is full; make room, or write to another one\n")
+
+
+def test_a_dash_is_standard_output(picture: Path, tmp_path: Path) -> None:
+    done = run("perceive", picture, "--jsonl", "-", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["state"] is not None
+    assert list(tmp_path.iterdir()) == []
+    named = run("perceive", picture, "--jsonl", "./-", cwd=tmp_path)
+    assert (named.returncode, named.stdout) == (0, "")
+    assert json.loads((tmp_path / "-").read_text())["state"] == json.loads(done.stdout)["state"]
+
+
+def test_a_small_file_that_says_it_is_huge_is_refused_before_it_is_decoded(tmp_path: Path) -> None:
+    side = 30_000
+    values = {256: side, 257: side, 258: 8, 259: 1, 262: 1, 273: 8, 277: 1, 278: side, 279: 4}  # width, height, bits, ...
+    entries = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in values.items())
+    (tmp_path / "huge.tif").write_bytes(struct.pack("<2sHIIH", b"II", 42, 12, 0, len(values)) + entries + bytes(4))
+    done = run_apart("perceive", tmp_path / "huge.tif")
+    assert done.returncode == 2
+    assert done.stderr.rstrip().endswith("huge.tif: is larger than 120 million pixels")
+
+
+@pytest.mark.parametrize("place", ["1e308", "1" + "0" * 400, "NaN", "true", "null"])
+def test_a_target_in_no_picture_on_earth_is_refused(picture: Path, tmp_path: Path, place: str) -> None:
+    (tmp_path / "t.json").write_text(f'{{"photo": [{place}, 1]}}')
+    done = run("perceive", picture, "--targets", tmp_path / "t.json")
+    assert done.returncode == 2
+    assert "photo: needs an object" in done.stderr.splitlines()[-1]
+
+
+def test_a_target_of_no_picture_is_noted(picture: Path, tmp_path: Path) -> None:
+    (tmp_path / "t.json").write_text(json.dumps({"photo": [320, 240], "phoot": [1, 2]}))
+    done = run("perceive", picture, "--targets", tmp_path / "t.json", "--jsonl", tmp_path / "o.jsonl")
+    assert done.returncode == 0, done.stderr
+    assert "targets of no picture: phoot" in done.stderr
+
+
+def test_pictures_of_the_same_name_do_not_overwrite_each_other(picture: Path, tmp_path: Path) -> None:
+    for name in ("x/a.png", "y/a.png", "y/a_2.png"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(picture.read_bytes())
+    arguments = [tmp_path / name for name in ("x/a.png", "y/a.png", "y/a_2.png")]
+    assert run("perceive", *arguments, "--jsonl", tmp_path / "o.jsonl", "--masks", tmp_path / "m").returncode == 0
+    assert sorted(p.name for p in (tmp_path / "m").glob("*_robot.png")) == ["a_2_robot.png", "a_3_robot.png", "a_robot.png"]
+
+
+def test_pictures_of_the_same_name_have_targets_of_their_own(picture: Path, tmp_path: Path) -> None:
+    for name in ("x/a.png", "y/a.png"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(picture.read_bytes())
+    (tmp_path / "t.json").write_text(json.dumps({"a": [320, 240], "a_2": [300, 200]}))
+    done = run("perceive", tmp_path / "x/a.png", tmp_path / "y/a.png", "--targets", tmp_path / "t.json")
+    assert done.returncode == 0, done.stderr
+    assert "targets of no picture" not in done.stderr
+
+
+def test_what_cannot_be_written_is_told_and_the_rest_goes_on(picture: Path, tmp_path: Path) -> None:
+    (tmp_path / "m").mkdir()
+    (tmp_path / "m" / "photo_vessel.png").mkdir()
+    other = tmp_path / "other.png"
+    other.write_bytes(picture.read_bytes())
+    done = run("perceive", picture, other, "--jsonl", tmp_path / "o.jsonl", "--masks", tmp_path / "m")
+    assert done.returncode == 2
+    assert "1 pictures could not be written" in done.stderr
+    assert len(rows(tmp_path / "o.jsonl")) == 2
+    assert (tmp_path / "m" / "other_robot.png").is_file()
+
+
+def test_a_folder_of_folders_says_in_which_there_are_pictures(picture: Path, tmp_path: Path) -> None:
+    for name in ("monday", "tuesday", "notes"):
+        (tmp_path / "set" / name).mkdir(parents=True)
+    where = tmp_path / "set"
+    for name, words in (
+        ("monday", f"{where / 'monday'} has some: name that"),
+        ("tuesday", "and others in it (2 folders) have some"),
+    ):
+        (where / name / "a.png").write_bytes(picture.read_bytes())
+        done = run("perceive", where)
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"error: {where}: no pictures or videos there; ")
+        assert words in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["perceive", "{tmp}/none.png"], "none of 1 pictures could be read"),
+        (["perceive", "{tmp}/empty_folder"], "no pictures or videos there"),
+        (["perceive", "{picture}", "--model", "nope"], "no model 'nope'"),
+        (["perceive", "{picture}", "--preset", "nope"], "unknown preset"),
+        (["perceive", "{picture}", "--masks", "{tmp}/file/masks"], "cannot be written"),
+        (["perceive", "{picture}", "--jsonl", "{tmp}/file/o.jsonl"], "cannot be written"),
+        (["perceive", "{picture}", "--targets", "{tmp}/bad.json"], "not valid JSON"),
+        (["perceive", "{picture}", "--targets", "{tmp}/odd.json"], "needs an object"),
+        (["perceive", "{picture}", "--config", "{tmp}/bad.toml"], "perception.pose.d_allow_px: must be > 0 and <= 200"),
+        (["gui", "--rig", "nope"], "unknown rig 'nope'"),
+        (["gui", "--source", "{tmp}/none.mp4"], "no such file"),
+        (["gui", "--source", "{tmp}/bad.toml"], "--source takes a folder of pictures, or a file that ends in .png, "),
+        (["gui", "--source", "{tmp}/cut.png"], "cut.png: "),
+        (["train", "--out", "{tmp}/model"], "nothing to train on"),
+        (["train", "--data", "{tmp}/empty_folder", "--out", "{tmp}/model"], "needs images/NAME.png"),
+        (["benchmark", "--accuracy", "{tmp}/empty_folder"], "no labelled frames"),
+    ],
+)
+def test_bad_input_is_one_clear_line_and_exit_code_2(arguments: list[str], words: str, picture: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty_folder").mkdir()
+    (tmp_path / "file").write_text("a file where a folder is wanted")
+    (tmp_path / "bad.json").write_text("{")
+    (tmp_path / "cut.png").write_bytes(picture.read_bytes()[:100])
+    (tmp_path / "odd.json").write_text('{"photo": [1, "x"]}')
+    (tmp_path / "bad.toml").write_text("[perception.pose]\nd_allow_px = 0\n")
+    done = run(*(a.format(tmp=tmp_path, picture=picture) for a in arguments))
+    assert done.returncode == 2
+    lines = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
+    assert len(lines) == 1
+    assert words in lines[0]
+    assert "Traceback" not in done.stderr
+
+
+def test_help_names_every_command() -> None:
+    done = run("--help")
+    assert done.returncode == 0
+    for command in ("gui", "perceive", "synth", "train", "benchmark"):
+        assert command in done.stdout

@@ -1,0 +1,459 @@
+"""The whole window over a fake engine: what keys, clicks and sizes do."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QEvent, QRect, Qt, QTimer
+from PySide6.QtWidgets import QAbstractItemView, QApplication, QLabel
+from pytestqt.qtbot import QtBot
+
+from app.operator.engine_thread import EnginePhase
+from app.operator.window import OperatorWindow
+from app.ui import theme
+from app.ui.actions import action_of
+from app.widgets.event_log import LogKind
+from app.widgets.scene_overlay import Layer
+from core.config.models import Config
+from core.control.modes import Act
+from core.control.motion import AT_REST, Jog
+from core.devices import DeviceError, EndOfStream
+from core.types import Tick
+from hardware.rig import RigKind
+from tests.app.conftest import MakeWindow
+from tests.app.fakes import FakeBench, FakeEngine, until
+
+Key = Qt.Key
+
+
+def test_keys_move_the_robot_while_held(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    qtbot.keyPress(running, Key.Key_W)
+    assert engine.jogs[-1] == Jog(advance=1.0)
+    lit = [motion.value for motion, cap in running.panels.jog._caps.items() if cap.is_lit]
+    assert lit == ["advance"]
+    qtbot.keyRelease(running, Key.Key_W)
+    assert engine.jogs[-1] == AT_REST
+    assert not any(cap.is_lit for cap in running.panels.jog._caps.values())
+
+
+def test_losing_the_focus_stops_the_robot(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    qtbot.keyPress(running, Key.Key_W)
+    QApplication.sendEvent(running, QEvent(QEvent.Type.WindowDeactivate))
+    assert engine.jogs[-1] == AT_REST
+
+
+def test_the_arrows_are_the_menu_bars_after_a_tap_on_alt(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    bar, live = running.menuBar(), running.panels.live
+    running.activateWindow()
+    live.setFocus()
+    qtbot.keyClick(live, Key.Key_Alt)
+    assert running.focusWidget() is bar
+    engine.jogs.clear()
+    for key in (Key.Key_Right, Key.Key_W):
+        qtbot.keyClick(bar, key)
+    assert engine.jogs == [], "who looks for a menu moves nothing"
+    assert bar.activeAction() is bar.actions()[1]
+    qtbot.keyClick(bar, Key.Key_Space)
+    assert engine.pilot.acts == [Act.STOP]
+    qtbot.keyClick(bar, Key.Key_Escape)
+    assert running.focusWidget() is live
+    qtbot.keyPress(live, Key.Key_Right)
+    assert engine.jogs[-1] == Jog(bend=1.0)
+    qtbot.keyRelease(live, Key.Key_Right)
+
+
+def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    chip = running.panels.overlay_bar._chips[Layer.MASKS]
+    chip.setFocus()
+    qtbot.keyPress(running, Key.Key_W)
+    qtbot.keyClick(chip, Key.Key_Space)
+    assert engine.jogs[-1] == AT_REST
+    assert engine.pilot.acts == [Act.STOP]
+    assert chip.isChecked(), "space is no click here"
+
+
+def test_digits_switch_overlays(running: OperatorWindow, qtbot: QtBot) -> None:
+    for layer in Layer:
+        qtbot.keyClick(running, layer.value.key)
+        assert not running.panels.overlay_bar.is_on(layer)
+        assert not action_of(running, layer.value.key).isChecked()
+    qtbot.keyClick(running, Key.Key_0)
+    assert all(running.panels.overlay_bar.is_on(layer) for layer in Layer)
+    assert all(action_of(running, layer.value.key).isChecked() for layer in Layer)
+
+
+def test_digits_typed_into_the_seed_switch_nothing(running: OperatorWindow, qtbot: QtBot) -> None:
+    assert running.panels.picker is not None
+    seed = running.panels.picker._seed
+    seed.setEnabled(True)
+    seed.setFocus()
+    qtbot.keyClicks(seed, "12")
+    assert running.panels.overlay_bar.is_on(Layer.MASKS)
+
+
+def test_escape_in_the_seed_takes_back_what_was_typed_and_gives_the_keys_to_the_robot(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    picker = running.panels.picker
+    assert picker is not None
+    picker.show_name("random:5")
+    chosen: list[str] = []
+    picker.chosen.connect(chosen.append)
+    running.panels.live.clicked.emit(500.0, 280.0)
+    picker._seed.setFocus()
+    qtbot.keyClicks(picker._seed, "12")
+    qtbot.keyClick(picker._seed, Key.Key_Escape)
+    assert running.focusWidget() is running.panels.live
+    assert picker.name == "random:5"
+    assert picker._seed.text() == "seed 5"
+    assert chosen == []
+    assert engine.targets[-1] is not None, "the target is not what was meant"
+    qtbot.keyPress(running.panels.live, Key.Key_W)
+    assert engine.jogs[-1].advance > 0.0
+
+
+def test_the_list_of_phantoms_never_takes_the_keys(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    assert running.panels.picker is not None
+    combo = running.panels.picker._combo
+    combo.showPopup()
+    qtbot.keyClick(combo.view(), Key.Key_Escape)
+    combo.hidePopup()
+    assert not combo.hasFocus()
+    name = running.panels.picker.name
+    for field in (running.panels.live, combo):
+        field.setFocus()
+        qtbot.keyPress(field, Key.Key_Down)
+        assert engine.jogs[-1].advance < 0.0
+        qtbot.keyRelease(field, Key.Key_Down)
+    combo.setFocus()
+    qtbot.keyClicks(combo, "tz")  # it would go to "Tree"
+    assert running.panels.picker.name == name
+
+
+@pytest.mark.parametrize("way", ["key", "tab and enter"])
+def test_a_phantom_is_chosen_by_keyboard(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, way: str) -> None:
+    picker = running.panels.picker
+    assert picker is not None
+    combo, chosen, moved = picker._combo, [], len(engine.jogs)
+    picker.chosen.connect(chosen.append)
+    if way == "key":
+        qtbot.keyClick(running, Key.Key_P, Qt.KeyboardModifier.ControlModifier)
+    else:
+        assert combo.focusPolicy() & Qt.FocusPolicy.TabFocus
+        combo.setFocus()
+        qtbot.keyClick(combo, Key.Key_Return)
+    qtbot.waitUntil(combo.view().isVisible)
+    qtbot.keyClick(combo.view(), Key.Key_Down)
+    qtbot.keyClick(combo.view(), Key.Key_Return)
+    qtbot.waitUntil(lambda: chosen == ["tree"])
+    assert not combo.view().isVisible()
+    assert all(jog.is_rest for jog in engine.jogs[moved:]), "the arrows chose, they moved nothing"
+
+
+def test_enter_presses_the_button_that_has_the_focus(running: OperatorWindow, qtbot: QtBot) -> None:
+    bar = running.panels.overlay_bar
+    chip = bar._chips[Layer.MASKS]
+    chip.setFocus()
+    qtbot.keyClick(chip, Key.Key_Return)
+    assert not bar.is_on(Layer.MASKS)
+    running.panels.live.setFocus()
+    qtbot.keyClick(running.panels.live, Key.Key_Enter)
+    assert not bar.is_on(Layer.MASKS), "without a button Enter does nothing"
+
+
+def test_click_sets_the_target_and_escape_clears_it(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running.panels.live.clicked.emit(500.0, 280.0)
+    assert engine.targets[-1] == (500.0, 280.0)
+    until(qtbot, lambda: running.shown_tick is not None and running.shown_tick.scene.route is not None)
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert engine.targets[-1] is None
+    running.panels.live.clicked.emit(500.0, 280.0)
+    running.panels.live.cleared.emit()
+    assert engine.targets[-1] is None
+
+
+def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    opened: list[str] = []
+    engines: list[FakeEngine] = []
+
+    def open_engine(config: Config) -> FakeEngine:
+        opened.append(config.twin.phantom)
+        engines.append(FakeEngine(bench))
+        return engines[-1]
+
+    window = make_window(open_engine)
+    window.start()
+    until(qtbot, lambda: window.shown_tick is not None)
+    window.panels.live.clicked.emit(500.0, 280.0)
+    qtbot.keyPress(window, Key.Key_D)
+    assert window.panels.picker is not None
+    window.panels.picker.chosen.emit("tree")
+    assert window._phase is EnginePhase.STARTING
+    assert not window.panels.live._picture.isVisible(), "the old world is not shown as the new one"
+    assert window._target is None
+    assert window.desk.jog.held == frozenset()
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert opened == ["s_curve", "tree"]
+    assert engines[0].closed.is_set()
+    qtbot.keyRelease(window, Key.Key_D)
+    qtbot.keyClick(window, Key.Key_R)
+    until(qtbot, lambda: len(opened) == 3)
+    assert opened[-1] == "random:1"
+
+
+def test_window_stays_alive_while_a_phantom_is_opened(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    """It is opened only when the window has turned often enough: a window that waits for it would wait in vain."""
+    turned_often, alive = threading.Event(), []
+
+    def open_slowly(_config: Config) -> FakeEngine:
+        alive.append(turned_often.wait(20.0))
+        return FakeEngine(bench)
+
+    window = make_window(open_slowly)
+    turns: list[EnginePhase] = []
+    timer = QTimer()
+    timer.timeout.connect(lambda: turns.append(window._phase))
+    timer.timeout.connect(lambda: turned_often.set() if len(turns) >= 20 else None)
+    timer.start(1)
+    window.start()
+    until(qtbot, lambda: window.shown_tick is not None)
+    assert alive == [True]
+    assert set(turns[1:20]) == {EnginePhase.STARTING}
+
+
+@pytest.mark.parametrize("page", ["events", "commands"])
+def test_a_list_is_reached_by_tab_scrolled_by_keys_and_left_by_escape(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, page: str
+) -> None:
+    """While it has the focus the arrows are its own; letters and STOP are the robot's as everywhere."""
+    panels = running.panels
+    panels.pages.setCurrentWidget({"events": panels.events, "commands": panels.commands}[page])
+    view = panels.pages.currentWidget().findChild(QAbstractItemView)
+    assert view is not None
+    for number in range(200):
+        panels.events.add(LogKind.OPERATOR, f"event {number}")
+    view.verticalScrollBar().setRange(0, max(500, view.verticalScrollBar().maximum()))
+    for _ in range(80):
+        qtbot.keyClick(running.focusWidget(), Key.Key_Tab)
+        if running.focusWidget() is view:
+            break
+    assert running.focusWidget() is view
+    engine.jogs.clear()
+    bar = view.verticalScrollBar()
+    qtbot.keyClick(view, Key.Key_Down)
+    assert bar.value() > 0
+    before = bar.value()
+    qtbot.keyClick(view, Key.Key_PageDown)
+    assert bar.value() > before
+    qtbot.keyClick(view, Key.Key_Home)
+    qtbot.keyClick(view, Key.Key_Up)
+    assert bar.value() == bar.minimum()
+    assert engine.jogs == []
+    qtbot.keyPress(view, Key.Key_W)
+    assert engine.jogs[-1] == Jog(advance=1.0)
+    qtbot.keyRelease(view, Key.Key_W)
+    qtbot.keyClick(view, Key.Key_Space)
+    assert engine.pilot.acts == [Act.STOP]
+    qtbot.keyClick(view, Key.Key_Escape)
+    assert running.focusWidget() is not view
+    qtbot.keyPress(running, Key.Key_Up)
+    assert engine.jogs[-1] == Jog(advance=1.0)
+    qtbot.keyRelease(running, Key.Key_Up)
+
+
+def test_a_click_into_a_list_leaves_the_arrows_to_the_robot(running: OperatorWindow, qtbot: QtBot) -> None:
+    panels = running.panels
+    panels.pages.setCurrentWidget(panels.events)
+    view = panels.events.findChild(QAbstractItemView)
+    qtbot.mouseClick(view.viewport(), Qt.MouseButton.LeftButton)
+    assert running.focusWidget() is not view
+
+
+def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    qtbot.keyClick(running, Key.Key_P)
+    until(qtbot, running.panels.toast.isVisible)
+    assert str(tmp_path / "shots") in running.panels.toast.text()
+    names = sorted(path.name for path in (tmp_path / "shots").iterdir())
+    assert [name.partition("_")[2][-12:] for name in names if name.endswith("overlay.png")]
+    record = json.loads(next((tmp_path / "shots").glob("*.json")).read_text())
+    assert record["state"] in ("A", "B", "C", "D")
+    assert (record["rig"], record["phantom"], record["model"]) == ("SIM", "s_curve", "default")
+
+
+def test_a_snapshot_names_the_phantom_that_runs(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    assert running.panels.picker is not None
+    running.panels.picker.show_name("tree")  # chosen, and not opened
+    qtbot.keyClick(running, Key.Key_P)
+    until(qtbot, running.panels.toast.isVisible)
+    (told,) = (tmp_path / "shots").glob("*.json")
+    assert json.loads(told.read_text())["phantom"] == "s_curve"
+
+
+def test_no_snapshot_of_a_picture_that_is_not_live(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, tmp_path: Path
+) -> None:
+    engine.silent = True
+    until(qtbot, lambda: running.panels.badge.title == "No new picture")
+    qtbot.keyClick(running, Key.Key_P)
+    assert running.panels.toast.text() == "No snapshot: the picture is not live"
+    engine.silent = False
+    until(qtbot, lambda: running.panels.badge.title != "No new picture")
+    engine.fail_with = EndOfStream("the end")
+    until(qtbot, lambda: running._phase is EnginePhase.ENDED)
+    qtbot.keyClick(running, Key.Key_P)
+    assert running.panels.toast.text() == "No snapshot: the picture is not live"
+    assert not (tmp_path / "shots").exists()
+
+
+@pytest.mark.parametrize("error", [EndOfStream("the end"), DeviceError("unplugged")])
+def test_nothing_is_held_any_more_after_the_end(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, error: Exception
+) -> None:
+    qtbot.keyPress(running, Key.Key_D)
+    qtbot.keyPress(running, Key.Key_W)
+    engine.fail_with = error
+    until(qtbot, lambda: running._phase in (EnginePhase.ENDED, EnginePhase.FAULT))
+    assert running.desk.jog.held == frozenset()
+    assert running.panels.jog.readout.startswith("bend –")
+
+
+def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    """The end may come before the last picture's time on the screen; the picture is shown nevertheless."""
+
+    class Short(FakeEngine):
+        def step(self, timeout_s: float) -> Tick | None:
+            if self._index == 3:
+                raise EndOfStream("the end")
+            return super().step(timeout_s)
+
+    window = make_window(lambda _config: Short(bench), kind=RigKind.PLAYBACK)
+    shown: list[int] = []
+    show_tick = window.panels.show_tick
+
+    def spy(tick: Tick, max_block_ms: float) -> None:
+        shown.append(tick.frame.index)
+        show_tick(tick, max_block_ms)
+
+    window.panels.show_tick = spy  # type: ignore[method-assign]
+    window._pace._due_s = time.monotonic() + 60.0  # no picture's time comes before the end
+    window.start()
+    until(qtbot, lambda: window._phase is EnginePhase.ENDED)
+    assert shown == [3]
+    assert window.panels.live._picture.isVisible()
+
+
+def test_snapshot_into_an_unwritable_folder_is_one_line(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "shots").write_text("a file where the folder should be")
+    qtbot.keyClick(running, Key.Key_S, Qt.KeyboardModifier.ControlModifier)
+    until(qtbot, running.panels.toast.isVisible)
+    assert running.panels.toast.text().startswith("Snapshot not saved: ")
+
+
+def test_no_snapshot_before_the_first_picture(make_window: MakeWindow, qtbot: QtBot) -> None:
+    window = make_window()
+    until(qtbot, window.isActiveWindow)
+    qtbot.keyClick(window, Key.Key_P)
+    assert window.panels.toast.text() == "No snapshot: there is no picture yet"
+
+
+def test_help_and_full_screen_and_what_escape_leaves_first(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running.panels.live.clicked.emit(500.0, 280.0)
+    qtbot.keyClick(running, Key.Key_F11)
+    assert running.isFullScreen()
+    assert not running.menuBar().isVisible()
+    assert running.panels.banner.isVisible(), "the banner is permanent"
+    qtbot.keyClick(running, Key.Key_F1)
+    assert running.panels.help.isVisible()
+    assert running.panels.help.mapTo(running, running.panels.help.rect().topLeft()).y() > running.panels.banner.geometry().bottom()
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert not running.panels.help.isVisible()
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert not running.isFullScreen()
+    assert running.menuBar().isVisible()
+    running.showFullScreen()
+    assert not running.menuBar().isVisible()
+    assert action_of(running, "F11").isChecked()
+    running.showNormal()  # as the desktop does it
+    assert running.menuBar().isVisible()
+    assert not action_of(running, "F11").isChecked()
+    assert engine.targets[-1] is not None, "the target is cleared last"
+    qtbot.keyClick(running, Key.Key_Escape)
+    assert engine.targets[-1] is None
+
+
+class Screen:
+    """A screen of a given size, as far as it is asked."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self._room = QRect(0, 0, width, height)
+
+    def availableGeometry(self) -> QRect:
+        return self._room
+
+
+SCREENS = [((1920, 1080), (1600, 900)), ((1366, 768), (1358, 728)), ((1280, 720), (1272, 680)), ((800, 600), (1100, 660))]
+
+
+@pytest.mark.parametrize(("screen", "expected"), SCREENS)
+def test_window_opens_no_larger_than_the_screen(screen: tuple[int, int], expected: tuple[int, int]) -> None:
+    assert theme.start_size(Screen(*screen)).toTuple() == expected  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900), (1920, 1080)])
+def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[int, int]) -> None:
+    running.resize(*size)
+    qtbot.wait(30)
+    assert (running.width(), running.height()) == size
+    shown = running.panels
+    everywhere = (shown.live, shown.badge, shown.gauge, shown.bars, shown.clearance, shown.mode, shown.mode_bar)
+    on_pages = (shown.jog, shown.trends, shown.servos, shown.commands, shown.events)
+    for widget in (*everywhere, *on_pages):
+        page = next((k for k in range(shown.pages.count()) if shown.pages.widget(k).isAncestorOf(widget)), None)
+        page = page if page is not None else shown.pages.indexOf(widget)
+        if page >= 0:
+            shown.pages.setCurrentIndex(page)
+            qtbot.wait(10)
+        assert widget.isVisible(), widget
+        assert widget.height() >= widget.minimumSizeHint().height(), widget
+        assert widget.height() >= widget.minimumHeight(), widget
+        assert widget.width() >= widget.minimumWidth(), widget
+    assert running.panels.live.width() >= 0.5 * size[0]
+
+
+@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900)])
+def test_the_page_of_keys_leaves_stop_in_sight_and_in_reach(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, size: tuple[int, int]
+) -> None:
+    """F1 lies beside the keys that drive: the first click on STOP is a STOP also while the page is open."""
+    panels, stop = running.panels, running.panels.mode_bar.stop
+    qtbot.keyClick(running, Key.Key_F1)
+    running.resize(*size)
+    qtbot.wait(30)
+    assert panels.help.isVisible()
+    bar = panels.mode_bar
+    assert running.childAt(stop.mapTo(running, stop.rect().center())) is stop
+    assert panels.help.geometry().bottom() < bar.mapTo(panels.help.parentWidget(), bar.rect().topLeft()).y()
+    qtbot.mouseClick(running.windowHandle(), Qt.MouseButton.LeftButton, pos=stop.mapTo(running, stop.rect().center()))
+    assert engine.pilot.acts == [Act.STOP]
+    assert panels.help.isVisible()
+
+
+def test_a_screen_of_720_lines_is_enough(running: OperatorWindow, qtbot: QtBot) -> None:
+    """In a low window the trends have a page of their own; the legend names only what is drawn."""
+    assert running.minimumSizeHint().height() <= 660
+    assert theme.MIN_WINDOW[1] <= 660
+    legends = [label for label in running.findChildren(QLabel) if "\N{GREEK SMALL LETTER THETA}" in label.text()]
+    for size, is_page in (((1280, 680), True), ((1600, 900), False), ((1280, 720), True)):
+        running.resize(*size)
+        qtbot.wait(30)
+        trends = running.panels.trends
+        assert (running.panels.pages.indexOf(running.panels._trends_card) >= 0) is is_page
+        if is_page:
+            running.panels.pages.setCurrentWidget(running.panels._trends_card)
+            qtbot.wait(30)
+        assert trends._angle._box.height() >= 36
+        assert ("d_head" in legends[0].text()) is trends.has_distances

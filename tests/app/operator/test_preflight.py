@@ -1,0 +1,212 @@
+"""Checks before driving: made beside the window, kept for some minutes, and a red one stands against arming."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import pytest
+from PySide6.QtCore import QPoint, QRect
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from app.operator.preflight import KEPT_S, PreflightModel, live_findings
+from app.operator.window import OperatorWindow
+from app.ui.texts import OperatorStep
+from app.ui.workers import module_of
+from app.widgets.preflight_list import PreflightList
+from core.config.models import Config
+from core.control.faults import Cause, Fault
+from core.control.modes import Act
+from core.control.pilot import DriveView
+from hardware.preflight.preflight import Level
+from tests.app.fakes import FakeEngine, until
+
+GOOD = {"name": "model", "ok": True, "detail": "all files are whole", "fix": ""}
+BAD = {"name": "self-test", "ok": False, "detail": "it gives no pose", "fix": "git checkout -- resources/models"}
+LOW = {"name": "recordings", "ok": False, "detail": "0.1 GB free", "fix": "make room"}
+
+
+def says(*checks: dict[str, object], code: int = 0, first: str = "") -> list[str]:
+    """A process that reads a configuration and makes these checks."""
+    lines = "".join(f"print({json.dumps(json.dumps(check))}, flush=True);" for check in checks)
+    return [sys.executable, "-c", f"import sys, time; sys.stdin.read(); {first}\n{lines}\nsys.exit({code})"]
+
+
+@dataclass
+class Bench:
+    """A desk with a clock and a rig that a test turns."""
+
+    config: Config = field(default_factory=Config)
+    view: DriveView | None = field(default_factory=lambda: DriveView(0.0))
+    now_s: float = 100.0
+    asked: list[str] = field(default_factory=list)
+
+    def desk(self, command: list[str]) -> PreflightModel:
+        desk = PreflightModel(lambda: self.config, lambda: self.view, command=command, clock=lambda: self.now_s)
+        desk.asked.connect(self.asked.append)
+        return desk
+
+
+def done(desk: PreflightModel, qtbot: QtBot) -> None:
+    qtbot.waitUntil(lambda: not desk.preflight.is_running, timeout=30_000)
+
+
+def test_arming_waits_for_the_checks_and_then_is_granted_for_some_minutes(qtbot: QtBot) -> None:
+    bench = Bench()
+    desk = bench.desk(says(GOOD, LOW))
+    assert not desk.may_take(OperatorStep.ARM)
+    assert desk.preflight.is_running
+    assert "some seconds" in bench.asked[0]
+    done(desk, qtbot)
+    assert desk.preflight.headline == "Ready: 3 of 4 checks good, 1 to note"
+    assert desk.may_take(OperatorStep.ARM)
+    bench.now_s += KEPT_S - 1.0
+    assert desk.may_take(OperatorStep.ARM)
+    bench.now_s += 2.0
+    assert not desk.may_take(OperatorStep.ARM), "too long ago"
+    assert desk.preflight.is_running
+    desk.close()
+
+
+def test_a_red_check_refuses_with_its_reason_and_what_to_do(qtbot: QtBot) -> None:
+    bench = Bench()
+    desk = bench.desk(says(GOOD, BAD))
+    desk.begin()
+    done(desk, qtbot)
+    assert not desk.may_take(OperatorStep.ARM)
+    assert bench.asked == ["Not armed. Self-test: it gives no pose. What to do: git checkout -- resources/models"]
+    for step in OperatorStep:
+        assert desk.may_take(step) is (step is not OperatorStep.ARM)
+
+
+def test_another_model_needs_new_checks_and_another_phantom_does_not(qtbot: QtBot) -> None:
+    bench = Bench()
+    desk = bench.desk(says(GOOD))
+    desk.begin()
+    done(desk, qtbot)
+    bench.config = Config.model_validate({"twin": {"phantom": "tree"}})
+    assert desk.preflight.is_fresh
+    bench.config = Config.model_validate({"perception": {"segmentation": {"model": "own_1"}}})
+    assert not desk.preflight.is_fresh
+    assert desk.preflight.findings == live_findings(bench.view), "what was found of another model is not shown"
+
+
+def test_without_a_robot_nothing_is_in_the_way() -> None:
+    bench = Bench(view=None)
+    assert bench.desk(says(BAD)).may_take(OperatorStep.ARM), "the pilot is not there to refuse; the window says so itself"
+    assert bench.asked == []
+
+
+@pytest.mark.parametrize(
+    ("command", "why"),
+    [
+        (says(GOOD, code=3), "exit code 3"),
+        (says(GOOD, first="sys.stderr.write('error: no memory\\n'); sys.exit(2)"), "no memory"),
+        (["/nowhere/python"], "cannot be started"),
+    ],
+)
+def test_checks_that_cannot_be_made_are_no_good_checks(command: list[str], why: str, qtbot: QtBot) -> None:
+    bench = Bench()
+    desk = bench.desk(command)
+    desk.begin()
+    done(desk, qtbot)
+    assert why in desk.preflight.headline
+    assert not desk.may_take(OperatorStep.ARM)
+    desk.close()
+
+
+def test_a_process_that_hangs_is_given_up(qtbot: QtBot) -> None:
+    bench = Bench()
+    desk = bench.desk(says(GOOD, first="time.sleep(100)"))
+    desk.begin()
+    desk._limit.start(50)
+    done(desk, qtbot)
+    assert "no answer" in desk.preflight.problem
+
+
+def test_lines_that_are_no_checks_are_left_out(qtbot: QtBot) -> None:
+    bench = Bench()
+    desk = bench.desk(says({"name": "half"}, {}, GOOD))
+    desk.begin()
+    done(desk, qtbot)
+    assert [finding.name for finding in desk.preflight.findings] == ["camera's pictures", "servos' answers", "model"]
+
+
+def test_what_the_open_rig_says_of_itself() -> None:
+    assert live_findings(None) == ()
+    assert all(finding.level is Level.GOOD for finding in live_findings(DriveView(0.0)))
+    faults = (Fault(Cause.WARM, "61 °C"), Fault(Cause.CAMERA_LOST, "newest frame 900 ms old"))
+    camera, servos = live_findings(DriveView(0.0, active=faults))
+    assert (camera.level, servos.level) == (Level.BAD, Level.WARNING)
+    assert camera.detail == "Camera lost (newest frame 900 ms old)"
+    assert camera.fix
+
+
+@pytest.fixture
+def window(qtbot: QtBot) -> Iterator[QWidget]:
+    window = QWidget()
+    qtbot.addWidget(window)
+    yield window
+
+
+def test_the_list_shows_words_not_only_colours_and_the_worst_first(window: QWidget, qtbot: QtBot) -> None:
+    desk = Bench().desk(says(GOOD, BAD))
+    shown = PreflightList(desk, window)
+    shown.open_list()
+    assert not shown.arm.isEnabled()
+    shown.again.click()
+    assert not shown.again.isEnabled()
+    done(desk, qtbot)
+    assert shown.headline == "Not ready: 1 of 4 checks stands against driving"
+    assert "NOT READY self-test: it gives no pose git checkout -- resources/models" in shown.texts
+    assert not shown.arm.isEnabled()
+    assert not shown.isModal()
+    shown.leave.click()
+    assert not shown.isVisible()
+    desk.close()
+
+
+@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900)])
+def test_the_list_that_opens_by_itself_does_not_lie_over_stop(running: OperatorWindow, qtbot: QtBot, size: tuple[int, int]) -> None:
+    running.resize(*size)
+    qtbot.wait(30)
+    stop = running.panels.mode_bar.stop
+    desk = PreflightModel(lambda: running.config, lambda: running.desk.view, running, command=says(GOOD))
+    shown = PreflightList(desk, running, stop)
+    shown.open_list()
+    with_title = shown.geometry().adjusted(0, -30, 0, 0)
+    assert not with_title.intersects(QRect(stop.mapToGlobal(QPoint(0, 0)), stop.size()))
+    assert shown.height() >= 300
+    shown.close()
+    desk.close()
+
+
+def test_in_the_window_f6_reaches_the_pilot_only_after_the_checks(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    desk = PreflightModel(lambda: running.config, lambda: running.desk.view, running, command=says(GOOD))
+    running.may_take = desk.may_take
+    until(qtbot, lambda: running.desk.view is not None)
+    running.take(OperatorStep.ARM)
+    assert Act.ARM not in engine.pilot.acts
+    done(desk, qtbot)
+    running.take(OperatorStep.ARM)
+    assert engine.pilot.acts[-1] is Act.ARM
+    running.desk.stop()
+    assert engine.pilot.acts[-1] is Act.STOP
+    desk.close()
+
+
+def test_the_real_checks_come_line_by_line_from_a_process_of_their_own(qtbot: QtBot) -> None:
+    bench = Bench()
+    bench.config = Config.model_validate({"perception": {"segmentation": {"model": "no_such_model"}}})
+    desk = bench.desk(module_of("hardware.preflight.preflight"))
+    desk.begin()
+    qtbot.waitUntil(lambda: not desk.preflight.is_running, timeout=120_000)
+    assert not desk.preflight.problem
+    against = {finding.name: finding for finding in desk.preflight.against}
+    assert "no_such_model" in against["model"].detail
+    assert against["model"].fix

@@ -1,0 +1,176 @@
+"""Starting a rig again: what the operator has not acknowledged is still there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+from tests.core.test_control import _Camera
+from tests.core.test_pipeline import DrawnNetwork, _draw_tapered, frame
+
+from app.operator import rig_engine
+from app.operator.rig_engine import EngineMaker, RigEngine
+from core.config.calibration import CalibrationConfig, ScaleConfig
+from core.config.models import Config, PerceptionConfig, PolicyName, PoseConfig
+from core.config.rig_file import make_rig, read_rig, with_rig, write_rig
+from core.control.engine import Perceive
+from core.control.faults import Cause, Fault
+from core.control.health import ModelReport
+from core.control.modes import Act, Mode
+from core.control.policies import Policy, make_policy
+from core.devices import DeviceError
+from core.perception.pipeline import Pipeline
+from core.types import Frame, Point, Reason, Refusal, Scene
+from hardware.rig import Rig, RigKind
+from hardware.twin.process import PrestartedProcesses
+from tests.core.pilot_bench import Robot
+
+
+class _Maker(EngineMaker):
+    """Loads no network."""
+
+    def _perception(self, config: PerceptionConfig) -> tuple[Perceive, ModelReport]:
+        def perceive(frame: Frame, target: Point | None = None) -> Scene:
+            return Scene(frame.index, frame.captured_s, (4, 4), 1.0, refusal=Refusal(Reason.BLACK))
+
+        return perceive, ModelReport(True)
+
+
+Open = Callable[[], RigEngine]
+
+
+@pytest.fixture
+def robots() -> list[Robot]:
+    return []
+
+
+@pytest.fixture
+def open_engine(monkeypatch: pytest.MonkeyPatch, robots: list[Robot]) -> Open:
+    """Opens the twin's rig, again and again; the robots that it opened are kept."""
+    maker = _Maker()
+
+    def open_rig(config: Config, _ahead: object) -> Rig:
+        robots.append(Robot())
+        return Rig("twin", RigKind.SIM, _Camera([]), robots[-1])
+
+    monkeypatch.setattr(rig_engine, "open_rig", open_rig)
+    return lambda: maker(Config())
+
+
+def test_the_twins_servos_are_switched_on_at_the_start(open_engine: Open, robots: list[Robot]) -> None:
+    engine = open_engine()
+    assert engine.pilot is not None
+    engine.pilot._requests._worker.submit(lambda: None).result(5.0)
+    engine.close()
+    assert "arm" in robots[0].calls
+
+
+def test_starting_again_clears_no_stop(open_engine: Open, robots: list[Robot]) -> None:
+    engine = open_engine()
+    assert engine.pilot is not None
+    engine.pilot.ask(Act.STOP)
+    engine.close()
+    for _ in range(2):  # and neither does a second time
+        engine = open_engine()
+        assert engine.pilot is not None
+        view = engine.pilot.view
+        assert (view.mode, view.latched) == (Mode.STOPPED, Fault(Cause.STOP_PRESSED))
+        engine.close()
+    assert all("arm" not in robot.calls for robot in robots[1:])
+    engine = open_engine()
+    assert engine.pilot is not None
+    engine.pilot.ask(Act.ACKNOWLEDGE)
+    engine.pilot.tick()
+    engine.close()
+    again = open_engine()
+    assert again.pilot is not None
+    assert again.pilot.view.mode is Mode.ADVISORY
+    again.close()
+
+
+def test_the_policy_and_the_watch_over_stalls_use_the_rigs_own_scale(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """0.2 mm a pixel at 1280 px are 2.5 working pixels a millimetre."""
+    scale = ScaleConfig(mm_per_px=0.2, size_px=(1280, 960), method="board", uncertainty_share=0.001)
+    known = CalibrationConfig(made_utc=datetime(2025, 3, 4, tzinfo=UTC), scale=scale)
+    path = write_rig(make_rig(Config(), "bench 1", known), tmp_path / "bench 1.toml")
+    told: list[float] = []
+
+    def make(name: PolicyName, config: Config) -> Policy:
+        told.append(config.policy.pursuit.pixels_per_mm)
+        return make_policy(name, config)
+
+    monkeypatch.setattr(rig_engine, "make_policy", make)
+    monkeypatch.setattr(rig_engine, "open_rig", lambda config, _ahead: Rig("twin", RigKind.SIM, _Camera([]), Robot()))
+    engine = _Maker()(with_rig(Config(), read_rig(path), path))
+    assert engine.pilot is not None
+    told.append(engine.pilot._config.policy.pursuit.pixels_per_mm)
+    engine.close()
+    assert told == [pytest.approx(2.5)] * 2
+
+
+class _Grey(_Camera):
+    """Pictures that are neither black nor white."""
+
+    def read(self, timeout_s: float) -> Frame | None:
+        given = super().read(timeout_s)
+        return frame(given.captured_s) if given is not None else None
+
+
+@pytest.mark.parametrize(("knows_past", "head_x"), [(True, 424.0), (False, 190.0)])
+def test_other_thresholds_do_not_turn_the_robot_about(knows_past: bool, head_x: float) -> None:
+    """The second picture by itself shows the robot the other way round; pictures without a past have no head to go on with."""
+    network = DrawnNetwork()
+    pipeline = Pipeline(network, PerceptionConfig())
+    rig = Rig("drawn", RigKind.LIVE, _Grey([0, 1]), None)
+    engine = RigEngine(rig, pipeline if knows_past else pipeline.perceive_single, Config(), ModelReport(True))
+    engine.use_network(pipeline, knows_past=knows_past)
+    _draw_tapered(network, 180.0, 420.0, thick="left")
+    first = engine.step(0.0)
+    assert engine.set_perception(PerceptionConfig(pose=PoseConfig(d_allow_px=9.0)))
+    _draw_tapered(network, 190.0, 424.0, thick="right")
+    second = engine.step(0.0)
+    engine.close()
+    found = [tick.scene.path.head[0] for tick in (first, second) if tick is not None and tick.scene.path is not None]
+    assert found == [pytest.approx(420.0, abs=3.0), pytest.approx(head_x, abs=3.0)]
+
+
+def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = open_engine()
+    assert engine.pilot is not None
+    engine.pilot.ask(Act.STOP)
+    engine.close()
+    works = rig_engine.open_rig
+
+    def broken(config: Config, _ahead: object) -> Rig:
+        raise DeviceError("no camera")
+
+    monkeypatch.setattr(rig_engine, "open_rig", broken)
+    with pytest.raises(DeviceError):
+        open_engine()
+    monkeypatch.setattr(rig_engine, "open_rig", works)
+    engine = open_engine()
+    assert engine.pilot is not None
+    assert engine.pilot.view.mode is Mode.STOPPED
+    engine.close()
+
+
+def test_what_was_started_ahead_is_the_first_rigs_and_is_ended_where_none_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[object] = []
+
+    def open_rig(config: Config, ahead: object) -> Rig:
+        given.append(ahead)
+        return Rig("twin", RigKind.SIM, _Camera([]), Robot())
+
+    monkeypatch.setattr(rig_engine, "open_rig", open_rig)
+    ahead = cast(PrestartedProcesses, SimpleNamespace(end=lambda: given.append("ended")))
+    maker = _Maker(ahead)
+    for _ in range(2):
+        maker(Config()).close()
+    maker.close()
+    assert given == [ahead, None]
+    _Maker(ahead).close()
+    assert given[2:] == ["ended"]

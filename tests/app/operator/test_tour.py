@@ -1,0 +1,213 @@
+"""The tour points at the real widgets, leaves the window in use, and never comes uncalled."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.operator import startup as tour_module
+from app.operator.startup import mark_seen, tour_at_start, was_seen
+from app.operator.window import OperatorWindow
+from app.ui.theme import MIN_WINDOW
+from app.widgets.mode_bar import StopButton
+from app.widgets.tour_overlay import TourOverlay, place_card
+from core.config.models import Config
+from core.control.modes import Act
+from hardware.rig import RigKind
+from tests.app.conftest import MakeWindow
+from tests.app.fakes import FakeEngine, until
+
+Key = Qt.Key
+SIZES = [MIN_WINDOW, (1280, 720), (1600, 900), (1920, 1080)]
+
+
+@pytest.fixture(autouse=True)
+def own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+
+
+def _stops(tour: TourOverlay) -> Iterator[int]:
+    """From stop to stop until it is over."""
+    while tour.is_running:
+        yield tour.place
+        tour.forward()
+
+
+# ---- places
+
+
+def test_the_card_stands_beside_the_light() -> None:
+    room, light = QRect(0, 0, 1000, 600), QRect(100, 100, 300, 200)
+    card = place_card(QSize(380, 150), room, light, [])
+    assert not card.intersects(light)
+    assert room.contains(card)
+
+
+def test_the_card_gives_way_to_what_is_kept_clear_even_on_the_light() -> None:
+    room, light = QRect(0, 0, 800, 400), QRect(0, 0, 400, 400)
+    clear = QRect(400, 0, 400, 400)  # all that the light leaves free
+    card = place_card(QSize(300, 150), room, light, [clear])
+    assert not card.intersects(clear)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_no_card_covers_stop_or_what_it_speaks_of(running: OperatorWindow, size: tuple[int, int], qtbot: QtBot) -> None:
+    running.resize(*size)
+    QApplication.processEvents()
+    panels, tour = running.panels, running.tour
+    stop = QRect(panels.mode_bar.stop.mapTo(panels, QPoint(0, 0)), panels.mode_bar.stop.size())
+    running.show_tour()
+    seen = []
+    for place in _stops(tour):
+        QApplication.processEvents()
+        card = tour.card.geometry()
+        seen.append(tour.card.text)
+        assert panels.rect().contains(card), place
+        assert not card.intersects(stop), place
+        assert tour.light.isValid(), f"{place}: it points at nothing"
+        assert panels.rect().adjusted(-6, -6, 6, 6).contains(tour.light), place
+        assert not card.intersects(tour.light), place
+        assert isinstance(panels.childAt(stop.center()), StopButton), place
+    assert len(seen) == len(set(seen)) == 7
+
+
+def test_all_of_the_text_is_on_the_card(running: OperatorWindow) -> None:
+    running.show_tour()
+    for _ in _stops(running.tour):
+        QApplication.processEvents()
+        label = running.tour.card._text
+        assert label.height() >= label.heightForWidth(label.width())
+
+
+# ---- what stays in use
+
+
+def test_stop_is_neither_covered_nor_silenced(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running.show_tour()
+    assert running.tour.card.forward.hasFocus() or running.focusWidget() is running.tour.card.forward
+    qtbot.keyClick(running.focusWidget(), Key.Key_Space)
+    assert engine.pilot.acts == [Act.STOP]
+    assert running.tour.place == 0, "Space pressed no button of the tour"
+    stop = running.panels.mode_bar.stop
+    qtbot.mouseClick(stop, Qt.MouseButton.LeftButton)
+    assert engine.pilot.acts == [Act.STOP, Act.STOP]
+    assert running.tour.is_running
+
+
+def test_the_robot_and_the_picture_stay_in_use(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    running.show_tour()
+    qtbot.keyPress(running.focusWidget(), Key.Key_W)
+    assert engine.jogs[-1].advance > 0
+    qtbot.keyRelease(running.focusWidget(), Key.Key_W)
+    live = running.panels.live
+    inside = live.mapTo(running.panels, live.rect().center())
+    under = running.panels.childAt(inside)
+    assert live.isAncestorOf(under) or under is live, "the shade lets clicks through"
+
+
+def test_it_works_by_keyboard_alone(running: OperatorWindow, qtbot: QtBot) -> None:
+    running.show_tour()
+    tour = running.tour
+    qtbot.keyClick(running.focusWidget(), Key.Key_Return)
+    assert tour.place == 1
+    running.panels.live.setFocus()  # as after a click into the picture
+    qtbot.keyClick(running.focusWidget(), Key.Key_Return)
+    assert tour.place == 2
+    qtbot.keyClick(running.focusWidget(), Key.Key_Backspace)
+    assert tour.place == 1
+    qtbot.keyClick(running.focusWidget(), Key.Key_Escape)
+    assert not tour.is_running
+    assert not tour.card.isVisible()
+    assert running.focusWidget() is running.panels.live
+
+
+def test_enter_on_a_control_is_the_controls(running: OperatorWindow, qtbot: QtBot) -> None:
+    running.show_tour()
+    running.panels.mode_bar.stop.setFocus()
+    qtbot.keyClick(running.panels.mode_bar.stop, Key.Key_Return)
+    assert running.tour.place == 0
+
+
+def test_the_end_of_it_can_be_clicked(running: OperatorWindow, qtbot: QtBot) -> None:
+    running.show_tour()
+    card = running.tour.card
+    assert not card.back.isEnabled()
+    qtbot.mouseClick(card.forward, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(card.back, Qt.MouseButton.LeftButton)
+    assert running.tour.place == 0
+    qtbot.mouseClick(card.skip, Qt.MouseButton.LeftButton)
+    assert not running.tour.is_running
+
+
+def test_it_turns_to_the_page_that_it_speaks_of(running: OperatorWindow) -> None:
+    panels = running.panels
+    panels.pages.setCurrentWidget(panels.events)
+    running.show_tour()
+    for _ in itertools.takewhile(lambda _place: "Move it yourself" not in running.tour.card.text, _stops(running.tour)):
+        pass
+    assert panels.jog.isVisible()
+
+
+def test_the_light_follows_the_window(running: OperatorWindow, qtbot: QtBot) -> None:
+    running.resize(1280, 720)
+    running.show_tour()
+    before = running.tour.light
+    running.resize(1600, 900)
+    qtbot.waitUntil(lambda: running.tour.light != before)
+    live = running.panels.live
+    assert running.tour.light.contains(QRect(live.mapTo(running.panels, QPoint(0, 0)), live.size()))
+
+
+def test_without_a_robot_it_does_not_speak_of_moving_one(make_window: MakeWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    config = Config.model_validate({"rig": {"camera": "video_file", "robot": "none", "source": "x.mp4"}, "record": {"ring_s": 0}})
+    window = make_window(lambda _config: engine, config, RigKind.PLAYBACK)
+    window.show_tour()
+    texts = [window.tour.card.text for _ in _stops(window.tour)]
+    assert len(texts) == 4
+    assert not any("arms it" in text or "advances" in text for text in texts)
+
+
+# ---- when it comes
+
+
+def test_never_uncalled_without_a_screen(running: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tour_module, "_LOOK_EVERY_MS", 1)
+    tour_at_start(running, asked=False)
+    qtbot.wait(30)
+    assert not running.tour.is_running
+    assert not was_seen()
+
+
+def test_once_at_the_first_start_on_a_screen(running: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tour_module, "_NO_SCREEN", ())
+    monkeypatch.setattr(tour_module, "_LOOK_EVERY_MS", 1)
+    tour_at_start(running, asked=False)
+    until(qtbot, lambda: running.tour.is_running)
+    assert was_seen()
+    running.tour.end()
+    tour_at_start(running, asked=False)
+    qtbot.wait(30)
+    assert not running.tour.is_running
+
+
+def test_whenever_it_is_asked_for(running: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tour_module, "_LOOK_EVERY_MS", 1)
+    mark_seen()
+    tour_at_start(running, asked=True)
+    until(qtbot, lambda: running.tour.is_running)
+    running.tour.end()
+    next(action for action in running.actions() if action.text() == "&Tour").trigger()
+    assert running.tour.is_running
+
+
+def test_a_folder_that_cannot_be_written_disturbs_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
+    mark_seen()
+    assert not was_seen()

@@ -1,0 +1,712 @@
+"""The player, driven by real keys and clicks: what it shows is what was recorded, and it is never taken for a live picture."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.commands.perceive import scene_to_json
+from app.player import decoder
+from app.player.decoder import drawable
+from app.player.session_model import JumpKind, scene_from_json
+from app.player.window import PlayerWindow
+from app.ui.texts import signed_degrees
+from core.config.models import Config
+from core.control.modes import Mode
+from core.session.files import LineFile
+from core.session.manifest import Event, EventKind, SessionError, event_of_target, read_manifest, write_manifest
+from core.session.reader import SessionReader
+from core.session.writer import SessionWriter
+from core.types import Frame, PoseState, Reason, Refusal, RobotStatus, Tick
+from tests.app.fakes import FakeBench, advise, make_scene
+from tests.core.session_data import ABOUT, QUICK, drive_of, record, tick_of
+
+Key = Qt.Key
+COUNT, FIRST_S, STEP_S = 60, 1000.0, 0.1
+MAIN = Path(__file__).resolve().parents[3] / "main.py"
+Open = Callable[..., PlayerWindow]
+
+
+def make_session(folder: Path) -> Path:
+    """Six seconds of the drawn bench: armed at 2 s, no robot from 3.0 to 3.4 s, a fault at 4 s, a note at 5 s."""
+    bench = FakeBench()
+    writer = SessionWriter(QUICK, ABOUT, folder=folder, clock=lambda: FIRST_S)
+    writer.start()
+    for k in range(COUNT):
+        time_s = FIRST_S + k * STEP_S
+        image, scene = bench.scene_at(k, time_s)
+        if 30 <= k < 34:
+            scene = make_scene(refusal=Refusal(Reason.NO_ROBOT, "0 px"), index=k, captured_s=time_s)
+        status = RobotStatus(time_s, 40.0, 0.0, (0.0,) * 4, (0.0,) * 4, 0.01)
+        tick = Tick(Frame(k, time_s, image), scene, advise(scene), None, status, 0, 10.0)
+        drive = drive_of(time_s, Mode.ADVISORY if k < 20 else Mode.ARMED)
+        assert writer.put(tick, drive)
+        assert writer.drive(drive)
+    writer.add_event(event_of_target((300.0, 200.0), FIRST_S + 1.0))
+    writer.add_event(Event(FIRST_S + 4.0, EventKind.FAULT, "head jumped", {"detail": "31 px"}))
+    writer.add_event(Event(FIRST_S + 5.0, EventKind.NOTE, "touches the wall"))
+    assert writer.close()
+    saved = writer.status().saved
+    assert saved is not None
+    return saved
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_session(tmp_path_factory.mktemp("sessions"))
+
+
+@pytest.fixture
+def open_player(qtbot: QtBot, tmp_path: Path) -> Iterator[Open]:
+    """Opens players; at the end each is closed, and its threads must have ended."""
+    windows: list[PlayerWindow] = []
+
+    def opened(folder: Path, against: Path | None = None) -> PlayerWindow:
+        config = Config.model_validate({"window": {"pictures_folder": str(tmp_path / "kept")}})
+        window = PlayerWindow(SessionReader(folder), config, against)
+        qtbot.addWidget(window)
+        windows.append(window)
+        window.resize(1280, 720)
+        window.show()
+        window.start()
+        return window
+
+    yield opened
+    for window in windows:
+        window.close()
+        assert not window._decode.isRunning()
+
+
+@pytest.fixture
+def player(open_player: Open, session: Path, qtbot: QtBot) -> PlayerWindow:
+    """On the first frame, with all rows and events known."""
+    window = open_player(session)
+    until(qtbot, lambda: window.place == 0 and window.rows == COUNT and len(window.events) > 3 and window._known.is_whole)
+    return window
+
+
+def press(window: PlayerWindow, *keys: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+    for key in keys:
+        QTest.keyClick(window.focusWidget() or window, key, modifier)
+
+
+def until(qtbot: QtBot, condition: Callable[[], bool]) -> None:
+    """Disks of busy machines stand still for seconds."""
+    qtbot.waitUntil(condition, timeout=30_000)
+
+
+def at(qtbot: QtBot, window: PlayerWindow, place: int) -> None:
+    until(qtbot, lambda: window.place == place)
+
+
+def test_it_opens_on_the_first_frame_and_says_what_it_is(player: PlayerWindow) -> None:
+    panels = player.panels
+    assert panels.banner.word == "PLAYBACK"
+    assert panels.plate.text.startswith("recorded SIM, ")
+    assert "rig twin" in panels.plate.text
+    assert "PLAYBACK" in player.windowTitle()
+    assert panels.live.scene is not None
+    assert panels.badge.letter in "ABCD"
+    assert panels.advice.text != ""
+    assert panels.mode.mode is Mode.ADVISORY
+    assert panels.bar.frame.text() == f"frame 1 of {COUNT}"
+    assert panels.bar.slider.maximum() == panels.bar.position.maximum() == round((COUNT - 1) * STEP_S * 1000)
+
+
+def test_arrows_go_by_frames_and_show_what_was_recorded(player: PlayerWindow, session: Path, qtbot: QtBot) -> None:
+    with SessionReader(session) as reader:
+        reader.wait()
+        for key, place in (
+            (Key.Key_Right, 1),
+            (Key.Key_Right, 2),
+            (Key.Key_Left, 1),
+            (Key.Key_End, COUNT - 1),
+            (Key.Key_Left, COUNT - 2),
+        ):
+            press(player, key)
+            at(qtbot, player, place)
+            row = reader.row(place)
+            assert row is not None
+            assert row.scene.pose is not None
+            assert player.panels.badge.letter == row.scene.pose.state.value
+            assert player.panels.bar.position.value() == round(place * STEP_S * 1000)
+    press(player, Key.Key_Home)
+    at(qtbot, player, 0)
+    press(player, Key.Key_Left)  # there is nothing before
+    press(player, Key.Key_Right, modifier=Qt.KeyboardModifier.ShiftModifier)
+    at(qtbot, player, 10)
+    press(player, Key.Key_Right, modifier=Qt.KeyboardModifier.ControlModifier)
+    at(qtbot, player, COUNT - 1)
+
+
+def test_what_was_refused_has_no_pose_and_says_why(player: PlayerWindow, qtbot: QtBot) -> None:
+    player.go(31)
+    at(qtbot, player, 31)
+    assert (player.panels.badge.letter, player.panels.badge.title) == ("-", "No robot in view")
+    assert player.panels.gauge.text == "\N{EN DASH}"
+    assert player.panels.mode.mode is Mode.ARMED
+
+
+def test_space_plays_and_pauses_wherever_the_focus_is(player: PlayerWindow, qtbot: QtBot) -> None:
+    player.panels.bar.note.setFocus()
+    press(player, Key.Key_Space)
+    assert player.is_playing
+    assert not player.panels.note.isVisible()
+    assert player.panels.bar.play.accessibleName() == "Pause"
+    until(qtbot, lambda: player.place > 2)
+    press(player, Key.Key_Space)
+    assert not player.is_playing
+    before = player.time_s
+    qtbot.wait(60)
+    assert player.time_s == before
+
+
+def test_a_pause_renews_the_numbers_that_playing_renews_now_and_then(player: PlayerWindow, qtbot: QtBot) -> None:
+    press(player, Key.Key_Space)
+    until(qtbot, lambda: player.place >= 4)
+    press(player, Key.Key_Space)
+    until(qtbot, lambda: player.place == player._asked)
+    scene = player.panels.live.scene
+    assert scene is not None
+    assert scene.pose is not None
+    assert player.panels.gauge.text == signed_degrees(scene.pose.theta_signed_deg, 1)
+
+
+def test_it_plays_to_the_end_and_from_the_beginning_again(player: PlayerWindow, qtbot: QtBot) -> None:
+    for _ in range(3):
+        press(player, Key.Key_BracketRight)
+    assert player.speed == 8.0
+    player.go(COUNT - 10)
+    press(player, Key.Key_Space)
+    until(qtbot, lambda: not player.is_playing and player.place == COUNT - 1)
+    press(player, Key.Key_Space)
+    assert player.is_playing
+    assert player.time_s < 1.0
+    press(player, Key.Key_R)
+    assert player.speed == 1.0
+    for _ in range(3):
+        press(player, Key.Key_BracketLeft)
+    assert (player.speed, player.panels.bar.speed.currentData()) == (0.1, 0.1)
+
+
+def test_n_and_p_jump_to_the_chosen_kind(player: PlayerWindow, qtbot: QtBot) -> None:
+    def choose(kind: JumpKind) -> None:
+        for _ in range(len(JumpKind)):
+            if player.jump_kind is not kind:
+                press(player, Key.Key_K)
+        assert player.jump_kind is kind
+        assert player.panels.bar.kind.currentData() is kind
+
+    for kind, place in ((JumpKind.FAULT, 40), (JumpKind.NOTE, 50), (JumpKind.MODE, 20), (JumpKind.TARGET, 10)):
+        choose(kind)
+        player.go(5)
+        press(player, Key.Key_N)
+        at(qtbot, player, place)
+        press(player, Key.Key_N)
+        assert player.panels.toast.text() == f"No {kind.value.lower()} after this frame"
+    choose(JumpKind.STATE)
+    player.go(29)
+    press(player, Key.Key_N)
+    at(qtbot, player, 30)
+    press(player, Key.Key_N)
+    at(qtbot, player, 34)
+    press(player, Key.Key_P)
+    at(qtbot, player, 30)
+
+
+def test_a_time_is_typed_and_dragged(player: PlayerWindow, qtbot: QtBot) -> None:
+    press(player, Key.Key_T)
+    QTest.keyClicks(player.focusWidget(), "2.5")
+    press(player, Key.Key_Return)
+    at(qtbot, player, 25)
+    assert player.focusWidget() is player.panels.live
+    player.panels.bar.slider.setValue(4199)
+    at(qtbot, player, 41)
+    assert player.panels.bar.position.value() == 4199
+
+
+def test_the_timeline_is_clicked_zoomed_and_selected(player: PlayerWindow, qtbot: QtBot) -> None:
+    line = player.panels.timeline
+    middle = QPoint((50 + line.width() - 10) // 2, line.height() // 2)
+    QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=middle)
+    assert player.time_s == pytest.approx((COUNT - 1) * STEP_S / 2, abs=0.05)
+    press(player, Key.Key_Plus)
+    low, high = line.view
+    assert high - low == pytest.approx(5.9 / 1.5)
+    assert low < player.time_s < high
+    press(player, Key.Key_0, modifier=Qt.KeyboardModifier.ControlModifier)
+    assert line.view == (0.0, pytest.approx(5.9))
+    shift = Qt.KeyboardModifier.ShiftModifier
+    QTest.mousePress(line, Qt.MouseButton.LeftButton, shift, QPoint(middle.x() - 100, 60))
+    QTest.mouseMove(line, QPoint(middle.x(), 60))
+    QTest.mouseRelease(line, Qt.MouseButton.LeftButton, shift, middle)
+    assert player.selection is not None
+    assert player.selection[1] == pytest.approx(2.95, abs=0.05)
+    assert "selected 0:0" in line.accessibleDescription()
+    player.panels.live.setFocus()
+    press(player, Key.Key_Escape)
+    assert player.selection is None
+    # the fault's mark is three pixels away
+    place = QPoint(round(50 + 4.0 / 5.9 * (line.width() - 60)) + 3, 26)
+    QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=place)
+    at(qtbot, player, 40)
+
+
+def test_the_timeline_tells_what_is_under_the_pointer(player: PlayerWindow) -> None:
+    line = player.panels.timeline
+    width = line.width() - 60
+    assert line.text_at(50 + 3.2 / 5.9 * width) == "0:03.200  no pose  ARMED"
+    state, angle = line.text_at(50 + 1.0 / 5.9 * width).split("  ")[1:3]
+    assert state[:6] == "state "
+    assert angle.endswith("°")
+
+
+def test_the_timeline_claims_nothing_for_a_time_without_frames(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    times_s = [FIRST_S + k * STEP_S for k in range(11)] + [FIRST_S + 6.0 + k * STEP_S for k in range(11)]
+    window = open_player(record(tmp_path, (tick_of(k, time_s, full=True) for k, time_s in enumerate(times_s))))
+    until(qtbot, lambda: window.rows == len(times_s) and len(window.events) > 0)
+    line = window.panels.timeline
+    width = line.width() - 60
+    assert line.text_at(50 + 0.5 / 7.0 * width).startswith("0:00.500  state D")
+    assert line.text_at(50 + 3.5 / 7.0 * width) == "0:03.500  no frames"
+    assert line.text_at(50 + 6.5 / 7.0 * width).startswith("0:06.500  state D")
+
+
+def test_values_that_no_dial_shows_can_be_read(player: PlayerWindow, qtbot: QtBot) -> None:
+    told = player.panels.values.toPlainText()
+    assert "frame 0 of the camera, captured at 1000.000 s, 640 \N{MULTIPLICATION SIGN} 480 px" in told
+    assert "insertion 40.0 mm, sheath 0.0 mm" in told
+    assert "perception 27.5 ms: " in told
+    player.go(31)
+    at(qtbot, player, 31)
+    assert "no pose: no robot: 0 px" in player.panels.values.toPlainText()
+
+
+def test_the_target_is_shown_from_when_it_was_chosen(player: PlayerWindow, qtbot: QtBot) -> None:
+    assert player.panels.live._target is None
+    player.go(12)
+    at(qtbot, player, 12)
+    assert player.panels.live._target == (300.0, 200.0)
+
+
+def test_the_list_of_events_leads_to_them(player: PlayerWindow, qtbot: QtBot) -> None:
+    press(player, Key.Key_F6)
+    listed = player.panels.events
+    assert listed.hasFocus()
+    assert listed.lines[-2:] == ["0:04.000  fault: head jumped (31 px)", "0:05.000  note: touches the wall"]
+    row = len(listed.lines) - 1
+    QTest.mouseClick(listed.viewport(), Qt.MouseButton.LeftButton, pos=listed.visualRect(listed.model().index(row, 0)).center())
+    at(qtbot, player, 50)
+
+
+def test_a_note_is_kept_in_the_session(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    window = open_player(folder)
+    until(qtbot, lambda: window.place == 0 and window.rows == COUNT)
+    window.go(22)
+    press(window, Key.Key_M)
+    assert window.panels.note.hasFocus()
+    QTest.keyClicks(window.panels.note, "space n and p are letters here")
+    press(window, Key.Key_Return)
+    until(qtbot, lambda: any(event.text == "space n and p are letters here" for event in window.events))
+    with SessionReader(folder) as reader:
+        (kept,) = [event for event in reader.events if "letters" in event.text]
+    assert (kept.kind, kept.time_s) == (EventKind.NOTE, pytest.approx(FIRST_S + 2.2))
+    assert "0:02.200  note: space n and p are letters here" in window.panels.events.lines
+    press(window, Key.Key_M)
+    QTest.keyClicks(window.panels.note, "never mind")
+    press(window, Key.Key_Escape)
+    assert not window.panels.note.isVisible()
+    assert not any("never" in event.text for event in window.events)
+
+
+def test_a_note_stays_at_its_time_and_is_lost_by_nothing(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    window = open_player(folder)
+    until(qtbot, lambda: window.place == 0 and window.rows == COUNT)
+    window.seek(2.0)
+    press(window, Key.Key_M)
+    QTest.keyClicks(window.panels.note, "head touches")
+    window.panels.live.setFocus()
+    press(window, Key.Key_M)
+    QTest.keyClicks(window.panels.note, " the wall")
+    window.seek(4.6)
+    QTest.keyClick(window.panels.note, Key.Key_Return)
+    until(qtbot, lambda: any(event.text == "head touches the wall" for event in window.events))
+    press(window, Key.Key_M)
+    QTest.keyClicks(window.panels.note, "written while closing")
+    window.close()
+    with SessionReader(folder) as reader:
+        kept = {event.text: event.time_s - FIRST_S for event in reader.events if event.kind is EventKind.NOTE}
+    assert kept["head touches the wall"] == pytest.approx(2.0)
+    assert kept["written while closing"] == pytest.approx(4.6)
+
+
+def test_escape_takes_back_a_time_that_was_typed(player: PlayerWindow, qtbot: QtBot) -> None:
+    player.seek(1.0)
+    press(player, Key.Key_T)
+    QTest.keyClicks(player.panels.bar.position, "4.5")
+    QTest.keyClick(player.panels.bar.position, Key.Key_Escape)
+    qtbot.wait(50)
+    assert player.time_s == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("typed", ["0:03.5", "3.5", "3,5", "3.5 s", "3500 ms", "0:0:3.5"])
+def test_a_time_is_typed_as_the_clock_shows_it_or_in_seconds(player: PlayerWindow, typed: str) -> None:
+    press(player, Key.Key_T)
+    QTest.keyClicks(player.panels.bar.position, typed)
+    QTest.keyClick(player.panels.bar.position, Key.Key_Return)
+    assert player.time_s == pytest.approx(3.5)
+    assert player.panels.bar.position.text() == "0:03.500"
+    assert not player.panels.bar.position.hasFocus()
+
+
+@pytest.mark.parametrize(("typed", "shown"), [("1:", "0:01.000"), ("abc", "0:01.000"), ("..", "0:01.000"), ("99:00", "0:05.900")])
+def test_what_is_no_time_changes_nothing_and_one_beyond_the_end_is_the_end(player: PlayerWindow, typed: str, shown: str) -> None:
+    player.seek(1.0)
+    press(player, Key.Key_T)
+    QTest.keyClicks(player.panels.bar.position, typed)
+    QTest.keyClick(player.panels.bar.position, Key.Key_Return)
+    assert player.panels.bar.position.text() == shown
+
+
+def test_notes_that_the_disk_does_not_take_are_not_lost(
+    open_player: Open, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = threading.Event()
+
+    def refuse(folder: Path, _event: Event) -> None:
+        written.wait(20.0)
+        raise SessionError(f"{folder}: read-only")
+
+    window = open_player(make_session(tmp_path))
+    until(qtbot, lambda: window.place == 0 and window.rows == COUNT)
+    with monkeypatch.context() as patch:
+        patch.setattr(decoder, "add_event", refuse)
+        for place, text in ((22, "a long careful remark"), (30, "another")):
+            window.go(place)
+            press(window, Key.Key_M)
+            QTest.keyClicks(window.panels.note, text)
+            press(window, Key.Key_Return)
+        written.set()
+        until(qtbot, lambda: window.panels.note.isVisible() and len(window._refused) == 1)
+    assert "read-only" in window.panels.toast.text()
+    until(qtbot, lambda: window.place == 22)
+    assert window.panels.note.text() == "a long careful remark"
+    press(window, Key.Key_Return)  # there is room again
+    until(qtbot, lambda: window.panels.note.text() == "another")
+    press(window, Key.Key_Return)
+    until(qtbot, lambda: {"a long careful remark", "another"} <= {event.text for event in window.events})
+
+
+def test_rows_that_went_from_a_closed_session_are_told(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    lines = (folder / "frames.jsonl").read_bytes().splitlines(keepends=True)
+    (folder / "frames.jsonl").write_bytes(b"".join(lines[:-5]))
+    window = open_player(folder)
+    until(qtbot, lambda: f"the last 5 of {COUNT} rows are lost" in window.panels.problems.toPlainText())
+
+
+def test_rows_that_turn_out_to_be_missing_while_it_is_read_are_all_counted(
+    open_player: Open, session: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = [2]
+    monkeypatch.setattr(SessionReader, "missing_rows", property(lambda _reader: found[0]))
+    window = open_player(session)
+    until(qtbot, lambda: "2 rows are missing" in window.panels.problems.toPlainText())
+    found[0] = 5
+    until(qtbot, lambda: "5 rows are missing" in window.panels.problems.toPlainText())
+
+
+def test_a_session_that_was_cut_says_so(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    write_manifest(folder, read_manifest(folder).model_copy(update={"closed": False}))
+    window = open_player(folder)
+    until(qtbot, lambda: "did not end properly" in window.panels.problems.toPlainText())
+    assert window.panels.plate.text.endswith(", cut off")
+
+
+def test_a_note_into_a_session_that_is_being_recorded_is_refused(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    write_manifest(folder, read_manifest(folder).model_copy(update={"closed": False}))
+    (folder / "frames.jsonl").rename(folder / "old")
+    lock = LineFile(folder / "frames.jsonl")
+    try:
+        for line in (folder / "old").read_text().splitlines():
+            lock.write(line)
+        window = open_player(folder)
+        until(qtbot, lambda: "still being recorded" in window.panels.toast.text())
+        until(qtbot, lambda: window.place == 0)
+        assert "did not end properly" not in window.panels.problems.toPlainText()
+        assert window.panels.plate.text.endswith(", being recorded")
+        press(window, Key.Key_M)
+        QTest.keyClicks(window.panels.note, "x")
+        press(window, Key.Key_Return)
+        until(qtbot, lambda: "stop the recording first" in window.panels.toast.text())
+    finally:
+        lock.close()
+
+
+def test_the_selection_becomes_a_video_with_the_banner_in_it(player: PlayerWindow, tmp_path: Path, qtbot: QtBot) -> None:
+    player.go(10)
+    press(player, Key.Key_I)
+    player.go(14)
+    press(player, Key.Key_O)
+    assert player.selection == (pytest.approx(1.0), pytest.approx(1.4))
+    assert player.panels.bar.clip.text() == "Clip 0.4 s"
+    press(player, Key.Key_E)
+    assert player.panels.bar.progress.isVisible()
+    until(qtbot, lambda: "Clip saved" in player.panels.toast.text())
+    assert not player.panels.bar.progress.isVisible()
+    (path,) = (tmp_path / "kept").iterdir()
+    assert path.name.endswith("_1000-1400ms.mp4")
+    with av.open(str(path)) as container:
+        assert sum(1 for _ in container.decode(video=0)) == 5
+
+
+def test_a_clip_of_the_whole_session_waits_until_all_of_it_is_known(
+    open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(SessionReader, "wait", lambda _reader, timeout_s=None: False)
+        player = open_player(session)
+        until(qtbot, lambda: player.place == 0)
+        player.export_clip()
+        assert "still being read" in player.panels.toast.text()
+        assert not player._keeper.has_clip
+    until(qtbot, lambda: player._known.is_whole)
+    player.export_clip()
+    until(qtbot, lambda: f"{COUNT} pictures" in player.panels.toast.text())
+
+
+def test_a_clip_is_cancelled_without_a_trace(player: PlayerWindow, tmp_path: Path, qtbot: QtBot) -> None:
+    press(player, Key.Key_E)
+    press(player, Key.Key_Escape)
+    until(qtbot, lambda: "Clip cancelled" in player.panels.toast.text())
+    assert not list((tmp_path / "kept").glob("*"))
+    assert player.panels.bar.clip.isVisible()
+
+
+def test_a_snapshot_tells_that_it_is_played_back(player: PlayerWindow, tmp_path: Path, qtbot: QtBot) -> None:
+    press(player, Key.Key_S)
+    until(qtbot, lambda: "Snapshot saved" in player.panels.toast.text())
+    (values,) = (tmp_path / "kept").glob("*.json")
+    told = json.loads(values.read_text())
+    assert (told["rig"], told["frame"], told["model"]) == ("SIM PLAYBACK", 0, "default")
+
+
+def test_overlays_help_and_full_screen_by_key(player: PlayerWindow) -> None:
+    press(player, Key.Key_0)
+    assert not any(chip.isChecked() for chip in player.panels.overlay_bar.findChildren(QAbstractButton))
+    press(player, Key.Key_1)
+    assert sum(chip.isChecked() for chip in player.panels.overlay_bar.findChildren(QAbstractButton)) == 1
+    press(player, Key.Key_F1)
+    assert player.panels.help.isVisible()
+    press(player, Key.Key_Escape)
+    assert not player.panels.help.isVisible()
+
+
+def test_all_controls_have_a_name(player: PlayerWindow) -> None:
+    bar = player.panels.bar
+    controls: list[QWidget] = [*bar.findChildren(QAbstractButton), bar.slider, bar.position, bar.kind, bar.speed]
+    controls += [player.panels.timeline, player.panels.events, player.panels.problems, player.panels.note, player.panels.live]
+    assert all(control.accessibleName() for control in controls)
+
+
+def test_damage_is_listed_and_the_rest_is_played(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    lines = (folder / "frames.jsonl").read_bytes().splitlines()
+    lines[5] = lines[5][:-40]
+    (folder / "frames.jsonl").write_bytes(b"\n".join(lines) + b"\n")
+    video = folder / "video_0000.mkv"
+    data = bytearray(video.read_bytes())
+    half = len(data) // 2
+    data[half : half + 3000] = bytes(3000)
+    video.write_bytes(bytes(data))
+    (folder / "manifest.json").write_text("{")
+    window = open_player(folder)
+    until(qtbot, lambda: window.place == 0 and window.rows == COUNT - 1)
+    assert "manifest is damaged" in window.panels.plate.text
+    assert window.panels.plate.text.startswith("recorded UNKNOWN")
+    for place in range(window.rows):
+        window.go(place)
+        at(qtbot, window, place)
+    until(qtbot, lambda: "no picture at" in window.panels.problems.toPlainText())
+    problems = window.panels.problems.toPlainText()
+    assert "line 6" in problems
+    assert "manifest.json: damaged" in problems
+    assert "1 rows are missing" in problems
+    assert "Problems" in window.panels.pages.tabText(3)
+    window.go(0)
+    at(qtbot, window, 0)
+    assert window.panels.badge.letter in {state.value for state in PoseState}
+
+
+def test_a_lost_picture_is_said_and_nothing_of_another_is_shown(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = make_session(tmp_path)
+    (folder / "video_0000.mkv").unlink()
+    window = open_player(folder)
+    at(qtbot, window, 0)
+    assert window.panels.notice.text.startswith("This picture is lost")
+    assert window.panels.live.scene is None
+    assert window.panels.badge.letter == "-"
+    press(window, Key.Key_S)
+    assert "No snapshot" in window.panels.toast.text()
+
+
+def test_of_a_lost_picture_the_values_of_its_own_row_are_shown(player: PlayerWindow, qtbot: QtBot) -> None:
+    panels = player.panels
+    player.go(25)
+    at(qtbot, player, 25)
+    until(qtbot, lambda: panels.values.toPlainText().startswith("frame 25 of the camera"))
+    row = player._reader.row(58)
+    panels.show_lost(row, 58)
+    assert panels.values.toPlainText().startswith("frame 58 of the camera")
+    assert (panels.mode.mode, panels.mode.isVisible()) == (Mode.ARMED, True)
+    panels.show_lost(None, 59)
+    assert panels.values.toPlainText() == "", "nobody knows what stood in a damaged row"
+    assert not panels.mode.isVisible()
+
+
+def test_a_session_without_rows_says_what_to_do(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = record(tmp_path, [tick_of(0, FIRST_S)])
+    (folder / "frames.jsonl").unlink()
+    window = open_player(folder)
+    until(qtbot, lambda: window.panels.notice.text.startswith("Nothing to play"))
+    assert "session recover" in window.panels.notice.text
+    for key in (Key.Key_Space, Key.Key_N, Key.Key_Right, Key.Key_E, Key.Key_I, Key.Key_M, Key.Key_Return, Key.Key_End):
+        press(window, key)
+    assert window.place == -1
+
+
+def test_rows_that_were_refused_with_masks_are_drawn_without_skeletons(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
+    """Skeletons are not recorded: the live picture must not look for them."""
+    full = tick_of(0, FIRST_S, full=True)
+    scene = full.scene
+    refused = type(scene)(
+        0, FIRST_S, scene.source_size, 1.0, masks=scene.masks, skeletons=scene.skeletons, refusal=Refusal(Reason.NO_ROBOT)
+    )
+    folder = record(tmp_path, [Tick(full.frame, refused, None, None, None, 0, 30.0)])
+    window = open_player(folder)
+    at(qtbot, window, 0)
+    assert window.panels.badge.title == "No robot in view"
+
+
+def replayed_file(session: Path, out: Path, *, name: str | None = None) -> Path:
+    """Results of a replay that sees what was recorded, but rows 12 to 14 turned by ten degrees and nothing in row 20."""
+    lines = []
+    with SessionReader(session) as reader:
+        reader.wait()
+        for place in range(len(reader)):
+            row = reader.row(place)
+            assert row is not None
+            record = scene_to_json(f"{name or session.name}#{row.row}", row.scene)
+            if 12 <= place < 15:
+                record["theta_signed_deg"] += 10.0
+            if place == 20:
+                record |= {"state": None, "theta_signed_deg": None, "reason": "low confidence: 12 %"}
+            lines.append(json.dumps(record))
+    out.write_text("\n".join([*lines, "{ nonsense"]) + "\n")
+    return out
+
+
+def test_a_replay_is_shown_beside_the_recording(open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot) -> None:
+    window = open_player(session, replayed_file(session, tmp_path / "again.jsonl"))
+    until(qtbot, lambda: window.jump_kind is JumpKind.REPLAY)
+    assert window.panels.toast.text() == "1 results of the replay cannot be read"
+    other = window.panels.other
+    assert other is not None
+    until(qtbot, lambda: other.scene is not None and other.scene.pose is not None)
+    until(qtbot, lambda: window.rows == COUNT)
+    window.go(5)
+    for place, told in ((12, "(+10.0°)"), (20, "no pose, low confidence: 12 %")):
+        press(window, Key.Key_N)
+        at(qtbot, window, place)
+        until(qtbot, lambda told=told: told in window.panels.compared.text())
+    assert other.scene is not None
+    assert (other.scene.pose, other.scene.refusal) == (None, Refusal(Reason.LOW_CONFIDENCE, "12 %"))
+    assert other.scene.path is not None
+    press(window, Key.Key_N)
+    assert "No difference after this frame" in window.panels.toast.text()
+
+
+def test_a_pose_comes_back_from_its_json(session: Path) -> None:
+    with SessionReader(session) as reader:
+        reader.wait()
+        row = reader.row(7)
+    assert row is not None
+    again = scene_from_json(scene_to_json("x#7", row.scene))
+    assert again.pose is not None
+    assert row.scene.pose is not None
+    for name in ("theta_signed_deg", "c_head_px", "c_tail_px", "confidence"):
+        assert getattr(again.pose, name) == pytest.approx(getattr(row.scene.pose, name), abs=1e-3)
+    assert (again.pose.state, again.pose.crossed) == (row.scene.pose.state, row.scene.pose.crossed)
+
+
+@pytest.mark.parametrize(("text", "why"), [("{}\n", "no results in it"), ("", "no results in it"), (None, "of another session")])
+def test_results_that_do_not_belong_here_are_refused(
+    open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot, text: str | None, why: str
+) -> None:
+    path = tmp_path / "again.jsonl"
+    if text is None:
+        replayed_file(session, path, name="session_of_someone_else")
+    else:
+        path.write_text(text)
+    window = open_player(session, path)
+    until(qtbot, lambda: why in window.panels.toast.text())
+    at(qtbot, window, 0)  # the recording plays all the same
+
+
+def far(tick: Tick) -> Tick:
+    path = tick.scene.path
+    assert path is not None
+    return replace(tick, scene=replace(tick.scene, path=replace(path, points=path.points * 1e30)))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        far,
+        lambda tick: replace(tick, scene=replace(tick.scene, scale=1e-30, scale_xy=None)),
+        lambda tick: replace(tick, scene=replace(tick.scene, centerline=replace(tick.scene.centerline, piece=np.zeros((0, 2))))),
+    ],
+)
+def test_absurd_geometry_is_not_drawn(damage: Callable[[Tick], Tick]) -> None:
+    """Lines to the end of the world would take seconds to paint."""
+    sound = tick_of(0, 0.0, full=True)
+    assert drawable(sound).scene.path is not None
+    shown = drawable(damage(sound))
+    assert (shown.scene.path, shown.scene.vessel_graph, shown.scene.masks, shown.scene.scale) == (None, None, None, 1.0)
+    assert shown.scene.pose is sound.scene.pose
+
+
+def test_an_absurd_advice_has_no_ghost() -> None:
+    sound = tick_of(0, 0.0, full=True)
+    assert sound.advice is not None
+    assert drawable(replace(sound, advice=replace(sound.advice, advance_mm_s=1e12))).advice is None
+
+
+@pytest.mark.parametrize(("name", "why"), [("nothing", "no such session"), ("empty", "not a session"), ("file", "not a file")])
+def test_what_is_no_session_is_one_line(tmp_path: Path, name: str, why: str) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SessionError, match=why):
+        SessionReader(tmp_path / name)
+    if name == "empty":  # the command says the same
+        done = subprocess.run(
+            [sys.executable, str(MAIN), "play", str(tmp_path / name)], capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, why in done.stderr, "Traceback" in done.stderr) == (2, True, False)

@@ -1,0 +1,147 @@
+"""Where the player stops: gaps, places to jump to, and the clock that plays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.player.session_model import Course, JumpKind, PlayClock, clock_text, course_of, event_line, neighbour, places_of
+from core.session.manifest import Event, EventKind
+from core.session.reader import Timeline
+
+
+def course(times_s: list[float], states: list[int] | None = None, rows: list[int] | None = None) -> Course:
+    count = len(times_s)
+    whole = np.arange(count)
+    return course_of(
+        Timeline(
+            np.array(rows if rows is not None else whole, np.int64),
+            np.array(times_s, np.float64),
+            np.zeros(count, np.int64),
+            np.array(times_s, np.int64),
+            np.zeros(count),
+            np.array(states if states is not None else [0] * count, np.int8),
+            np.full(count, -1, np.int8),
+        )
+    )
+
+
+def test_times_count_from_the_first_row_and_never_go_back() -> None:
+    found = course([100.0, 100.1, 100.05, 100.3])
+    assert found.first_s == 100.0
+    assert found.times_s == pytest.approx([0.0, 0.1, 0.1, 0.3])
+    assert found.duration_s == pytest.approx(0.3)
+    assert [found.place_at(t) for t in (-1.0, 0.0, 0.05, 0.1, 0.29, 9.0)] == [0, 0, 0, 2, 2, 3]
+
+
+def test_an_empty_session_has_no_length() -> None:
+    assert (len(course([])), course([]).duration_s) == (0, 0.0)
+    assert places_of(JumpKind.NOTE, course([]), [Event(1.0, EventKind.NOTE)]).size == 0
+
+
+def test_gaps_are_long_pauses_and_rows_that_are_missing() -> None:
+    assert course([0.0, 0.1, 0.2, 0.7, 0.8]).gaps.tolist() == [3]
+    assert course([0.0, 0.1, 0.2, 0.3], rows=[0, 1, 5, 6]).gaps.tolist() == [2]
+    # a slow camera has no gaps
+    assert course([0.0, 1.0, 2.0, 3.0]).gaps.size == 0
+
+
+def test_each_kind_has_its_places() -> None:
+    shown = course([10.0, 10.1, 10.2, 10.3, 11.9], states=[0, 0, 1, -1, -1])
+    events = [
+        Event(10.0, EventKind.MODE, "ADVISORY"),
+        Event(10.15, EventKind.NOTE, "between two frames: the first that was captured after it"),
+        Event(10.2, EventKind.FAULT, "at a frame"),
+        Event(99.0, EventKind.OVERRIDE, "after the end"),
+        Event(10.1, EventKind.VIDEO, "video_0000.mkv"),
+    ]
+    places = {kind: places_of(kind, shown, events).tolist() for kind in JumpKind}
+    assert places == {
+        JumpKind.STATE: [2, 3],
+        JumpKind.FAULT: [2],
+        JumpKind.OVERRIDE: [4],
+        JumpKind.NOTE: [2],
+        JumpKind.MODE: [0],
+        JumpKind.TARGET: [],
+        JumpKind.GAP: [4],
+        JumpKind.REPLAY: [],
+        JumpKind.ANY: [0, 2, 4],
+    }
+
+
+def test_neighbours() -> None:
+    places = np.array([2, 5, 9])
+    assert [neighbour(places, at, 1) for at in (0, 2, 8, 9)] == [2, 5, 9, None]
+    assert [neighbour(places, at, -1) for at in (2, 3, 9, 12)] == [None, 2, 5, 9]
+
+
+@pytest.mark.parametrize(
+    ("time_s", "text"), [(0.0, "0:00.000"), (61.2345, "1:01.234"), (3723.5, "1:02:03.500"), (0.9996, "0:01.000")]
+)
+def test_times_are_read_as_a_clock(time_s: float, text: str) -> None:
+    assert clock_text(time_s) == text
+
+
+def test_events_in_words() -> None:
+    assert event_line(Event(0.0, EventKind.FAULT, "head jumped", {"detail": "31 px"})) == "fault: head jumped (31 px)"
+    assert event_line(Event(0.0, EventKind.ARM)) == "arm"
+
+
+class Wall:
+    """A clock that is set by hand."""
+
+    def __init__(self) -> None:
+        self.now_s = 50.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def test_playing_follows_the_clock_at_its_speed_and_ends() -> None:
+    wall, shown = Wall(), course([k / 10 for k in range(21)])
+    clock = PlayClock(wall)
+    assert not clock.turn(shown, 2.0)
+    clock.play()
+    wall.now_s += 0.5
+    assert clock.turn(shown, 2.0)
+    assert clock.position_s == pytest.approx(0.5)
+    clock.speed = 0.1
+    wall.now_s += 1.0
+    clock.turn(shown, 2.0)
+    assert clock.position_s == pytest.approx(0.6)
+    clock.speed = 8.0
+    wall.now_s += 1.0
+    assert not clock.turn(shown, 2.0)
+    assert (clock.position_s, clock.is_playing) == (2.0, False)
+
+
+def test_speeds_go_from_a_tenth_to_eight() -> None:
+    clock = PlayClock()
+    assert [clock.faster(1) for _ in range(4)] == [2.0, 4.0, 8.0, 8.0]
+    assert [clock.faster(-1) for _ in range(7)] == [4.0, 2.0, 1.0, 0.5, 0.25, 0.1, 0.1]
+
+
+def test_a_long_gap_is_passed_over_and_told() -> None:
+    wall, shown = Wall(), course([0.0, 0.1, 0.2, 60.2, 60.3])
+    clock = PlayClock(wall)
+    clock.play()
+    wall.now_s += 0.6
+    clock.turn(shown, 60.3)
+    assert (clock.position_s, clock.passed_s) == (pytest.approx(0.6), 0.0)
+    wall.now_s += 0.2
+    clock.turn(shown, 60.3)
+    assert (clock.position_s, clock.passed_s) == (pytest.approx(60.2), pytest.approx(59.4))
+    wall.now_s += 0.01
+    clock.turn(shown, 60.3)
+    assert clock.passed_s == 0.0
+
+
+def test_a_seek_while_playing_starts_from_there() -> None:
+    wall, shown = Wall(), course([k / 10 for k in range(100)])
+    clock = PlayClock(wall)
+    clock.play()
+    wall.now_s += 3.0
+    clock.seek(1.0)
+    wall.now_s += 0.5
+    clock.turn(shown, 9.9)
+    assert clock.position_s == pytest.approx(1.5)

@@ -1,0 +1,653 @@
+"""The rig wizard by its pages: names, camera, board, clicks, servos by hand, STOP, save; and what goes wrong."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QFileDialog, QSpinBox, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.commands.rig import calibration_lines
+from app.rig_wizard import servo_pages
+from app.rig_wizard.model import RigWizardModel
+from app.rig_wizard.wizard import RigWizard
+from app.ui.window_base import close_all, is_asked_to_end
+from core.calibration.camera import BoardView
+from core.calibration.servos import Assignment
+from core.config.calibration import CalibrationConfig, ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
+from core.config.models import Config, load_config
+from core.config.rig_file import find_rig, list_rigs
+from core.config.safety import JOINT_NAMES, TENDONS
+from core.devices import DeviceError
+from core.types import Frame
+from hardware.calibration import bench as calibration_bench
+from hardware.calibration.bench import CalibrationBench
+from hardware.calibration.servo_identification import Zeros
+from hardware.servos.discovery import FoundPort, FoundServo, FoundServos
+from tests.app.fakes import make_scene, until
+
+
+class StillCamera:
+    name, is_live = "still camera", False
+
+    def open(self) -> None: ...
+
+    def read(self, timeout_s: float) -> Frame | None:
+        time.sleep(0.01)
+        return Frame(0, time.monotonic(), np.full((480, 640, 3), 90, np.uint8))
+
+    def close(self) -> None: ...
+
+
+def _open(config: Config, see: object) -> CalibrationBench:
+    return CalibrationBench(config, StillCamera(), None, lambda frame: make_scene(), lambda: None)
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+
+
+MakeWizard = Callable[..., RigWizard]
+
+
+@pytest.fixture
+def make_wizard(qtbot: QtBot) -> Iterator[MakeWizard]:
+    made: list[RigWizard] = []
+
+    def make(
+        name: str = "", config: Config | None = None, known: CalibrationConfig | None = None, opener: Callable[..., object] = _open
+    ) -> RigWizard:
+        desk = RigWizardModel(config or load_config(), known, opener, lambda _config: lambda frame: make_scene())  # type: ignore[arg-type]
+        wizard = RigWizard(desk, name)
+        qtbot.addWidget(wizard)
+        made.append(wizard)
+        wizard.show()
+        until(qtbot, lambda: not desk.is_busy)
+        return wizard
+
+    yield make
+    for wizard in made:
+        wizard.reject()
+
+
+@pytest.fixture
+def opened(make_wizard: MakeWizard, qtbot: QtBot) -> RigWizard:
+    wizard = make_wizard("bench 1")
+    _open_camera(wizard, qtbot)
+    return wizard
+
+
+def _open_camera(wizard: RigWizard, qtbot: QtBot) -> None:
+    qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
+    _idle(wizard, qtbot)
+    assert wizard.desk.bench is not None
+
+
+def _idle(wizard: RigWizard, qtbot: QtBot) -> None:
+    until(qtbot, lambda: not wizard.desk.is_busy)
+
+
+def _to(wizard: RigWizard, page: object) -> None:
+    while wizard.page is not page:
+        assert wizard.next_button.isEnabled()
+        wizard.next_button.click()
+
+
+# ---- the first page
+
+
+def test_a_rig_needs_a_name_and_a_camera(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    wizard = make_wizard()
+    page = wizard.camera_page
+    assert [page.cameras.item(k).text() for k in range(page.cameras.count())][-1] == "Bench twin (no hardware)"
+    assert "Give the rig a name" in page.problem.text()
+    assert not wizard.next_button.isEnabled()
+    _open_camera(wizard, qtbot)
+    assert not wizard.next_button.isEnabled()
+    qtbot.keyClicks(page.name_edit, "twin")
+    assert "cannot be called twin" in page.problem.text()
+    assert not wizard.next_button.isEnabled()
+    page.name_edit.setText("bench 1")
+    assert wizard.next_button.isEnabled()
+    wizard.next_button.click()
+    assert wizard.page is wizard.scale_page
+
+
+def test_a_camera_that_cannot_be_opened_is_one_line(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    def refuse(config: Config, see: object) -> CalibrationBench:
+        raise DeviceError("no webcam: plug it in")
+
+    wizard = make_wizard("bench 1", opener=refuse)
+    qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
+    _idle(wizard, qtbot)
+    assert wizard.message == "no webcam: plug it in"
+    assert not wizard.next_button.isEnabled()
+
+
+def test_the_living_picture_is_shown(opened: RigWizard, qtbot: QtBot) -> None:
+    until(qtbot, lambda: opened.picture._image is not None)
+    assert opened.camera_page.is_done
+
+
+# ---- scale and lens
+
+
+def test_the_board_gives_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
+    page = opened.scale_page
+    _to(opened, page)
+    assert opened.next_button.text() == "&Skip"
+    for _ in range(2):
+        qtbot.mouseClick(page.take_button, Qt.MouseButton.LeftButton)
+        _idle(opened, qtbot)
+    assert page.count.text() == "2 pictures of the board taken"
+    assert len(page.shapes()) > 30
+    assert not page.square.isEnabled()
+    qtbot.mouseClick(page.solve_button, Qt.MouseButton.LeftButton)
+    _idle(opened, qtbot)
+    assert opened.desk.draft is not None
+    assert opened.desk.draft.scale is not None
+    assert opened.desk.draft.scale.mm_per_px == pytest.approx(1.0 / 3.1, rel=0.01)
+    assert "mm per pixel" in page.result.text()
+    assert opened.next_button.text() == "&Next"
+
+
+def test_two_clicks_give_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
+    page = opened.scale_page
+    _to(opened, page)
+    page.length.setValue(80.0)
+    qtbot.mouseClick(page.clicks_button, Qt.MouseButton.LeftButton)
+    until(qtbot, lambda: opened.picture._image is not None)
+    for place in ((100.0, 100.0), (300.0, 100.0)):
+        x, y = opened.picture.on_screen(place)
+        qtbot.mouseClick(opened.picture, Qt.MouseButton.LeftButton, pos=_point(x, y))
+    assert opened.desk.draft is not None
+    assert opened.desk.draft.scale is not None
+    assert opened.desk.draft.scale.mm_per_px == pytest.approx(0.4, rel=0.02)
+    assert len(page.shapes()) == 3
+    page.click(10.0, 10.0)
+    page.click(12.0, 10.0)
+    assert "px apart" in opened.message
+    assert page.shapes() == []
+
+
+def test_a_length_that_is_corrected_after_the_two_clicks_counts(opened: RigWizard, qtbot: QtBot) -> None:
+    page, draft = opened.scale_page, opened.desk.draft
+    assert draft is not None
+    _to(opened, page)
+    page.length.setValue(50.0)
+    qtbot.mouseClick(page.clicks_button, Qt.MouseButton.LeftButton)
+    page.click(100.0, 100.0)
+    page.length.setValue(60.0)
+    assert draft.scale is None, "one click is no length yet"
+    page.click(500.0, 100.0)
+    page.length.selectAll()
+    qtbot.keyClicks(page.length, "80")
+    assert draft.scale is not None
+    assert draft.scale.mm_per_px == pytest.approx(0.2)
+    assert page.result.text().startswith("Scale: 0.2000 mm per pixel")
+    page.leave()  # the next page, and back: the picture may have moved since
+    page.length.setValue(100.0)
+    assert draft.scale.mm_per_px == pytest.approx(0.2)
+
+
+def _point(x: float, y: float) -> object:
+    from PySide6.QtCore import QPoint
+
+    return QPoint(round(x), round(y))
+
+
+def test_a_board_that_is_not_seen_is_told(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    class Empty(CalibrationBench):
+        def board_picture(self, spec: object) -> np.ndarray:
+            return np.full((480, 640, 3), 90, np.uint8)
+
+    wizard = make_wizard(
+        "bench 1", opener=lambda config, see: Empty(config, StillCamera(), None, lambda frame: make_scene(), lambda: None)
+    )
+    _open_camera(wizard, qtbot)
+    _to(wizard, wizard.scale_page)
+    qtbot.mouseClick(wizard.scale_page.take_button, Qt.MouseButton.LeftButton)
+    _idle(wizard, qtbot)
+    assert wizard.message.startswith("no board: 0 of its markers")
+    assert not wizard.scale_page.is_done
+
+
+def test_the_board_is_written_for_the_printer(opened: RigWizard, tmp_path: Path) -> None:
+    opened.scale_page.save_board(tmp_path / "board.pdf")
+    assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
+    assert "100 %" in opened.message
+    opened.scale_page.save_board(tmp_path / "board.jpg")
+    assert "written as .pdf or .png" in opened.message
+
+
+def test_no_dialog_of_the_desktop_keeps_stop_from_the_wizard(opened: RigWizard) -> None:
+    """It would be another program's: Space in it would reach nobody here."""
+    dialogs: list[bool] = []
+
+    def look() -> None:
+        dialog = QApplication.activeModalWidget()
+        assert isinstance(dialog, QFileDialog)
+        dialogs.append(dialog.testOption(QFileDialog.Option.DontUseNativeDialog))
+        dialog.reject()
+
+    QTimer.singleShot(0, look)
+    opened.scale_page._print()
+    assert dialogs == [True]
+
+
+# ---- servos
+
+
+def test_without_servos_their_pages_have_nothing_to_do(opened: RigWizard, qtbot: QtBot) -> None:
+    _to(opened, opened.port_page)
+    qtbot.mouseClick(opened.port_page.search_button, Qt.MouseButton.LeftButton)
+    _idle(opened, qtbot)
+    for page, control in (
+        (opened.identify_page, opened.identify_page.auto_button),
+        (opened.zero_page, opened.zero_page.find_button),
+        (opened.steering_page, opened.steering_page.learn_button),
+    ):
+        _to(opened, page)
+        assert not control.isEnabled()
+        assert page.result.text() == "Search the servos first."
+
+
+def _with_servos(wizard: RigWizard) -> None:
+    assert wizard.desk.draft is not None
+    assert wizard.desk.bench is not None
+    wizard.desk.bench.port = "/dev/ttyUSB0"
+    wizard.desk.draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in range(1, 8)))
+    wizard.desk.changed.emit()
+
+
+def test_servos_are_told_apart_by_hand(opened: RigWizard, qtbot: QtBot) -> None:
+    _to(opened, opened.identify_page)
+    _with_servos(opened)
+    page, draft = opened.identify_page, opened.desk.draft
+    assert draft is not None
+    assert page.auto_button.isEnabled()
+    page._signs[0].setCurrentIndex(1)
+    page._signs[0].activated.emit(1)
+    assert draft.assignments[0] == Assignment("right", 1, -1, "set by hand")
+    assert draft.config.servos.joints[0].sign == -1
+    qtbot.mouseClick(page.swap_button, Qt.MouseButton.LeftButton)
+    assert [(one.name, one.id) for one in draft.assignments[2:4]] == [("up", 4), ("down", 3)]
+    page._ids[0].setCurrentIndex(1)
+    page._ids[0].activated.emit(1)
+    assert "every servo must have one name" in opened.message
+    assert draft.assignments[0].id == 1
+
+
+def test_touching_one_servo_confirms_no_other_one(opened: RigWizard) -> None:
+    """A rig that is calibrated once more: nobody has looked which of two is up meanwhile."""
+    _to(opened, opened.identify_page)
+    _with_servos(opened)
+    page, draft = opened.identify_page, opened.desk.draft
+    assert draft is not None
+    draft._assumed_earlier = ("up", "down")
+    page._signs[4].activated.emit(page._signs[4].currentIndex())
+    assert draft.assumed == ("up", "down")
+    page._signs[2].setCurrentIndex(1 - page._signs[2].currentIndex())
+    page._signs[2].activated.emit(0)
+    assert draft.assumed == ("down",)
+
+
+@pytest.mark.parametrize("change", ["another servo", "the other way"])
+def test_zero_and_steering_are_of_the_servos_they_were_found_with(opened: RigWizard, qtbot: QtBot, change: str) -> None:
+    _to(opened, opened.identify_page)
+    _with_servos(opened)
+    page, draft = opened.identify_page, opened.desk.draft
+    assert draft is not None
+    named = [Assignment(joint.name, joint.id, joint.sign, "seen") for joint in draft.config.servos.joints]
+    draft.zero = ZeroConfig(ticks=tuple(range(7)), slack_mm=(0.1, 0.2, 0.3, 0.4), pretension_mm=0.3)
+    draft.zeros = Zeros((0.1, 0.2, 0.3, 0.4))
+    tendons = tuple(TendonConfig.model_validate({"name": name, "moved_px": 9.0, "px_per_mm": 6.0}) for name in TENDONS)
+    draft.steering = SteeringConfig(heading_deg=0.0, roll_deg=0.0, disagreement_deg=1.0, tendons=tendons)
+    draft.set_assignments(named)
+    assert opened.zero_page.is_done and opened.steering_page.is_done, "the servos are where they were"
+    if change == "another servo":
+        qtbot.mouseClick(page.swap_button, Qt.MouseButton.LeftButton)
+    else:
+        other = 1 - page._signs[0].currentIndex()
+        page._signs[0].setCurrentIndex(other)
+        page._signs[0].activated.emit(other)
+    assert (draft.zero, draft.zeros, draft.steering, draft.head_px) == (None, None, None, None)
+    assert not opened.zero_page.is_done
+    assert not opened.steering_page.is_done
+    assert "find them anew" in opened.message
+
+
+def test_the_person_is_asked_which_of_two_is_up(opened: RigWizard, qtbot: QtBot) -> None:
+    """One camera cannot tell; without an answer the rig file says that it is assumed."""
+    _to(opened, opened.identify_page)
+    _with_servos(opened)
+    page, draft = opened.identify_page, opened.desk.draft
+    assert draft is not None
+    assert not page.right_button.isVisible()
+    named = [Assignment(name, number, 1, "seen", assumed=name in {"up", "down"}) for number, name in enumerate(JOINT_NAMES, 1)]
+    draft.set_assignments(named)
+    opened.desk.changed.emit()
+    assert "does the head rise" in page.result.text()
+    rig = draft.rig_file("bench 1")
+    assert rig.calibration is not None
+    assert rig.calibration.assumed == ("up", "down")
+    assert any(line.startswith("assumed: up and down by the order of their ids") for line in calibration_lines(rig))
+    qtbot.mouseClick(page.right_button, Qt.MouseButton.LeftButton)
+    assert not page.right_button.isVisible()
+    assert [one.seen for one in draft.assignments[2:4]] == ["seen by eye"] * 2
+    assert draft.calibration().assumed is None
+    draft.set_assignments(named)
+    opened.desk.changed.emit()
+    qtbot.mouseClick(page.swap_button, Qt.MouseButton.LeftButton)
+    assert [(one.name, one.id) for one in draft.assignments[2:4]] == [("up", 4), ("down", 3)]
+    assert draft.calibration().assumed is None, "who swaps has looked"
+
+
+def test_stop_is_heard_on_every_page(opened: RigWizard, qtbot: QtBot) -> None:
+    bench = opened.desk.bench
+    assert bench is not None
+    for press in (
+        lambda: qtbot.mousePress(opened.stop_button, Qt.MouseButton.LeftButton),
+        lambda: qtbot.keyClick(opened, Qt.Key.Key_Space),
+        opened.stop,
+    ):
+        bench.stop.release()
+        press()
+        assert bench.stop.is_pressed
+
+
+def test_a_rig_may_have_a_space_in_its_name_and_space_is_stop_there_while_a_job_runs(opened: RigWizard, qtbot: QtBot) -> None:
+    bench, name = opened.desk.bench, opened.camera_page.name_edit
+    assert bench is not None
+    opened.back()
+    name.clear()
+    qtbot.keyClicks(name, "left bench")
+    assert name.text() == "left bench"
+    assert not bench.stop.is_pressed
+    opened.desk.run("moving a servo", lambda: bench.stop.sleep(20.0))
+    qtbot.keyClick(name, Qt.Key.Key_Space)
+    assert bench.stop.is_pressed
+    assert name.text() == "left bench"
+    _idle(opened, qtbot)
+
+
+def test_stop_reaches_a_job_that_runs(opened: RigWizard, qtbot: QtBot) -> None:
+    bench = opened.desk.bench
+    assert bench is not None
+    opened.desk.run("moving a servo", lambda: bench.stop.sleep(20.0))
+    assert not opened.next_button.isEnabled()
+    assert opened.message == "Moving a servo ..."
+    qtbot.mousePress(opened.stop_button, Qt.MouseButton.LeftButton)
+    _idle(opened, qtbot)
+    assert opened.message == "stopped: nothing moves before you go on"
+    opened.desk.run("looking", bench.stop.check)  # asking for the next step is going on
+    _idle(opened, qtbot)
+    assert opened.message == ""
+
+
+# ---- the end
+
+
+def test_saved_rigs_hold_what_was_found(opened: RigWizard, qtbot: QtBot) -> None:
+    assert opened.desk.draft is not None
+    opened.desk.draft.scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="two clicks", uncertainty_share=0.01)
+    _to(opened, opened.summary_page)
+    assert "scale: 0.3000 mm/px" in opened.summary_page.text.toPlainText()
+    assert opened.next_button.text() == "&Save"
+    with qtbot.waitSignal(opened.saved) as told:
+        opened.next_button.click()
+    assert told.args == ["bench 1"]
+    _, rig = find_rig("bench 1")
+    assert rig.calibration is not None
+    assert rig.calibration.scale is not None
+    assert rig.calibration.scale.mm_per_px == 0.3
+    assert opened.desk.wait_closed()
+    assert opened.desk.bench is None  # the camera is free again
+
+
+def test_a_step_that_is_left_out_keeps_what_was_known(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="board", uncertainty_share=0.01)
+    known = CalibrationConfig.model_validate({"made_utc": "2025-01-01T00:00:00Z", "scale": scale})
+    wizard = make_wizard("bench 1", known=known)
+    _open_camera(wizard, qtbot)
+    assert wizard.scale_page.is_done
+    _to(wizard, wizard.summary_page)
+    wizard.next_button.click()
+    assert find_rig("bench 1")[1].calibration.scale == scale  # type: ignore[union-attr]
+
+
+def test_another_camera_does_not_inherit_the_calibration(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="board", uncertainty_share=0.01)
+    known = CalibrationConfig.model_validate({"made_utc": "2025-01-01T00:00:00Z", "scale": scale})
+    before = load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}, "camera": {"device": "/dev/v4l/by-id/a"}})
+    wizard = make_wizard("bench 1", before, known)
+    for changes in ({"device": "/dev/v4l/by-id/b"}, {"width_px": 1280, "height_px": 720}):
+        wizard.desk.open_camera(before.model_copy(update={"camera": before.camera.model_copy(update=changes)}))
+        _idle(wizard, qtbot)
+        assert not wizard.scale_page.is_done
+    wizard.desk.open_camera(before)
+    _idle(wizard, qtbot)
+    assert wizard.scale_page.is_done
+
+
+@pytest.mark.parametrize(("kind", "sign"), [("realsense", "serial"), ("webcam", "device")])
+def test_a_camera_that_was_not_named_keeps_its_calibration_when_it_is_found(
+    make_wizard: MakeWizard, qtbot: QtBot, kind: str, sign: str
+) -> None:
+    known = CalibrationConfig.model_validate({"made_utc": "2025-01-01T00:00:00Z", "port": {"x_share": 0.1, "y_share": 0.5}})
+    before = load_config(overrides={"rig": {"camera": kind, "robot": "none"}})
+    wizard = make_wizard("bench 1", before, known)
+    wizard.desk.open_camera(before.model_copy(update={"camera": before.camera.model_copy(update={sign: "f0123456"})}))
+    _idle(wizard, qtbot)
+    assert wizard.desk.draft is not None
+    assert wizard.desk.draft.port == known.port
+
+
+def test_opening_the_camera_anew_asks_before_it_loses_what_was_found(opened: RigWizard, qtbot: QtBot) -> None:
+    draft, page = opened.desk.draft, opened.camera_page
+    assert draft is not None
+    draft.scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="board", uncertainty_share=0.01)
+    page.open_button.click()
+    assert opened.question.text == "Open the camera anew and lose what was found?"
+    opened.question.cancel()
+    assert opened.desk.draft is draft
+    page.open_button.click()
+    opened.question._yes.click()
+    _idle(opened, qtbot)
+    assert opened.desk.draft is not draft
+
+
+def test_the_pretension_is_what_the_wires_envelopes_allow(opened: RigWizard) -> None:
+    draft, page = opened.desk.draft, opened.zero_page
+    assert draft is not None
+    joints = tuple(joint.model_copy(update={"high_mm": 1.5}) for joint in draft.config.servos.joints)
+    draft.config = draft.config.model_copy(
+        update={"servos": draft.config.servos.model_copy(update={"joints": joints, "pretension_mm": 0.8})}
+    )
+    page.refresh()
+    assert page.pretension.value() == pytest.approx(0.8)
+    page.pretension.setValue(9.0)
+    assert draft.config.servos.pretension_mm == page.pretension.value() == 1.5
+
+
+def test_the_ports_are_those_of_the_bench_that_is_open(
+    make_wizard: MakeWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wizard = make_wizard("bench 1")
+    _open_camera(wizard, qtbot)
+    page = wizard.port_page
+    page.enter()
+    assert [page.ports.itemText(k) for k in range(page.ports.count())] == ["the twin's own servos"]
+    wizard.desk.open_camera(load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}}))
+    _idle(wizard, qtbot)
+    monkeypatch.setattr(servo_pages, "find_ports", lambda: (FoundPort("/dev/serial/by-id/u2d2", "U2D2"),))
+    page.enter()
+    assert [page.ports.itemData(k) for k in range(page.ports.count())] == ["/dev/serial/by-id/u2d2", None]
+
+
+def by_escape(wizard: RigWizard) -> None:
+    wizard.setFocus()
+    QTest.keyClick(wizard, Qt.Key.Key_Escape)
+
+
+def by_cancel(wizard: RigWizard) -> None:
+    wizard.cancel_button.click()
+
+
+def by_the_title_bar(wizard: RigWizard) -> None:
+    wizard.close()
+
+
+LEAVING = pytest.mark.parametrize("leave", [by_escape, by_cancel, by_the_title_bar])
+
+
+def _find_a_scale(wizard: RigWizard) -> None:
+    assert wizard.desk.draft is not None
+    wizard.desk.draft.solve_clicks((100.0, 100.0), (500.0, 100.0), 80.0)
+    wizard.desk.changed.emit()
+
+
+@LEAVING
+def test_what_was_found_is_not_thrown_away_without_a_question(
+    opened: RigWizard, qtbot: QtBot, leave: Callable[[RigWizard], None]
+) -> None:
+    _find_a_scale(opened)
+    leave(opened)
+    assert opened.isVisible()
+    assert opened.question.isVisible()
+    assert opened.question.text == "Leave without saving what was found?"
+    assert opened.desk.bench is not None, "camera and servos are still here"
+    qtbot.keyClick(opened, Qt.Key.Key_Space)
+    assert opened.isVisible(), "Space is STOP, and answers nothing"
+    assert opened.question.isVisible()
+    qtbot.keyClick(opened, Qt.Key.Key_Escape)
+    assert not opened.question.isVisible()
+    assert opened.cancel_button.isVisible()
+    leave(opened)
+    opened.question._yes.click()
+    assert not opened.isVisible()
+    until(qtbot, lambda: opened.desk.bench is None)
+
+
+def test_a_program_that_is_asked_to_end_is_not_kept_by_a_question(opened: RigWizard, qtbot: QtBot, qapp: QApplication) -> None:
+    """Ctrl-C, or a computer that is shut down: whoever waits for an answer is killed, and leaves the servos as they are."""
+    _find_a_scale(opened)
+    close_all(qapp)
+    assert not opened.isVisible()
+    until(qtbot, lambda: opened.desk.bench is None)
+    assert not is_asked_to_end()
+
+
+@LEAVING
+def test_where_nothing_was_found_nobody_is_asked(opened: RigWizard, qtbot: QtBot, leave: Callable[[RigWizard], None]) -> None:
+    leave(opened)
+    assert not opened.isVisible()
+
+
+def turn_the_wheel(over: QWidget) -> QWheelEvent:
+    at = QPointF(over.rect().center())
+    down, none = QPoint(0, -120), Qt.MouseButton.NoButton
+    everywhere = QPointF(over.mapToGlobal(at.toPoint()))
+    event = QWheelEvent(at, everywhere, QPoint(), down, none, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False)
+    QApplication.sendEvent(over, event)
+    return event
+
+
+def test_the_wheel_changes_no_servo_no_direction_and_no_number(opened: RigWizard) -> None:
+    """Turned over the table of joints it would pull a wire the wrong way ever after."""
+    lists, numbers = opened.findChildren(QComboBox), opened.findChildren(QSpinBox) + opened.findChildren(QDoubleSpinBox)
+    assert len(lists) > 14
+    assert len(numbers) > 3
+    for control in (*lists, *numbers):
+        control.setEnabled(True)
+        before = control.currentIndex() if isinstance(control, QComboBox) else control.value()
+        event = turn_the_wheel(control)
+        assert before == (control.currentIndex() if isinstance(control, QComboBox) else control.value()), control.accessibleName()
+        assert not event.isAccepted()
+    assert not opened.identify_page.is_done
+
+
+def test_escape_leaves_the_field_first(opened: RigWizard, qtbot: QtBot) -> None:
+    _to(opened, opened.scale_page)
+    opened.scale_page.length.setFocus()
+    qtbot.keyClick(opened.scale_page.length, Qt.Key.Key_Escape)
+    assert opened.isVisible()
+    assert opened.focusWidget() is not opened.scale_page.length
+    qtbot.keyClick(opened, Qt.Key.Key_Escape)
+    assert not opened.isVisible()
+
+
+def test_the_question_gives_way_to_another_page_and_to_what_went_wrong(opened: RigWizard) -> None:
+    _find_a_scale(opened)
+    for happens in (opened.next, lambda: opened.desk.failed.emit("the port is gone")):
+        opened.ask_to_leave()
+        assert opened.question.isVisible()
+        happens()
+        assert not opened.question.isVisible()
+    assert opened.message == "the port is gone"
+    assert opened.line.isVisible()
+
+
+def test_a_board_that_is_forgotten_again_leaves_nothing_to_ask_about(opened: RigWizard) -> None:
+    draft = opened.desk.draft
+    assert draft is not None
+    assert not draft.has_news
+    draft.views.append(BoardView(np.zeros((4, 2)), np.zeros((4, 2))))
+    assert draft.has_news
+    draft.forget_boards()
+    assert not draft.has_news
+
+
+def test_cancel_saves_nothing_and_gives_the_camera_back(opened: RigWizard) -> None:
+    opened.cancel_button.click()
+    assert list_rigs() == ()
+    assert opened.desk.wait_closed()
+    assert opened.desk.bench is None
+
+
+def test_a_camera_without_pictures_is_none(make_wizard: MakeWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Blind(StillCamera):
+        def read(self, timeout_s: float) -> Frame | None:
+            time.sleep(0.01)
+            return None
+
+    monkeypatch.setattr(calibration_bench, "_LOOK_WITHIN_S", 0.1)
+    wizard = make_wizard(
+        "bench 1", opener=lambda config, see: CalibrationBench(config, Blind(), None, lambda frame: make_scene(), lambda: None)
+    )
+    qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
+    _idle(wizard, qtbot)
+    assert "gives no pictures" in wizard.message
+    assert wizard.desk.bench is None
+    assert not wizard.camera_page.is_done
+    wizard.next()
+    assert wizard.page is wizard.camera_page
+
+
+def test_a_driver_that_hangs_does_not_hold_the_window_up(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    go_on = threading.Event()
+
+    def hang(config: Config, see: object) -> CalibrationBench:
+        go_on.wait(20.0)
+        return _open(config, see)
+
+    wizard = make_wizard("bench 1", opener=hang)
+    closed: list[bool] = []
+    wizard.desk.closed.connect(lambda: closed.append(True))
+    qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
+    wizard.cancel_button.click()  # comes back although the driver does not
+    assert not wizard.isVisible()
+    qtbot.wait(50)
+    assert closed == []
+    go_on.set()
+    until(qtbot, lambda: closed == [True])
+    assert wizard.desk.bench is None

@@ -1,0 +1,360 @@
+"""The dialog: fields from the schema, search, marks, resets, profiles; it works by keyboard and Space is left to STOP."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit
+from pytestqt.qtbot import QtBot
+
+from app.settings.dialog import WANTED, NumberEdit, ProfileRow, SettingField, SettingsDialog, SettingsDraft
+from core.config.files import Profiles
+from core.config.models import RESOURCES, Config, load_config
+from core.config.schema import schema, settings_by_key
+
+D_ALLOW, THETA = "perception.pose.d_allow_px", "perception.pose.theta_allow_deg"
+Key = Qt.Key
+
+
+@pytest.fixture
+def profiles(tmp_path: Path) -> Profiles:
+    return Profiles(tmp_path / "profiles")
+
+
+@pytest.fixture
+def dialog(qtbot: QtBot, themed: None, profiles: Profiles) -> SettingsDialog:
+    made = SettingsDialog(SettingsDraft(load_config()), Path("settings.toml"), profiles)
+    made.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose, False)
+    qtbot.addWidget(made)
+    made.show()
+    return made
+
+
+def drafts(dialog: SettingsDialog) -> list[Config]:
+    seen: list[Config] = []
+    dialog.drafted.connect(seen.append)
+    return seen
+
+
+def field(dialog: SettingsDialog, key: str) -> SettingField:
+    dialog.go_to(key)
+    return dialog.page.fields[key]
+
+
+def type_into(dialog: SettingsDialog, key: str, text: str) -> SettingField:
+    shown = field(dialog, key)
+    editor = shown.editor
+    assert isinstance(editor, QLineEdit)
+    editor.selectAll()
+    QTest.keyClicks(editor, text)
+    return shown
+
+
+def test_every_section_has_its_page_with_every_setting(dialog: SettingsDialog) -> None:
+    """But for six of the seven joints, which are all alike."""
+    seen: set[str] = set()
+    for section in schema().walk():
+        if section.key and (not section.key.startswith("servos.joints.") or section.key.endswith(".0")):
+            dialog.show_section(section)
+            dialog.page.add_all()
+            seen |= set(dialog.page.fields)
+    assert seen == {key for key in settings_by_key() if not key.startswith("servos.joints.") or ".0." in key}
+
+
+def test_a_field_shows_unit_default_range_and_meaning(dialog: SettingsDialog) -> None:
+    shown = field(dialog, D_ALLOW)
+    texts = " ".join(label.text() for label in shown.findChildren(type(shown._error))).replace("\N{NO-BREAK SPACE}", " ")
+    for words in ("Allowed distance", "px", "Default 6 px", "above 0 and at most 200 px", "Distance of head and tail"):
+        assert words in texts
+    assert shown.editor.accessibleName() == "Allowed distance, px"
+    assert shown.toolTip() == D_ALLOW
+
+
+@pytest.mark.parametrize("where", ["setting", "profile"])
+def test_a_choice_by_keyboard_keeps_the_focus_where_it_was(dialog: SettingsDialog, qtbot: QtBot, where: str) -> None:
+    combo = field(dialog, "rig.robot").editor if where == "setting" else dialog.findChild(ProfileRow).combo
+    assert isinstance(combo, QComboBox)
+    combo.setFocus()
+    before = combo.currentText()
+    QTest.keyClick(combo, Key.Key_Return)
+    qtbot.waitUntil(combo.view().isVisible)
+    QTest.keyClick(combo.view(), Key.Key_Down)
+    QTest.keyClick(combo.view(), Key.Key_Return)
+    qtbot.waitUntil(lambda: not combo.view().isVisible())
+    assert combo.currentText() != before
+    assert dialog.focusWidget() is combo, "Tab goes on from here"
+
+
+def test_typing_is_checked_at_once_and_marked(dialog: SettingsDialog) -> None:
+    seen = drafts(dialog)
+    shown = type_into(dialog, D_ALLOW, "9")
+    assert seen[-1].perception.pose.d_allow_px == 9.0
+    assert shown.is_marked
+    assert dialog.save.isEnabled()
+    assert "picture shows it already" in dialog.status.text()
+    type_into(dialog, D_ALLOW, "900")
+    assert shown.error_text.endswith("must be above 0 and at most 200 px")
+    assert not dialog.save.isEnabled()
+    assert D_ALLOW in dialog.status.text()
+    assert seen[-1].perception.pose.d_allow_px == 90.0, "the last one that was allowed"
+    shown.reset_button.click()
+    assert not shown.is_marked
+    assert shown.error_text == ""
+    assert seen[-1] == load_config()
+
+
+def test_escape_asks_before_changes_are_lost(dialog: SettingsDialog) -> None:
+    type_into(dialog, D_ALLOW, "9")
+    QTest.keyClick(dialog.page.fields[D_ALLOW].editor, Key.Key_Escape)
+    assert dialog.isVisible()
+    assert dialog.question.text == "Leave without saving the changes?"
+    assert not dialog.status.isVisible()
+    assert not dialog.cancel.isVisible(), "there is one Cancel, and it goes on"
+    QTest.keyClick(dialog.question._no, Key.Key_Escape)
+    assert dialog.question.text == ""
+    assert dialog.status.isVisible()
+    assert dialog.cancel.isVisible()
+    assert dialog.draft.is_dirty, "nothing was lost"
+    QTest.keyClick(dialog, Key.Key_Escape)
+    dialog.question._yes.click()
+    assert not dialog.isVisible()
+    assert dialog.result() == SettingsDialog.DialogCode.Rejected
+
+
+def test_without_changes_nobody_is_asked_and_cancel_and_the_cross_ask_nobody(dialog: SettingsDialog) -> None:
+    QTest.keyClick(dialog, Key.Key_Escape)
+    assert not dialog.isVisible()
+    for leave in (dialog.cancel.click, dialog.close):
+        dialog.show()
+        type_into(dialog, D_ALLOW, "9")
+        leave()
+        assert not dialog.isVisible()
+
+
+def test_the_tree_tells_where_something_differs_or_is_wrong(dialog: SettingsDialog) -> None:
+    type_into(dialog, D_ALLOW, "9")
+    assert dialog._items["perception.pose"].text(1).endswith("1")
+    assert dialog._items["perception"].text(1).endswith("1")
+    assert dialog._items["safety"].text(1) == ""
+    type_into(dialog, THETA, "999")
+    assert dialog._items["perception.pose"].text(1) == "\N{WARNING SIGN}"
+    assert dialog._items["perception.pose"].data(0, Qt.ItemDataRole.AccessibleTextRole).endswith("not allowed")
+
+
+def test_the_problem_below_leads_to_its_field(dialog: SettingsDialog) -> None:
+    type_into(dialog, D_ALLOW, "900")
+    dialog.show_section(next(s for s in schema().walk() if s.key == "record"))
+    dialog.status.linkActivated.emit(D_ALLOW)
+    assert dialog.focusWidget() is dialog.page.fields[D_ALLOW].editor
+
+
+def test_search_shows_what_fits_from_all_sections(dialog: SettingsDialog, qtbot: QtBot) -> None:
+    QTest.keyClick(dialog, Key.Key_F, Qt.KeyboardModifier.ControlModifier)
+    assert dialog.focusWidget() is dialog.search
+    QTest.keyClicks(dialog.search, "threshold")
+    qtbot.waitUntil(lambda: "perception.gaps.gap_threshold_px" in dialog.page.fields)
+    assert "perception.segmentation.vessel_threshold" in dialog.page.fields
+    dialog.search.setText("zebra")
+    qtbot.waitUntil(lambda: not dialog.page.fields)
+    QTest.keyClick(dialog.search, Key.Key_Escape)
+    assert dialog.isVisible(), "Escape clears the search first"
+    qtbot.waitUntil(lambda: bool(dialog.page.fields))
+
+
+def test_resets_of_section_and_of_all(dialog: SettingsDialog) -> None:
+    type_into(dialog, D_ALLOW, "9")
+    type_into(dialog, "advice.fast_mm_s", "9")
+    dialog.page.section_reset_asked.emit(next(s for s in schema().walk() if s.key == "advice"))
+    assert dialog.draft.value("advice.fast_mm_s") == 8.0
+    assert dialog.draft.value(D_ALLOW) == 9.0
+    dialog.reset_all.click()
+    assert dialog.profile_row.question.text == "Put all settings back to their defaults?"
+    assert dialog.draft.value(D_ALLOW) == 9.0, "asked first"
+    dialog.profile_row.question._on_yes()
+    assert dialog.draft.config == load_config()
+
+
+def test_switches_and_choices_work_by_enter_and_say_what_they_are(dialog: SettingsDialog) -> None:
+    shown = field(dialog, "perception.tracking.enabled")
+    assert isinstance(shown.editor, QCheckBox)
+    QTest.keyClick(shown.editor, Key.Key_Return)
+    assert dialog.draft.value("perception.tracking.enabled") is False
+    assert shown.editor.text() == "off"
+    choice = field(dialog, "perception.gaps.rule")
+    choice.editor.setCurrentIndex(1)
+    assert dialog.draft.value("perception.gaps.rule") == "every_pair"
+
+
+def test_a_slider_is_there_for_what_acts_at_once_and_nowhere_else(dialog: SettingsDialog) -> None:
+    shown = field(dialog, D_ALLOW)
+    assert shown.slider is not None
+    shown.slider.setValue(1000)
+    assert dialog.draft.value(D_ALLOW) == 200.0
+    shown.slider.setValue(0)
+    assert not dialog.draft.error(D_ALLOW)
+    assert 0.0 < dialog.draft.value(D_ALLOW) < 0.1, "0 itself is not allowed, and not offered"
+    assert field(dialog, "advice.fast_mm_s").slider is None
+
+
+def test_no_place_of_a_slider_gives_what_is_refused(dialog: SettingsDialog) -> None:
+    sliders = 0
+    for key in settings_by_key():
+        dialog.go_to(key)
+        shown = dialog.page.fields.get(key)
+        if shown is None or shown.slider is None:
+            continue
+        sliders += 1
+        bounds = shown.setting.bounds
+        for place in (0, 1, 2, 333, 500, 998, 999, 1000):
+            value = float(shown._value_at(place))
+            assert bounds.low is not None and bounds.high is not None
+            assert bounds.low <= value <= bounds.high
+            assert value != bounds.low or not bounds.low_open
+            assert value != bounds.high or not bounds.high_open
+            assert bounds.step is None or value % bounds.step == 0
+    assert sliders > 20
+
+
+def test_arrows_go_by_what_a_setting_is_a_multiple_of(dialog: SettingsDialog) -> None:
+    shown = field(dialog, "perception.tracking.window_px")
+    editor = shown.editor
+    assert isinstance(editor, NumberEdit)
+    before = int(editor.text())
+    editor.step(1)
+    assert int(editor.text()) == before + 32
+    assert "a multiple of 32" in shown._note()
+
+
+@pytest.mark.parametrize(
+    "key", ["perception.pose.dwell_s", "perception.cleaning.min_robot_area_px", "perception.path.weight_length", D_ALLOW, THETA]
+)
+def test_a_slider_comes_back_to_the_value_that_it_shows(dialog: SettingsDialog, key: str) -> None:
+    shown = field(dialog, key)
+    default = dialog.draft.default_value(key)
+    assert float(shown._value_at(shown._place_of(float(default)))) == pytest.approx(default, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("text", "is_whole", "steps", "after"),
+    [("6", False, 1, "6.1"), ("40", False, -1, "39"), ("0.5", False, 1, "0.51"), ("3", True, 10, "13"), ("0", False, 1, "0.01"),
+     ("abc", False, 1, "abc"), ("-0.2", False, -1, "-0.21")],
+)  # fmt: skip
+def test_up_and_down_step_by_what_fits_the_number(qtbot: QtBot, text: str, is_whole: bool, steps: int, after: str) -> None:
+    edit = NumberEdit(is_whole=is_whole)
+    qtbot.addWidget(edit)
+    edit.setText(text)
+    edit.step(steps)
+    assert edit.text() == after
+
+
+def test_profiles_are_saved_chosen_and_deleted_in_the_row(dialog: SettingsDialog, profiles: Profiles) -> None:
+    row = dialog.profile_row
+    type_into(dialog, D_ALLOW, "9")
+    row.save_button.click()
+    QTest.keyClicks(row.name, "bench")
+    QTest.keyClick(row.name, Key.Key_Return)
+    assert [profile.name for profile in profiles.all()] == ["paper", "bench"]
+    assert row.combo.currentText() == "bench"
+    dialog.draft.load(load_config())
+    dialog._changed()
+    assert row.combo.currentText() == "Own settings"
+    row.chosen.emit(profiles.all()[1])
+    assert dialog.draft.value(D_ALLOW) == 9.0
+    assert row.combo.currentText() == "bench"
+    row.delete_button.click()
+    assert row.question.text == "Delete the profile bench?"
+    assert len(profiles.all()) == 2, "asked first"
+    row.question._on_yes()
+    assert [profile.name for profile in profiles.all()] == ["paper"]
+
+
+def test_the_paper_preset_is_a_profile_that_cannot_be_deleted(dialog: SettingsDialog, profiles: Profiles) -> None:
+    dialog.profile_row.chosen.emit(profiles.all()[0])
+    assert dialog.draft.config == load_config(preset="paper")
+    assert dialog.profile_row.combo.currentText() == "paper (preset)"
+    assert not dialog.profile_row.delete_button.isEnabled()
+
+
+def test_a_name_that_is_taken_is_asked_about(dialog: SettingsDialog, profiles: Profiles) -> None:
+    profiles.save("bench", load_config())
+    type_into(dialog, D_ALLOW, "9")
+    dialog.profile_row.save_asked.emit("bench")
+    assert "already" in dialog.profile_row.question.text
+    dialog.profile_row.question.cancel()
+    assert profiles.load(profiles.all()[1]).config == load_config()
+    dialog.profile_row.save_asked.emit("../x")
+    assert "1 to 60 letters" in dialog.notice.text()
+
+
+def test_what_was_wrong_with_the_file_is_shown(qtbot: QtBot, themed: None, profiles: Profiles) -> None:
+    made = SettingsDialog(SettingsDraft(load_config()), Path("x.toml"), profiles, ("x.toml: future: unknown key",))
+    made.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose, False)
+    qtbot.addWidget(made)
+    made.show()
+    assert "future: unknown key" in made.notice.text()
+
+
+def test_a_locked_dialog_says_why_and_changes_nothing(dialog: SettingsDialog) -> None:
+    type_into(dialog, D_ALLOW, "9")
+    dialog.lock("The robot is armed")
+    assert "The robot is armed" in dialog.status.text()
+    assert not dialog.page.isEnabled()
+    assert not dialog.save.isEnabled()
+    assert dialog.cancel.isEnabled()
+    dialog.lock("")
+    assert dialog.save.isEnabled()
+
+
+def test_restart_is_offered_only_for_what_needs_it(dialog: SettingsDialog) -> None:
+    asked: list[bool] = []
+    dialog.save_asked.connect(asked.append)
+    assert not dialog.save_and_restart.isVisible()
+    type_into(dialog, "advice.fast_mm_s", "9")
+    assert dialog.save_and_restart.isVisible()
+    dialog.save_and_restart.setFocus()
+    QTest.keyClick(dialog.save_and_restart, Key.Key_Return)
+    dialog.save.click()
+    assert asked == [True, False]
+
+
+def test_enter_in_a_field_saves_nothing(dialog: SettingsDialog) -> None:
+    asked: list[bool] = []
+    dialog.save_asked.connect(asked.append)
+    shown = type_into(dialog, D_ALLOW, "9")
+    QTest.keyClick(shown.editor, Key.Key_Return)
+    assert asked == []
+    assert dialog.isVisible()
+
+
+def test_a_folder_is_chosen_on_the_disk(dialog: SettingsDialog, tmp_path: Path) -> None:
+    seen = drafts(dialog)
+    chooser = field(dialog, "record.folder").browse_button
+    assert chooser is not None
+    chooser.click()
+    assert chooser.dialog is not None
+    assert not chooser.dialog.isModal(), "STOP must stay in reach"
+    chooser.dialog.setDirectory(str(tmp_path))
+    chooser.dialog.fileSelected.emit(str(tmp_path))
+    chooser.dialog.reject()
+    assert seen[-1].record.folder == str(tmp_path)
+    editor = dialog.page.fields["record.folder"].editor
+    assert isinstance(editor, QLineEdit)
+    assert editor.text() == str(tmp_path)
+
+
+def test_everything_that_is_a_path_can_be_browsed_for(dialog: SettingsDialog) -> None:
+    assert set(WANTED) <= set(settings_by_key())
+    for key in WANTED:
+        assert field(dialog, key).browse_button is not None
+    source = field(dialog, "rig.source").browse_button
+    assert source is not None
+    assert [action.text() for action in source.menu().actions()] == ["&File...", "F&older..."]
+
+
+def test_a_shipped_model_goes_by_its_name(dialog: SettingsDialog) -> None:
+    seen = drafts(dialog)
+    chooser = field(dialog, "perception.segmentation.model").browse_button
+    assert chooser is not None
+    chooser._on_selected(str(RESOURCES / "models" / "other"))
+    assert seen[-1].perception.segmentation.model == "other"

@@ -1,0 +1,159 @@
+"""Two schemes with the same meanings; a change reaches everything that is open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+from itertools import combinations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+from tests.app.test_palette import _as_deuteranope
+
+from app.operator.window import OperatorWindow
+from app.player.session_model import MARK_LOOK
+from app.ui import theme
+from app.ui.theme import DARK, LIGHT, ON_PICTURE, Scheme
+from app.widgets.alerts import LOOK
+from app.widgets.event_log import LogKind
+from app.widgets.messages import NoticeKind
+from app.widgets.mode_bar import MODE_LOOK
+from app.widgets.servo_table import TONE_ROLE
+from app.widgets.state_badge import StateBadge
+from app.widgets.theta_gauge import ThetaGauge
+from app.widgets.trend_plot import TrendPlot
+from core.config.models import PoseConfig
+from core.types import PoseState
+from tests.app.fakes import make_pose, make_scene, until
+
+ROLES = [field.name for field in fields(Scheme)]
+SURFACES = ("WINDOW", "PANEL", "RAISED")
+NOT_WRITTEN = {*SURFACES, "LINE", "INK", "GHOST", "VESSEL_VECTOR"}
+
+
+@pytest.fixture(autouse=True)
+def dark_again(qapp: QApplication) -> Iterator[None]:
+    yield
+    theme.apply_theme(qapp)
+
+
+def hue_deg(name: str) -> float:
+    red, green, blue = (part / 255 for part in theme.rgb(name))
+    return float(np.degrees(np.arctan2(np.sqrt(3) * (green - blue), 2 * red - green - blue)) % 360)
+
+
+@pytest.mark.parametrize("role", [role for role in ROLES if role not in NOT_WRITTEN])
+@pytest.mark.parametrize("ground", SURFACES)
+def test_everything_that_is_written_can_be_read_in_the_light(role: str, ground: str) -> None:
+    assert theme.contrast(getattr(LIGHT, role), getattr(LIGHT, ground)) >= 4.5
+
+
+@pytest.mark.parametrize("role", ["ORANGE", "SKY", "GREEN", "YELLOW", "VERMILLION", "PURPLE", "SIM", "LIVE", "PLAYBACK", "FAULT"])
+def test_ink_can_be_read_on_every_filled_sign_in_the_light(role: str) -> None:
+    assert theme.contrast(LIGHT.INK, getattr(LIGHT, role)) >= 4.5
+
+
+@pytest.mark.parametrize("role", ["ORANGE", "SKY", "GREEN", "YELLOW", "VERMILLION", "PURPLE", "THETA", "D_HEAD", "D_TAIL"])
+def test_a_colour_keeps_its_hue(role: str) -> None:
+    apart = abs(hue_deg(getattr(DARK, role)) - hue_deg(getattr(LIGHT, role)))
+    assert min(apart, 360 - apart) < 20
+
+
+def test_curves_that_lie_in_one_chart_differ_for_a_deuteranope_in_the_light() -> None:
+    for first, second in combinations(("D_HEAD", "D_TAIL", "THETA"), 2):
+        assert np.linalg.norm(_as_deuteranope(getattr(LIGHT, first)) - _as_deuteranope(getattr(LIGHT, second))) > 0.12
+
+
+def test_states_and_overlays_never_change() -> None:
+    states = dict(theme.STATE_COLOUR)
+    theme.use(LIGHT)
+    assert {state: theme.STATE_COLOUR[state] for state in PoseState} == {state: states[state] for state in PoseState}
+    assert theme.STATE_COLOUR[None] == LIGHT.TEXT_FAINT
+    assert ON_PICTURE is DARK
+    for state in PoseState:
+        assert theme.contrast(theme.STATE_INK, theme.STATE_COLOUR[state]) >= 4.5
+
+
+def test_names_of_the_module_are_those_of_the_scheme_in_use() -> None:
+    for scheme in (LIGHT, DARK):
+        theme.use(scheme)
+        assert theme.current() is scheme
+        for role in ROLES:
+            assert getattr(theme, role) == getattr(scheme, role) == theme.of(role)
+    assert LIGHT.is_dark is False
+    assert DARK.is_dark
+
+
+def test_every_table_names_roles_that_there_are() -> None:
+    tables = [
+        *(kind.value.role for kind in LogKind),
+        *(look.role for look in MARK_LOOK.values()),
+        *(look.role for look in LOOK.values()),
+        *(look.role for look in MODE_LOOK.values()),
+        *(kind.value for kind in NoticeKind),
+        *TONE_ROLE.values(),
+    ]
+    assert set(tables) <= set(ROLES)
+    assert theme.of("#12AB34") == "#12AB34"
+    assert theme.sheet("a { color: @TEXT; } b { color: @LINE }") == f"a {{ color: {DARK.TEXT}; }} b {{ color: {DARK.LINE} }}"
+
+
+def ground_of(widget: QWidget) -> str:
+    image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    return image.pixelColor(1, image.height() - 2).name().upper()
+
+
+def test_style_sheets_of_widgets_follow(qapp: QApplication, qtbot: QtBot) -> None:
+    label = QLabel("x")
+    qtbot.addWidget(label)
+    theme.set_sheet(label, "color: @FAULT;")
+    assert DARK.FAULT in label.styleSheet()
+    theme.apply_theme(qapp, "light")
+    assert LIGHT.FAULT in label.styleSheet()
+    button = QPushButton("later")
+    qtbot.addWidget(button)
+    theme.set_sheet(button, "color: @TEXT;")
+    assert LIGHT.TEXT in button.styleSheet()
+
+
+def test_what_widgets_keep_painted_is_painted_anew(qapp: QApplication, qtbot: QtBot) -> None:
+    gauge, badge, trends = ThetaGauge(10.0), StateBadge(PoseConfig(), 0.5), TrendPlot(PoseConfig())
+    for widget in (gauge, badge, trends):
+        qtbot.addWidget(widget)
+        widget.resize(300, 200)
+        widget.show()
+    gauge.show_pose(make_pose())
+    badge.show_scene(make_scene(make_pose()))
+    for name, scheme in (("dark", DARK), ("light", LIGHT), ("dark", DARK)):
+        theme.apply_theme(qapp, name)
+        for widget in (gauge, badge):
+            assert ground_of(widget) == scheme.PANEL.upper()
+        assert [curve.opts["pen"].color().name().upper() for curve in trends.curves] == [scheme.THETA, scheme.D_HEAD, scheme.D_TAIL]
+
+
+def test_the_desktop_decides_when_it_is_asked(qapp: QApplication, monkeypatch: pytest.MonkeyPatch) -> None:
+    schemes = Qt.ColorScheme
+    for desktop, scheme in ((schemes.Light, LIGHT), (schemes.Dark, DARK), (schemes.Unknown, DARK)):
+        assert theme._scheme_of(theme.Theme.SYSTEM, desktop) is scheme
+    assert theme._scheme_of(theme.Theme.DARK, schemes.Light) is DARK
+    theme.apply_theme(qapp, "system")
+    monkeypatch.setattr(theme, "_scheme_of", lambda chosen, _desktop: LIGHT if chosen is theme.Theme.SYSTEM else DARK)
+    qapp.styleHints().colorSchemeChanged.emit(schemes.Light)
+    assert theme.current() is LIGHT
+    theme.apply_theme(qapp, "dark")
+    qapp.styleHints().colorSchemeChanged.emit(schemes.Light)
+    assert theme.current() is DARK, "whoever chose dark keeps it"
+
+
+def test_a_running_window_follows(running: OperatorWindow, qapp: QApplication, qtbot: QtBot) -> None:
+    legend = running.panels._legend
+    assert DARK.THETA in legend.text()
+    theme.apply_theme(qapp, "light")
+    assert LIGHT.THETA in legend.text()
+    assert running.panels.badge.grab().toImage().pixelColor(1, 1).name().upper() == LIGHT.PANEL
+    shown = running.shown_tick
+    until(qtbot, lambda: running.shown_tick is not shown)

@@ -1,0 +1,707 @@
+"""The widgets that show who drives and let the operator decide: badge, bar with STOP and deadman, alerts, event log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime, timedelta
+from itertools import combinations
+
+import pytest
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QGuiApplication, QImage, QMouseEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QMenu, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.ui.texts import STOP_KEY, OperatorStep, Undriven, next_step, who_drives
+from app.widgets.alerts import BRIEF_S, LINGER_S, LOOK, AlertStrip
+from app.widgets.event_log import MOST_ROWS, EventLog, LogKind
+from app.widgets.mode_bar import DOUBLE_PRESS_S, HEIGHT, MODE_LOOK, REASON_DWELL_S, ModeBadge, ModeBar
+from core.control.alerts import ALERTS, Alert, AlertKey, Priority
+from core.control.faults import CAUSES, Cause, Fault
+from core.control.gate import RejectReason, Source
+from core.control.modes import Hindrance, Mode
+from core.control.pilot import DriveView
+from tests.app.hand_clock import Clock
+
+LEFT = Qt.MouseButton.LeftButton
+NARROWEST_AT_720 = 760
+OFF = DriveView(0.0)
+READY = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True)
+ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=False)
+DRIVING = DriveView(0.0, Mode.AUTONOMOUS, Source.PROGRAM, servos_on=True, deadman=True)
+HELD = DriveView(0.0, Mode.HOLD, servos_on=True, deadman=False, active=(Fault(Cause.DEADMAN),))
+STOPPED = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING, "0.8 mm"))
+VIEWS = (OFF, READY, ARMED, DRIVING, HELD, STOPPED)
+
+
+def words(key: AlertKey) -> str:
+    """What is the matter and what to do, from the table, as two sentences."""
+    text, what_to_do = ALERTS[key].text, ALERTS[key].what_to_do
+    return f"{text}. {what_to_do[0].upper()}{what_to_do[1:]}."
+
+
+def arming_refused(*reasons: Hindrance | Cause, time_s: float = 0.0) -> DriveView:
+    return DriveView(time_s, permitted=Source.OPERATOR, servos_on=True, against_arming=reasons)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def bar(qtbot: QtBot, clock: Clock) -> ModeBar:
+    widget = ModeBar(clock)
+    qtbot.addWidget(widget)
+    widget.resize(NARROWEST_AT_720, HEIGHT)
+    widget.show()
+    return widget
+
+
+def asked(bar: ModeBar) -> list[str]:
+    """What the bar asks for from now on, in order."""
+    heard: list[str] = []
+    for name in ("servos_on", "acknowledge", "arm", "hand_over", "take_back", "disarm", "stop"):
+        getattr(bar, f"{name}_asked").connect(lambda name=name: heard.append(name))
+    return heard
+
+
+# ---- badge
+
+
+@pytest.mark.parametrize(
+    ("view", "mode", "who"),
+    [
+        (None, "ADVISORY", "pictures only"),
+        (OFF, "ADVISORY", "servos follow nobody"),
+        (READY, "ADVISORY", "you steer"),
+        (DriveView(0.0, latched=Fault(Cause.HOT)), "ADVISORY", "nothing moves"),
+        (ARMED, "ARMED", "you steer"),
+        (DRIVING, "AUTONOMOUS", "the program drives"),
+        (HELD, "HOLD", "interrupted"),
+        (STOPPED, "STOPPED", "nothing moves"),
+    ],
+)
+def test_badge_names_the_mode_and_who_drives(qtbot: QtBot, view: DriveView | None, mode: str, who: str) -> None:
+    badge = ModeBadge()
+    qtbot.addWidget(badge)
+    badge.show_view(DRIVING)
+    badge.show_view(view)
+    assert (badge.accessibleName(), badge.accessibleDescription()) == (f"Mode: {mode}", who)
+    assert badge.who == who_drives(view)
+
+
+def test_without_a_rig_nobody_knows_whether_there_is_something_to_drive(qtbot: QtBot, bar: ModeBar) -> None:
+    badge = ModeBadge()
+    qtbot.addWidget(badge)
+    assert badge.who == "waiting for the rig"
+    badge.show_view(None)
+    assert badge.who == "pictures only"
+    for shown in (badge, bar):
+        shown.show_view(DRIVING)
+        shown.show_view(None, Undriven.NOT_YET)
+    assert (badge.mode, badge.who) == (Mode.ADVISORY, "waiting for the rig")
+    assert bar.text == "Waiting for the rig."
+    assert not bar.main.isEnabled()
+    for shown in (badge, bar):
+        shown.show_view(None, Undriven.CLOSED)
+    assert (badge.who, bar.text) == ("no rig is open", "No rig is open. F5 opens it again.")
+    assert not bar.main.isEnabled()
+
+
+def grey(badge: ModeBadge, view: DriveView) -> QImage:
+    badge.show_view(view)
+    return badge.grab().toImage().convertToFormat(QImage.Format.Format_Grayscale8)
+
+
+def test_modes_differ_without_colour_and_without_words(qtbot: QtBot) -> None:
+    badge = ModeBadge()
+    qtbot.addWidget(badge)
+    signs = [grey(badge, view).copy(0, 0, 32, 34) for view in (READY, ARMED, DRIVING, HELD, STOPPED)]
+    for first, second in combinations(signs, 2):
+        pixels = zip(bytes(first.constBits()), bytes(second.constBits()), strict=True)
+        assert sum(abs(one - other) > 60 for one, other in pixels) > 60
+    assert len({look.sign for look in MODE_LOOK.values()}) == len({look.colour for look in MODE_LOOK.values()}) == len(Mode)
+
+
+def test_badge_repaints_only_for_something_new(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    badge = ModeBadge()
+    qtbot.addWidget(badge)
+    painted: list[int] = []
+    monkeypatch.setattr(badge, "update", lambda: painted.append(1))
+    for time_s in range(5):
+        badge.show_view(DriveView(float(time_s), Mode.ARMED, Source.OPERATOR))
+    assert len(painted) == 1
+
+
+# ---- the next step, and why not
+
+
+@pytest.mark.parametrize(
+    ("view", "step", "granted", "text"),
+    [
+        (
+            OFF,
+            OperatorStep.SERVOS_ON,
+            True,
+            "The servos follow nobody, but may still pull. Press F3: they are checked with the torque off, then tighten the wires.",
+        ),
+        (DriveView(0.0, busy="checking the servos"), OperatorStep.SERVOS_ON, False, "Checking the servos. This takes a moment."),
+        (READY, OperatorStep.ARM, True, "You steer. Press F6 to arm; then you can hand over to the program."),
+        (ARMED, OperatorStep.HAND_OVER, True, "Ready. Hold Shift, then press F7 to hand over."),
+        (HELD, OperatorStep.TAKE_BACK, True, words(Cause.DEADMAN)),
+        (STOPPED, OperatorStep.ACKNOWLEDGE, True, words(Cause.TRACKING)),
+        (
+            arming_refused(Hindrance.SERVOS_UNCHECKED, Cause.HEAD_LOST, Cause.WARM),
+            OperatorStep.ARM,
+            False,
+            f"{words(Hindrance.SERVOS_UNCHECKED)} (+2 more)",
+        ),
+        (
+            DriveView(0.0, Mode.ARMED, servos_on=True, against_hand_over=(Hindrance.NO_DESTINATION,)),
+            OperatorStep.HAND_OVER,
+            False,
+            words(Hindrance.NO_DESTINATION),
+        ),
+    ],
+)
+def test_next_step_and_its_line(view: DriveView, step: OperatorStep, granted: bool, text: str) -> None:
+    following = next_step(view)
+    assert (following.step, following.granted, following.text) == (step, granted, text)
+
+
+def test_the_line_follows_the_deadman() -> None:
+    held = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=True)
+    assert next_step(held).text == "Ready. Press F7: the program drives while you hold."
+
+
+def test_a_latched_fault_comes_before_everything_else() -> None:
+    view = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, latched=Fault(Cause.CAMERA_LOST))
+    assert next_step(view).step is OperatorStep.ACKNOWLEDGE
+
+
+def test_acknowledging_looks_subdued_while_servos_in_use_still_have_the_fault() -> None:
+    hot = Fault(Cause.HOT)
+    assert not next_step(DriveView(0.0, servos_on=True, latched=hot, active=(hot,))).granted
+    assert next_step(DriveView(0.0, servos_on=True, latched=hot)).granted
+
+
+def test_what_is_not_as_configured_is_said_where_it_is_known() -> None:
+    detail = "not armed: outside its envelope: right at 4.00 mm (-2.4 to 2.8 mm)"
+    wrong = next_step(DriveView(0.0, active=(Fault(Cause.SERVOS_WRONG, detail),)))
+    assert wrong.rest == detail
+    assert next_step(DriveView(0.0, active=(Fault(Cause.SERVOS_WRONG),))).rest == ALERTS[Cause.SERVOS_WRONG].what_to_do
+
+
+def test_servos_in_trouble_can_be_checked_again() -> None:
+    following = next_step(DriveView(0.0, active=(Fault(Cause.PORT_LOST),)))
+    assert (following.step, following.granted, following.headline) == (OperatorStep.SERVOS_ON, True, ALERTS[Cause.PORT_LOST].text)
+
+
+def test_every_mode_has_a_step_that_can_be_pressed_and_no_two_steps_share_a_key() -> None:
+    assert all(next_step(DriveView(0.0, mode, servos_on=on)).text for mode in Mode for on in (False, True))
+    keys = [step.value.key for step in OperatorStep]
+    assert len({*keys, STOP_KEY, "F5"}) == len(keys) + 2
+
+
+@pytest.mark.parametrize("mode", [Mode.ARMED, Mode.AUTONOMOUS, Mode.HOLD])
+def test_disarming_is_offered_while_armed(mode: Mode) -> None:
+    assert next_step(DriveView(0.0, mode, servos_on=True)).other is OperatorStep.DISARM
+    assert next_step(READY).other is None
+
+
+# ---- bar
+
+
+@pytest.mark.parametrize(
+    ("view", "name"),
+    [
+        (OFF, "servos_on"),
+        (READY, "arm"),
+        (ARMED, "hand_over"),
+        (DRIVING, "take_back"),
+        (HELD, "take_back"),
+        (STOPPED, "acknowledge"),
+        (arming_refused(Cause.HEAD_LOST), "arm"),
+    ],
+)
+def test_the_main_button_asks_for_what_it_says_refused_or_not(qtbot: QtBot, bar: ModeBar, view: DriveView, name: str) -> None:
+    heard = asked(bar)
+    bar.show_view(view)
+    assert bar.main.text().lower().replace(" ", "_") == name
+    qtbot.mouseClick(bar.main, LEFT)
+    bar.main.click()
+    assert heard == [name, name]
+
+
+def test_disarm_has_a_button_of_its_own(qtbot: QtBot, bar: ModeBar) -> None:
+    heard = asked(bar)
+    bar.show_view(READY)
+    assert not bar.second.isVisible()
+    bar.show_view(ARMED)
+    qtbot.mouseClick(bar.second, LEFT)
+    assert heard == ["disarm"]
+
+
+def test_a_refused_button_looks_subdued_but_can_be_pressed_and_tells_all_reasons(bar: ModeBar) -> None:
+    bar.show_view(arming_refused(Cause.HEAD_LOST, Hindrance.CAMERA_SETTLING))
+    assert bar.main.isEnabled() and not bar.main.is_granted
+    assert words(Cause.HEAD_LOST) in bar.main.toolTip() and words(Hindrance.CAMERA_SETTLING) in bar.main.toolTip()
+    assert bar.text.endswith("(+1 more)")
+
+
+def test_a_double_click_never_presses_two_different_steps(qtbot: QtBot, bar: ModeBar, clock: Clock) -> None:
+    heard = asked(bar)
+    bar.show_view(DRIVING)
+    qtbot.mouseClick(bar.main, LEFT)
+    bar.show_view(ARMED)
+    clock.now_s += 0.9 * DOUBLE_PRESS_S
+    qtbot.mouseDClick(bar.main, LEFT)
+    assert heard == ["take_back"], "the second half of a double click must not hand over again"
+    clock.now_s += DOUBLE_PRESS_S
+    qtbot.mouseClick(bar.main, LEFT)
+    assert heard == ["take_back", "hand_over"]
+
+
+def test_a_click_means_what_was_on_the_button_when_it_went_down(qtbot: QtBot, bar: ModeBar) -> None:
+    heard = asked(bar)
+    bar.show_view(DRIVING)
+    qtbot.mousePress(bar.main, LEFT)
+    bar.show_view(STOPPED)
+    qtbot.mouseRelease(bar.main, LEFT)
+    assert heard == ["take_back"]
+
+
+def test_without_a_robot_only_stop_can_be_pressed(qtbot: QtBot, bar: ModeBar) -> None:
+    heard = asked(bar)
+    bar.show_view(ARMED)
+    bar.show_view(None)
+    for widget in (bar.main, bar.second, bar.deadman):
+        assert not widget.isEnabled()
+        QTest.mouseClick(widget, LEFT)
+    assert bar.text == "This rig has no robot. Pictures and advice only."
+    qtbot.mouseClick(bar.stop, LEFT)
+    assert heard == ["stop"]
+
+
+def test_reasons_that_alternate_stay_long_enough_to_be_read(bar: ModeBar) -> None:
+    bar.show_view(arming_refused(Cause.CONFIDENCE_LOW, time_s=10.0))
+    first = bar.text
+    bar.show_view(arming_refused(Hindrance.PERCEPTION_SETTLING, time_s=10.03))
+    assert bar.text == first
+    bar.show_view(arming_refused(Hindrance.PERCEPTION_SETTLING, time_s=10.03 + REASON_DWELL_S))
+    assert bar.text != first
+    bar.show_view(DriveView(11.1, permitted=Source.OPERATOR, servos_on=True))
+    assert bar.main.is_granted, "what may be done now is shown at once"
+
+
+def test_no_line_is_cut_at_1280_by_720(bar: ModeBar) -> None:
+    refused = [DriveView(0.0, servos_on=True, against_arming=(key, key, key)) for key in ALERTS]
+    latched = [DriveView(0.0, latched=Fault(cause)) for cause in CAUSES]
+    for view in (None, *VIEWS, DriveView(0.0, Mode.HOLD), DriveView(0.0, Mode.STOPPED), *refused, *latched):
+        bar.show_view(view)
+        assert bar.text_fits, bar.text
+
+
+def test_in_the_smallest_window_a_long_line_ends_in_an_ellipsis_and_the_tool_tip_has_it_all(bar: ModeBar) -> None:
+    bar.resize(bar.minimumWidth(), HEIGHT)
+    bar.show_view(arming_refused(Cause.BUS_NOISE, Cause.WARM))
+    assert not bar.text_fits
+    assert bar.main.toolTip().count("\n") >= 2
+    assert ALERTS[Cause.BUS_NOISE].what_to_do.split()[-1] in bar._text.toolTip()
+
+
+def test_places_do_not_move_with_the_mode(bar: ModeBar) -> None:
+    places = set()
+    for view in (None, *VIEWS):
+        bar.show_view(view)
+        QApplication.processEvents()
+        places.add((bar.main.mapTo(bar, QPoint()).toTuple(), bar.deadman.geometry().getRect(), bar.stop.geometry().getRect()))
+    assert len(places) == 1
+
+
+def test_the_bar_speaks(bar: ModeBar) -> None:
+    bar.show_view(ARMED)
+    assert bar.accessibleDescription() == bar.text
+    assert bar.main.accessibleName() == "Hand over (F7)"
+    for widget in (bar.main, bar.second, bar.deadman, bar.stop):
+        assert widget.accessibleName() and widget.accessibleDescription() and widget.toolTip()
+
+
+# ---- STOP
+
+
+def test_stop_fires_when_the_mouse_goes_down_and_not_again_when_it_comes_up(qtbot: QtBot, bar: ModeBar) -> None:
+    heard = asked(bar)
+    qtbot.mousePress(bar.stop, LEFT)
+    assert heard == ["stop"]
+    qtbot.mouseRelease(bar.stop, LEFT, pos=QPoint(-50, -50))
+    assert heard == ["stop"]
+
+
+@pytest.mark.parametrize("button", [LEFT, Qt.MouseButton.RightButton, Qt.MouseButton.MiddleButton])
+def test_every_press_of_any_button_counts(qtbot: QtBot, bar: ModeBar, button: Qt.MouseButton) -> None:
+    heard = asked(bar)
+    for _ in range(3):
+        qtbot.mousePress(bar.stop, button)
+        qtbot.mouseRelease(bar.stop, button)
+    qtbot.mouseDClick(bar.stop, button)
+    assert heard.count("stop") >= 4
+
+
+def test_stop_works_by_keyboard_and_when_somebody_disabled_it(qtbot: QtBot, bar: ModeBar) -> None:
+    heard = asked(bar)
+    bar.stop.click()
+    bar.setEnabled(False)
+    qtbot.mousePress(bar.stop, LEFT)
+    assert heard == ["stop", "stop"]
+
+
+# ---- deadman
+
+
+@pytest.fixture
+def holds(bar: ModeBar) -> list[bool]:
+    """The deadman's news, of a bar that is armed."""
+    news: list[bool] = []
+    bar.deadman_changed.connect(news.append)
+    bar.show_view(ARMED)
+    return news
+
+
+def test_deadman_is_held_while_the_left_button_is_down(qtbot: QtBot, bar: ModeBar, holds: list[bool]) -> None:
+    qtbot.mousePress(bar.deadman, Qt.MouseButton.RightButton)
+    assert holds == []
+    qtbot.mousePress(bar.deadman, LEFT)
+    assert holds == [True]
+    qtbot.mouseRelease(bar.deadman, LEFT, pos=QPoint(300, 5))
+    assert holds == [True, False]
+
+
+def move(widget: QWidget, place: QPointF) -> None:
+    event = QMouseEvent(
+        QEvent.Type.MouseMove, place, widget.mapToGlobal(place), Qt.MouseButton.NoButton, LEFT, Qt.KeyboardModifier.NoModifier
+    )
+    QApplication.sendEvent(widget, event)
+
+
+def test_a_trembling_hand_holds_but_leaving_the_window_lets_go(qtbot: QtBot, bar: ModeBar, holds: list[bool]) -> None:
+    qtbot.mousePress(bar.deadman, LEFT)
+    move(bar.deadman, QPointF(-20, 5))
+    assert holds == [True]
+    move(bar.deadman, QPointF(5, -400))
+    assert holds == [True, False]
+
+
+@pytest.mark.parametrize(
+    "lose",
+    [
+        lambda bar: bar.hide(),
+        lambda bar: bar.deadman.hide(),
+        lambda bar: bar.show_view(None),
+        lambda bar: QApplication.sendEvent(bar.window(), QEvent(QEvent.Type.WindowDeactivate)),
+        lambda bar: QApplication.sendEvent(bar.window(), QEvent(QEvent.Type.WindowBlocked)),
+        lambda bar: QApplication.sendEvent(QApplication.instance(), QEvent(QEvent.Type.ApplicationDeactivate)),
+        lambda bar: QApplication.sendEvent(bar.deadman, QEvent(QEvent.Type.UngrabMouse)),
+    ],
+    ids=["bar hidden", "field hidden", "no robot", "focus lost", "dialog", "other application", "grab lost"],
+)
+def test_whatever_may_swallow_the_release_is_one(qtbot: QtBot, bar: ModeBar, holds: list[bool], lose: object) -> None:
+    qtbot.mousePress(bar.deadman, LEFT)
+    lose(bar)  # type: ignore[operator]
+    assert holds == [True, False]
+    assert not bar.deadman.is_held
+
+
+def test_a_release_that_goes_to_a_menu_counts(qtbot: QtBot, bar: ModeBar, holds: list[bool]) -> None:
+    qtbot.mousePress(bar.deadman, LEFT)
+    menu = QMenu(bar)
+    menu.addAction("entry")
+    menu.popup(QPoint(0, 0))
+    qtbot.mouseRelease(menu, LEFT)
+    menu.close()
+    assert holds == [True, False]
+
+
+def test_deadman_shows_what_the_program_sees(bar: ModeBar) -> None:
+    bar.show_view(OFF)
+    assert (bar.deadman.word, bar.deadman.is_lit) == ("none", False)
+    bar.show_view(ARMED)
+    assert (bar.deadman.word, bar.deadman.is_lit) == ("not held", False)
+    bar.show_view(DRIVING)
+    assert (bar.deadman.word, bar.deadman.is_lit) == ("held", True)
+    assert bar.deadman.accessibleDescription() == "held"
+
+
+# ---- alerts
+
+
+def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
+    return Alert(key, ALERTS[key], detail, repeats)
+
+
+@pytest.fixture
+def picture(qtbot: QtBot) -> QWidget:
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    widget.resize(775, 408)
+    widget.show()
+    return widget
+
+
+@pytest.fixture
+def strip(picture: QWidget, clock: Clock) -> Iterator[AlertStrip]:
+    yield AlertStrip(picture, clock)
+
+
+def test_alerts_say_what_is_the_matter_how_much_how_often_and_what_to_do(strip: AlertStrip) -> None:
+    assert strip.isHidden()
+    strip.show_alerts([alert(Cause.WARM, "pull left: 66 °C", repeats=2)])
+    name, what_to_do = words(Cause.WARM).split(". ")
+    assert strip.texts == [f"{name} (pull left: 66 °C) ×3. {what_to_do}"]
+    assert strip.isVisible()
+    assert strip.accessibleName().startswith(f"Alerts: {name}")
+
+
+def test_the_most_urgent_three_are_shown_newest_first_among_equals(strip: AlertStrip) -> None:
+    keys = [Hindrance.NO_DESTINATION, Cause.HOT, Cause.WARM, Cause.CONFIDENCE_LOW, Cause.STOP_PRESSED, Cause.VOLTAGE_LOW]
+    strip.show_alerts([alert(key) for key in keys])
+    assert strip.texts == [words(key) for key in (Cause.STOP_PRESSED, Cause.VOLTAGE_LOW, Cause.HOT)]
+
+
+def test_the_same_alert_again_is_counted(strip: AlertStrip) -> None:
+    for _ in range(2):
+        strip.show_alerts([alert(Hindrance.NO_DESTINATION)])
+    assert strip.texts == [words(Hindrance.NO_DESTINATION).replace(".", " ×2.", 1)]
+
+
+@pytest.mark.parametrize("key", [Hindrance.NO_DESTINATION, RejectReason.OVER_RATE, Cause.WARM])
+def test_hints_and_warnings_go_away_by_themselves(strip: AlertStrip, clock: Clock, key: AlertKey) -> None:
+    strip.show_alerts([alert(key)])
+    clock.now_s += BRIEF_S[ALERTS[key].priority] - 0.1
+    strip._expire()
+    assert strip.texts
+    clock.now_s += 0.1
+    strip._expire()
+    assert strip.texts == [] and strip.isHidden()
+    assert not strip._timer.isActive()
+
+
+def test_a_latched_fault_stays_until_it_is_acknowledged(strip: AlertStrip, clock: Clock) -> None:
+    strip.show_alerts([alert(Cause.STOP_PRESSED)])
+    stopped = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.STOP_PRESSED))
+    for _ in range(10):
+        strip.show_view(stopped)
+        clock.now_s += 10.0
+    strip.show_view(stopped)
+    assert strip.texts
+    strip.show_view(OFF)
+    assert strip.texts == []
+
+
+def test_acknowledging_takes_the_consequences_along_but_not_what_is_still_true(strip: AlertStrip) -> None:
+    strip.show_alerts([alert(Cause.TRACKING), alert(Cause.BUS_NOISE), alert(Cause.CAMERA_LOST)])
+    active = (Fault(Cause.CAMERA_LOST),)
+    strip.show_view(DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING), active=active))
+    assert len(strip.texts) == 3
+    strip.show_view(DriveView(0.0, active=active))
+    assert strip.texts == [words(Cause.CAMERA_LOST)]
+
+
+def test_what_was_never_latched_lingers_after_it_is_over(strip: AlertStrip, clock: Clock) -> None:
+    strip.show_alerts([alert(Cause.HEAD_LOST)])
+    clock.now_s += 60.0
+    strip.show_view(DriveView(0.0, Mode.HOLD, active=(Fault(Cause.HEAD_LOST),)))
+    assert strip.texts
+    clock.now_s += LINGER_S - 0.1
+    strip.show_view(ARMED)
+    assert strip.texts
+    clock.now_s += 0.1
+    strip.show_view(ARMED)
+    assert strip.texts == []
+
+
+def test_a_click_dismisses_one_and_the_next_in_line_takes_its_place(qtbot: QtBot, strip: AlertStrip) -> None:
+    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.HOT, Cause.TRACKING, Cause.DISK_LOW)])
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    assert strip.texts == [words(key) for key in (Cause.HOT, Cause.DISK_LOW, Cause.WARM)]
+    strip.clear()
+    assert strip.isHidden()
+
+
+def test_a_double_click_dismisses_one_alert_and_not_the_next_that_nobody_has_read(qtbot: QtBot, strip: AlertStrip) -> None:
+    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.TRACKING)])
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    qtbot.mouseDClick(strip._rows[0], LEFT)
+    qtbot.mouseRelease(strip._rows[0], LEFT)
+    assert strip.texts == [words(Cause.WARM)]
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    assert strip.texts == []
+
+
+def test_a_click_on_an_alert_sets_no_destination_behind_it(qtbot: QtBot, clock: Clock) -> None:
+    class Picture(QWidget):
+        pressed = 0
+
+        def mousePressEvent(self, event: QMouseEvent) -> None:
+            self.pressed += 1
+
+    picture = Picture()
+    qtbot.addWidget(picture)
+    picture.resize(775, 408)
+    picture.show()
+    strip = AlertStrip(picture, clock)
+    strip.show_alerts([alert(Cause.WARM)])
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    assert picture.pressed == 0
+
+
+@pytest.mark.parametrize("size", [(480, 320), (600, 348), (775, 408), (1230, 768)])
+def test_alerts_leave_three_quarters_of_the_picture_free(picture: QWidget, strip: AlertStrip, size: tuple[int, int]) -> None:
+    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.HOT, Cause.TRACKING, Cause.DISK_LOW)])
+    picture.resize(*size)
+    assert 1 <= len(strip.texts) <= 3
+    assert strip.height() <= 0.26 * picture.height()
+    assert picture.rect().contains(strip.geometry())
+    assert strip.texts[0] == words(Cause.TRACKING)
+
+
+def test_screen_readers_are_told_once_and_urgently_what_interrupts(strip: AlertStrip, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[tuple[str, QAccessible.AnnouncementPoliteness]] = []
+
+    def listen(event: QAccessibleAnnouncementEvent) -> None:
+        told.append((event.message(), event.politeness()))
+
+    monkeypatch.setattr(QAccessible, "updateAccessibility", listen)
+    for _ in range(2):
+        strip.show_alerts([alert(Cause.WARM), alert(Cause.TRACKING)])
+    assert [message for message, _ in told] == [words(Cause.WARM), words(Cause.TRACKING)]
+    polite, assertive = QAccessible.AnnouncementPoliteness.Polite, QAccessible.AnnouncementPoliteness.Assertive
+    assert [politeness for _, politeness in told] == [polite, assertive]
+
+
+def test_priorities_differ_in_sign() -> None:
+    assert len({LOOK[priority].sign for priority in Priority}) == len(Priority)
+
+
+# ---- event log
+
+
+class WallClock:
+    def __init__(self) -> None:
+        self.now = datetime(2026, 3, 4, 14, 2, 0)
+
+    def __call__(self) -> datetime:
+        return self.now
+
+    def wait(self, seconds: float) -> None:
+        self.now += timedelta(seconds=seconds)
+
+
+@pytest.fixture
+def wall() -> WallClock:
+    return WallClock()
+
+
+@pytest.fixture
+def log(qtbot: QtBot, wall: WallClock) -> EventLog:
+    widget = EventLog(wall)
+    qtbot.addWidget(widget)
+    widget.resize(470, 200)
+    return widget
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_log_lists_the_newest_first_with_time_and_kind(log: EventLog, wall: WallClock, visible: bool) -> None:
+    log.setVisible(visible)
+    log.add(LogKind.MODE, "ADVISORY to ARMED")
+    wall.wait(65)
+    log.add(LogKind.OPERATOR, "hand\nover")
+    assert log.lines == ["14:03:05  operator  hand over", "14:02:00  mode      ADVISORY to ARMED"]
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_a_repetition_within_two_seconds_is_counted(log: EventLog, wall: WallClock, visible: bool) -> None:
+    log.setVisible(visible)
+    for _ in range(3):
+        log.add(LogKind.GATE, "clamped")
+        wall.wait(2.0)
+    wall.wait(0.1)
+    log.add(LogKind.GATE, "clamped")
+    log.add(LogKind.ALERT, "clamped")
+    assert [line[10:] for line in log.lines] == ["alert     clamped", "gate      clamped", "gate      clamped ×3"]
+    log.add(LogKind.ALERT, "clamped")
+    assert log.lines[0].endswith("×2"), "also after the list was read"
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_log_keeps_the_newest_two_thousand(log: EventLog, visible: bool) -> None:
+    log.setVisible(visible)
+    for k in range(MOST_ROWS + 7):
+        log.add(LogKind.NOTE, str(k))
+    assert len(log.lines) == MOST_ROWS == log._model.rowCount()
+    assert log.lines[-1].endswith("  7")
+
+
+def test_a_hidden_log_bothers_no_view_until_it_is_shown(log: EventLog) -> None:
+    changes: list[int] = []
+    log._model.rowsInserted.connect(lambda: changes.append(1))
+    log._model.modelReset.connect(lambda: changes.append(1))
+    for k in range(100):
+        log.add(LogKind.NOTE, str(k))
+    assert changes == []
+    log.show()
+    assert changes == [1] and log._model.rowCount() == 100
+
+
+def test_filter_shows_one_kind_also_of_what_comes_later(log: EventLog, wall: WallClock) -> None:
+    log.show()
+    log.add(LogKind.NOTE, "a")
+    log.add(LogKind.ALERT, "b")
+    log.show_kind(LogKind.ALERT)
+    log.add(LogKind.NOTE, "c")
+    log.add(LogKind.NOTE, "c")
+    log.add(LogKind.ALERT, "d")
+    assert [line[-1] for line in log.lines] == ["d", "b"]
+    log.show_kind(None)
+    assert [line.split("  ")[-1].strip() for line in log.lines] == ["d", "c ×2", "b", "a"]
+
+
+def test_copy_all_takes_what_is_shown(log: EventLog) -> None:
+    log.add(LogKind.NOTE, "a")
+    log.add(LogKind.ALERT, "b")
+    log.copy_all()
+    assert QGuiApplication.clipboard().text() == "14:02:00  alert     b\n14:02:00  note      a"
+
+
+def test_context_menu_offers_to_copy(qtbot: QtBot, log: EventLog) -> None:
+    log.show()
+    log.add(LogKind.NOTE, "a")
+    log._view.customContextMenuRequested.emit(QPoint(5, 5))
+    menu = log.findChild(QMenu)
+    assert [action.text() for action in menu.actions()] == ["Copy all"]
+    menu.close()
+
+
+def test_whoever_scrolled_down_keeps_his_place(log: EventLog) -> None:
+    log.show()
+    for k in range(60):
+        log.add(LogKind.NOTE, str(k))
+    QApplication.processEvents()
+    view, bar = log._view, log._view.verticalScrollBar()
+    bar.setValue(240)
+    before = view.indexAt(QPoint(5, 5)).data()
+    log.add(LogKind.NOTE, "new")
+    assert view.indexAt(QPoint(5, 5)).data() == before
+    bar.setValue(0)
+    log.add(LogKind.NOTE, "newer")
+    assert bar.value() == 0 and view.indexAt(QPoint(5, 5)).data().endswith("newer")
+
+
+def test_log_paints_every_kind(log: EventLog) -> None:
+    log.show()
+    for kind in LogKind:
+        log.add(kind, "a long text " * 30)
+        log.add(kind, "a long text " * 30)
+    assert not log.grab().isNull()

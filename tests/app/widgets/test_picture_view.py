@@ -1,0 +1,74 @@
+"""Where a picture lies in a widget: places there and back, zoom at a place, limits, and what is rendered."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.ui import theme
+from app.widgets.image_canvas import PictureView, halvings, render
+
+SIZE, ROOM = (640, 480), (900, 600)
+
+
+def test_the_whole_picture_lies_in_the_middle() -> None:
+    view = PictureView.fitted(SIZE, ROOM)
+    assert view.zoom == 1.25
+    assert view.to_screen((-0.5, -0.5)) == (50.0, 0.0)
+    assert view.to_screen((639.5, 479.5)) == (850.0, 600.0)
+    assert view.is_fitted
+
+
+@pytest.mark.parametrize("zoom", [1.0, 3.7, 25.0])
+def test_there_and_back(zoom: float) -> None:
+    view = PictureView.fitted(SIZE, ROOM).zoomed(zoom, (200.0, 100.0))
+    assert view.to_image(*view.to_screen((123.4, 56.7))) == pytest.approx((123.4, 56.7))
+    mapped = view.transform.map(123.4 + 0.5, 56.7 + 0.5)
+    assert mapped == pytest.approx(view.to_screen((123.4, 56.7)))
+
+
+def test_zoom_keeps_the_place_and_ends_at_the_whole_picture() -> None:
+    view = PictureView.fitted(SIZE, ROOM)
+    fixed = view.to_image(300.0, 200.0)
+    near = view.zoomed(4.0, (300.0, 200.0))
+    assert near.to_image(300.0, 200.0) == pytest.approx(fixed)
+    assert near.zoomed(0.01, (0.0, 0.0)) == view
+    assert near.zoomed(1e6, (300.0, 200.0)).zoom == 40.0
+
+
+def test_the_picture_cannot_be_lost() -> None:
+    view = PictureView.fitted(SIZE, ROOM).zoomed(5.0, (0.0, 0.0)).panned(1e6, -1e6)
+    left, _ = view.to_screen((-0.5, 0.0))
+    assert left == pytest.approx(60.0), "no more than a margin of surroundings"
+
+
+def test_another_widget_size_keeps_what_is_seen() -> None:
+    assert PictureView.fitted(SIZE, ROOM).in_room((640, 480)).zoom == 1.0
+    near = PictureView.fitted(SIZE, ROOM).zoomed(4.0, (450.0, 300.0))
+    assert near.in_room((500, 500)).center == near.center
+
+
+def test_halvings_of_large_pictures_only() -> None:
+    assert len(halvings(np.zeros((480, 640, 3), np.uint8))) == 1
+    assert [level.shape[1] for level in halvings(np.zeros((300, 7681, 3), np.uint8))] == [7681, 3841, 1921]
+
+
+@pytest.mark.parametrize("size", [(640, 480), (5120, 3840)])
+def test_a_pixel_is_rendered_where_it_lies(size: tuple[int, int]) -> None:
+    image = np.zeros((size[1], size[0], 3), np.uint8)
+    unit = size[0] // 640
+    image[100 * unit : 104 * unit, 200 * unit : 204 * unit] = (255, 0, 0)
+    for factor in (1.0, 3.0, 8.0):
+        view = PictureView.fitted(size, ROOM).zoomed(factor, (300.0, 130.0))
+        picture = render(halvings(image), view, 1.0, 1.0, 0.0)
+        x, y = view.to_screen((202.0 * unit - 0.5, 102.0 * unit - 0.5))
+        assert picture.pixelColor(round(x), round(y)).red() > 200
+        assert picture.pixelColor(round(x + 4 * view.zoom * unit), round(y)).red() < 40
+
+
+def test_beyond_the_picture_is_nothing_and_light_changes_greys() -> None:
+    image = np.full((480, 640, 3), 100, np.uint8)
+    view = PictureView.fitted(SIZE, ROOM)
+    picture = render((image,), view, 1.0, 2.0, 10.0)
+    assert picture.pixelColor(20, 300).name().upper() == theme.INK
+    assert picture.pixelColor(450, 300).red() == (100 - 128) * 2 + 128 + 10

@@ -1,0 +1,225 @@
+"""Agreement of simulated raters whose errors are known, and the common answer of several."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.annotation.agreement_report import (
+    agreement_report,
+    choose_study,
+    group_notes,
+    manual_measurements,
+    rater_notes,
+    second_measure_notes,
+    undecided,
+    write_measures,
+)
+from core.annotation.model import Annotation, AnnotationError, ImageView, measure_lines
+from core.annotation.store import ItemKey, StoredAnnotation
+from core.config.models import PerceptionConfig
+from core.evaluation.evaluation import EvaluationError, evaluate, read_measurements, write_measurements
+from core.types import PoseState
+
+TRUE_DEG = np.linspace(0.0, 60.0, 200)
+
+
+def answer(
+    image: str, rater: str, repeat: int, theta_deg: float | None, state: PoseState | None, study: str = "s"
+) -> StoredAnnotation:
+    content = Annotation(((0.0, 0.0), (50.0, 0.0)), ((0.0, 5.0), (90.0, 5.0)), state, cannot_tell=theta_deg is None)
+    measured = (theta_deg, theta_deg, 1.0, 2.0) if theta_deg is not None else (None,) * 4
+    return StoredAnnotation(ItemKey(image, study, rater, repeat), ImageView.AS_IS, content, *measured, False, 20.0, "2026")
+
+
+def state_of(theta_deg: float) -> PoseState:
+    return PoseState.B if theta_deg < 30 else PoseState.C
+
+
+def simulated(rater: str, sd_deg: float, bias_deg: float, seed: int) -> list[StoredAnnotation]:
+    rng = np.random.default_rng(seed)
+    angles = [(k, repeat, true + bias_deg + rng.normal(0, sd_deg)) for repeat in (1, 2) for k, true in enumerate(TRUE_DEG)]
+    return [answer(str(k), rater, repeat, theta, state_of(theta)) for k, repeat, theta in angles]
+
+
+def test_known_errors_come_out() -> None:
+    """Ann errs by 1 degree (SD), Bob by 2 and he reads 3 degrees more; their difference has the SD sqrt(1 + 4)."""
+    report = agreement_report(simulated("ann", 1.0, 0.0, 1) + simulated("bob", 2.0, 3.0, 2), {})
+    ann, bob = report["raters"]["ann"], report["raters"]["bob"]
+    assert ann["sd_deg"] == pytest.approx(1.0, rel=0.15)
+    assert bob["sd_deg"] == pytest.approx(2.0, rel=0.15)
+    assert report["within"]["sd_deg"] == pytest.approx(math.sqrt((ann["sd_deg"] ** 2 + bob["sd_deg"] ** 2) / 2))
+    assert "repeatability_sd_deg" not in bob["angle"], "said once"
+    assert ann["angle"]["icc"] > 0.99
+    (pair,) = report["pairs"]
+    assert pair["angle"]["mean_difference_deg"] == pytest.approx(3.0, abs=0.5)
+    reach = 1.96 * math.sqrt(5.0)
+    assert pair["angle"]["loa_high_deg"] - pair["angle"]["loa_low_deg"] == pytest.approx(2 * reach, rel=0.15)
+    # within an image: half the variance of the difference, with its bias of 3: (9 + 5) / 2
+    assert report["between"]["sd_deg"] == pytest.approx(math.sqrt(7.0), rel=0.1)
+    assert 0.9 < report["between"]["icc"] < ann["angle"]["icc"]
+    assert 0.7 < pair["state"]["kappa"] < 1.0
+    assert report["raters"]["ann"]["median_time_s"] == 20.0
+    assert (report["images"], report["annotations"]) == (200, 800)
+
+
+def test_kappa_by_hand() -> None:
+    """Two raters, four images, three alike: p = 3/4; B 3 and 2 times, C 1 and 2 times: chance 1/2; kappa = 1/2."""
+    first = [answer(str(k), "ann", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 3 + [PoseState.C])]
+    second = [answer(str(k), "bob", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 2 + [PoseState.C] * 2)]
+    (pair,) = agreement_report(first + second, {})["pairs"]
+    assert (pair["state"]["n"], pair["state"]["equal"], pair["state"]["kappa"]) == (4, 0.75, pytest.approx(0.5))
+
+
+def test_kappa_is_of_states_and_who_cannot_tell_gives_none() -> None:
+    """As above, with five images that nobody and two that only Bob could tell: they change no agreement of states."""
+    ann = [answer(str(k), "ann", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 3 + [PoseState.C])]
+    bob = [answer(str(k), "bob", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 2 + [PoseState.C] * 2)]
+    dark = [answer(f"dark {k}", who, 1, None, None) for k in range(5) for who in ("ann", "bob")]
+    half = [answer(f"dim {k}", "ann", 1, None, None) for k in (1, 2)]
+    half += [answer(f"dim {k}", "bob", 1, 5.0, PoseState.B) for k in (1, 2)]
+    (pair,) = agreement_report(ann + bob + dark + half, {})["pairs"]
+    assert pair["state"] == {"n": 4, "equal": 0.75, "kappa": pytest.approx(0.5), "one_cannot_tell": 2, "neither_can_tell": 5}
+    (pair,) = agreement_report(dark, {})["pairs"]
+    assert pair["state"] == {"n": 0, "equal": None, "kappa": None, "one_cannot_tell": 0, "neither_can_tell": 5}
+
+
+def test_cant_tell_is_an_answer_without_an_angle() -> None:
+    both = [answer("1", "ann", 1, None, None), answer("1", "ann", 2, 4.0, PoseState.B), answer("2", "ann", 1, 3.0, PoseState.B)]
+    ann = agreement_report(both, {})["raters"]["ann"]
+    assert (ann["cannot_tell"], ann["angle"]["n"], ann["state"]["n"], ann["state"]["one_cannot_tell"]) == (1, 0, 0, 1)
+    assert ann["sd_deg"] is None
+
+
+def test_one_rater_alone_has_no_pairs(tmp_path) -> None:
+    report = agreement_report([answer("1", "ann", 1, 4.0, PoseState.B)], {"1": "one.png"})
+    assert report["pairs"] == []
+    assert report["between"] == {"raters": 1, "n": 0, "sd_deg": None, "icc": None}
+    write_measures(tmp_path / "m.csv", report["measures"])
+    header, row = (tmp_path / "m.csv").read_text().splitlines()
+    assert dict(zip(header.split(","), row.split(","), strict=True))["image"] == "one.png"
+
+
+def test_the_common_answer() -> None:
+    def common(*answers: StoredAnnotation) -> tuple[float | None, float | None, str | None]:
+        (row,) = manual_measurements(answers, {})
+        return row.angle_1, row.angle_2, row.state
+
+    b, c = PoseState.B, PoseState.C
+    assert common(answer("i", "ann", 1, 4.0, b)) == (4.0, None, "B")
+    assert common(answer("i", "ann", 1, 4.0, b), answer("i", "ann", 2, 6.0, c)) == (4.0, 6.0, "B")
+    assert common(answer("i", "bob", 1, 8.0, c), answer("i", "ann", 1, 4.0, b)) == (4.0, 8.0, "B")
+    twice = [answer("i", who, k, 4.0 * k + shift, c) for who, shift in (("ann", 0.0), ("bob", 2.0)) for k in (1, 2)]
+    assert common(*twice) == (5.0, 9.0, "C")
+    assert common(answer("i", "ann", 1, None, None), answer("i", "bob", 1, 3.0, c)) == (3.0, None, "C")
+    assert common(answer("i", "ann", 1, None, None)) == (None, None, None)
+
+
+def test_the_common_angle_is_the_mean_of_all_measures_whatever_the_raters_are_called(tmp_path) -> None:
+    for names in (("anna", "ben", "cleo"), ("zoe", "ben", "cleo")):
+        answers = [answer("i", who, 1, theta, PoseState.B) for who, theta in zip(names, (10.0, 20.0, 30.0), strict=True)]
+        (row,) = manual_measurements(answers, {})
+        assert row.manual_angle_deg == pytest.approx(20.0)
+    answers = [answer("i", who, 1, 10.0, PoseState.B) for who in names] + [answer("i", names[0], 2, 40.0, PoseState.B)]
+    (row,) = manual_measurements(answers, {})
+    assert row.manual_angle_deg == pytest.approx(17.5)
+    write_measurements(tmp_path / "m.csv", [row])
+    assert read_measurements(tmp_path / "m.csv") == [row], "also when it is read again"
+    text = (tmp_path / "m.csv").read_text().replace(",3,1", ",0,1")
+    (tmp_path / "m.csv").write_text(text)
+    with pytest.raises(EvaluationError, match=r"line 2: count_1 is '0'; must be of how many measures"):
+        read_measurements(tmp_path / "m.csv")
+
+
+def test_a_row_tells_of_how_many_measures_its_angles_are_the_means() -> None:
+    answers = [answer("i", who, k, 4.0, PoseState.B) for who, repeats in (("ann", (1, 2, 3)), ("bob", (1,))) for k in repeats]
+    (row,) = manual_measurements(answers, {})
+    assert row.counts == (2, 2)
+    rows = [replace(row, image=str(k), angle_1=4.0 + k, algorithm_angle=5.0 + k) for k in range(3)]
+    assert any("means over several raters" in note for note in evaluate(rows)["notes"])
+    assert not any("means" in note for note in evaluate([replace(one, counts=(1, 1)) for one in rows])["notes"])
+
+
+def test_several_studies_ask_for_a_choice() -> None:
+    rows = [answer("1", "ann", 1, 4.0, PoseState.B, "pilot"), answer("1", "ann", 1, 5.0, PoseState.B, "main")]
+    with pytest.raises(AnnotationError, match=r"holds several studies \('main', 'pilot'\); choose one with --study NAME"):
+        choose_study(rows, None, "here")
+    assert [one.key.study for one in choose_study(rows, "main", "here")] == ["main"]
+    with pytest.raises(AnnotationError, match="no finished annotation of study 'other'"):
+        choose_study(rows, "other", "here")
+
+
+def test_the_round_trip_of_a_rater_with_a_pixel_of_noise() -> None:
+    """48 known poses, drawn twice with 1 px of noise on every point: angles come back without bias, within what the noise explains.
+
+    Noise of 1 px on both ends of a line of 80 px turns it by sqrt(2) / 80 = 1.01 degrees, two lines by 1.43 degrees.
+    """
+    rng = np.random.default_rng(3)
+    config, answers, true = PerceptionConfig(), [], {}
+    for k in range(48):
+        theta, turn = rng.uniform(5, 60), rng.uniform(-180, 180)
+        true[str(k)] = theta
+        robot, vessel = _pose(theta, turn)
+        for repeat in (1, 2):
+            noisy = [tuple(tuple(p) for p in (np.array(line) + rng.normal(0, 1, (2, 2))).tolist()) for line in (robot, vessel)]
+            pose = measure_lines(Annotation(noisy[0], noisy[1]), (640, 480), config).pose
+            assert pose is not None
+            answers.append(answer(str(k), "ann", repeat, pose.theta_deg, pose.state))
+    ann = agreement_report(answers, {})["raters"]["ann"]
+    assert ann["sd_deg"] == pytest.approx(1.43, rel=0.25)
+    errors = [
+        row.manual_angle_deg - true[row.image] for row in manual_measurements(answers, {}) if row.manual_angle_deg is not None
+    ]
+    assert len(errors) == 48
+    assert np.mean(errors) == pytest.approx(0.0, abs=0.45)
+    assert np.std(errors, ddof=1) == pytest.approx(1.43 / math.sqrt(2), rel=0.3)
+
+
+def _pose(theta_deg: float, turn_deg: float) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+    """A robot of 80 px whose head lies in the middle of a vessel line of 80 px, at an angle to it."""
+    vessel, robot = (math.radians(turn_deg), math.radians(turn_deg + theta_deg))
+    along, back = np.array([math.cos(vessel), math.sin(vessel)]), np.array([math.cos(robot), math.sin(robot)])
+    head = np.array([320.0, 240.0])
+    return [tuple(head - 80 * back), tuple(head)], [tuple(head - 40 * along), tuple(head + 40 * along)]
+
+
+def test_images_on_which_no_state_was_given_most_often_are_counted() -> None:
+    """There the name that comes first decides, which a reader has to know."""
+    states = {"1": "BD", "2": "BBD", "3": "BDDB", "4": "A", "5": ""}
+    answers = [answer(image, f"r{k}", 1, 1.0, PoseState(s)) for image, given in states.items() for k, s in enumerate(given)]
+    assert undecided(answers) == 2
+    assert undecided([*answers, answer("1", "r9", 1, None, PoseState.D)]) == 2, "who could not tell says nothing"
+
+
+def test_names_that_may_be_one_persons_are_told() -> None:
+    done = [answer("a", "Anna", 1, 10.0, PoseState.B), answer("b", "anna ", 1, 10.0, PoseState.B)]
+    (note,) = rater_notes(done)
+    assert note == "The raters 'Anna' and 'anna ' are taken for different people: figures between raters count them so."
+    assert rater_notes(done[:1]) == []
+
+
+@pytest.mark.parametrize("cannot_tell", [False, True])
+def test_second_measures_of_two_kinds_are_told(cannot_tell: bool) -> None:
+    """Image "a" was measured twice by Ann, "b" by two raters, "c" once; where Bob could not tell, "b" has one measure alone."""
+    done = [answer("a", "ann", repeat, 10.0, PoseState.B) for repeat in (1, 2)]
+    done += [answer("b", "ann", 1, 10.0, PoseState.B), answer("c", "ann", 1, 10.0, PoseState.B)]
+    assert second_measure_notes(done) == []
+    notes = second_measure_notes([*done, answer("b", "bob", 1, None if cannot_tell else 11.0, PoseState.B)])
+    if cannot_tell:
+        assert notes == []
+    else:
+        assert notes[0].startswith("The second manual measure is a rater's later one on 1 images and another rater's on 1;")
+        rows = {row.image: row.counts for row in manual_measurements([*done, answer("b", "bob", 1, 11.0, PoseState.B)], {})}
+        assert rows["b"] == rows["a"], "the same columns hold both kinds"
+
+
+def test_too_few_groups_for_intervals_are_told() -> None:
+    answers = [answer(str(k), rater, 1, 10.0 + k, PoseState.B) for k in range(12) for rater in ("ann", "ben")]
+    assert group_notes(answers, {str(k): str(k % 2) for k in range(12)}) == [
+        "No intervals between measures: the images are of 2 groups (sessions or phantoms), and images of one are alike; "
+        "intervals need 10 groups."
+    ]
+    assert group_notes(answers, {str(k): str(k) for k in range(12)}) == group_notes(answers, {}) == []

@@ -1,0 +1,182 @@
+"""What is measured from drawn lines: the 40-px rule, angle, distances, crossing and state, computed by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from core.annotation.model import (
+    Annotation,
+    ImageView,
+    MaskPolygon,
+    MaskTarget,
+    Status,
+    annotation_from_json,
+    measure_lines,
+    status_of,
+    turn_annotation,
+    turn_image,
+    turn_point,
+    working_scale,
+)
+from core.config.models import PerceptionConfig
+from core.perception.vectors import fit_robot_vector
+from core.types import PoseState
+
+CONFIG = PerceptionConfig()
+SIZE = (640, 480)
+
+
+def test_a_robot_30_degrees_to_the_right_of_a_level_vessel() -> None:
+    """Head at (300, 200), its 40 px come from 30 degrees above; the vessel's line is y = 210, drawn from left to right."""
+    tail = (300.0 - 100.0 * math.cos(math.radians(30)), 200.0 - 100.0 * math.sin(math.radians(30)))
+    found = measure_lines(Annotation(robot=(tail, (300.0, 200.0)), vessel=((200.0, 210.0), (400.0, 210.0))), SIZE, CONFIG)
+    assert found.pose is not None
+    assert found.pose.theta_deg == pytest.approx(30.0)
+    assert found.pose.theta_signed_deg == pytest.approx(30.0), "downwards is to the right on a screen"
+    assert found.pose.d_head_px == pytest.approx(10.0)
+    assert found.pose.d_tail_px == pytest.approx(10.0 + 20.0), "40 px back along 30 degrees is 20 px higher"
+    assert not found.pose.crossed
+    assert found.pose.state is PoseState.B
+    assert (found.robot_length_px, found.vessel_length_px) == (pytest.approx(40.0), pytest.approx(40.0))
+
+
+def test_the_vessels_direction_is_the_robots_however_it_was_drawn() -> None:
+    robot = ((200.0, 200.0), (300.0, 210.0))
+    forth = measure_lines(Annotation(robot, ((200.0, 220.0), (400.0, 220.0))), SIZE, CONFIG).pose
+    back = measure_lines(Annotation(robot, ((400.0, 220.0), (200.0, 220.0))), SIZE, CONFIG).pose
+    assert forth is not None
+    assert back is not None
+    assert forth.theta_signed_deg == pytest.approx(back.theta_signed_deg) == pytest.approx(math.degrees(math.atan2(10, 100)))
+
+
+def test_only_the_last_40_px_of_the_robot_count() -> None:
+    """A right-angled bend 40 px before the head is the border of what counts; one 60 px before it says nothing."""
+    vessel = ((200.0, 200.0), (400.0, 200.0))
+    bent = measure_lines(Annotation(((240.0, 100.0), (240.0, 200.0), (300.0, 200.0)), vessel), SIZE, CONFIG)
+    assert bent.pose is not None
+    assert bent.pose.theta_deg == pytest.approx(0.0, abs=1e-9)
+    assert bent.robot_piece is not None
+    assert bent.robot_piece.tolist() == [[260.0, 200.0], [300.0, 200.0]]
+    assert bent.pose.state is PoseState.A
+
+
+def test_the_fit_is_that_of_perception() -> None:
+    line = ((250.0, 190.0), (270.0, 204.0), (285.0, 203.0), (300.0, 212.0))
+    found = measure_lines(Annotation(robot=line), SIZE, CONFIG)
+    assert found.robot_vector == fit_robot_vector(np.array(line), 40.0)
+    assert found.missing == "draw the vessel's centerline beside the head"
+
+
+def test_the_vessel_line_counts_20_px_to_both_sides_of_the_place_beside_the_head() -> None:
+    vessel = ((100.0, 400.0), (280.0, 220.0), (400.0, 220.0))
+    found = measure_lines(Annotation(((240.0, 230.0), (330.0, 210.0)), vessel), SIZE, CONFIG)
+    assert found.vessel_piece is not None
+    assert found.vessel_piece[[0, -1]].tolist() == [[310.0, 220.0], [350.0, 220.0]]
+
+
+def test_a_short_vessel_line_is_used_as_far_as_it_goes() -> None:
+    robot = ((200.0, 200.0), (300.0, 200.0))
+    short = measure_lines(Annotation(robot, ((300.0, 210.0), (312.0, 210.0))), SIZE, CONFIG)
+    assert short.vessel_length_px == pytest.approx(12.0)
+    assert short.pose is not None
+    none = measure_lines(Annotation(robot, ((300.0, 210.0), (305.0, 210.0))), SIZE, CONFIG)
+    assert none.pose is None
+    assert none.missing == "the vessel line ends too soon beside the head: draw it farther"
+
+
+@pytest.mark.parametrize(
+    ("robot", "state", "crossed"),
+    [
+        (((260.0, 202.0), (300.0, 204.0)), PoseState.A, False),  # 2 and 4 px, 2.9 degrees
+        (((260.0, 190.0), (300.0, 210.0)), PoseState.D, True),  # from 10 px above to 10 px below
+        (((260.0, 230.0), (300.0, 215.0)), PoseState.B, False),  # from 30 to 15 px
+        (((260.0, 215.0), (300.0, 230.0)), PoseState.C, False),  # from 15 to 30 px
+    ],
+)
+def test_states_by_the_rule(robot: tuple[tuple[float, float], ...], state: PoseState, crossed: bool) -> None:
+    pose = measure_lines(Annotation(robot, ((200.0, 200.0), (400.0, 200.0))), SIZE, CONFIG).pose
+    assert pose is not None
+    assert (pose.state, pose.crossed) == (state, crossed)
+
+
+def test_a_picture_of_twice_the_size_measures_the_same() -> None:
+    """All lengths are working pixels: the longer side scaled to 640. A source pixel (x, y) lies at (x + 0.5) / 2 - 0.5 there."""
+    small = Annotation(((220.0, 180.0), (300.0, 200.0)), ((200.0, 215.0), (400.0, 205.0)))
+    large = Annotation(*(tuple((2 * x + 0.5, 2 * y + 0.5) for x, y in line) for line in (small.robot, small.vessel)))
+    first, second = measure_lines(small, (640, 480), CONFIG), measure_lines(large, (1280, 960), CONFIG)
+    assert first.pose is not None
+    assert second.pose is not None
+    assert second.pose.theta_deg == pytest.approx(first.pose.theta_deg)
+    assert second.pose.d_head_px == pytest.approx(first.pose.d_head_px)
+    assert second.robot_vector is not None
+    assert second.robot_vector.end == pytest.approx((600.5, 400.5)), "but points are source pixels"
+    assert working_scale((1280, 960), 640) == (0.5, 0.5)
+
+
+@pytest.mark.parametrize("line", [(), ((5.0, 5.0),), ((5.0, 5.0), (5.0, 5.0)), ((5.0, 5.0), (7.0, 5.0))])
+def test_no_line_no_angle(line: tuple[tuple[float, float], ...]) -> None:
+    found = measure_lines(Annotation(line, line), SIZE, CONFIG)
+    assert found.pose is None
+    assert found.missing
+
+
+@pytest.mark.parametrize("view", list(ImageView))
+def test_a_view_is_its_own_inverse_and_keeps_the_measures(view: ImageView) -> None:
+    drawn = Annotation(((220.0, 180.0), (300.0, 200.0)), ((200.0, 215.0), (400.0, 205.0)), masks=(_triangle(),))
+    shown = turn_annotation(drawn, view, SIZE)
+    assert turn_annotation(shown, view, SIZE) == drawn
+    first, second = (measure_lines(one, SIZE, CONFIG).pose for one in (drawn, shown))
+    assert first is not None
+    assert second is not None
+    assert second.theta_deg == pytest.approx(first.theta_deg)
+    assert (second.d_head_px, second.state) == (pytest.approx(first.d_head_px), first.state)
+
+
+def test_points_and_pixels_turn_alike() -> None:
+    image = np.zeros((48, 64, 3), np.uint8)
+    image[7, 11] = 255
+    for view in ImageView:
+        x, y = turn_point((11.0, 7.0), view, (64, 48))
+        assert turn_image(image, view)[round(y), round(x)].tolist() == [255, 255, 255]
+
+
+def _triangle() -> MaskPolygon:
+    return MaskPolygon(MaskTarget.ROBOT, ((1.0, 1.0), (9.0, 1.0), (1.0, 9.0)), is_hole=True)
+
+
+def test_json_keeps_everything() -> None:
+    full = Annotation(((1.5, 2.0), (3.0, 4.25)), ((0.0, 0.0),), PoseState.C, False, (_triangle(),), "head – „blurred“")
+    assert annotation_from_json(full.to_json()) == full
+    assert annotation_from_json(Annotation().to_json()) == Annotation()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "null",
+        "[]",
+        "{}",
+        "[" * 100_000,
+        Annotation().to_json().replace('"robot":[]', '"robot":[[1,NaN]]'),
+        Annotation().to_json().replace('"robot":[]', '"robot":[[1,2,3]]'),
+        Annotation().to_json().replace('"robot":[]', '"robot":[[1,1e99]]'),
+        Annotation().to_json().replace('"state":null', '"state":"E"'),
+        Annotation().to_json().replace('"masks":[]', '"masks":[{"target":"bone","points":[],"is_hole":false}]'),
+    ],
+)
+def test_damaged_json_is_an_error(text: str) -> None:
+    with pytest.raises(ValueError):
+        annotation_from_json(text)
+
+
+def test_status() -> None:
+    lines = Annotation(((1.0, 1.0),))
+    assert status_of(None, measured=False) is Status.NEW
+    assert status_of(Annotation(), measured=False) is Status.NEW
+    assert status_of(lines, measured=False) is Status.BEGUN
+    assert status_of(Annotation(state=PoseState.A), measured=True) is Status.DONE
+    assert status_of(Annotation(cannot_tell=True), measured=False) is Status.CANNOT_TELL

@@ -1,0 +1,98 @@
+"""Masks to polygons and back; brush; simplification."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.annotation.masks import fill, paint, polygons_of, simplify
+from core.annotation.model import MaskPolygon, MaskTarget
+from core.types import Mask
+
+SIZE = (64, 48)
+
+
+def ring() -> Mask:
+    """A disc with a hole, and a bar apart from it."""
+    y, x = np.mgrid[:48, :64]
+    away = np.hypot(x - 20, y - 24)
+    return np.asarray(((away <= 15) & (away > 6)) | ((x > 45) & (x < 60) & (y > 10) & (y < 20)))
+
+
+def test_exact_outlines_give_the_mask_back() -> None:
+    polygons = polygons_of(ring(), MaskTarget.VESSEL, 0.0)
+    assert sorted(polygon.is_hole for polygon in polygons) == [False, False, True]
+    assert np.array_equal(fill(polygons, MaskTarget.VESSEL, SIZE), ring())
+    assert not fill(polygons, MaskTarget.ROBOT, SIZE).any()
+
+
+def test_an_island_in_a_hole_is_kept() -> None:
+    y, x = np.mgrid[:48, :64]
+    away = np.hypot(x - 32, y - 24)
+    mask = np.asarray(((away <= 22) & (away > 14)) | ((away <= 9) & (away > 5)) | (away <= 2))
+    assert np.array_equal(fill(polygons_of(mask, MaskTarget.VESSEL, 0.0), MaskTarget.VESSEL, SIZE), mask)
+    hollow = polygons_of(away > 14, MaskTarget.VESSEL)
+    painted = paint(hollow, MaskTarget.VESSEL, np.array([(32.0, 24.0)]), 5.0, SIZE, erase=False)
+    assert fill(painted, MaskTarget.VESSEL, SIZE)[24, 32]
+
+
+def test_fewer_points_change_little() -> None:
+    exact, few = (polygons_of(ring(), MaskTarget.VESSEL, tolerance) for tolerance in (0.0, 0.7))
+    assert sum(len(p.points) for p in few) < 0.6 * sum(len(p.points) for p in exact)
+    assert np.mean(fill(few, MaskTarget.VESSEL, SIZE) != ring()) < 0.01
+    fewer = simplify(few, MaskTarget.VESSEL, 2.0)
+    assert sum(len(p.points) for p in fewer) < sum(len(p.points) for p in few)
+    assert simplify(few, MaskTarget.ROBOT, 2.0) == few
+
+
+def test_nothing_and_specks_make_no_polygon() -> None:
+    speck = np.zeros((48, 64), bool)
+    assert polygons_of(speck, MaskTarget.ROBOT) == ()
+    speck[5, 5] = True
+    assert polygons_of(speck, MaskTarget.ROBOT) == ()
+
+
+def test_a_rectangle_covers_its_corners_pixels() -> None:
+    square = MaskPolygon(MaskTarget.ROBOT, ((10.0, 10.0), (19.0, 10.0), (19.0, 14.0), (10.0, 14.0)))
+    assert fill([square], MaskTarget.ROBOT, SIZE).sum() == 10 * 5
+
+
+@pytest.mark.parametrize("place", [(20.0, 24.0), (0.0, 0.0), (63.0, 47.0), (-20.0, 10.0)])
+def test_the_brush_adds_and_takes_away_a_disc(place: tuple[float, float]) -> None:
+    other = MaskPolygon(MaskTarget.ROBOT, ((1.0, 1.0), (5.0, 1.0), (1.0, 5.0)))
+    y, x = np.mgrid[:48, :64]
+    disc = np.hypot(x - place[0], y - place[1]) <= 5
+    for erase, before in ((False, np.zeros((48, 64), bool)), (True, np.ones((48, 64), bool))):
+        polygons = (*polygons_of(before, MaskTarget.VESSEL), other)
+        after = paint(polygons, MaskTarget.VESSEL, np.array([place]), 5.0, SIZE, erase=erase)
+        assert other in after
+        found = fill(after, MaskTarget.VESSEL, SIZE)
+        assert np.sum(found != (before & ~disc if erase else before | disc)) <= 16
+
+
+def test_the_brush_changes_nothing_that_it_does_not_come_near() -> None:
+    polygons = (*polygons_of(ring(), MaskTarget.VESSEL), MaskPolygon(MaskTarget.VESSEL, ((1.0, 44.0), (3.0, 46.0), (2.0, 45.0))))
+    bar = next(p for p in polygons if min(x for x, _ in p.points) > 40)
+    after = paint(polygons, MaskTarget.VESSEL, np.array([(52.0, 15.0)]), 2.0, SIZE, erase=True)
+    others = tuple(polygon for polygon in polygons if polygon is not bar)
+    assert after[: len(others)] == others
+    assert len(after) > len(others)
+
+
+def test_painting_again_and_again_wears_nothing_away() -> None:
+    """A tube of one pixel's width is training truth, too."""
+    line = np.zeros((48, 64), bool)
+    line[24, 4:60] = True
+    line[30:33, 4:60] = True
+    polygons = polygons_of(line, MaskTarget.VESSEL, 0.0)
+    for k in range(20):
+        polygons = paint(polygons, MaskTarget.VESSEL, np.array([(10.0 + 2 * k, 27.0)]), 1.0, SIZE, erase=k % 2 == 1)
+    found = fill(polygons, MaskTarget.VESSEL, SIZE)
+    assert (found & line).sum() == line.sum()
+
+
+def test_a_stroke_is_as_wide_as_the_brush() -> None:
+    stroke = np.array([[10.0, 24.0], [50.0, 24.0]])
+    found = fill(paint((), MaskTarget.VESSEL, stroke, 4.0, SIZE, erase=False), MaskTarget.VESSEL, SIZE)
+    assert found[:, 30].sum() == pytest.approx(9, abs=1)
+    assert not found[:, 4].any()

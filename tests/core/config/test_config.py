@@ -1,0 +1,144 @@
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel, ValidationError
+
+from core.config.models import Config, ConfigError, choose_model, load_config
+from core.config.safety import SafetyConfig, ServosConfig
+
+
+def _write(folder: Path, text: str) -> Path:
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_defaults_and_presets_load() -> None:
+    assert load_config().twin.phantom == "tree"
+    paper = load_config(preset="paper").perception
+    assert paper.gaps.rule == "every_pair"
+    assert paper.path.cosine == "absolute"
+    assert not paper.cleaning.extend_ends
+
+
+def test_a_users_file_wins_over_the_preset_and_keeps_the_rest(tmp_path: Path) -> None:
+    path = _write(tmp_path, "[perception.gaps]\ngap_threshold_px = 12\n")
+    config = load_config(path, preset="paper")
+    assert config.perception.gaps.gap_threshold_px == 12
+    assert config.perception.gaps.rule == "every_pair"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[perception.pose]\nd_allow_px = -3\n", ["perception.pose.d_allow_px", "> 0 and <= 200", "-3"]),
+        ("[perception.pose]\nd_allow = 3\n", ["perception.pose.d_allow", "unknown key"]),
+        ("[perception.pose]\nd_allow_px = 'wide'\n", ["perception.pose.d_allow_px", "'wide'"]),
+        ("[perception.pose]\nd_allow_px = nan\n", ["perception.pose.d_allow_px"]),
+        ("[perception.gaps]\nrule = 'nearest'\n", ["perception.gaps.rule", "components", "every_pair"]),
+        ("[perception\n", ["not valid TOML"]),
+        (
+            "[servos]\nport = '/dev/ttyUSB0'\nheartbeat_timeout_s = 3.0\n",
+            ["servos: ", "heartbeat_timeout_s must be 0.5 at most with real servos"],
+        ),
+        ("[servos]\nport = '/dev/ttyUSB0'\nwatchdog_s = 2.0\n", ["watchdog_s must be 0.5 at most with real servos"]),
+        (
+            "[servos]\nport = '/dev/ttyUSB0'\nbus_hz = 5.0\nwatchdog_s = 0.4\n",
+            ["bus_hz must be 20 at least with real servos"],
+        ),
+        ("perception = 3\n", ["perception"]),
+        ("[[servos.joints]]\nname = 'right'\nid = 999\n", ["servos.joints.0.id: must be >= 0 and <= 252, got 999"]),
+    ],
+)
+def test_a_bad_file_is_one_line_with_file_key_and_range(tmp_path: Path, text: str, words: list[str]) -> None:
+    path = _write(tmp_path, text)
+    with pytest.raises(ConfigError) as caught:
+        load_config(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert str(path) in message
+    for word in words:
+        assert word in message
+
+
+def test_the_twins_servos_may_be_more_patient(tmp_path: Path) -> None:
+    assert load_config(_write(tmp_path, "[servos]\nheartbeat_timeout_s = 3.0\n")).servos.heartbeat_timeout_s == 3.0
+
+
+def test_missing_file_and_unknown_preset_are_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no such configuration file"):
+        load_config(tmp_path / "none.toml")
+    with pytest.raises(ConfigError, match=r"unknown preset 'papre'; known: paper"):
+        load_config(preset="papre")
+
+
+def test_a_binary_file_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "x.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match="UTF-8"):
+        load_config(path)
+
+
+def test_the_configuration_cannot_be_changed_in_place() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        Config().twin = None  # type: ignore[misc, assignment]
+
+
+def _joints_with(name: str, **changes: float) -> list[dict[str, object]]:
+    joints = [joint.model_dump() for joint in ServosConfig().joints]
+    return [{**joint, **changes} if joint["name"] == name else joint for joint in joints]
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "words"),
+    [
+        (ServosConfig, {"pretension_mm": 5.0}, "joint right: pretension_mm must lie between low_mm and high_mm"),
+        (ServosConfig, {"joints": _joints_with("advance", low_mm=100.0)}, "joint advance: zero must lie between"),
+        (ServosConfig, {"joints": _joints_with("delivery_2", high_mm=-1.0)}, "delivery_2"),
+        (ServosConfig, {"watchdog_s": 0.02}, "watchdog_s must be two cycles of the bus"),
+        (ServosConfig, {"bus_hz": 5.0}, "watchdog_s must be two cycles of the bus"),
+        (ServosConfig, {"max_temperature_c": 85.0}, "80"),
+        (SafetyConfig, {"frame_loss_min_frames": 300}, "loss is never seen"),
+    ],
+)
+def test_limits_that_contradict_each_other_are_refused(section: type[BaseModel], values: dict[str, object], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        section.model_validate(values)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[perception.pose]\nd_allow_px = true", "d_allow_px: must be .* got True"),
+        ('[perception.pose]\nd_allow_px = "6"', "d_allow_px: must be .* got '6'"),
+        ("[perception.tracking]\nwindow_px = 33", "window_px: must be .*a multiple of 32, got 33"),
+        ("x = " + "[" * 5000 + "]" * 5000, "not valid TOML: nested too deeply"),
+        ("x = " + "9" * 5000, "not valid TOML"),
+    ],
+)
+def test_a_wrong_type_and_a_hidden_rule_are_said(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "my.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=said) as raised:
+        load_config(path)
+    assert len(str(raised.value).splitlines()) == 1
+
+
+def test_a_whole_number_is_a_number_and_a_mark_at_the_beginning_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "my.toml"
+    path.write_bytes(b"\xef\xbb\xbf[perception.pose]\nd_allow_px = 7\n")
+    assert load_config(path).perception.pose.d_allow_px == 7.0
+
+
+def test_a_name_that_is_no_text_is_one_clear_error() -> None:
+    with pytest.raises(ConfigError, match=r"command line: 'm\\udcff' is no text in UTF-8; rename that file or folder"):
+        load_config(overrides=choose_model("m\udcff"))
+
+
+def test_a_file_that_is_nested_too_deeply_is_one_short_line(tmp_path: Path) -> None:
+    for depth in (120, 250, 900):
+        path = _write(tmp_path, "[" + ".".join(["a"] * depth) + "]\nb = 1\n")
+        with pytest.raises(ConfigError) as raised:
+            load_config(path)
+        assert str(raised.value).startswith(str(path))
+        assert len(str(raised.value)) < len(str(path)) + 120

@@ -1,0 +1,304 @@
+"""Rig files: round trips, names, broken files that are kept, and what of them reaches configuration and sessions."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from core.config.calibration import CalibrationConfig, LensConfig, PortConfig, ScaleConfig
+from core.config.models import Config, load_config
+from core.config.rig_file import (
+    RigFileError,
+    as_calibrated,
+    calibration_of,
+    check_rig_name,
+    find_rig,
+    has_rig,
+    list_rigs,
+    make_rig,
+    read_again,
+    read_rig,
+    rig_path,
+    rigs_folder,
+    scaled,
+    sections_of_rig,
+    set_port,
+    with_rig,
+    write_rig,
+)
+from core.session.manifest import Manifest, about_rig
+
+MADE = datetime(2025, 3, 4, 5, 6, 7, tzinfo=UTC)
+LENS = LensConfig(k1=-0.1, center_px=(319.5, 239.5), size_px=(640, 480), residual_px=0.1, pictures=3)
+SCALE = ScaleConfig(mm_per_px=0.32, size_px=(640, 480), method="board", uncertainty_share=0.001)
+KNOWN = CalibrationConfig(made_utc=MADE, lens=LENS, scale=SCALE)
+REAL = load_config(
+    overrides={
+        "rig": {"camera": "webcam", "robot": "servos"},
+        "camera": {"device": "/dev/v4l/by-id/cam"},
+        "servos": {"port": "/dev/serial/by-id/u2d2"},
+    }
+)
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+
+
+@pytest.mark.parametrize("config", [load_config(), REAL])
+def test_a_rig_comes_back_as_it_was_saved(config: Config) -> None:
+    rig = make_rig(config, "bench 1", KNOWN)
+    path = write_rig(rig)
+    assert path == rigs_folder() / "bench 1.toml"
+    assert read_rig(path) == rig
+    assert find_rig("BENCH 1") == (path, rig)
+    assert [one.name for one in list_rigs()] == ["bench 1"]
+
+
+def test_a_rig_with_real_servos_keeps_to_the_safety_rules() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    text = path.read_text()
+    assert "heartbeat_timeout_s = 0.5" in text
+    path.write_text(text.replace("heartbeat_timeout_s = 0.5", "heartbeat_timeout_s = 5.0"))
+    with pytest.raises(RigFileError, match=r"servos: heartbeat_timeout_s must be 0\.5 at most"):
+        read_rig(path)
+
+
+def test_a_copy_of_a_rig_file_does_not_take_its_place() -> None:
+    path = write_rig(make_rig(REAL, "bench", KNOWN))
+    (path.parent / "a backup of bench.toml").write_text(path.read_text())
+    assert find_rig("bench")[0] == path
+    assert find_rig("BENCH")[0] == path
+    assert find_rig("a backup of bench")[0].stem == "a backup of bench"
+    assert has_rig("Bench")
+    assert not has_rig("bench 2")
+
+
+def test_a_copy_is_the_rig_that_its_file_says() -> None:
+    """The way to a second bench: copied, and another port put in."""
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    copied = path.with_name("bench 2.toml")
+    copied.write_text(path.read_text())
+    assert [(one.name, one.path) for one in list_rigs()] == [("bench 1", path), ("bench 2", copied)]
+    assert with_rig(load_config(), read_rig(copied), copied).rig.name == "bench 2"
+    assert find_rig("bench 2")[0] == copied
+
+
+def test_the_configuration_takes_the_rig_over() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    config = with_rig(load_config(overrides={"advice": {"slow_mm_s": 2.0}}), read_rig(path), path)
+    assert config.rig.name == "bench 1"
+    assert config.rig.camera == "webcam"
+    assert config.camera == REAL.camera
+    assert config.servos == REAL.servos
+    assert config.advice.slow_mm_s == 2.0
+    assert calibration_of(config) == KNOWN
+    assert sections_of_rig(config, load_config()) == {"camera", "servos"}
+    named = load_config(overrides={"rig": {"file": str(path)}})  # its calibration only
+    assert sections_of_rig(named, named) == sections_of_rig(REAL, load_config()) == frozenset()
+
+
+def test_a_rig_is_read_again_and_nothing_that_was_chosen_instead_of_it() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    opened = with_rig(load_config(), read_rig(path), path)
+    file = path.read_text(encoding="utf-8")
+    path.write_text(file.replace("max_pull_mm = 2.0", "max_pull_mm = 3.5"), encoding="utf-8")
+    assert read_again(opened, load_config()).servos.max_pull_mm == 3.5
+    assert read_again(opened, load_config()).rig == opened.rig
+    settings = load_config(
+        overrides={"rig": {"file": str(path), "camera": "webcam", "robot": "servos"}, "servos": {"port": "/dev/x"}}
+    )
+    assert read_again(settings, settings) is settings, "its calibration only"
+    for chosen in (
+        {"name": "twin", "camera": "twin", "robot": "twin"},
+        {"name": "webcam", "camera": "webcam", "robot": "none"},
+        {"camera": "video_file", "robot": "none", "source": "clip.mp4"},
+    ):
+        running = settings.model_copy(update={"rig": settings.rig.model_copy(update=chosen)})
+        assert read_again(running, settings) is running
+
+
+def test_the_twins_scale_is_that_of_its_own_pictures() -> None:
+    config = load_config(overrides={"twin": {"image_width_px": 1280, "image_height_px": 720}})
+    known = KNOWN.model_copy(update={"scale": SCALE.model_copy(update={"size_px": (1280, 720), "mm_per_px": 0.2})})
+    assert scaled(config, known).policy.pursuit.pixels_per_mm == pytest.approx(2.5)
+    assert scaled(load_config(), known) == load_config()
+
+
+@pytest.mark.parametrize(
+    ("mm_per_px", "size_px", "working_px", "px_per_mm"),
+    [
+        (0.2, (640, 480), 640, 5.0),
+        (0.2, (1280, 720), 640, 2.5),  # half a source pixel is a working pixel
+        (0.2, (640, 480), 320, 2.5),
+    ],
+)
+def test_the_measured_scale_goes_before_the_configured_one(
+    mm_per_px: float, size_px: tuple[int, int], working_px: int, px_per_mm: float
+) -> None:
+    camera = {"width_px": size_px[0], "height_px": size_px[1]}
+    said = {
+        "rig": {"camera": "realsense", "robot": "none"},
+        "perception": {"working_size_px": working_px},
+        "policy": {"pursuit": {"pixels_per_mm": 7.0}},
+        "camera": camera,
+    }
+    config = load_config(overrides=said)
+    scale = SCALE.model_copy(update={"mm_per_px": mm_per_px, "size_px": size_px})
+    found = scaled(config, KNOWN.model_copy(update={"scale": scale}))
+    assert found.policy.pursuit.pixels_per_mm == pytest.approx(px_per_mm)
+    assert found.policy.pursuit.look_ahead_px == config.policy.pursuit.look_ahead_px
+    cropped = load_config(overrides=said | {"camera": {"width_px": 960, "height_px": 960}})
+    assert scaled(cropped, KNOWN.model_copy(update={"scale": scale})) == cropped, "another part of the bench"
+    assert scaled(config, None) is config
+    assert scaled(config, CalibrationConfig(made_utc=MADE, lens=LENS)).policy.pursuit.pixels_per_mm == 7.0
+
+
+def test_the_insertion_port_is_kept_in_the_rig_file_and_reaches_perception() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", None))
+    set_port(path, PortConfig(x_share=0.1, y_share=0.6))
+    config = with_rig(load_config(), read_rig(path), path)
+    found = as_calibrated(config).perception.path
+    assert (found.port_x_share, found.port_y_share) == (0.1, 0.6)
+    assert config.perception.path.port_x_share is None, "it is the rig's, not the user's"
+    set_port(path, None)
+    assert as_calibrated(config).perception == config.perception
+    path = write_rig(make_rig(REAL, "bench 2", KNOWN))
+    set_port(path, PortConfig(x_share=0.1, y_share=0.6))
+    assert read_rig(path).calibration == KNOWN.model_copy(update={"port": PortConfig(x_share=0.1, y_share=0.6)})
+
+
+def test_a_port_of_the_configuration_holds_for_rigs_that_tell_none() -> None:
+    config = load_config(overrides={"perception": {"path": {"port_x_share": 0.2, "port_y_share": 0.3}}})
+    assert as_calibrated(config).perception.path.port_x_share == 0.2
+
+
+def test_a_session_tells_its_calibration_again() -> None:
+    manifest = Manifest(id="x", kind="LIVE", started_utc=MADE, started_monotonic_s=0.0)
+    assert manifest.known is None
+    assert manifest.model_copy(update={"calibration": KNOWN.model_dump(mode="json")}).known == KNOWN
+    assert manifest.model_copy(update={"calibration": {"of": "a newer version"}}).known is None
+
+
+def test_a_session_keeps_the_calibration() -> None:
+    path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    about = about_rig(with_rig(load_config(), read_rig(path), path), "SIM", "bench 1")
+    assert about.calibration is not None
+    assert CalibrationConfig.model_validate(about.calibration) == KNOWN
+    assert about_rig(load_config(), "SIM", "twin").calibration is None
+
+
+def test_a_recording_is_straight_already() -> None:
+    path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    config = load_config(overrides={"rig": {"camera": "video_file", "source": "a.mp4", "file": str(path), "robot": "none"}})
+    assert calibration_of(config) is None
+
+
+def test_the_insertion_port_leaves_the_older_calibration_where_it_is() -> None:
+    write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    path = write_rig(make_rig(load_config(), "bench 1", None))
+    for share in (0.1, 0.2):
+        set_port(path, PortConfig(x_share=share, y_share=0.6))
+    assert read_rig(path.with_name("bench 1.older.toml")).calibration == KNOWN
+
+
+def test_saving_again_keeps_the_older_one() -> None:
+    write_rig(make_rig(load_config(), "bench 1", None))
+    path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    older = path.with_name("bench 1.older.toml")
+    assert read_rig(older).calibration is None
+    assert read_rig(path).calibration == KNOWN
+    assert [one.path for one in list_rigs()] == [path]
+
+
+def test_a_disk_that_does_not_take_it_is_one_line(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    with pytest.raises(RigFileError, match="cannot be saved") as told:
+        write_rig(make_rig(load_config(), "bench 1", None), blocked / "bench 1.toml")
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("name", ["", "  ", "../up", "a/b", ".hidden", "twin", "Webcam", "x" * 61, "a.older"])
+def test_names_that_are_none(name: str) -> None:
+    with pytest.raises(ValueError, match=r"name|called"):
+        check_rig_name(name)
+    with pytest.raises(RigFileError):
+        make_rig(load_config(), name, None)
+
+
+BROKEN = (
+    ("= 3", "no TOML"),
+    ("format = 99", "newer version"),
+    ('name = "b"', "made_utc: Field required"),
+    ("\x00", "no TOML"),
+    ("a = " + "[" * 5000 + "]" * 5000, "no TOML"),
+    ("a = " + "9" * 5000, "no TOML"),
+)
+
+
+@pytest.mark.parametrize(("text", "problem"), BROKEN)
+def test_a_broken_file_is_one_clear_line_and_is_kept(text: str, problem: str) -> None:
+    path = rig_path("bench 1")
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    with pytest.raises(RigFileError, match=problem) as told:
+        read_rig(path)
+    assert "\n" not in str(told.value)
+    assert str(path) in str(told.value)
+    assert path.read_text() == text
+    listed = list_rigs()
+    assert [(one.name, one.rig) for one in listed] == [("bench 1", None)]
+    assert problem in listed[0].problem
+    with pytest.raises(RigFileError, match=problem):
+        find_rig("bench 1")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("id = 3", "id = 2", "two servos have the same id"),
+        ("mm_per_px = 0.32", "mm_per_px = -0.32", "calibration.scale.mm_per_px"),
+        ('kind = "twin"', 'kind = "webcam"', "twin"),
+        ("roll_deg = 0.0", "roll_dog = 0.0", "twin.roll_dog"),
+        ('robot = "twin"', 'robot = "servos"', "robot servos needs a real camera"),
+    ],
+)
+def test_a_value_that_cannot_be_is_named(old: str, new: str, problem: str) -> None:
+    path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(RigFileError, match=problem):
+        read_rig(path)
+
+
+def test_a_missing_rig_names_those_that_there_are() -> None:
+    write_rig(make_rig(load_config(), "bench 1", None))
+    with pytest.raises(RigFileError, match="unknown rig 'bench 2'; known: twin, realsense, webcam, bench 1"):
+        find_rig("bench 2")
+    with pytest.raises(RigFileError, match="no such rig file"):
+        read_rig(rig_path("bench 2"))
+
+
+def test_a_recording_is_no_rig() -> None:
+    config = load_config(overrides={"rig": {"camera": "video_file", "source": "a.mp4", "robot": "none"}})
+    with pytest.raises(RigFileError, match="plays a recording"):
+        make_rig(config, "bench 1", None)
+
+
+def test_a_rig_whose_file_was_renamed_is_not_saved_over_by_another_one_of_its_name() -> None:
+    old = write_rig(make_rig(REAL, "bench", KNOWN))
+    kept = old.rename(old.with_name("lab before the move.toml"))
+    assert write_rig(make_rig(REAL, "bench", None)) == old
+    assert read_rig(kept).calibration == KNOWN
+    assert find_rig("bench")[0] == old
+
+
+def test_a_rig_that_is_saved_again_in_other_letters_stays_one_file() -> None:
+    path = write_rig(make_rig(REAL, "empt", None))
+    assert write_rig(make_rig(REAL, "EMPT", KNOWN)) == path
+    assert [one.path for one in list_rigs()] == [path]
+    assert find_rig("empt")[1].calibration == KNOWN
+    assert read_rig(path.with_name("empt.older.toml")).calibration is None

@@ -1,0 +1,116 @@
+"""From advice to command: turns become bend, speeds become feed; rate-limited, without wind-up, quiet without advice."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from core.config.models import DriveConfig
+from core.control.motion import AdviceController
+from core.types import Advice, Command, Speed
+
+PLAIN = DriveConfig(
+    turn_deg=100.0, proportional=0.0, integral_s=0.5, max_bend_rate_per_s=10.0, max_acceleration_mm_s2=1000.0, max_gap_s=0.1
+)
+
+
+def _advice(steer_deg: float = 0.0, advance_mm_s: float = 5.0) -> Advice:
+    return Advice(Speed.MODERATE, advance_mm_s, steer_deg, "test")
+
+
+def test_the_first_command_moves_nothing() -> None:
+    assert AdviceController(PLAIN, bend=0.3).command(_advice(40.0), 7.0) == Command(bend=0.3, advance_mm_s=0.0)
+
+
+def test_an_advised_turn_is_made_in_the_integral_time() -> None:
+    drive = AdviceController(PLAIN)
+    bends = [drive.command(_advice(20.0), 0.1 * step).bend for step in range(6)]
+    # 20 of 100 degrees are a bend of 0.2; it is made in 0.5 s, in steps of 0.1 s
+    assert bends == pytest.approx([0.0, 0.04, 0.08, 0.12, 0.16, 0.2])
+
+
+def test_without_steering_the_bend_stays() -> None:
+    drive = AdviceController(PLAIN, bend=-0.4)
+    assert [drive.command(_advice(0.0), 0.1 * step).bend for step in range(3)] == [-0.4] * 3
+
+
+def test_the_proportional_share_acts_at_once_and_goes_with_the_error() -> None:
+    drive = AdviceController(PLAIN.model_copy(update={"proportional": 0.5, "integral_s": 60.0}))
+    drive.command(_advice(20.0), 0.0)
+    assert drive.command(_advice(20.0), 0.1).bend == pytest.approx(0.1, abs=1e-3)
+    assert drive.command(_advice(0.0), 0.2).bend == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_bend_changes_at_most_at_its_rate() -> None:
+    drive = AdviceController(PLAIN.model_copy(update={"max_bend_rate_per_s": 0.5}))
+    bends = [drive.command(_advice(180.0), 0.1 * step).bend for step in range(4)]
+    assert bends == pytest.approx([0.0, 0.05, 0.1, 0.15])
+
+
+def test_at_the_end_of_its_range_the_bend_does_not_wind_up() -> None:
+    drive = AdviceController(PLAIN, bend=0.95)
+    for step in range(50):
+        drive.command(_advice(90.0), 0.1 * step)
+    assert drive.command(_advice(-10.0), 5.0).bend < 1.0  # the very next command for the other side acts
+
+
+def test_without_advice_the_feed_stops_at_once_and_the_bend_is_kept() -> None:
+    drive = AdviceController(PLAIN)
+    for step in range(3):
+        moving = drive.command(_advice(20.0), 0.1 * step)
+    assert moving.advance_mm_s == 5.0
+    assert drive.command(None, 0.3) == Command(bend=moving.bend, advance_mm_s=0.0)
+
+
+def test_the_feed_speeds_up_gradually_and_stops_at_once() -> None:
+    drive = AdviceController(PLAIN.model_copy(update={"max_acceleration_mm_s2": 20.0}))
+    speeds = [drive.command(_advice(0.0, 5.0), 0.1 * step).advance_mm_s for step in range(4)]
+    assert speeds == pytest.approx([0.0, 2.0, 4.0, 5.0])
+    assert drive.command(_advice(0.0, 0.0), 0.4).advance_mm_s == 0.0
+
+
+def test_a_reversal_starts_from_rest() -> None:
+    drive = AdviceController(PLAIN.model_copy(update={"max_acceleration_mm_s2": 20.0}))
+    for step in range(5):
+        drive.command(_advice(0.0, 5.0), 0.1 * step)
+    assert drive.command(_advice(0.0, -3.0), 0.5).advance_mm_s == pytest.approx(-2.0)
+
+
+def test_a_pause_counts_as_the_longest_gap() -> None:
+    drive = AdviceController(PLAIN)
+    drive.command(_advice(20.0), 0.0)
+    assert drive.command(_advice(20.0), 30.0).bend == pytest.approx(0.04)
+
+
+def test_a_clock_that_goes_back_moves_nothing() -> None:
+    drive = AdviceController(PLAIN)
+    drive.command(_advice(20.0), 10.0)
+    assert drive.command(_advice(20.0), 9.0) == Command()
+
+
+def test_taking_over_forgets_what_was_driven_before() -> None:
+    drive = AdviceController(PLAIN)
+    for step in range(4):
+        drive.command(_advice(40.0), 0.1 * step)
+    drive.take_over(-0.2)
+    assert drive.command(_advice(40.0), 0.4) == Command(bend=-0.2)
+
+
+@given(
+    st.lists(
+        st.tuples(st.one_of(st.none(), st.floats(-180, 180)), st.floats(-50, 50), st.floats(0.0, 1.0)), min_size=1, max_size=60
+    )
+)
+def test_every_command_is_finite_in_range_and_within_its_rate(turns: list[tuple[float | None, float, float]]) -> None:
+    config = DriveConfig()
+    drive, now_s, before = AdviceController(config), 0.0, Command()
+    for steer, advance_mm_s, wait_s in turns:
+        now_s += wait_s
+        command = drive.command(None if steer is None else _advice(steer, advance_mm_s), now_s)
+        assert math.isfinite(command.bend) and abs(command.bend) <= 1.0
+        assert abs(command.bend - before.bend) <= config.max_bend_rate_per_s * min(wait_s, config.max_gap_s) + 1e-9
+        assert abs(command.advance_mm_s) <= (0.0 if steer is None else abs(advance_mm_s))
+        before = command

@@ -1,0 +1,1226 @@
+"""The pilot: who drives, from where, and what it is told."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.config.models import Config
+from core.config.safety import SafetyConfig
+from core.control.alerts import Note
+from core.control.faults import Cause, Fault
+from core.control.gate import Rejection, RejectReason, Source
+from core.control.health import ModelReport
+from core.control.modes import Act, Hindrance, Mode
+from core.control.motion import AT_REST, Jog
+from core.control.pilot import PERIOD_S, LeftOver, Pilot
+from core.control.policies import make_policy
+from core.devices import DeviceError
+from core.types import Advice, Points, Reason, Refusal, Route, Scene, Speed
+from tests.core.pilot_bench import ADVICE, WELL, Bench, Policy, scene_at
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    bench = Bench()
+    yield bench
+    bench.pilot.close()
+
+
+@pytest.fixture
+def strict() -> Iterator[Callable[..., Bench]]:
+    """Benches with tightened thresholds."""
+    made: list[Bench] = []
+
+    def make(**safety: float) -> Bench:
+        made.append(Bench(Config(safety=SafetyConfig.model_validate(safety))))
+        return made[-1]
+
+    yield make
+    for bench in made:
+        bench.pilot.close()
+
+
+def test_nothing_is_sent_before_the_servos_were_switched_on(bench: Bench) -> None:
+    bench.jog = Jog(bend=1.0, advance=1.0)
+    bench.seconds(0.5)
+    assert bench.robot.sent == []
+    assert not bench.pilot.view.servos_on
+    assert Hindrance.SERVOS_UNCHECKED in bench.alerts(), "a key that does nothing says why"
+
+
+def test_switching_on_checks_the_servos_and_gives_the_operator_the_hand(bench: Bench) -> None:
+    bench.on()
+    assert bench.robot.calls == ["disarm", "acknowledge", "arm"]
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.permitted is Source.OPERATOR
+    assert bench.pilot.view.against_arming == ()
+
+
+def test_it_is_certain_that_nothing_moves_only_while_the_servos_are_off(bench: Bench) -> None:
+    bench.seconds(0.1)
+    assert not bench.pilot.can_move
+    bench.pilot.switch_on()
+    assert bench.pilot.can_move, "from the request on, before any turn has seen it"
+    bench.seconds(2.0)
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.can_move
+    bench.pilot.ask(Act.STOP)
+    bench.seconds(2.0)
+    assert bench.pilot.view.mode is Mode.STOPPED
+    assert bench.pilot.can_move, "STOP can be said again"
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.seconds(0.1)
+    assert bench.pilot.can_move, "the servos may still be at it"
+    bench.seconds(2.0)
+    assert not bench.pilot.can_move
+
+
+def test_servos_that_are_not_in_order_are_named(bench: Bench) -> None:
+    bench.robot.problem = "servo 3 is an XL430, not an XM430-W350"
+    bench.on()
+    assert not bench.pilot.view.servos_on
+    assert Cause.SERVOS_WRONG in bench.pilot.view.against_arming
+    details = [alert.detail for alert in bench.pilot.news().alerts if alert.key is Cause.SERVOS_WRONG]
+    assert details == [bench.robot.problem]
+
+
+def test_held_keys_are_rates_of_bend_and_speeds_of_feed(bench: Bench) -> None:
+    bench.on().jog = Jog(bend=0.5, advance=-1.0)
+    bench.seconds(0.5)
+    source, command, captured_s = bench.robot.sent[-1]
+    assert (source, captured_s) == (Source.OPERATOR, None)
+    assert command.bend == pytest.approx(0.5 * 0.5 * 1.2, abs=0.02)
+    assert command.advance_mm_s == -10.0
+    bench.jog = AT_REST
+    bench.pilot.jog("keys", AT_REST)
+    bench.turn()
+    rest = bench.robot.sent[-1][1]
+    assert (rest.bend, rest.advance_mm_s) == (command.bend, 0.0)
+
+
+def test_a_share_of_full_speed_holds_for_all_controls_together(bench: Bench) -> None:
+    bench.pilot.hand_speed(0.2)
+    bench.on().jog = Jog(bend=1.0, advance=1.0, delivery=-1.0)
+    for _ in range(25):
+        bench.pilot.jog("pad", Jog(bend=1.0, advance=1.0))
+        bench.turn()
+    bent = bench.robot.sent[-1][1]
+    assert bent.bend == pytest.approx(0.2 * 0.5 * 1.2, abs=0.01)
+    assert (bent.advance_mm_s, bent.delivery_mm_s) == (2.0, -2.0)
+    bench.jog = Jog(straighten=True)
+    bench.pilot.jog("pad", AT_REST)
+    bench.turn()
+    assert bent.bend - bench.robot.sent[-1][1].bend == pytest.approx(0.2 * 1.2 * PERIOD_S)
+
+
+def test_a_slow_touch_ends_autonomy_as_any_other(bench: Bench) -> None:
+    bench.pilot.hand_speed(0.0)
+    bench.handed_over().turn(10).jog = Jog(advance=1.0)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+
+
+def test_a_window_that_says_no_more_lets_go(bench: Bench) -> None:
+    bench.on().jog = Jog(advance=1.0)
+    bench.seconds(0.2)
+    assert bench.robot.sent[-1][1].advance_mm_s == 10.0
+    bench.jog = AT_REST  # nothing is reported any more, as by a window that hangs
+    bench.seconds(0.14)
+    assert bench.robot.sent[-1][1].advance_mm_s == 0.0
+
+
+def test_arming_and_handing_over_lets_the_program_drive_from_where_the_robot_is(bench: Bench) -> None:
+    bench.on().jog = Jog(bend=1.0)
+    bench.seconds(0.3)
+    bench.jog = AT_REST
+    bench.seconds(0.4)
+    bend = bench.robot.sent[-1][1].bend
+    assert bend > 0.2
+    bench.pilot.ask(Act.ARM)
+    bench.turn().held = True
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn()
+    assert bench.mode is Mode.AUTONOMOUS
+    source, command, captured_s = bench.robot.sent[-1]
+    assert source is Source.PROGRAM
+    assert command.bend == bend, "the first command moves nothing"
+    assert captured_s is not None
+    bench.turn(5)
+    assert bench.robot.sent[-1][1].bend > bend, "the advice is to the right"
+    assert bench.policy.resets == 1
+    assert bench.pilot.view.latency_s == pytest.approx(0.08)
+    assert bench.pilot.view.commanded == bench.robot.sent[-1][1]
+
+
+def test_the_operators_touch_takes_back_in_the_same_turn_and_from_where_the_program_left(bench: Bench) -> None:
+    bench.handed_over().turn(10)
+    bend = bench.robot.sent[-1][1].bend
+    bench.jog = Jog(advance=1.0)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    source, command, _ = bench.robot.sent[-1]
+    assert source is Source.OPERATOR
+    assert command.bend == pytest.approx(bend)
+
+
+def test_a_touch_shorter_than_a_turn_counts(bench: Bench) -> None:
+    bench.handed_over()
+    bench.pilot.jog("pad", Jog(bend=0.1))
+    bench.pilot.jog("pad", AT_REST)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+
+
+def test_letting_the_deadman_go_holds(bench: Bench) -> None:
+    bench.handed_over().turn(3)
+    bench.held = False
+    bench.turn()
+    assert bench.mode is Mode.HOLD
+    assert bench.robot.permitted is None
+    count = len(bench.robot.sent)
+    bench.turn(3)
+    assert len(bench.robot.sent) == count
+
+
+def test_a_policy_remembers_through_a_hold_and_forgets_at_the_next_hand_over(bench: Bench) -> None:
+    """Else a branch that it misses again and again would be new to it after every short hold."""
+    bench.handed_over().turn(3)
+    assert bench.policy.resets == 1
+    bench.held = False
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    bench.held = True
+    bench.seconds(0.5)
+    assert bench.mode is Mode.AUTONOMOUS
+    assert bench.robot.permitted is Source.PROGRAM
+    assert bench.policy.resets == 1
+    bench.pilot.ask(Act.TAKE_BACK)
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn(2)
+    assert bench.mode is Mode.AUTONOMOUS
+    assert bench.policy.resets == 2
+
+
+def test_a_policy_forgets_when_it_is_handed_over_to_out_of_a_hold_that_has_expired(bench: Bench) -> None:
+    """Whoever asks for it again wants it to try again: one that has given up would else give up at once."""
+    bench.handed_over().turn(3)
+    bench.held = False
+    bench.seconds(2.0)
+    assert bench.mode is Mode.HOLD
+    bench.held = True
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn(3)
+    assert bench.mode is Mode.AUTONOMOUS
+    assert bench.policy.resets == 2
+    bench.pilot.ask(Act.HAND_OVER)  # refused: it drives already
+    bench.turn(3)
+    assert bench.policy.resets == 2
+
+
+def test_a_deadman_that_falls_silent_is_let_go_within_a_tenth_of_a_second(bench: Bench) -> None:
+    bench.handed_over()
+    last_s = bench.now_s
+    for _ in range(5):
+        bench.now_s += PERIOD_S
+        bench.pilot.window_alive()
+        bench.pilot.tick()
+        if bench.mode is Mode.HOLD:
+            break
+    assert bench.mode is Mode.HOLD
+    assert bench.now_s - last_s <= 0.1 + 1e-9
+
+
+def test_stop_goes_to_the_robot_at_once_and_stays(bench: Bench) -> None:
+    bench.handed_over()
+    bench.pilot.ask(Act.STOP)
+    assert bench.robot.calls[-1] == "stop", "not in the next turn"
+    bench.turn()
+    assert bench.mode is Mode.STOPPED
+    assert bench.alerts() >= {Cause.STOP_PRESSED}
+    bench.pilot.ask(Act.ARM)
+    bench.turn()
+    assert bench.mode is Mode.STOPPED
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.done().turn()
+    assert bench.mode is Mode.ADVISORY
+    assert not bench.pilot.view.servos_on
+    assert "acknowledge" in bench.robot.calls[-1]
+
+
+def test_faults_of_the_servos_stop_them_too(bench: Bench) -> None:
+    bench.armed()
+    bench.robot.bus = replace(WELL, hardware_errors=(0, 0, 32, 0, 0, 0, 0))
+    bench.turn()
+    assert bench.mode is Mode.STOPPED
+    assert bench.robot.calls[-1] == "stop"
+    assert bench.pilot.view.latched is not None
+    assert bench.pilot.view.latched.cause is Cause.SERVO_ALERT
+
+
+def test_a_bus_process_that_is_gone_is_started_again_by_switching_on(bench: Bench) -> None:
+    bench.on()
+    bench.robot.failure = "the servo bus process ended (killed by SIGKILL)"
+    bench.turn(2)
+    assert not bench.pilot.view.servos_on
+    assert bench.pilot.view.latched is not None
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.done().turn(2)
+    bench.pilot.switch_on()
+    bench.done().turn(2)
+    assert "connect" in bench.robot.calls
+    assert bench.pilot.view.servos_on
+
+
+def test_no_advice_is_shown_while_a_fault_blanks_it(bench: Bench) -> None:
+    bench.on()
+    assert bench.shown is ADVICE
+    assert bench.pilot.view.advice is ADVICE
+    bench.scene = lambda scene: replace(scene, pose=None, refusal=Refusal(Reason.SEVERAL_ROBOTS), route=None)
+    bench.turn(4)
+    assert bench.shown is None
+    assert bench.pilot.view.advice is None
+    assert bench.pilot.view.blanked == Cause.SEVERAL_ROBOTS.value
+    assert bench.alerts() == set(), "in ADVISORY the screen says it, and nothing beeps"
+
+
+def test_the_frame_that_ends_a_silence_brings_its_advice(bench: Bench) -> None:
+    bench.on().seeing = False
+    bench.seconds(0.2)
+    assert bench.pilot.view.blanked == Cause.CAMERA_SILENT.value
+    bench.shown, bench.seeing = None, True
+    bench.turn(2)
+    assert bench.shown is ADVICE
+
+
+def test_no_advice_survives_a_silent_camera(bench: Bench) -> None:
+    bench.on().seeing = False
+    bench.seconds(0.6)
+    assert bench.pilot.view.advice is None
+
+
+def test_at_the_destination_the_operator_has_the_hand_again(bench: Bench) -> None:
+    bench.handed_over()
+    bench.scene = lambda scene: scene_at(scene.frame_index, scene.captured_s, left_px=5.0)
+    bench.seconds(0.8)
+    assert bench.mode is Mode.ARMED
+    assert Note.REACHED in bench.alerts()
+
+
+def test_a_hand_over_without_a_way_is_refused_with_its_reason(bench: Bench) -> None:
+    bench.scene = lambda scene: replace(scene, route=None)
+    bench.armed().held = True
+    assert bench.pilot.view.against_hand_over == (Hindrance.NO_DESTINATION,)
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    assert Hindrance.NO_DESTINATION in bench.alerts()
+
+
+def test_commands_that_the_gate_rejects_again_and_again_end_autonomy(bench: Bench) -> None:
+    bench.handed_over()
+    bench.robot.edit = lambda sent: replace(sent, source=None, rejection=RejectReason.OVER_RATE)
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    bench.seconds(0.4)
+    assert bench.mode is Mode.ADVISORY
+    assert bench.pilot.view.latched is not None
+    assert bench.pilot.view.latched.cause is Cause.COMMANDS_REJECTED
+
+
+def test_a_joint_at_its_end_is_told_to_him_who_drives_it(bench: Bench) -> None:
+    bench.on().jog = Jog(advance=1.0)
+    bench.robot.edit = lambda sent: replace(sent, at_end=("advance",))
+    bench.turn(4)
+    assert [alert.detail for alert in bench.pilot.news().alerts if alert.key is Note.AT_END] == ["advance"]
+
+
+def test_a_feed_at_its_end_is_told_when_the_program_drives_and_a_tendon_is_not(bench: Bench) -> None:
+    bench.handed_over()
+    for at_end, told in ((("right",), []), (("right", "advance"), ["advance"])):
+        bench.robot.edit = lambda sent, at_end=at_end: replace(sent, at_end=at_end)
+        bench.turn(4)
+        assert [alert.detail for alert in bench.pilot.news().alerts if alert.key is Note.AT_END] == told
+
+
+def test_zeroing_restarting_and_letting_go_need_switching_on_afterwards(bench: Bench) -> None:
+    for request, call in (
+        (bench.pilot.zero, "zero"),
+        (lambda: bench.pilot.reboot(3), "reboot 3"),
+        (bench.pilot.torque_off, "torque off"),
+    ):
+        bench.on()
+        assert bench.pilot.view.servos_on
+        request()
+        bench.done().turn(2)
+        assert bench.robot.calls[-2:] == ["disarm", call]
+        assert not bench.pilot.view.servos_on
+        if bench.pilot.view.latched is not None:
+            bench.pilot.ask(Act.ACKNOWLEDGE)
+            bench.done().turn()
+
+
+@pytest.mark.parametrize("during", ["disarm", "arm"])
+def test_letting_the_wires_go_is_never_lost_behind_what_is_under_way(bench: Bench, during: str) -> None:
+    """Checking seven servos on a bad line takes seconds; who changes his mind meanwhile finds the servos without torque."""
+    under_way, go_on, plain = threading.Event(), threading.Event(), getattr(bench.robot, during)
+
+    def slow() -> None:
+        plain()
+        if not under_way.is_set():
+            under_way.set()
+            assert go_on.wait(10.0)
+
+    setattr(bench.robot, during, slow)
+    assert bench.pilot.switch_on()
+    assert under_way.wait(10.0)
+    assert bench.pilot.torque_off()
+    go_on.set()
+    bench.done().turn(2)
+    assert bench.robot.calls[-2:] == ["disarm", "torque off"]
+    assert not bench.pilot.view.servos_on
+    assert bench.robot.calls.count("arm") == (during == "arm")
+
+
+def test_while_the_servos_are_busy_other_requests_are_refused_aloud(bench: Bench) -> None:
+    under_way, go_on = threading.Event(), threading.Event()
+
+    def slow() -> None:
+        under_way.set()
+        assert go_on.wait(10.0)
+
+    bench.robot.arm = slow  # type: ignore[method-assign]
+    assert bench.pilot.switch_on()
+    assert under_way.wait(10.0)
+    for request in (bench.pilot.zero, bench.pilot.switch_on, lambda: bench.pilot.reboot(3)):
+        assert not request()
+        (alert,) = bench.pilot.news().alerts
+        assert (alert.key, alert.detail) == (Hindrance.SERVOS_BUSY, "checking the servos")
+    go_on.set()
+    assert bench.done().turn(2).pilot.view.servos_on
+    assert "zero" not in bench.robot.calls
+
+
+def test_following_the_advice_is_measured(bench: Bench) -> None:
+    bench.on().jog = Jog(bend=0.5, advance=0.5)
+    assert bench.seconds(1.0).pilot.view.follow_share == 1.0
+    bench.jog = Jog(bend=-0.5, advance=-0.5)
+    assert 0.0 < (bench.seconds(1.0).pilot.view.follow_share or 0.0) < 1.0
+
+
+def test_servos_that_the_bus_process_disarmed_by_itself_are_off_with_its_reason(bench: Bench) -> None:
+    bench.handed_over()
+    bench.robot.bus = replace(WELL, armed=False, ended=Fault(Cause.TRACKING, "advance pushes against something"))
+    bench.turn(4)
+    assert bench.mode is Mode.STOPPED
+    assert not bench.pilot.view.servos_on
+    assert bench.pilot.view.latched == Fault(Cause.TRACKING, "advance pushes against something")
+    assert Cause.TRACKING in bench.alerts()
+
+
+def test_a_bus_process_that_missed_the_program_is_a_watchdog(bench: Bench) -> None:
+    bench.on()
+    bench.robot.bus = replace(WELL, armed=False, ended=Fault(Cause.WORKER_DEAD, "no heartbeat"))
+    bench.turn(4)
+    assert not bench.pilot.view.servos_on
+    assert bench.pilot.view.latched == Fault(Cause.WATCHDOG, "worker stopped, no heartbeat")
+
+
+def test_one_report_from_before_arming_is_no_fault(bench: Bench) -> None:
+    bench.on().robot.bus = replace(WELL, armed=False)
+    bench.turn(2)
+    bench.robot.bus = WELL
+    bench.turn(5)
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.latched is None
+
+
+@pytest.mark.parametrize("call", ["disarm", "acknowledge", "arm"])
+def test_stop_while_the_servos_are_being_switched_on_is_not_undone(bench: Bench, call: str) -> None:
+    bench.seconds(0.2)
+    before = getattr(bench.robot, call)
+
+    def stopped_in_it() -> None:
+        before()
+        bench.pilot.ask(Act.STOP)
+
+    setattr(bench.robot, call, stopped_in_it)
+    bench.pilot.switch_on()
+    bench.done().turn(3)
+    assert bench.mode is Mode.STOPPED
+    assert bench.robot.calls[-1] == "stop" or "arm" not in bench.robot.calls
+    assert not bench.pilot.view.servos_on
+    setattr(bench.robot, call, before)
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.done().turn(3)
+    assert not bench.pilot.view.servos_on, "an acknowledgement moves nothing"
+    bench.pilot.switch_on()
+    bench.done().turn(3)
+    assert bench.pilot.view.servos_on
+
+
+def test_servo_requests_wait_until_nobody_may_be_driving(bench: Bench) -> None:
+    bench.armed()
+    count = len(bench.robot.calls)
+    for request in (bench.pilot.switch_on, bench.pilot.zero, bench.pilot.torque_off):
+        request()
+    bench.pilot.reboot(3)
+    bench.done().turn()
+    assert len(bench.robot.calls) == count
+    assert Hindrance.ALREADY_ARMED in bench.alerts()
+    assert bench.mode is Mode.ARMED
+
+
+def test_a_torque_off_that_waits_when_the_program_ends_is_still_done(bench: Bench) -> None:
+    """Asked for while the servos were being checked; it was dropped, and the wires stayed under tension."""
+    go_on, entered = threading.Event(), threading.Event()
+
+    def arm() -> None:
+        entered.set()
+        go_on.wait(5.0)
+
+    bench.seconds(0.2)
+    bench.robot.arm = arm  # type: ignore[method-assign]
+    bench.pilot.switch_on()
+    assert entered.wait(5.0)
+    bench.pilot.torque_off()
+    bench.pilot.close()
+    go_on.set()
+    assert bench.robot.calls.count("torque off") == 1
+
+
+def test_a_torque_off_that_is_done_is_not_done_again_at_the_end(bench: Bench) -> None:
+    bench.seconds(0.2)
+    bench.pilot.torque_off()
+    bench.done().pilot.close()
+    assert bench.robot.calls.count("torque off") == 1
+
+
+def test_servos_that_were_switched_on_after_a_torque_off_in_vain_keep_their_torque_at_the_end(bench: Bench) -> None:
+    """The wires went slack when the window was closed, though the operator had switched the servos on and driven since."""
+    bench.seconds(0.2)
+    plain = bench.robot.torque_off
+
+    def in_vain() -> None:
+        plain()
+        raise DeviceError("torque of up is not proven to be off: cut the servos' power")
+
+    bench.robot.torque_off = in_vain  # type: ignore[method-assign]
+    bench.pilot.torque_off()
+    bench.done().turn()
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.on()
+    assert bench.pilot.view.servos_on
+    bench.pilot.close()
+    assert bench.robot.calls.count("torque off") == 1
+
+
+def test_a_hold_that_fails_does_not_keep_the_torque_on(bench: Bench) -> None:
+    """The servos were to hold first; where that failed the bus process never heard of the torque-off, and owed none."""
+    bench.seconds(0.2)
+
+    def lost() -> None:
+        raise DeviceError("servo port is lost")
+
+    bench.robot.disarm = lost  # type: ignore[method-assign]
+    bench.pilot.torque_off()
+    bench.done()
+    assert "torque off" in bench.robot.calls
+
+
+def test_a_torque_off_needs_no_bus_process_that_lives(bench: Bench) -> None:
+    bench.seconds(0.2)
+    bench.robot.failure = "the servo bus process ended"
+    bench.pilot.torque_off()
+    bench.done()
+    assert bench.robot.calls[-2:] == ["connect", "torque off"]
+
+
+def test_a_torque_off_needs_not_all_servos_to_connect(bench: Bench) -> None:
+    """The bus process was gone and a servo was missing: connecting failed, and six servos went on pulling."""
+    bench.seconds(0.2)
+    bench.robot.failure = "the servo bus process ended"
+
+    def connect() -> None:
+        bench.robot.calls.append("connect")
+        raise DeviceError("servo up (id 3) does not answer")
+
+    bench.robot.connect = connect  # type: ignore[method-assign]
+    bench.alerts()
+    bench.pilot.torque_off()
+    bench.done()
+    bench.turn()
+    assert bench.robot.calls[-2:] == ["connect", "torque off"]
+    assert Note.TORQUE_OFF in bench.alerts()
+    bench.turn()
+    assert Note.TORQUE_OFF not in bench.alerts()
+
+
+def _letting_go(bench: Bench) -> bool:
+    return any(fault.cause is Cause.TORQUE_ON for fault in bench.pilot.view.active)
+
+
+def _lose_the_bus(bench: Bench) -> None:
+    def connect() -> None:
+        raise DeviceError("the servo port is not there")
+
+    bench.robot.connect = connect  # type: ignore[method-assign]
+    bench.robot.failure = "the servo bus process ended (killed by SIGKILL)"
+
+
+@pytest.mark.parametrize("is_wanted", [True, False])
+def test_a_stop_lets_go_also_where_the_bus_process_is_gone(is_wanted: bool) -> None:
+    """The debt lived in the process that was gone: all servos went on pulling, and nobody was told."""
+    config = Config()
+    bench = Bench(config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": is_wanted})}))
+    bench.on()
+    _lose_the_bus(bench)
+    bench.turn(2)
+    assert not _letting_go(bench), "nobody has pressed STOP"
+    bench.pilot.ask(Act.STOP)
+    bench.turn(2)
+    assert _letting_go(bench) is is_wanted
+    bench.done().turn(3)
+    assert bench.robot.calls.count("torque off") == int(is_wanted)
+    assert (Note.TORQUE_OFF in bench.alerts()) is is_wanted
+    assert not _letting_go(bench)
+    bench.seconds(11.0).done()
+    assert bench.robot.calls.count("torque off") == int(is_wanted), "once is enough"
+    bench.pilot.close()
+
+
+@pytest.fixture
+def slackening() -> Iterator[Bench]:
+    """A bench whose STOP also switches the torque off."""
+    config = Config()
+    bench = Bench(config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": True})}))
+    yield bench
+    bench.pilot.close()
+
+
+def test_what_a_stop_owes_is_tried_until_the_servos_have_let_go_or_are_switched_on(slackening: Bench) -> None:
+    bench = slackening
+    plain = bench.robot.torque_off
+
+    def in_vain() -> None:
+        plain()
+        raise DeviceError("torque of up is not proven to be off: cut the servos' power")
+
+    bench.on()
+    _lose_the_bus(bench)
+    bench.robot.torque_off = in_vain  # type: ignore[method-assign]
+    bench.pilot.ask(Act.STOP)
+    bench.turn(3).done().seconds(9.0).done()
+    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (1, True)
+    bench.seconds(1.5).done()
+    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (2, True)
+    bench.pilot.ask(Act.STOP)
+    bench.turn(2).done()
+    assert bench.robot.calls.count("torque off") == 3, "another STOP need not wait"
+    bench.turn().pilot.ask(Act.ACKNOWLEDGE)
+    bench.turn().done().seconds(11.0).done()
+    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (4, True), "still not proven"
+    bench.robot.failure = None
+    bench.turn().pilot.ask(Act.ACKNOWLEDGE)
+    bench.turn().on()
+    view = bench.pilot.view
+    assert (view.servos_on, view.latched, view.permitted) == (True, None, Source.OPERATOR), "the operator has switched them on"
+    bench.seconds(11.0).done()
+    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (4, False)
+
+
+def test_a_stop_that_the_bus_process_has_paid_is_owed_no_more(slackening: Bench) -> None:
+    """It may pay before the pilot's turn hears of the STOP, and of a second press it takes no notice."""
+    bench = slackening
+    bench.on()
+    bench.pilot.ask(Act.STOP)
+    bench.robot.bus = replace(WELL, torque_off=True)
+    bench.turn()
+    bench.robot.bus = WELL
+    bench.turn().pilot.ask(Act.STOP)
+    bench.turn(3)
+    bench.robot.failure = "the servo bus process ended"
+    bench.turn(3).done()
+    assert not _letting_go(bench)
+    assert "torque off" not in bench.robot.calls
+    bench.robot.failure = None
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.turn().on()
+    assert bench.pilot.view.servos_on
+    _lose_the_bus(bench)
+    bench.pilot.ask(Act.STOP)
+    bench.turn(3).done().turn()
+    assert "torque off" in bench.robot.calls, "it was on in between"
+
+
+def test_what_a_stop_owes_is_paid_at_the_end(slackening: Bench) -> None:
+    """Pressed when nothing is heard from the bus any more, but nobody knows it yet: no turn has heard of it before the end."""
+    slackening.on()
+    slackening.pilot.ask(Act.STOP)
+    slackening.pilot.close()
+    assert slackening.robot.calls.count("torque off") == 1
+
+
+@pytest.mark.parametrize("is_stopped", [False, True])
+def test_a_torque_off_that_is_under_way_at_the_end_is_waited_for_and_not_done_twice(slackening: Bench, is_stopped: bool) -> None:
+    entered, go_on = threading.Event(), threading.Event()
+    plain = slackening.robot.torque_off
+
+    def slow() -> None:
+        entered.set()
+        go_on.wait(5.0)
+        plain()
+
+    slackening.robot.torque_off = slow  # type: ignore[method-assign]
+    slackening.seconds(0.2).pilot.torque_off()
+    assert entered.wait(5.0)
+    if is_stopped:  # and owes one, too
+        slackening.pilot.ask(Act.STOP)
+    threading.Timer(0.1, go_on.set).start()
+    slackening.pilot.close()
+    assert slackening.robot.calls.count("torque off") == 1
+
+
+def test_a_stop_that_was_taken_over_from_the_rig_before_is_owed_too() -> None:
+    config = Config()
+    config = config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": True})})
+    bench = Bench(config, LeftOver(Fault(Cause.STOP_PRESSED), True))
+    _lose_the_bus(bench)
+    bench.turn(3).done().turn()
+    assert "torque off" in bench.robot.calls
+    bench.pilot.close()
+
+
+def test_what_became_of_a_torque_off_is_told(bench: Bench) -> None:
+    bench.on()
+    bench.alerts()
+    bench.robot.bus = replace(WELL, torque_off=True)
+    bench.turn()
+    bench.robot.bus = replace(WELL, torque_problem="torque of up is not proven to be off: cut the servos' power")
+    bench.turn()
+    assert {Note.TORQUE_OFF, Cause.TORQUE_ON} <= set(bench.alerts())
+
+
+@pytest.mark.parametrize("is_on", [True, False])
+def test_torque_that_is_not_proven_to_be_off_is_told_though_the_servos_follow_nobody(bench: Bench, is_on: bool) -> None:
+    """After a STOP they follow nobody: that is when it matters."""
+    bench.seconds(0.2)
+    if is_on:
+        bench.on()
+    bench.pilot.ask(Act.STOP)
+    bench.turn(2)
+    bench.alerts()
+    bench.robot.bus = replace(WELL, armed=False, torque_problem="torque of up is not proven to be off: cut the servos' power")
+    bench.turn(2)
+    assert Cause.TORQUE_ON in bench.alerts()
+
+
+@pytest.mark.parametrize(
+    "before", [{"watchdog_tripped": True}, {"torque_problem": "torque of up is not proven to be off: cut the servos' power"}]
+)
+def test_what_arming_has_mended_is_no_fault_of_the_servos_that_were_switched_on(bench: Bench, before: dict[str, object]) -> None:
+    """Arming is answered a moment before the first report since: in that turn the last one from before disarmed them again."""
+    bench.seconds(0.2)
+    bench.robot.bus = replace(WELL, armed=False, **before)  # type: ignore[arg-type]
+    bench.turn(2)
+    bench.robot.bus = None
+    bench.pilot.switch_on()
+    bench.done().turn()
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.latched is None
+    bench.robot.bus = replace(WELL, **before)  # type: ignore[arg-type]
+    bench.turn()
+    assert bench.pilot.view.latched is not None, "what is said of them afterwards counts"
+
+
+def test_an_unexpected_error_of_a_request_is_told(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    def broken() -> None:
+        raise OSError(24, "Too many open files")
+
+    bench.robot.arm = broken  # type: ignore[method-assign]
+    bench.on()
+    assert not bench.pilot.view.servos_on
+    details = [alert.detail for alert in bench.pilot.news().alerts if alert.key is Cause.SERVOS_WRONG]
+    assert len(details) == 1
+    assert "Too many open files" in details[0]
+    assert "Traceback" in caplog.text
+
+
+def test_a_request_that_takes_long_is_no_silent_bus(bench: Bench) -> None:
+    bench.seconds(0.2)
+    go_on = threading.Event()
+    bench.robot.arm = lambda: go_on.wait(5.0)  # type: ignore[method-assign,assignment,return-value]
+    bench.robot.bus = None
+    bench.pilot.switch_on()
+    bench.seconds(2.0)
+    assert bench.pilot.view.busy == "checking the servos"
+    go_on.set()
+    bench.done().robot.bus = WELL
+    bench.turn(3)
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.latched is None
+
+
+def test_pitch_stays_where_it_was_when_the_program_takes_over(bench: Bench) -> None:
+    bench.on().jog = Jog(pitch=1.0)
+    bench.seconds(0.4)
+    bench.jog = AT_REST
+    bench.seconds(0.4)
+    pitch = bench.robot.sent[-1][1].pitch
+    assert pitch > 0.3
+    bench.pilot.ask(Act.ARM)
+    bench.turn().held = True
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn(5)
+    assert bench.mode is Mode.AUTONOMOUS
+    assert bench.robot.sent[-1][1].pitch == pitch
+
+
+def test_advice_that_is_no_number_is_neither_driven_nor_shown(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench.handed_over()
+    bend = bench.robot.sent[-1][1].bend
+    broken = Advice(Speed.SLOW, 2.0, math.nan, "broken")
+    monkeypatch.setattr(Policy, "__call__", lambda *_, **__: broken)
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    assert bench.shown is None
+    bench.turn(20)
+    assert bench.mode is Mode.ADVISORY
+    assert bench.pilot.view.latched is not None
+    assert bench.pilot.view.latched.cause is Cause.NOT_FINITE_REPEATED
+    assert abs(bench.robot.motion.motion.bend - bend) < 0.1
+
+
+def test_a_deadman_held_since_before_arming_does_not_count_after_a_hiccup_either(bench: Bench) -> None:
+    bench.on().held = True
+    bench.turn(3).pilot.ask(Act.ARM)
+    bench.turn()
+    for _ in range(6):  # 120 ms in which the window says nothing
+        bench.now_s += PERIOD_S
+        bench.pilot.window_alive()
+        bench.pilot.tick()
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    assert Hindrance.DEADMAN_HELD_BEFORE in bench.alerts()
+
+
+@pytest.mark.parametrize("what", ["damaged", "damaged for long", "late", "beside a tap of the key", "late beside a tap of the key"])
+def test_a_pedal_that_is_stuck_since_before_arming_never_counts(bench: Bench, what: str) -> None:
+    def turn(pedal: bool | None, count: int = 1) -> None:
+        for _ in range(count):
+            bench.pilot.deadman("pedal", pedal)
+            bench.turn()
+
+    turn(False)
+    bench.on()
+    turn(True, 3)
+    bench.pilot.ask(Act.ARM)
+    turn(True)
+    if "key" in what:
+        bench.held = True
+        turn(True, 3)
+        bench.held = False
+    if "late" in what:
+        bench.turn()
+    if "damaged" in what:
+        turn(None, 40 if "long" in what else 1)
+    turn(True, 3)
+    bench.pilot.ask(Act.HAND_OVER)
+    turn(True, 3)
+    assert bench.mode is Mode.ARMED
+    assert Hindrance.DEADMAN_HELD_BEFORE in bench.alerts()
+    assert bench.pilot.view.deadman is True  # what it says, which is another question
+    turn(False)
+    turn(True, 2)
+    bench.pilot.ask(Act.HAND_OVER)
+    turn(True)
+    assert bench.mode is Mode.AUTONOMOUS
+
+
+def test_a_hold_that_never_clears_itself_takes_no_press_away(strict: Callable[..., Bench]) -> None:
+    bench = strict(hold_clear_s=0.0, deadman_timeout_s=0.05)
+    bench.handed_over()
+    assert bench.seconds(0.5).mode is Mode.AUTONOMOUS
+    bench.held = False
+    bench.turn()
+    bench.held = True
+    assert bench.seconds(0.5).mode is Mode.HOLD  # which is what was asked for
+    bench.pilot.ask(Act.HAND_OVER)
+    assert bench.turn().mode is Mode.AUTONOMOUS
+
+
+@pytest.mark.parametrize("phase_s", [0.0, 0.007, 0.013])
+def test_the_soonest_that_a_command_may_be_too_old_is_later_than_a_held_key_is_repeated(
+    strict: Callable[..., Bench], phase_s: float
+) -> None:
+    period_s = 0.033  # app/operator/manual_drive.py
+    bench = strict(command_max_age_s=0.05)
+    bench.on()
+    said_s = bench.now_s + phase_s
+    for turn in range(30):
+        now_s = bench.now_s
+        while said_s <= now_s + PERIOD_S:
+            bench.now_s = said_s
+            bench.pilot.jog("keys", Jog(advance=1.0))
+            said_s += period_s
+        bench.now_s = now_s
+        bench.turn()
+        assert turn < 2 or bench.pilot.view.asked.advance_mm_s > 0.0, turn
+
+
+def test_a_tap_of_the_key_beside_a_held_pedal_holds_nothing(bench: Bench) -> None:
+    bench.armed().pilot.deadman("pedal", False)
+    for turn in range(40):
+        if turn % 3 != 2:  # its reports and the pilot's turns keep no common time
+            bench.pilot.deadman("pedal", True)
+        if turn == 3:
+            bench.pilot.ask(Act.HAND_OVER)
+        bench.held = turn in {10, 11, 12, 20, 30}
+        bench.turn()
+        assert turn < 3 or bench.mode is Mode.AUTONOMOUS, turn
+    assert Cause.DEADMAN not in bench.alerts()
+
+
+def test_a_held_deadman_that_cannot_tell_for_a_moment_holds_at_once_and_goes_on(bench: Bench) -> None:
+    def turn(pedal: bool | None) -> Mode:
+        bench.pilot.deadman("pedal", pedal)
+        bench.turn()
+        return bench.mode
+
+    bench.armed()
+    turn(False)
+    turn(True)
+    bench.pilot.ask(Act.HAND_OVER)
+    assert turn(True) is Mode.AUTONOMOUS
+    assert turn(None) is Mode.HOLD
+    assert bench.pilot.view.deadman is False
+    assert turn(True) is Mode.HOLD
+    assert bench.pilot.view.deadman is True
+    modes = [turn(True) for _ in range(7)]
+    assert modes == sorted(modes, key=[Mode.HOLD, Mode.AUTONOMOUS].index)
+    assert modes[-1] is Mode.AUTONOMOUS
+
+
+def test_a_control_held_since_before_must_be_let_go_first(bench: Bench) -> None:
+    bench.jog = Jog(advance=1.0)
+    bench.on()
+    assert {command.advance_mm_s for _, command, _ in bench.robot.sent} == {0.0}
+    bench.jog = AT_REST
+    bench.seconds(0.2)
+    bench.jog = Jog(advance=1.0)
+    bench.turn()
+    assert bench.robot.sent[-1][1].advance_mm_s == 10.0
+
+
+def test_nobody_drives_by_hand_before_a_window_that_hangs(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench.on().jog = Jog(advance=1.0)
+    bench.turn(3)
+    assert bench.robot.sent[-1][1].advance_mm_s == 10.0
+    monkeypatch.setattr(bench.pilot, "window_alive", lambda: None)
+    bench.seconds(0.6)
+    assert bench.robot.sent[-1][1].advance_mm_s == 0.0
+
+
+def test_what_ends_autonomy_is_heard(bench: Bench) -> None:
+    bench.handed_over()
+    bench.scene = lambda scene: replace(scene, pose=None, refusal=Refusal(Reason.SEVERAL_ROBOTS), route=None)
+    bench.turn(3)
+    assert bench.mode is Mode.ADVISORY
+    assert "disarm" in {alert.sound for alert in bench.pilot.news().alerts}
+
+
+def test_a_rejection_in_the_turn_of_a_touch_does_not_stay(bench: Bench) -> None:
+    bench.handed_over()
+    bench.robot.edit = lambda sent: replace(sent, source=None, rejection=RejectReason.OVER_RATE)
+    bench.turn()
+    bench.robot.edit = lambda sent: sent
+    bench.pilot.jog("pad", Jog(bend=0.1))
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    bench.seconds(1.0)
+    assert bench.pilot.view.against_hand_over == ()
+
+
+def test_keys_while_stopped_remind_and_do_not_sound(bench: Bench) -> None:
+    bench.on().pilot.ask(Act.STOP)
+    bench.turn()
+    bench.pilot.news()
+    bench.jog = Jog(advance=1.0)
+    bench.seconds(8.0)
+    alerts = bench.pilot.news().alerts
+    assert {alert.key for alert in alerts} == {Hindrance.IS_STOPPED}
+    assert {alert.sound for alert in alerts} == {None}
+
+
+def test_halting_lets_nobody_drive(bench: Bench) -> None:
+    bench.handed_over().pilot.halt()
+    bench.turn()
+    assert bench.robot.permitted is None
+
+
+def test_straightening_and_steering_are_no_faster_than_either(bench: Bench) -> None:
+    bench.on().jog = Jog(bend=1.0)
+    bench.seconds(0.3)
+    before = bench.robot.sent[-1][1].bend
+    bench.jog = Jog(bend=-1.0, straighten=True)
+    bench.turn()
+    assert before - bench.robot.sent[-1][1].bend <= 1.2 * PERIOD_S + 1e-9
+
+
+def test_closing_holds_and_permits_nobody(bench: Bench) -> None:
+    bench.on().pilot.close()
+    assert bench.robot.permitted is None
+    assert bench.robot.motion.source is None
+
+
+# ---- what outlives a rig, and what ends a hand-over
+
+
+def test_another_destination_ends_the_hand_over_and_the_old_advice_is_not_followed(bench: Bench) -> None:
+    bench.handed_over().alerts()
+    bench.seeing = False
+    sent = len(bench.robot.sent)
+    bench.pilot.target_changed()
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    assert bench.alerts() == {Note.NEW_TARGET}
+    assert all(source is not Source.PROGRAM for source, _, _ in bench.robot.sent[sent:])
+
+
+def test_a_destination_chosen_while_driving_by_hand_changes_nothing_else(bench: Bench) -> None:
+    bench.armed().alerts()
+    bench.pilot.target_changed()
+    bench.turn()
+    assert bench.mode is Mode.ARMED
+    assert bench.alerts() == set()
+
+
+def pilot_after(bench: Bench, left_over: LeftOver | None) -> Bench:
+    """The next rig's bench; the one before is closed."""
+    bench.pilot.close()
+    after = Bench()
+    after.pilot.close()
+    after.pilot = Pilot(after.robot, after.policy, Config(), ModelReport(True), clock=lambda: after.now_s, left_over=left_over)
+    return after
+
+
+def test_a_stop_outlives_the_rig_and_needs_its_acknowledgement(bench: Bench) -> None:
+    bench.on().pilot.ask(Act.STOP)
+    bench.turn()
+    assert bench.pilot.left_over == LeftOver(Fault(Cause.STOP_PRESSED), stopped=True)
+    after = pilot_after(bench, bench.pilot.left_over)
+    assert (after.mode, after.pilot.view.latched) == (Mode.STOPPED, Fault(Cause.STOP_PRESSED))
+    assert after.robot.calls == ["stop"], "pressed while it was being opened, it had reached no servo, and no torque went off"
+    after.pilot.switch_on()
+    after.done().seconds(0.2)
+    assert after.mode is Mode.STOPPED
+    assert "arm" not in after.robot.calls
+    after.pilot.ask(Act.ACKNOWLEDGE)
+    after.turn()
+    assert (after.mode, after.pilot.view.latched, after.pilot.left_over) == (Mode.ADVISORY, None, None)
+    after.on()
+    assert after.pilot.view.servos_on
+    after.pilot.close()
+
+
+def test_a_stop_that_no_turn_has_heard_any_more_is_left_over_too(bench: Bench) -> None:
+    bench.on().pilot.ask(Act.STOP)
+    assert bench.pilot.left_over == LeftOver(Fault(Cause.STOP_PRESSED), stopped=True)
+
+
+def test_a_rig_that_breaks_off_while_armed_leaves_that_and_one_that_is_ended_does_not(bench: Bench) -> None:
+    bench.armed()
+    left_over = bench.pilot.left_over
+    assert left_over is not None
+    assert (left_over.fault.cause, left_over.stopped) == (Cause.WORKER_DEAD, False)
+    bench.pilot.halt()
+    bench.turn()
+    assert bench.pilot.left_over is None
+
+
+def test_changes_are_kept_for_the_record_though_nobody_looks(bench: Bench) -> None:
+    bench.handed_over().pilot.news()
+    bench.held = False
+    bench.turn(2)
+    bench.held = True
+    bench.turn(10)
+    news = bench.pilot.news()
+    assert [view.mode for view in news.changes] == [Mode.HOLD, Mode.HOLD, Mode.AUTONOMOUS]
+    assert bench.pilot.news().changes == ()
+
+
+def test_a_late_frame_is_counted_and_told_and_changes_nothing(bench: Bench) -> None:
+    bench.handed_over().alerts()
+    bench.pilot.frame_late()
+    bench.turn()
+    assert bench.mode is Mode.AUTONOMOUS
+    assert Fault(Cause.OUT_OF_ORDER, "1 until now") in bench.pilot.view.active
+    assert bench.alerts() == {Cause.OUT_OF_ORDER}
+
+
+# ---- a robot that nobody can drive, though its servos are on
+
+
+OUTSIDE = Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, "advance at -7.00 mm (-5 to 400 mm)")
+
+
+def test_a_robot_that_keeps_all_back_is_told_to_who_moves_the_controls_and_nobody_is_shown_as_driving(bench: Bench) -> None:
+    bench.robot.keeps_back = OUTSIDE
+    bench.on().alerts()
+    assert bench.seconds(0.2).alerts() == set()  # nobody has tried
+    assert bench.pilot.view.servos_on
+    assert bench.pilot.view.permitted is None
+    bench.jog = Jog(advance=1.0)
+    bench.turn()
+    told = {alert.key: alert.detail for alert in bench.pilot.news().alerts}
+    assert told == {RejectReason.MEASURED_OUT_OF_ENVELOPE: "advance at -7.00 mm (-5 to 400 mm)"}
+    bench.robot.keeps_back = None
+    bench.turn()
+    assert bench.pilot.view.permitted is Source.OPERATOR
+
+
+def test_a_robot_that_keeps_all_back_is_not_driven_by_the_program_either(bench: Bench) -> None:
+    bench.robot.keeps_back = OUTSIDE
+    bench.handed_over()
+    bench.seconds(1.0)
+    assert bench.mode is Mode.HOLD
+    assert bench.pilot.view.permitted is None
+    assert bench.alerts() >= {RejectReason.MEASURED_OUT_OF_ENVELOPE, Cause.COMMAND_REJECTED}
+    assert all(source is Source.OPERATOR for source, _, _ in bench.robot.sent)
+
+
+@pytest.mark.parametrize("reason", [RejectReason.NOT_ARMED, RejectReason.NO_COMMAND])
+def test_the_first_turns_after_switching_on_are_not_worth_a_word(bench: Bench, reason: RejectReason) -> None:
+    bench.on().alerts()
+    bench.robot.keeps_back = Rejection(reason)
+    bench.jog = Jog(advance=1.0)
+    assert bench.turn(3).alerts() == set()
+
+
+# ---- orders of events that are seldom
+
+
+@pytest.mark.parametrize("said_after_turn_s", [0.001, 0.01, 0.019])
+def test_the_deadmans_silence_counts_from_when_it_was_said(bench: Bench, said_after_turn_s: float) -> None:
+    bench.handed_over()
+    turned_s = bench.now_s
+    said_s = bench.now_s = turned_s + said_after_turn_s
+    bench.pilot.deadman("key", True)
+    bench.now_s = turned_s
+    while bench.mode is Mode.AUTONOMOUS:
+        bench.now_s += PERIOD_S
+        bench.pilot.window_alive()
+        bench.pilot.worker_alive()
+        bench.pilot.tick()
+    assert bench.mode is Mode.HOLD
+    assert bench.now_s - said_s <= 0.1 + 1e-9
+
+
+def test_another_destination_in_the_turn_of_the_hand_over_ends_it(bench: Bench) -> None:
+    bench.armed().held = True
+    bench.turn(2)
+    bench.pilot.ask(Act.HAND_OVER)
+    bench.pilot.target_changed()
+    bench.turn(6)
+    assert bench.mode is Mode.ARMED
+    assert all(source is Source.OPERATOR for source, _, _ in bench.robot.sent)
+
+
+def _behind(scene: Scene) -> Scene:
+    way = np.column_stack([np.arange(200.0, 20.0, -1.0), np.full(180, 60.0)])
+    return replace(scene, route=Route(way, 180.0, (20.0, 60.0)))
+
+
+def test_an_expired_hold_does_not_excuse_a_destination_behind_the_robot(bench: Bench) -> None:
+    bench.handed_over().held = False
+    bench.seconds(0.3)
+    bench.scene = _behind
+    bench.seconds(30.0)
+    assert bench.mode is Mode.HOLD
+    assert Hindrance.DESTINATION_BEHIND in bench.pilot.view.against_hand_over
+    bench.alerts()
+    bench.held = True
+    bench.turn(2).pilot.ask(Act.HAND_OVER)
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    assert Hindrance.DESTINATION_BEHIND in bench.alerts()
+
+
+@pytest.mark.parametrize("handed_over", [True, False])
+def test_a_press_that_ends_a_hold_moves_at_once(bench: Bench, handed_over: bool) -> None:
+    bench.handed_over().held = handed_over
+    bench.seconds(0.3)
+    assert bench.mode is (Mode.AUTONOMOUS if handed_over else Mode.HOLD)
+    bench.jog = Jog(advance=-1.0)
+    bench.turn(2)
+    assert bench.mode is Mode.ARMED
+    assert bench.robot.sent[-1][1].advance_mm_s == -10.0
+
+
+def _spoilt(points: Points, value: float) -> Points:
+    spoilt = points.copy()
+    spoilt[len(spoilt) // 2] = value
+    return spoilt
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    "part",
+    ["path", "path radius", "bridged", "piece", "nearest", "radius", "ambiguity", "route", "length", "target", "theta"],
+)
+def test_any_number_that_is_none_holds_and_the_policy_is_not_asked(bench: Bench, part: str, value: float) -> None:
+    def spoil(scene: Scene) -> Scene:
+        path, line, route, pose = scene.path, scene.centerline, scene.route, scene.pose
+        assert path is not None
+        assert line is not None
+        assert route is not None
+        assert pose is not None
+        changes: dict[str, dict[str, Any]] = {
+            "path": {"path": replace(path, points=_spoilt(path.points, value))},
+            "path radius": {"path": replace(path, radius_px=value)},
+            "bridged": {"path": replace(path, bridged_px=value)},
+            "piece": {"centerline": replace(line, piece=_spoilt(line.piece, value))},
+            "nearest": {"centerline": replace(line, nearest=(value, 60.0))},
+            "radius": {"centerline": replace(line, radius_px=value)},
+            "ambiguity": {"centerline": replace(line, ambiguity=value)},
+            "route": {"route": replace(route, points=_spoilt(route.points, value))},
+            "length": {"route": replace(route, length_px=value)},
+            "target": {"route": replace(route, target=(value, 60.0))},
+            "theta": {"pose": replace(pose, theta_deg=value)},
+        }
+        return replace(scene, **changes[part])
+
+    bench.pilot._policy = make_policy("pursuit", Config())
+    bench.handed_over()
+    assert bench.mode is Mode.AUTONOMOUS
+    bench.scene = spoil
+    bench.turn(2)
+    assert bench.mode is Mode.HOLD
+    assert Cause.NOT_FINITE in {fault.cause for fault in bench.pilot.view.active}
+    assert bench.shown is None
+
+
+def test_a_jump_of_the_clock_with_the_servos_on_is_told_and_must_be_acknowledged(bench: Bench) -> None:
+    bench.on().alerts()
+    bench.now_s += 2.0
+    bench.turn(5)
+    view = bench.pilot.view
+    assert (view.mode, view.servos_on) == (Mode.ADVISORY, False)
+    assert view.latched is not None
+    assert view.latched.cause is Cause.CLOCK
+    assert Cause.CLOCK in bench.alerts()
+
+
+def test_a_jump_of_the_clock_with_the_servos_off_is_nobodys_concern(bench: Bench) -> None:
+    bench.seconds(0.2).alerts()
+    bench.now_s += 2.0
+    bench.turn(5)
+    assert bench.pilot.view.latched is None
+    assert bench.alerts() == set()

@@ -1,0 +1,118 @@
+"""Too much current for half a second: a rippling one is, a spike is not. Limit 600 mA, a reading every 20 ms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from core.config.safety import SafetyConfig, ServosConfig
+from core.control.faults import REACTION, Cause, Reaction
+from core.control.health import BusWatch, bus_faults, see_bus
+from tests.core.healthy import GOOD_BUS
+
+SERVOS, SAFETY = ServosConfig(), SafetyConfig()
+CYCLE_S = 0.02
+Current = Callable[[int], float | None]
+
+
+def seconds_until_strained(
+    current_ma: Current, servos: ServosConfig = SERVOS, cycle_s: float = CYCLE_S, most_s: float = 3.0
+) -> float | None:
+    """When the fault comes, from the first reading on; `current_ma` of the third joint by cycle. None: not within `most_s`."""
+    watch = BusWatch()
+    for n in range(round(most_s / cycle_s)):
+        now_s = 64.0 + n * cycle_s
+        report = replace(GOOD_BUS, currents_ma=(40.0, 40.0, current_ma(n), None, 40.0, 40.0, 40.0))
+        watch = see_bus(watch, report, now_s, servos, SAFETY)
+        faults = [fault for fault in bus_faults(watch, now_s, servos, SAFETY) if fault.cause is Cause.STRAINED]
+        if faults:
+            assert faults[0].detail.startswith("up up to ")
+            assert faults[0].detail.endswith("(at most 600 mA)")
+            return now_s - 64.0
+    return None
+
+
+def test_it_stops() -> None:
+    assert REACTION[Cause.STRAINED] is Reaction.STOP
+
+
+@pytest.mark.parametrize("current_ma", [601.0, -601.0, 2300.0, math.nan])
+def test_a_current_beyond_the_limit_for_half_a_second(current_ma: float) -> None:
+    assert seconds_until_strained(lambda n: current_ma) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    "current_ma",
+    [
+        lambda n: 900.0 if n % 2 == 0 else 100.0,
+        lambda n: 700.0 if n % 3 else 300.0,
+        lambda n: -900.0 if n % 5 else 0.0,
+        lambda n: 900.0 if n % 5 < 3 else 100.0,
+        lambda n: 900.0 if n % 3 else None,
+    ],
+    ids=["every second", "below on the average", "now and then", "60 ms of 100", "not read in every cycle"],
+)
+def test_a_ripple_that_dips_below_the_limit_hides_nothing(current_ma: Current) -> None:
+    found_s = seconds_until_strained(current_ma)
+    assert found_s is not None
+    assert found_s <= 0.62
+
+
+@pytest.mark.parametrize(
+    "current_ma",
+    [
+        lambda n: 600.0,
+        lambda n: 2300.0 if n == 30 else 100.0,
+        lambda n: 2300.0 if n % 5 == 0 else 100.0,
+        lambda n: 900.0 if n % 4 == 0 else 100.0,
+        lambda n: 900.0 if n % 50 < 24 else 100.0,
+        lambda n: 900.0 if n % 12 < 5 else 500.0,
+        lambda n: None,
+        lambda n: 900.0 if n % 12 == 0 else None,
+    ],
+    ids=[
+        "at the limit",
+        "one spike",
+        "spikes",
+        "a spike each 80 ms",
+        "0.48 s",
+        "starts and stops",
+        "no current told",
+        "seldom read",
+    ],
+)
+def test_no_strain(current_ma: Current) -> None:
+    assert seconds_until_strained(current_ma) is None
+
+
+def test_a_strain_after_long_spikes_is_seen_as_soon() -> None:
+    began = 100
+    found_s = seconds_until_strained(lambda n: 900.0 if n >= began or n % 4 == 0 else 100.0, most_s=4.0)
+    assert found_s is not None
+    assert 0.1 <= found_s - began * CYCLE_S <= 0.5
+
+
+def test_a_late_status_is_no_strain() -> None:
+    """Two readings beyond the limit with a pause between them tell nothing of that time."""
+    watch, high = BusWatch(), replace(GOOD_BUS, currents_ma=(900.0,) * 7)
+    for now_s in (0.0, 0.02, 0.5, 0.52):
+        watch = see_bus(watch, high, now_s, SERVOS, SAFETY)
+        assert Cause.STRAINED not in [fault.cause for fault in bus_faults(watch, now_s + 0.1, SERVOS, SAFETY)]
+
+
+@pytest.mark.parametrize("bus_hz", [200.0, 20.0, 5.0])
+def test_a_bus_of_any_rate_sees_it(bus_hz: float) -> None:
+    servos = SERVOS.model_copy(update={"bus_hz": bus_hz})
+    found_s = seconds_until_strained(lambda n: 900.0, servos, 1.0 / bus_hz)
+    assert found_s is not None
+    assert 0.5 <= found_s <= 0.5 + 1.0 / bus_hz + 1e-6
+
+
+def test_it_is_over_when_the_current_is() -> None:
+    watch = BusWatch()
+    for n in range(40):
+        watch = see_bus(watch, replace(GOOD_BUS, currents_ma=(900.0 if n < 30 else 40.0,) * 7), n * CYCLE_S, SERVOS, SAFETY)
+    assert watch.strained == ""

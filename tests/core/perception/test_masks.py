@@ -1,0 +1,139 @@
+import cv2
+import numpy as np
+import pytest
+
+from core.config.models import CleaningConfig, PerceptionConfig, SegmentationConfig
+from core.perception.segmentation import clean, clean_mask
+from tests.core.drawing import art, picture
+
+CLUTTERED = art("""
+##............
+##..########..
+....########..
+....##.##.##..
+....########..
+.#..########..
+""")
+
+
+def test_specks_go_and_pinholes_are_filled() -> None:
+    assert picture(clean_mask(CLUTTERED, min_area_px=5, max_hole_area_px=1)) == (
+        "..............\n....########..\n....########..\n....########..\n....########..\n....########.."
+    )
+
+
+def test_the_limits_are_exact() -> None:
+    assert clean_mask(CLUTTERED, 4, 0)[:2, :2].all()  # the speck has four pixels
+    assert not clean_mask(CLUTTERED, 5, 0)[:2, :2].any()
+    assert not clean_mask(CLUTTERED, 0, 0)[3, 6]
+    assert clean_mask(CLUTTERED, 0, 1)[3, 6]
+
+
+RING = art("""
+.........
+.#######.
+.#.....#.
+.#.###.#.
+.#.....#.
+.#######.
+.........
+""")
+
+
+def test_a_loop_that_encloses_more_than_a_hole_stays_open() -> None:
+    assert not clean_mask(RING, 0, 11)[2, 3]  # the hole has 15 pixels, or 12 without the island in it
+    assert clean_mask(RING, 0, 15)[1:6, 1:8].all()
+
+
+def test_holes_do_not_count_as_area() -> None:
+    assert clean_mask(RING, 20, 0)[1, 1]  # the ring has 20 pixels
+    assert not clean_mask(RING, 21, 0)[1, 1]
+
+
+@pytest.mark.parametrize("thickness", [1, 2, 3])
+def test_what_lies_inside_a_ring_stays_when_the_ring_goes(thickness: int) -> None:
+    mask, disc = np.zeros((140, 140), np.uint8), np.zeros((140, 140), np.uint8)
+    cv2.circle(disc, (70, 70), 18, 1, cv2.FILLED)
+    cv2.circle(mask, (70, 70), 31, 1, thickness)
+    cv2.circle(mask, (70, 70), 23, 1, thickness)
+    cleaned = clean_mask((mask | disc) > 0, min_area_px=1000, max_hole_area_px=20)
+    assert (cleaned == (disc > 0)).all()
+
+
+def test_an_island_in_a_filled_hole_is_no_speck() -> None:
+    assert clean_mask(RING, 5, 15)[1:6, 1:8].all()
+
+
+def test_background_at_the_image_border_is_no_hole() -> None:
+    bay = art("""
+##.##
+##.##
+#####
+""")
+    assert picture(clean_mask(bay, 0, 100)) == picture(bay)
+
+
+def test_diagonal_pixels_belong_together() -> None:
+    stairs = art("""
+#....
+.#...
+..#..
+...#.
+....#
+""")
+    assert clean_mask(stairs, 5, 0).sum() == 5
+    assert clean_mask(stairs, 6, 0).sum() == 0
+
+
+def test_the_input_is_not_written_to() -> None:
+    before = CLUTTERED.copy()
+    clean_mask(CLUTTERED, 100, 100)
+    assert (before == CLUTTERED).all()
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_empty_and_full_images(value: float) -> None:
+    probability = np.full((48, 64), value, np.float32)
+    masks = clean(probability, probability, PerceptionConfig())
+    assert masks.vessel.all() == masks.robot.all() == bool(value)
+    assert masks.vessel.dtype == masks.robot.dtype == np.bool_
+
+
+def test_each_mask_has_its_own_threshold_and_limit() -> None:
+    probability = np.zeros((60, 80), np.float32)
+    probability[10:40, 10:40] = 0.6
+    config = PerceptionConfig(
+        segmentation=SegmentationConfig(vessel_threshold=0.5, robot_threshold=0.7),
+        cleaning=CleaningConfig(min_vessel_area_px=900, min_robot_area_px=900),
+    )
+    masks = clean(probability, probability, config)
+    assert masks.vessel.sum() == 900
+    assert masks.robot.sum() == 0
+    assert masks.vessel_probability is probability
+
+
+def noise(pitch_px: int) -> np.ndarray:
+    """Squares of 2 px, this far apart, all over an image."""
+    mask = np.zeros((480, 640), bool)
+    for row in (0, 1):
+        for column in (0, 1):
+            mask[row::pitch_px, column::pitch_px] = True
+    return mask
+
+
+@pytest.mark.parametrize("pitch_px", [4, 5, 9, 16])
+def test_of_a_mask_scattered_all_over_the_image_nothing_is_left(pitch_px: int) -> None:
+    assert not clean_mask(noise(pitch_px), min_area_px=0, max_hole_area_px=0).any()
+
+
+def test_noise_is_told_before_its_outlines_are_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cv2, "findContours", lambda *_: pytest.fail("followed"))
+    assert not clean_mask(np.kron(np.indices((240, 320)).sum(axis=0) % 2, np.ones((2, 2))) > 0, 0, 0).any()
+
+
+def test_a_few_hundred_specks_beside_a_vessel_are_only_removed() -> None:
+    mask = noise(32)
+    mask[200:240] = True
+    assert picture(clean_mask(mask, min_area_px=5, max_hole_area_px=0)[190:250, :40]) == picture(
+        np.pad(np.ones((40, 40), bool), ((10, 10), (0, 0)))
+    )

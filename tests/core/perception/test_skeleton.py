@@ -1,0 +1,217 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter, label
+from skimage.morphology import skeletonize
+
+from core.config.models import CleaningConfig, PerceptionConfig
+from core.perception.skeleton import (
+    end_direction,
+    end_pixels,
+    extend_ends,
+    thin,
+    thin_half_size,
+    thin_masks,
+    walk_back,
+    without_spurs,
+)
+from core.types import Mask
+from tests.core.drawing import art, curve, depth, everywhere, masks_of, picture, probability
+
+EIGHT = np.ones((3, 3))
+
+
+def topology(mask: Mask) -> tuple[int, int]:
+    """Components, and holes (background that does not reach the border)."""
+    framed = np.pad(mask, 1)
+    return label(framed, EIGHT)[1], label(~framed)[1] - 1
+
+
+def test_a_bar_becomes_its_middle_line() -> None:
+    bar = art("""
+............
+.##########.
+.##########.
+.##########.
+............
+""")
+    assert not thin(bar)[[1, 3], 3:9].any()
+    assert thin(bar)[2, 3:9].all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10**6), sigma=st.floats(0.8, 4.0), share=st.floats(0.2, 0.8))
+def test_thinning_keeps_components_and_loops(seed: int, sigma: float, share: float) -> None:
+    noise = gaussian_filter(np.random.default_rng(seed).random((60, 80)), sigma)
+    mask = noise > np.quantile(noise, share)
+    skeleton = thin(mask)
+    assert topology(skeleton) == topology(mask)
+    assert not (skeleton & ~mask).any()
+
+
+@pytest.mark.parametrize("shape", [(481, 641), (480, 640), (360, 640), (200, 131)])
+def test_half_size_thinning_keeps_loops_and_narrow_walls(shape: tuple[int, int]) -> None:
+    mask = np.zeros(shape, bool)
+    mask[20:120, 10:110] = True
+    mask[40:100, 30:90] = False  # a loop of 20 px wide vessel
+    mask[120, 10:110] = False
+    mask[121:160, 10:110] = True  # one pixel of wall between two vessels
+    skeleton = thin_half_size(mask)
+    assert skeleton.shape == mask.shape
+    assert topology(skeleton) == topology(mask) == (2, 1)
+    assert not (skeleton & ~mask).any()
+
+
+@settings(max_examples=150, deadline=None)
+@given(seed=st.integers(0, 10**6), sigma=st.floats(0.0, 5.0), share=st.floats(0.05, 0.95), height=st.integers(1, 60))
+def test_thinning_is_scikit_images_pixel_for_pixel(seed: int, sigma: float, share: float, height: int) -> None:
+    noise = gaussian_filter(np.random.default_rng(seed).random((height, 47)), sigma)
+    mask = noise >= np.quantile(noise, share)
+    assert np.array_equal(thin(mask), skeletonize(mask))
+
+
+def test_a_tangle_of_noise_is_thinned_and_no_more() -> None:
+    comb = np.zeros((480, 640), np.float32)
+    comb[200:206] = 1.0
+    comb[180:226, 10::6] = 1.0  # some hundred teeth to each side
+    masks = masks_of(everywhere(), comb)
+    assert picture(thin_masks(masks, PerceptionConfig()).robot) == picture(thin(masks.robot))
+
+
+def test_half_size_thinning_finds_the_same_middle() -> None:
+    mask = probability(depth(curve((-20, 200), (200, 260), (420, 180), (660, 300)), 15.0)) > 0.5
+    half, full = np.argwhere(thin_half_size(mask)), np.argwhere(thin(mask))
+    gaps = np.array([np.hypot(*(full - place).T).min() for place in half])
+    assert np.percentile(gaps, 95) <= 2.0
+    assert topology(thin_half_size(mask)) == (1, 0)
+
+
+def test_a_thin_vessel_is_thinned_at_full_size() -> None:
+    mask = np.zeros((100, 200), bool)
+    mask[50:54, 10:190] = True
+    assert topology(thin_half_size(mask)) == (1, 0)
+    assert thin_half_size(mask).sum() > 150
+
+
+@pytest.mark.parametrize("shift_px", [0.0, 0.5])
+def test_a_narrow_branch_of_a_wide_vessel_is_not_lost_at_half_size(shift_px: float) -> None:
+    trunk = depth(np.array([[-20.0, 240.0], [660.0, 240.0]]), 22.0)
+    branch = depth(curve((300, 240), (400, 180 + shift_px), (520, 120), (690, 60)), 1.5)
+    mask = probability(trunk, branch) >= 0.5
+    skeleton = thin_half_size(mask)
+    assert topology(skeleton) == (1, 0)
+    assert skeleton[:200, 400:].sum() > 200  # some 240 px of it
+    assert picture(thin_half_size(trunk > 0.0)) != picture(thin(trunk > 0.0)), "where nothing is lost half the size is enough"
+
+
+def test_ends_are_where_the_papers_convolution_gives_eleven() -> None:
+    skeleton = art("""
+.........
+.#.....#.
+..#...#..
+...###...
+....#....
+....#....
+.........
+""")
+    assert sorted(end_pixels(skeleton)) == [(1, 1), (4, 5), (7, 1)]
+
+
+def test_an_end_around_a_corner_is_one_too() -> None:
+    hook = art("""
+.....
+.###.
+.#...
+.....
+""")
+    assert sorted(end_pixels(hook)) == [(1, 2), (3, 1)]
+
+
+def test_walking_back_stops_at_a_junction() -> None:
+    fork = art("""
+.#.......#
+..#.....#.
+...#...#..
+....#.#...
+.....#....
+.....#....
+""")
+    assert walk_back(fork, (1, 0), 10) == [(1, 0), (2, 1), (3, 2), (4, 3)] or len(walk_back(fork, (1, 0), 10)) <= 6
+    assert walk_back(fork, (1, 0), 2) == [(1, 0), (2, 1), (3, 2)]
+
+
+def test_a_branch_leaves_through_its_end() -> None:
+    row = np.zeros((9, 30), bool)
+    row[4, 5:25] = True
+    assert end_direction(row, (24, 4)) == pytest.approx((1.0, 0.0))
+    assert end_direction(row, (5, 4)) == pytest.approx((-1.0, 0.0))
+    dot = np.zeros((9, 30), bool)
+    dot[4, 5:7] = True
+    assert end_direction(dot, (5, 4)) is None
+
+
+def test_ends_are_extended_to_the_masks_edge() -> None:
+    mask = np.zeros((40, 120), bool)
+    mask[15:26, 20:100] = True
+    skeleton = thin(mask)
+    assert np.argwhere(skeleton)[:, 1].max() < 98  # thinning stops short of a blunt end
+    extended = extend_ends(skeleton, mask)
+    columns = np.argwhere(extended)[:, 1]
+    assert (columns.min(), columns.max()) == (20, 99)
+    assert len(end_pixels(extended)) == 2
+    assert not (extended & ~mask).any()
+
+
+@pytest.mark.parametrize(("radius", "length_px", "angle_deg"), [(10, 26, 53), (12, 41, 39), (16, 44, 37), (12, 30, 6), (16, 60, 6)])
+def test_a_short_thick_robot_stays_in_one_piece_from_end_to_end(radius: float, length_px: float, angle_deg: float) -> None:
+    along = np.array([np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))])
+    middle = np.array([200.0, 200.0])
+    x, y = np.meshgrid(np.arange(400.0), np.arange(400.0))
+    places = np.stack([x, y], axis=-1) - middle
+    reach = np.clip(places @ along, -0.5 * length_px, 0.5 * length_px)
+    mask = np.hypot(*np.moveaxis(places - reach[..., None] * along, -1, 0)) < radius  # with round ends
+    masks = masks_of(everywhere((400, 400)), mask.astype(np.float32))
+    skeleton = thin_masks(masks, PerceptionConfig()).robot
+    assert label(skeleton, EIGHT)[1] == 1
+    ends = np.array(sorted(end_pixels(skeleton)), float)
+    assert len(ends) == 2
+    chord = ends[1] - ends[0]
+    assert np.hypot(*chord) == pytest.approx(length_px + 2 * radius, abs=3.0)
+    assert np.degrees(np.arctan2(chord[1], chord[0])) == pytest.approx(angle_deg, abs=4.0)
+
+
+def test_the_fork_at_a_broken_end_is_pruned() -> None:
+    mask = np.zeros((60, 160), bool)
+    mask[25:36, 20:140] = True
+    mask[28:33, 135:140] = False  # the end is torn: two horns
+    forked = thin(mask)
+    assert len(end_pixels(forked)) == 3
+    pruned = without_spurs(forked, mask)
+    assert len(end_pixels(pruned)) == 2
+    assert topology(pruned) == (1, 0)
+
+
+def test_a_real_side_branch_is_not_pruned() -> None:
+    mask = np.zeros((120, 160), bool)
+    mask[55:62, 10:150] = True
+    mask[10:60, 80:86] = True
+    assert len(end_pixels(without_spurs(thin(mask), mask))) == 3
+
+
+def test_the_papers_form_leaves_the_ends_as_thinning_made_them() -> None:
+    robot = probability(depth(np.array([[50.0, 100.0], [300.0, 180.0]]), 6.0))
+    masks = masks_of(everywhere(), robot)
+    plain = CleaningConfig(prune_spurs=False, extend_ends=False, half_size_thinning=False)
+    literal = thin_masks(masks, PerceptionConfig(cleaning=plain)).robot
+    assert picture(literal) == picture(thin(masks.robot))
+    ours = thin_masks(masks, PerceptionConfig()).robot
+    assert np.argwhere(ours)[:, 1].max() > np.argwhere(literal)[:, 1].max()
+
+
+def test_empty_masks_have_empty_skeletons() -> None:
+    nothing = np.zeros((48, 64), np.float32)
+    skeletons = thin_masks(masks_of(nothing, nothing), PerceptionConfig())
+    assert not skeletons.vessel.any()
+    assert not skeletons.robot.any()
+    assert skeletons.bridges == ()

@@ -1,0 +1,876 @@
+"""The recorder: nothing put is lost silently, its sender never waits, and a disk that fails stops it visibly."""
+
+from __future__ import annotations
+
+import errno
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from core.control.faults import Cause, Fault
+from core.control.modes import Mode
+from core.control.pilot import DriveView
+from core.evaluation.replay import event_target
+from core.session import files as session_files
+from core.session import writer as session_writer
+from core.session.files import EncodedFrame, Ring, SessionFiles, is_being_written
+from core.session.manifest import About, Event, EventKind, SessionError, event_of_target, read_manifest, write_manifest
+from core.session.reader import SessionReader
+from core.session.video import FrameEncoder, Packet
+from core.session.writer import SessionWriter, faults_between
+from core.types import Tick
+from tests.core.session_data import ABOUT, QUICK, SIZE, drive_of, number_in, record, tick_of, wait_for
+
+
+def ticks(count: int, start: int = 0, fps: float = 30.0, **options: object) -> list[Tick]:
+    return [tick_of(i, 1000.0 + i / fps, **options) for i in range(start, start + count)]  # type: ignore[arg-type]
+
+
+@contextmanager
+def writer_in(folder: Path, config: object = QUICK) -> Iterator[SessionWriter]:
+    writer = SessionWriter(config, ABOUT, folder=folder, clock=lambda: 1002.0)  # type: ignore[arg-type]
+    try:
+        yield writer
+    finally:
+        assert writer.close()
+
+
+def test_every_frame_has_its_row_and_its_own_picture(tmp_path: Path) -> None:
+    session = record(tmp_path, ticks(70, full=True))
+    with SessionReader(session) as reader:
+        assert reader.wait(10.0)
+        assert len(reader) == 70
+        assert reader.is_closed
+        for place in (0, 1, 29, 30, 31, 69, 68, 5):
+            frame = reader.frame(place)
+            assert frame is not None
+            assert (frame.index, number_in(frame.image)) == (place, place)
+        assert reader.problems == ()
+
+
+def test_the_manifest_tells_what_the_session_is(tmp_path: Path) -> None:
+    session = record(tmp_path, ticks(5))
+    assert session.name.startswith("session_")
+    assert {path.name for path in session.iterdir()} == {"manifest.json", "video_0000.mkv", "frames.jsonl", "events.jsonl"}
+    manifest = read_manifest(session)
+    assert (manifest.kind, manifest.rig, manifest.model["name"]) == ("SIM", "twin", "default")
+    assert manifest.calibration == {"mm_per_px": 0.25}
+    assert manifest.config == {"rig": {"name": "twin"}}
+    assert {"python", "numpy", "av"} <= set(manifest.versions)
+    assert manifest.closed
+    assert (manifest.counts.frames, manifest.counts.videos, manifest.counts.dropped) == (5, 1, 0)
+    assert manifest.started_monotonic_s == 1000.0
+
+
+def test_until_it_ends_properly_the_manifest_says_so_and_the_session_is_held(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0))
+        wait_for(lambda: writer.status().frames == 1)
+        session = writer.status().folder
+        assert session is not None
+        assert not read_manifest(session).closed
+        assert is_being_written(session)
+        assert writer.status().recording
+        assert writer.status().elapsed_s == 0.0
+    assert read_manifest(session).closed
+    assert not is_being_written(session)
+
+
+def test_each_row_is_on_the_disk_as_soon_as_it_is_counted(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        for tick in ticks(3):
+            writer.put(tick)
+        wait_for(lambda: writer.status().frames == 3)
+        session = writer.status().folder
+        assert session is not None
+        lines = (session / "frames.jsonl").read_bytes().splitlines()
+        assert [json.loads(line)["index"] for line in lines] == [0, 1, 2]
+
+
+def test_times_come_from_the_rows_and_drops_of_the_camera_leave_their_gap(tmp_path: Path) -> None:
+    times = [1000.0, 1000.033, 1000.2, 1000.2, 1000.1]
+    session = record(tmp_path, [tick_of(i, t) for i, t in enumerate(times)])
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        line = reader.timeline()
+        assert line.time_s.tolist() == times
+        assert line.pts_ms.tolist() == [0, 33, 200, 201, 202]
+        assert all(reader.frame(place) is not None for place in range(5))
+
+
+def test_a_time_that_is_no_number_is_replaced_by_the_clock(tmp_path: Path) -> None:
+    session = record(tmp_path, [tick_of(0, math.nan)])
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        assert reader.timeline().time_s.tolist() == [1000.0]
+
+
+def test_all_videos_are_on_the_disk_before_the_manifest_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that was ended between two looks of the syncer would be forced by nobody."""
+    forced: list[str] = []
+    real = os.fdatasync
+
+    def force(handle: int) -> None:
+        forced.append(Path(os.readlink(f"/proc/self/fd/{handle}")).name)
+        real(handle)
+
+    monkeypatch.setattr(session_files.os, "fdatasync", force)
+    session = record(tmp_path, ticks(100), replace_config(split_s=1.0))
+    videos = sorted(path.name for path in session.glob("video_*.mkv"))
+    assert len(videos) > 2
+    assert set(videos) <= set(forced)
+
+
+def test_a_new_video_begins_when_the_size_changes_and_when_it_is_long(tmp_path: Path) -> None:
+    odd = [tick_of(i, 1000.0 + i / 30, size=(97, 63)) for i in range(40, 44)]
+    session = record(tmp_path, [*ticks(40), *odd], replace_config(split_s=1.0))
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        assert [path.name for path in reader.videos] == ["video_0000.mkv", "video_0001.mkv", "video_0002.mkv"]
+        line = reader.timeline()
+        assert sorted(set(line.video.tolist())) == [0, 1, 2]
+        assert [int(line.pts_ms[line.video == video][0]) for video in (0, 1, 2)] == [0, 0, 0]
+        frame, last = reader.frame(35), reader.frame(43)
+        assert frame is not None
+        assert number_in(frame.image) == 35
+        assert last is not None
+        assert last.image.shape == (63, 97, 3)
+
+
+def replace_config(**changes: object):  # type: ignore[no-untyped-def]
+    return QUICK.model_copy(update=changes)
+
+
+def test_lossless_keeps_every_pixel(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (63, 97, 3), dtype=np.uint8)
+    tick = tick_of(0, 1000.0)
+    tick = replace(tick, frame=replace(tick.frame, image=noise))
+    session = record(tmp_path, [tick], replace_config(codec="lossless"))
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        frame = reader.frame(0)
+        assert frame is not None
+        assert np.array_equal(frame.image, noise)
+
+
+def slow_disk(monkeypatch: pytest.MonkeyPatch) -> tuple[threading.Event, threading.Event]:
+    """A frame has come to be written; and let it, and all later ones, be."""
+    entered, go = threading.Event(), threading.Event()
+    real = SessionFiles.write_frame
+
+    def slow(self: SessionFiles, frame: EncodedFrame) -> None:
+        entered.set()
+        assert go.wait(10.0)
+        real(self, frame)
+
+    monkeypatch.setattr(SessionFiles, "write_frame", slow)
+    return entered, go
+
+
+def test_a_full_queue_drops_counts_and_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    entered, go = slow_disk(monkeypatch)
+    with writer_in(tmp_path, replace_config(max_queue=2)) as writer:
+        writer.start()
+        assert writer.put(tick_of(0, 1000.0))
+        assert entered.wait(10.0)
+        taken = [writer.put(tick) for tick in ticks(5, start=1)]
+        assert taken == [True, True, False, False, False]
+        assert writer.event(EventKind.NOTE, "events are never dropped for frames")
+        assert writer.status().dropped == 3
+        go.set()
+        wait_for(lambda: writer.status().frames == 3)
+        writer.put(tick_of(9, 1000.3))
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        rows = [reader.row(place) for place in range(len(reader))]
+        assert [row.index for row in rows if row] == [0, 1, 2, 9]
+        assert [row.dropped_rows for row in rows if row] == [0, 0, 0, 3]
+        assert read_manifest(session).counts.dropped == 3
+        assert [e.data["total"] for e in reader.events if e.kind is EventKind.DROPPED] == [3]
+        assert any(e.kind is EventKind.NOTE for e in reader.events)
+
+
+def test_what_is_dropped_after_the_stop_was_asked_is_not_the_sessions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what was dropped just before it is told, though no picture came after it."""
+    entered, go = slow_disk(monkeypatch)
+    with writer_in(tmp_path, replace_config(max_queue=2)) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0))
+        assert entered.wait(10.0)
+        assert [writer.put(tick) for tick in ticks(3, start=1)] == [True, True, False]
+        writer.stop()
+        assert [writer.put(tick) for tick in ticks(4, start=4)] == [False] * 4
+        assert writer.status().dropped == 1
+        go.set()
+        wait_for(lambda: writer.status().saved is not None)
+        assert writer.status().dropped == 1
+    session = writer.status().saved
+    assert session is not None
+    assert read_manifest(session).counts.dropped == 1
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        assert [event.data for event in reader.events if event.kind is EventKind.DROPPED] == [{"count": 1, "total": 1}]
+        assert read_manifest(session).counts.events == len(reader.events)
+
+
+def test_events_of_driving_and_the_mode_at_the_start_are_written(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0), DriveView(1000.0, Mode.ADVISORY))
+        writer.put(tick_of(1, 1000.1), drive_of(1000.1, Mode.ARMED))
+        writer.drive(drive_of(1000.1, Mode.ARMED))
+        writer.event(EventKind.TARGET, "10, 20", {"xy": [10.0, 20.0]}, 1000.2)
+        writer.stop("enough")
+        wait_for(lambda: writer.status().saved is not None)
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        kinds = [event.kind for event in reader.events]
+        assert kinds[:2] == [EventKind.MODE, EventKind.VIDEO]
+        assert kinds.count(EventKind.FAULT) == 2
+        assert EventKind.ARM in kinds
+        assert kinds[-1] is EventKind.TARGET
+    assert read_manifest(session).ended == "enough"
+
+
+def test_driving_is_recorded_though_the_camera_gives_no_picture(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0), DriveView(1000.0, Mode.AUTONOMOUS))
+        lost = Fault(Cause.CAMERA_LOST, "newest frame 501 ms old")
+        writer.drive(DriveView(1000.5, Mode.ADVISORY, latched=lost, active=(lost,)))
+        writer.drive(DriveView(1000.4, Mode.HOLD))  # overtaken: it tells nothing new
+        writer.stop()
+        wait_for(lambda: writer.status().saved is not None)
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        told = [(event.time_s, event.kind, event.text) for event in reader.events if event.kind is not EventKind.VIDEO]
+    assert told == [
+        (1000.0, EventKind.MODE, "AUTONOMOUS"),
+        (1000.5, EventKind.MODE, "ADVISORY"),
+        (1000.5, EventKind.DISARM, "camera lost"),
+        (1000.5, EventKind.FAULT, "camera lost"),
+    ]
+
+
+def test_a_hold_shorter_than_a_picture_is_kept_though_its_news_come_late(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0), DriveView(1000.0, Mode.AUTONOMOUS))
+        writer.put(tick_of(1, 1000.066), DriveView(1000.06, Mode.AUTONOMOUS))
+        for view in (DriveView(1000.04, Mode.HOLD), DriveView(1000.06, Mode.AUTONOMOUS)):
+            writer.drive(view)
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        told = [(event.time_s, event.text) for event in reader.events if event.kind is EventKind.MODE]
+    assert told == [(1000.0, "AUTONOMOUS"), (1000.04, "HOLD"), (1000.06, "AUTONOMOUS")]
+
+
+def test_what_the_recorder_dropped_is_told_in_what_the_ring_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with writer_in(tmp_path, replace_config(ring_s=5.0)) as writer:
+        for tick in ticks(3):
+            writer.put(tick)
+        wait_for(lambda: writer.pictures_waiting == 0)
+        writer._dropped += 7
+        for tick in ticks(3, start=10):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().saved is not None)
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        assert [row.dropped_rows for place in range(len(reader)) if (row := reader.row(place))] == [0, 0, 0, 7, 7, 7]
+    assert read_manifest(session).counts.dropped == 7
+
+
+def test_saving_the_last_seconds_twice_or_of_nothing_stops_no_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    go = threading.Event()
+    close = SessionFiles.close
+
+    def slow(self: SessionFiles, ended: str, dropped: int) -> str:
+        go.wait(10.0)
+        return close(self, ended, dropped)
+
+    monkeypatch.setattr(SessionFiles, "close", slow)
+    with writer_in(tmp_path, replace_config(ring_s=5.0)) as writer:
+        writer.put(tick_of(0, 1000.0))
+        writer.put(tick_of(1, 1000.5))
+        wait_for(lambda: writer.status().ring_s > 0.0)
+        before = writer.status()
+        writer.save_last()
+        writer.save_last()
+        wait_for(lambda: writer.status().notices == 1)
+        assert writer.status().notice == "the last seconds are still being saved"
+        go.set()
+        wait_for(lambda: writer.status().saved is not None)
+        writer.set_about(About("LIVE", "bench"))
+        wait_for(lambda: writer.status().ring_s == 0.0)
+        writer.save_last()
+        wait_for(lambda: writer.status().notices == 2)
+        assert (writer.status().problem, faults_between(before, writer.status())) == ("", [])
+
+
+def test_a_recording_that_cannot_start_says_so_each_time(tmp_path: Path) -> None:
+    (tmp_path / "sessions").write_text("a file where the folder should be")
+    with writer_in(tmp_path / "sessions") as writer:
+        for count in (1, 2):
+            before = writer.status()
+            writer.start()
+            writer.put(tick_of(count, 1000.0 + count))
+            wait_for(lambda: writer.status().problems == count)  # noqa: B023
+            assert [fault.cause for fault in faults_between(before, writer.status())] == [Cause.RECORDING_STOPPED]
+
+
+def test_losses_between_two_sessions_are_not_the_second_ones(tmp_path: Path) -> None:
+    def with_lost(index: int, lost: int) -> Tick:
+        tick = tick_of(index, 1000.0 + index)
+        return replace(tick, frame=replace(tick.frame, lost=lost))
+
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(with_lost(0, 0))
+        writer.stop()
+        wait_for(lambda: writer.status().saved is not None)
+        writer.put(with_lost(1, 500))
+        writer.start()
+        writer.put(with_lost(2, 500))
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        assert EventKind.LOST not in {event.kind for event in reader.events}
+
+
+def test_nothing_is_written_before_start_and_after_stop(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        assert writer.put(tick_of(0, 1000.0))
+        writer.start()
+        writer.put(tick_of(1, 1000.1))
+        writer.stop()
+        wait_for(lambda: writer.status().saved is not None)
+        assert writer.put(tick_of(2, 1000.2))
+        writer.start()
+        writer.put(tick_of(3, 1000.3))
+    counts = sorted(read_manifest(path).counts.frames for path in tmp_path.iterdir())
+    assert counts == [1, 1]
+    assert not writer.put(tick_of(4, 1000.4))
+
+
+def test_a_note_between_start_and_the_first_frame_is_kept(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.event(EventKind.NOTE, "ready")
+        writer.put(tick_of(0, 1000.0))
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        assert "ready" in [event.text for event in reader.events]
+
+
+def test_the_destination_that_was_chosen_before_is_told_at_the_start(tmp_path: Path) -> None:
+    def targets_of(session: Path | None) -> list[tuple[float, object]]:
+        assert session is not None
+        with SessionReader(session) as reader:
+            return [(event.time_s, event_target(event)) for event in reader.events if event.kind is EventKind.TARGET]
+
+    with writer_in(tmp_path, replace_config(ring_s=2.0)) as writer:
+        writer.add_event(event_of_target((10.0, 20.0), 999.0))
+        writer.add_event(event_of_target((30.0, 40.0), 999.5))
+        writer.start()
+        for tick in ticks(3):
+            writer.put(tick)
+        writer.stop()
+        wait_for(lambda: writer.status().saved is not None)
+        first = writer.status().saved
+        assert targets_of(first) == [(1000.0, (30.0, 40.0))]
+        writer.save_last()
+        wait_for(lambda: writer.status().saved != first)
+        assert targets_of(writer.status().saved) == [(1000.0, (30.0, 40.0))]
+        writer.set_about(About("SIM", "twin", {"perception": "under other thresholds"}))
+        second = writer.status().saved
+        writer.start()
+        writer.put(tick_of(9, 1001.0))
+        writer.stop()
+        wait_for(lambda: writer.status().saved != second)
+        assert targets_of(writer.status().saved) == [(1001.0, (30.0, 40.0))]
+        writer.add_event(event_of_target(None, 1001.5))
+        writer.start()
+        writer.put(tick_of(10, 1002.0))
+    assert targets_of(writer.status().saved) == []
+
+
+def test_the_destination_outlasts_what_the_ring_keeps_of_events(tmp_path: Path) -> None:
+    """It was chosen once, before the last seconds began and before thousands of alerts; it is in force all the same."""
+
+    def targets_of(session: Path | None) -> list[tuple[float, object]]:
+        assert session is not None
+        with SessionReader(session) as reader:
+            return [(event.time_s, event_target(event)) for event in reader.events if event.kind is EventKind.TARGET]
+
+    def alerts(count: int) -> None:
+        for _ in range(count):
+            assert writer.event(EventKind.ALERT, "again", time_s=999.5)
+
+    with writer_in(tmp_path, replace_config(ring_s=2.0)) as writer:
+        writer.add_event(event_of_target((10.0, 20.0), 999.0))
+        alerts(5000)
+        for tick in ticks(3):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().saved is not None)
+        first = writer.status().saved
+        assert targets_of(first) == [(1000.0, (10.0, 20.0))]
+        writer.add_event(event_of_target(None, 999.5))
+        alerts(5000)
+        writer.save_last()
+        wait_for(lambda: writer.status().saved != first)
+        assert targets_of(writer.status().saved) == []
+
+
+def test_a_session_that_waits_for_its_first_picture_says_so_and_can_be_taken_back(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        wait_for(lambda: writer.status().armed)
+        assert not writer.status().recording
+        writer.stop()
+        wait_for(lambda: not writer.status().armed)
+        writer.put(tick_of(0, 1000.0))
+        writer.start()
+        writer.put(tick_of(1, 1000.1))
+        wait_for(lambda: writer.status().recording)
+        assert not writer.status().armed
+    (session,) = tmp_path.iterdir()
+    assert read_manifest(session).counts.frames == 1
+
+
+def test_another_rig_ends_the_session(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0))
+        writer.set_about(About("LIVE", "bench"))
+        writer.start()
+        writer.put(tick_of(1, 1000.1))
+    found = {read_manifest(path).kind: read_manifest(path) for path in tmp_path.iterdir()}
+    assert set(found) == {"SIM", "LIVE"}
+    assert found["SIM"].ended == "another rig was opened"
+
+
+# --- the last seconds
+
+
+def test_the_last_seconds_are_saved_without_having_recorded(tmp_path: Path) -> None:
+    with writer_in(tmp_path, replace_config(ring_s=2.0)) as writer:
+        for tick in ticks(150):
+            writer.put(tick)
+        writer.event(EventKind.NOTE, "old", time_s=1000.1)
+        writer.event(EventKind.NOTE, "new", time_s=1004.5)
+        writer.save_last()
+        wait_for(lambda: writer.status().saved is not None)
+        assert not writer.status().recording
+        assert writer.status().ring_s == pytest.approx(2.97, abs=0.1)
+    session = writer.status().saved
+    assert session is not None
+    manifest = read_manifest(session)
+    assert (manifest.origin, manifest.closed) == ("last seconds", True)
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        first, last = reader.frame(0), reader.frame(len(reader) - 1)
+        assert first is not None
+        assert last is not None
+        assert (last.index, number_in(last.image)) == (149, 149)
+        assert number_in(first.image) == first.index
+        # at least what was asked for, at most a group of pictures more
+        assert 2.0 <= reader.duration_s <= 3.0
+        assert [e.text for e in reader.events if e.kind is EventKind.NOTE] == ["new"]
+        assert manifest.started_monotonic_s == reader.timeline().time_s[0]
+
+
+def test_the_last_seconds_tell_where_driving_stood_when_they_began(tmp_path: Path) -> None:
+    armed = drive_of(1000.0)
+    with writer_in(tmp_path, replace_config(ring_s=2.0)) as writer:
+        for tick in ticks(150):
+            writer.put(tick, replace(armed, time_s=tick.frame.captured_s))
+        writer.drive(replace(armed, time_s=1004.5, mode=Mode.ADVISORY, active=(Fault(Cause.WARM),)))
+        writer.save_last()
+        wait_for(lambda: writer.status().saved is not None)
+    session = writer.status().saved
+    assert session is not None
+    first_s = read_manifest(session).started_monotonic_s
+    with SessionReader(session) as reader:
+        told = [(event.time_s, event.kind, event.text) for event in reader.events if event.kind is not EventKind.VIDEO]
+    assert told == [
+        (first_s, EventKind.MODE, "ARMED"),
+        (first_s, EventKind.FAULT, str(Cause.HEAD_JUMP)),
+        (first_s, EventKind.FAULT, str(Cause.WARM)),
+        (1004.5, EventKind.MODE, "ADVISORY"),
+        (1004.5, EventKind.DISARM, str(Cause.HEAD_JUMP)),
+        (1004.5, EventKind.CLEARED, str(Cause.HEAD_JUMP)),
+    ]
+
+
+def test_what_the_ring_has_from_the_very_beginning_is_not_told_twice(tmp_path: Path) -> None:
+    with writer_in(tmp_path, replace_config(ring_s=20.0)) as writer:
+        for tick in ticks(5):
+            writer.put(tick, DriveView(1000.001, Mode.ADVISORY))
+        writer.save_last()
+        wait_for(lambda: writer.status().saved is not None)
+    session = writer.status().saved
+    assert session is not None
+    with SessionReader(session) as reader:
+        assert [event.text for event in reader.events if event.kind is EventKind.MODE] == ["ADVISORY"]
+
+
+def test_last_seconds_that_were_saved_in_part_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the folder, too: the message in the window is gone the next day."""
+    writes = SessionFiles.write_frame
+    written: list[int] = []
+
+    def full_after_twenty(files: SessionFiles, frame: EncodedFrame) -> None:
+        if len(written) == 20:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(files.folder))
+        written.append(1)
+        writes(files, frame)
+
+    monkeypatch.setattr(SessionFiles, "write_frame", full_after_twenty)
+    with writer_in(tmp_path, replace_config(ring_s=60.0)) as writer:
+        for tick in ticks(50):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().notice)
+        assert writer.status().notice.startswith("of the last seconds only 20 of 50 frames were saved: ")
+        assert writer.status().saved is None
+    (session,) = (path for path in tmp_path.iterdir() if path.is_dir())
+    manifest = read_manifest(session)
+    assert (manifest.counts.frames, manifest.counts.dropped) == (20, 30)
+    assert manifest.ended.endswith("No space left on device")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_fault_of_the_program_while_the_last_seconds_are_saved_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the next ones can be saved: it does not stand there as being saved for ever."""
+    calls: list[int] = []
+    writes = SessionFiles.write_frame
+
+    def breaks_once(files: SessionFiles, frame: EncodedFrame) -> None:
+        calls.append(1)
+        if len(calls) == 3:
+            raise RuntimeError("nobody has thought of this")
+        writes(files, frame)
+
+    monkeypatch.setattr(SessionFiles, "write_frame", breaks_once)
+    with writer_in(tmp_path, replace_config(ring_s=60.0)) as writer:
+        for tick in ticks(10):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().notice)
+        told = "of the last seconds only 2 of 10 frames were saved: an error of the program; its log says more"
+        assert (writer.status().notice, writer.status().saving) == (told, False)
+        wait_for(lambda: all(thread.name != "ring saver" for thread in threading.enumerate()))
+        writer.save_last()
+        wait_for(lambda: writer.status().saved)
+    assert sorted(read_manifest(path).counts.frames for path in tmp_path.iterdir()) == [2, 10]
+
+
+def test_the_last_seconds_leave_the_last_room_of_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rule of a recording: what is open must still be closed, and the system must go on."""
+    free = [30_000_000]
+    writes = SessionFiles.write_frame
+
+    def shrinking(files: SessionFiles, frame: EncodedFrame) -> None:
+        writes(files, frame)
+        free[0] -= 1_000_000
+
+    monkeypatch.setattr(SessionFiles, "write_frame", shrinking)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: (100_000_000_000, 0, free[0]))
+    with writer_in(tmp_path, replace_config(ring_s=60.0, stop_free_mb=40.0)) as writer:
+        for tick in ticks(50):
+            writer.put(tick)
+        writer.save_last()
+        wait_for(lambda: writer.status().notices == 1)
+        left = f"MB left in {tmp_path}); make room and save them again"
+        assert writer.status().notice == f"the last seconds were not saved: disk full (30 {left}"
+        assert list(tmp_path.iterdir()) == []
+        free[0] = 59_500_000
+        writer.save_last()
+        wait_for(lambda: writer.status().notices == 2)
+        assert writer.status().notice == f"of the last seconds only 20 of 50 frames were saved: disk full (40 {left}"
+        assert not writer.status().problem
+    (session,) = tmp_path.iterdir()
+    manifest = read_manifest(session)
+    assert (manifest.closed, manifest.counts.frames) == (True, 20)
+    assert manifest.ended.startswith("disk full")
+
+
+def test_a_recording_and_the_last_seconds_share_one_encoder(tmp_path: Path) -> None:
+    with writer_in(tmp_path, replace_config(ring_s=5.0)) as writer:
+        for tick in ticks(10):
+            writer.put(tick)
+        writer.start()
+        for tick in ticks(20, start=10):
+            writer.put(tick)
+        writer.save_last()
+        for tick in ticks(5, start=30):
+            writer.put(tick)
+        writer.stop()
+    found = {read_manifest(path).origin: path for path in tmp_path.iterdir()}
+    with SessionReader(found["recorded"]) as recorded, SessionReader(found["last seconds"]) as ring:
+        recorded.wait(10.0)
+        ring.wait(10.0)
+        assert (len(recorded), len(ring)) == (25, 30)
+        for reader, place, number in ((recorded, 0, 10), (recorded, 24, 34), (ring, 0, 0), (ring, 29, 29), (ring, 11, 11)):
+            frame = reader.frame(place)
+            assert frame is not None
+            assert number_in(frame.image) == number
+
+
+def test_with_nothing_in_memory_saving_says_so(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.save_last()
+        wait_for(lambda: "nothing to save" in writer.status().notice)
+
+
+def test_the_ring_is_bounded_by_bytes_and_begins_at_a_key_picture() -> None:
+    encoder = FrameEncoder(SIZE, QUICK)
+    ring = Ring(60.0, 1000)
+    for i in range(100):
+        ring.add(EncodedFrame(i / 30, Packet(b"x" * 90, i * 33, i % 10 == 0), encoder, "r" * 10))
+        assert ring.nbytes <= 1000 + 1000
+    frames, _ = ring.content()
+    assert frames[0].packet.is_key
+    assert frames[-1].captured_s == pytest.approx(99 / 30)
+    assert ring.nbytes == sum(frame.nbytes for frame in frames) <= 1000
+    ring.clear()
+    assert ring.content() == ([], [])
+    encoder.close()
+
+
+# --- disks that fail
+
+
+def test_a_folder_that_cannot_be_written_is_a_problem_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with writer_in(tmp_path / "file") as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0))
+        wait_for(lambda: writer.status().problem)
+        assert "choose another folder" in writer.status().problem
+        assert "\n" not in writer.status().problem
+        assert not writer.status().recording
+
+
+@pytest.mark.parametrize("name", ["frames.jsonl", "video_0000.mkv"])
+def test_a_full_disk_stops_the_recording_visibly_and_keeps_what_was_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    real_line, real_track = session_files.LineFile.write, session_files.VideoTrack.write
+    written: list[str] = []
+
+    def line(self: session_files.LineFile, text: str) -> int:
+        if name == "frames.jsonl" and '"index":' in text and len(written) >= 5:
+            self._file.close()
+            self._file = open("/dev/full", "wb", buffering=0)
+        size = real_line(self, text)
+        if '"index":' in text:
+            written.append(text)
+        return size
+
+    def track(self: session_files.VideoTrack, packet: Packet) -> int:
+        if name == "video_0000.mkv" and len(written) >= 5:
+            raise session_files.VideoError("video_0000.mkv: cannot be written (No space left on device)")
+        return real_track(self, packet)
+
+    monkeypatch.setattr(session_files.LineFile, "write", line)
+    monkeypatch.setattr(session_files.VideoTrack, "write", track)
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        for tick in ticks(20):
+            writer.put(tick)
+        wait_for(lambda: writer.status().problem)
+        status = writer.status()
+        assert "recording stopped" in status.problem
+        assert "No space left" in status.problem
+        assert not status.recording
+        assert status.folder is not None
+    with SessionReader(status.folder) as reader:
+        reader.wait(10.0)
+        assert len(reader) == 5
+        frame = reader.frame(4)
+        assert frame is not None
+        assert number_in(frame.image) == 4
+
+
+def test_with_the_disk_nearly_full_it_warns_and_before_it_is_full_it_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    free = [10_000_000_000]
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: (100_000_000_000, 0, free[0]))
+    monkeypatch.setattr(session_writer, "_LOOK_AT_DISK_S", 0.0)
+    config = replace_config(warn_free_mb=500.0, warn_free_share=0.07, stop_free_mb=40.0)
+    with writer_in(tmp_path, config) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0))
+        wait_for(lambda: writer.status().frames == 1)
+        assert (writer.status().warning, writer.status().disk_free) == ("", 10_000_000_000)
+        free[0] = 6_000_000_000
+        writer.put(tick_of(1, 1000.1))
+        wait_for(lambda: "6,000 MB left" in writer.status().warning)
+        assert writer.status().recording
+        free[0] = 30_000_000
+        writer.put(tick_of(2, 1000.2))
+        wait_for(lambda: "disk full" in writer.status().problem)
+        assert not writer.status().recording
+        session = writer.status().folder
+        assert session is not None
+    assert read_manifest(session).closed
+    assert "disk full" in read_manifest(session).ended
+
+
+LIMITED = """
+import resource, signal, sys
+sys.path[:0] = [{root!r}]
+from pathlib import Path
+from dataclasses import replace
+import numpy as np
+from core.session.writer import SessionWriter
+from tests.core.session_data import ABOUT, QUICK, tick_of, wait_for
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
+writer = SessionWriter(QUICK.model_copy(update={{"codec": {codec!r}}}), ABOUT, folder=Path(sys.argv[1]), clock=lambda: 1000.0)
+writer.start()
+noise = np.random.default_rng(0)
+for i in range(600):
+    tick = tick_of(i, 1000.0 + i / 30)
+    if {codec!r} == "lossless":
+        tick = replace(tick, frame=replace(tick.frame, image=noise.integers(0, 256, (64, 96, 3), dtype=np.uint8)))
+    while not writer.put(tick) and not writer.status().problem:
+        pass
+    if writer.status().problem:
+        break
+writer.close()
+print(writer.status().problem)
+"""
+
+
+@pytest.mark.parametrize("codec", ["lossy", "lossless"])
+def test_a_disk_that_is_really_full_loses_nothing_written(tmp_path: Path, codec: str) -> None:
+    """A file size limit stands in for it: rows hit it in the lossy case, the video in the lossless one."""
+    root = str(Path(__file__).resolve().parents[3])
+    code = LIMITED.format(root=root, limit=60_000 if codec == "lossy" else 150_000, codec=codec)
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "recording stopped" in done.stdout
+    assert "File too large" in done.stdout
+    (session,) = tmp_path.glob("session_*")
+    with SessionReader(session) as reader:
+        reader.wait(10.0)
+        assert len(reader) > 5
+        assert all("line" not in problem for problem in reader.problems), "no torn line"
+        lost = sum(reader.frame(place) is None for place in range(len(reader)))
+        assert lost <= 8
+
+
+def test_the_manifest_is_written_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = record(tmp_path, ticks(2))
+    manifest = read_manifest(session)
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        write_manifest(session, manifest.model_copy(update={"rig": "other"}))
+    monkeypatch.undo()
+    assert read_manifest(session).rig == "twin"
+    assert [path.name for path in session.iterdir() if path.name.startswith(".")] == []
+
+
+def test_a_video_is_readable_while_it_is_written(tmp_path: Path) -> None:
+    """What a kill would leave: half a second at most is not in the file yet."""
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        for tick in ticks(90):
+            writer.put(tick)
+        wait_for(lambda: writer.status().frames == 90)
+        session = writer.status().folder
+        assert session is not None
+        copy = tmp_path / "copy.mkv"
+        copy.write_bytes((session / "video_0000.mkv").read_bytes())
+        with av.open(str(copy)) as container:
+            count = sum(1 for _ in container.decode(video=0))
+        assert count >= 90 - 15
+
+
+def test_an_unexpected_failure_ends_the_recorder_visibly(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        writer.put(tick_of(0, 1000.0))
+        broken = tick_of(1, 1000.1)
+        writer.put(replace(broken, frame=replace(broken.frame, image=np.zeros((64, 96), np.uint8))))
+        wait_for(lambda: writer.status().problem)
+        assert "recording stopped" in writer.status().problem
+        wait_for(lambda: not writer.put(tick_of(2, 1000.2)))
+    session = writer.status().folder
+    assert session is not None
+    assert read_manifest(session).closed
+
+
+def test_a_reason_with_a_name_that_is_no_utf8_still_ends_the_session(tmp_path: Path) -> None:
+    """The manifest could not hold the folder's name, stayed open, and the recorder went on saying that it records."""
+    files = SessionFiles(tmp_path, ABOUT, QUICK, first_s=1000.0, now_s=1000.0)
+    assert files.close("disk full in /data/b\udcfc", 0) == ""
+    manifest = read_manifest(files.folder)
+    assert (manifest.closed, manifest.ended) == (True, "disk full in /data/b\\xfc")
+
+
+def test_a_drive_without_locks_can_be_recorded_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_locks(_file: int, _kind: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(session_files.fcntl, "flock", no_locks)
+    files = SessionFiles(tmp_path / "under way", ABOUT, QUICK, first_s=1000.0, now_s=1000.0)
+    assert is_being_written(files.folder), "it has just been written to"
+    with pytest.raises(SessionError, match="is being recorded"):
+        session_files.add_event(files.folder, Event(1000.0, EventKind.NOTE, "kink"))
+    os.utime(files.folder / session_files.FRAMES, (0.0, 0.0))
+    assert not is_being_written(files.folder), "it was cut"
+    assert files.close("the end", 0) == ""
+    session = record(tmp_path, ticks(3))
+    assert read_manifest(session).closed
+    assert not is_being_written(session)
+    assert session_files.add_event(session, Event(1000.0, EventKind.NOTE, "kink")).text == "kink"
+
+
+def test_the_largest_pictures_at_the_largest_rate_have_an_encoder() -> None:
+    FrameEncoder((4096, 3072), QUICK.model_copy(update={"max_mbit_s": 100.0, "codec": "lossy"})).close()
+
+
+def test_pictures_without_a_size_have_no_encoder() -> None:
+    with pytest.raises(session_files.VideoError, match="no encoder"):
+        FrameEncoder((0, 0), QUICK)
+
+
+def test_ticks_can_be_put_from_several_threads(tmp_path: Path) -> None:
+    with writer_in(tmp_path) as writer:
+        writer.start()
+        threads = [threading.Thread(target=lambda: [writer.put(tick) for tick in ticks(20)]) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert writer.status().frames == 60

@@ -1,0 +1,186 @@
+"""A step of the wizard that is stopped half way leaves wires that nobody knows, and no zero is taken there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import cast
+
+import numpy as np
+import pytest
+
+from core.calibration.camera import BoardError, BoardSpec
+from core.calibration.servos import Assignment, HeadNotSeen, ServoFinding, SteeringNotSeen
+from core.config.calibration import ZeroConfig
+from core.config.models import Config
+from core.devices import DeviceError
+from core.types import Image
+from hardware.calibration import servo_identification
+from hardware.calibration.rig_draft import RigDraft
+from hardware.calibration.servo_identification import Zeros
+from hardware.calibration.servo_probe import ProcedureStopped, StopSwitch, Strained
+from hardware.servos.discovery import FoundServo, FoundServos
+from hardware.servos.dynamixel_port import NoAnswer
+
+TICKS = (2048, 2049, 2050, 2051, 0, 1, 2)
+
+
+class Bench:
+    """No camera and no servos: the wizard's steps are told what happens."""
+
+    bench = None
+
+    def __init__(self) -> None:
+        self.stop = StopSwitch()
+        self.pictures: Iterator[Image] = iter(())
+
+    def set_lens(self, _lens: object) -> None: ...
+
+    def servos_config(self, servos: object) -> object:
+        return servos
+
+    def board_picture(self, _spec: BoardSpec) -> Image:
+        return next(self.pictures)
+
+
+@pytest.fixture
+def draft(monkeypatch: pytest.MonkeyPatch) -> RigDraft:
+    monkeypatch.setattr(servo_identification, "find_zeros", lambda *_: Zeros((0.1,) * 4))
+    monkeypatch.setattr(servo_identification, "standing_ticks", lambda *_: TICKS)
+    made = RigDraft(Bench(), Config())  # type: ignore[arg-type]
+    made.find_zeros()
+    return made
+
+
+def ends(monkeypatch: pytest.MonkeyPatch, step: str, error: BaseException) -> None:
+    def broken(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(servo_identification, step, broken)
+
+
+@pytest.mark.parametrize("error", [ProcedureStopped("stopped"), KeyboardInterrupt()])
+@pytest.mark.parametrize(("step", "run"), [("find_zeros", RigDraft.find_zeros), ("learn_steering", RigDraft.learn_steering)])
+def test_stopped_half_way_there_are_no_zeros_until_they_are_found_anew(
+    draft: RigDraft, monkeypatch: pytest.MonkeyPatch, step: str, run: Callable[[RigDraft], object], error: BaseException
+) -> None:
+    ends(monkeypatch, step, error)
+    with pytest.raises(type(error)):
+        run(draft)
+    assert draft.zeros is None
+    assert draft.zero is None
+    assert not draft.are_zeros_known
+    ends(monkeypatch, "learn_steering", AssertionError("zeroed where the wires happened to be"))
+    with pytest.raises(DeviceError, match="find the zeros anew"):
+        draft.learn_steering()
+    monkeypatch.setattr(servo_identification, "find_zeros", lambda *_: Zeros((0.2,) * 4))
+    draft.find_zeros()
+    assert draft.are_zeros_known
+    ends(monkeypatch, "learn_steering", HeadNotSeen("no head"))
+    with pytest.raises(HeadNotSeen):
+        draft.learn_steering()
+    assert draft.are_zeros_known, "a look that fails lets the wires go back"
+
+
+def test_a_tendon_that_could_not_be_told_is_known_once_it_was_put_there_by_hand(
+    draft: RigDraft, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problems = ("up: the head does not follow", "down: the head does not follow")
+    monkeypatch.setattr(servo_identification, "find_zeros", lambda *_: Zeros((0.0,) * 4, problems))
+    monkeypatch.setattr(servo_identification, "nudge", lambda *_: None)
+    draft.find_zeros()
+    for name in ("right", "down"):
+        draft.nudge(name, 0.2)
+        assert not draft.are_zeros_known
+    assert draft.zero is None
+    draft.nudge("up", 0.2)
+    assert draft.are_zeros_known
+    assert draft.zero is not None
+    draft.find_zeros()
+    assert not draft.are_zeros_known
+    assert draft.zero is None
+
+
+def test_a_wire_that_strains_while_it_is_tightened_lets_all_go(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends(monkeypatch, "nudge", Strained("tendon up: 312 mA: let go"))
+    with pytest.raises(Strained):
+        draft.nudge("up", 0.1)
+    assert not draft.are_zeros_known
+    with pytest.raises(DeviceError, match="find the zeros anew"):
+        draft.learn_steering()
+
+
+def test_a_line_that_hiccups_afterwards_costs_no_zeros(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends(monkeypatch, "standing_ticks", NoAnswer("servo 3: no answer"))
+    monkeypatch.setattr(servo_identification, "nudge", lambda *_: None)
+    said: list[str] = []
+    draft.say = said.append
+    for step in (draft.find_zeros, lambda: draft.nudge("up", 0.1)):
+        step()
+        assert draft.are_zeros_known
+        assert draft.zero is None
+        assert "learn the steering, which keeps it, too" in said[-1]
+    ends(monkeypatch, "learn_steering", HeadNotSeen("no head"))
+    with pytest.raises(HeadNotSeen):
+        draft.learn_steering()
+
+
+def test_a_head_without_room_costs_no_zero(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends(monkeypatch, "learn_steering", SteeringNotSeen("feed the robot to a place where it has room"))
+    for _ in range(2):
+        with pytest.raises(SteeringNotSeen):
+            draft.learn_steering()
+    assert draft.zero is not None
+    assert draft.are_zeros_known
+
+
+def test_zeros_are_kept_without_the_steering(draft: RigDraft) -> None:
+    draft.set_pretension(0.4)
+    assert draft.calibration().zero == ZeroConfig(ticks=TICKS, slack_mm=(0.1,) * 4, pretension_mm=0.4)
+
+
+@pytest.mark.parametrize(
+    ("elsewhere", "problem"),
+    [
+        (((57_600, (6, 7)),), r"^servos at several speeds: 1, 2, 3, 4, 5 at 1000000 baud; 6, 7 at 57600 baud; set all"),
+        ((), r"^5 servos answer, seven are needed: .*check cables"),
+    ],
+)
+def test_what_keeps_servos_from_being_seven_is_told(
+    draft: RigDraft, monkeypatch: pytest.MonkeyPatch, elsewhere: tuple[tuple[int, tuple[int, ...]], ...], problem: str
+) -> None:
+    draft.config = draft.config.model_copy(update={"servos": draft.config.servos.model_copy(update={"port": "/dev/ttyUSB0"})})
+    found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in range(1, 6)), elsewhere)
+    monkeypatch.setattr("hardware.calibration.rig_draft.find_servos", lambda *_: found)
+    with pytest.raises(DeviceError, match=problem):
+        draft.search_servos()
+
+
+def test_what_was_seen_of_a_servo_that_is_gone_is_forgotten(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    draft.config = draft.config.model_copy(update={"servos": draft.config.servos.model_copy(update={"port": "/dev/ttyUSB0"})})
+    draft.set_assignments([Assignment(joint.name, joint.id, joint.sign, "seen") for joint in draft.servos.joints])
+    draft.findings = dict.fromkeys(range(1, 8), ServoFinding("advance", 1, "seen"))  # type: ignore[arg-type]
+    found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in (1, 2, 3, 4, 5, 6, 9)))
+    monkeypatch.setattr("hardware.calibration.rig_draft.find_servos", lambda *_: found)
+    draft.search_servos()
+    assert sorted(draft.findings) == [1, 2, 3, 4, 5, 6]
+    assert draft.assignments == ()
+
+
+def test_the_servos_wait_until_the_board_is_away(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    board, empty, said = np.ones((2, 2), np.uint8), np.zeros((2, 2), np.uint8), []
+
+    def find_board(image: Image, _spec: BoardSpec) -> None:
+        if not image.any():
+            raise BoardError("no board is seen")
+
+    monkeypatch.setattr("hardware.calibration.rig_draft.find_board", find_board)
+    draft.say = said.append
+    bench = cast("Bench", draft.bench)
+    monkeypatch.setattr("hardware.calibration.rig_draft._BOARD_LOOK_S", 0.0)
+    bench.pictures = iter([board, board, *[empty] * 5, board, *[empty] * 6])
+    draft.wait_for_no_board()
+    assert said == ["take the board away: the servos move when it is out of sight"]
+    assert next(bench.pictures, None) is None, "a hand over it is not enough"
+    bench.pictures = iter([board] * 9)
+    with pytest.raises(BoardError, match="still in the picture: take it away"):
+        draft.wait_for_no_board(0.0)

@@ -1,0 +1,576 @@
+"""The preflight against fakes: folders for /dev and /sys, pseudo-terminals as ports, software servos, spoilt copies of a model."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import pty
+import re
+import shutil
+import time
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.config.models import Config, GamepadConfig, PedalConfig, PerceptionConfig, RecordConfig, RigConfig, SegmentationConfig
+from core.config.safety import ServosConfig
+from core.devices import DeviceError
+from core.perception.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, sha256_of
+from core.types import Frame, Image
+from hardware.cameras.realsense import RealSenseInfo
+from hardware.preflight import checks as machine
+from hardware.preflight import checks as model
+from hardware.preflight import checks as program
+from hardware.preflight import device_checks
+from hardware.preflight.checks import Check
+from hardware.preflight.preflight import run_checks
+from hardware.twin.servos.bus import SoftServoBus
+from hardware.twin.soft_pedal import SoftPedal
+
+ROOT = Path(__file__).resolve().parents[3]
+L515 = RealSenseInfo("Intel RealSense L515", "f1", "1.5.8.1", "1.5.8.1", "3.2")
+
+
+def _bad(check: Check, detail: str, fix: str) -> None:
+    """Not ok, and both texts are one line that contains this."""
+    assert not check.ok
+    assert re.search(detail, check.detail), check.detail
+    assert re.search(fix, check.fix), check.fix
+    assert "\n" not in check.detail + check.fix
+
+
+def _good(check: Check, detail: str = "") -> None:
+    assert check.ok, check
+    assert re.search(detail, check.detail), check.detail
+    assert check.fix == ""
+
+
+# --- the program -----------------------------------------------------------------------------------------------------------------
+
+
+def test_only_python_3_11_will_do() -> None:
+    _good(program.check_python((3, 11, 9)), r"3\.11\.9")
+    _bad(program.check_python((3, 12, 0)), r"3\.12\.0", r"Python 3\.11")
+
+
+@pytest.fixture
+def lock(tmp_path: Path) -> Path:
+    path = tmp_path / "requirements.lock"
+    lines = ["# a comment", "# --- to run", "numpy==2.4.6", "openvino-telemetry==1.0", "pyrealsense2==2.54.2.5684", "torch==2.13.0"]
+    path.write_text("\n".join([*lines, "# --- to test", "pytest==9.2.0", ""]))
+    return path
+
+
+class _Installed(dict[str, str]):
+    def __call__(self, name: str) -> str:
+        if name not in self:
+            raise metadata.PackageNotFoundError(name)
+        return self[name]
+
+
+def test_packages_are_compared_with_the_lock(lock: Path) -> None:
+    there = _Installed({"numpy": "2.4.6", "pyrealsense2": "2.54.2.5684", "torch": "2.13.0+cpu"})
+    _good(program.check_packages(lock, there), "^3 as pinned$")  # what tests need does not count, nor what set-up removes
+    there |= {"pyrealsense2": "2.55.1.6486"}
+    _bad(program.check_packages(lock, there), r"pyrealsense2 2\.55\.1\.6486 instead of 2\.54\.2\.5684 \(.*L515\)", "make setup")
+    del there["numpy"]
+    _bad(program.check_packages(lock, there), r"numpy missing instead of 2\.4\.6; pyrealsense2", "make setup")
+    _bad(program.check_packages(lock.with_name("gone.lock"), there), "cannot be read", "restore")
+
+
+def test_the_list_of_libraries_is_the_one_of_set_up() -> None:
+    text = (ROOT / "scripts" / "set_up.sh").read_text(encoding="utf-8")
+    listed = re.search(r'^libraries="\n(.*?)^"', text, re.MULTILINE | re.DOTALL)
+    assert listed
+    assert dict(line.split() for line in listed[1].splitlines()) == program.LIBRARIES
+
+
+def test_a_missing_library_is_one_command() -> None:
+    def load(library: str) -> None:
+        if library.startswith("libxcb-c"):
+            raise OSError(f"{library}: cannot open shared object file")
+
+    _good(program.check_libraries(lambda _: None), "12 can be loaded")
+    _bad(program.check_libraries(load), "missing: libxcb-cursor.so.0$", "sudo apt-get install .* libxcb-cursor0$")
+
+
+def test_vendor_libraries_are_really_loaded(tmp_path: Path) -> None:
+    broken = tmp_path / "libbroken.so"
+    broken.write_bytes(b"\x7fELF but no more")
+    check = program.check_binaries([("OpenCV", broken), ("Qt", None)])
+    _bad(check, r"OpenCV: .*libbroken\.so.*; Qt: is not installed", "^make clean && make setup$")
+    lacking = "libxcb-icccm.so.4: cannot open shared object file: No such file or directory"
+    _bad(program.check_binaries([("Qt", broken)], lambda _: lacking), "libxcb-icccm", "apt-get install .* libxcb-icccm4$")
+    _bad(program.check_binaries([("Qt", broken)], lambda _: lacking.replace("icccm", "new")), "libxcb-new", "apt-file search")
+    _good(program.check_binaries([("Qt", broken)], lambda _: ""), "Qt can be loaded")
+
+
+def test_what_an_installed_package_brings_is_mended_by_a_new_venv(tmp_path: Path) -> None:
+    """No package of the system has it, and set-up by itself would find the version that it wants."""
+
+    def load(path: Path) -> str:
+        return f"{path.name}: cannot open shared object file: No such file or directory"
+
+    gone, needed, system = (tmp_path / name for name in ("libqxcb.so", "libQt6Core.so.6", "libxcb-shape.so.0"))
+    _bad(program.check_binaries([("Qt", gone)], load), "libqxcb", "^make clean && make setup$")
+    _bad(program.check_binaries([("Qt", needed)], load), "libQt6Core", "^make clean && make setup$")
+    check = program.check_binaries([("Qt", system), ("OpenCV", needed)], load)
+    _bad(check, "libxcb-shape.*libQt6Core", "^sudo apt-get install .* libxcb-shape0 && make clean && make setup$")
+
+
+def _cut_short(tmp_path: Path) -> Path:
+    """A library whose process dies of a bus error when it is loaded, as one does that a full disk has cut."""
+    package = metadata.distribution("pyrealsense2")
+    whole = next(file for file in package.files or [] if file.match("pyrealsense2/pyrealsense2*.so"))
+    cut = tmp_path / "pyrealsense2.so"
+    cut.write_bytes(Path(str(whole.locate())).read_bytes()[:200_000])
+    return cut
+
+
+def test_a_library_cut_short_is_damaged() -> None:
+    damaged = "loading it ends with a fault (SIGBUS)"
+    _bad(program.check_binaries([("RealSense", Path("x.so"))], lambda _: damaged), "SIGBUS", "^make clean && make setup$")
+
+
+def test_a_realsense_library_cut_short_ends_no_other_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cut = _cut_short(tmp_path)
+    assert "SIGBUS" in program.load_elsewhere(cut)
+    monkeypatch.setattr(program, "_binaries", lambda: [("RealSense", cut)])
+    config = _rig(camera="realsense")
+    for check in (device_checks.check_camera(config), device_checks.check_picture(config)):
+        _bad(check, "library of RealSense cameras cannot be used: .*SIGBUS", "see the vendor libraries in main.py doctor")
+    _good(device_checks.list_cameras(dev=tmp_path, sys=tmp_path), "RealSense: the library .*SIGBUS")
+
+
+def test_a_display(tmp_path: Path) -> None:
+    def answers(display: str) -> bool:
+        return display == ":5"
+
+    _bad(program.check_display({}, answers), "none", "xvfb-run")
+    _good(program.check_display({"DISPLAY": ":5"}, answers), "X11, :5")
+    _bad(program.check_display({"DISPLAY": ":6"}, answers), "no X server", "xvfb-run")
+    _good(program.check_display({"QT_QPA_PLATFORM": "offscreen"}, answers), "nothing is shown")
+    wayland = {"WAYLAND_DISPLAY": "wayland-0", "XDG_RUNTIME_DIR": str(tmp_path)}
+    _bad(program.check_display(wayland, answers), "wayland-0", "desktop session")
+    (tmp_path / "wayland-0").touch()
+    _good(program.check_display(wayland, answers), "Wayland")
+
+
+def test_no_x_server_is_noticed_by_connecting() -> None:
+    assert not program.x_server_answers(":6123")
+
+
+# --- the computer ----------------------------------------------------------------------------------------------------------------
+
+
+def test_cores_and_memory() -> None:
+    _good(machine.check_machine(4, lambda: (16.0, 9.0)), "4 cores, 16.0 GB")
+    _bad(machine.check_machine(1, lambda: (16.0, 9.0)), "^1 core, ", "2 cores or more")
+    _bad(machine.check_machine(4, lambda: (16.0, 0.4)), "0.4 GB free", "close other programs")
+
+
+def test_room_for_recordings(tmp_path: Path) -> None:
+    config = RecordConfig(folder=str(tmp_path / "not" / "yet"))
+    _good(machine.check_disk(config, lambda _: (100_000_000_000, 0, 50_000_000_000)), "50.0 GB free of 100.0 GB")
+    _bad(machine.check_disk(config, lambda _: (100_000_000_000, 0, 5_000_000_000)), "5.0 GB free", r"7\.0 GB or more")
+    (tmp_path / "not").write_text("a file")
+    _bad(machine.check_disk(config), "is no folder", "record.folder")
+
+
+def test_the_clock() -> None:
+    _good(machine.check_clock(watched_s=0.005), "monotonic")
+    steps = itertools.count()
+    back = iter([10.0, 10.1, 10.05])
+    _bad(machine.check_clock(lambda: next(back), lambda: 0.001 * next(steps)), "went back by 50000 us", "restart")
+    steps = itertools.count()
+    slow = (0.0005 * number for number in itertools.count())
+    _bad(machine.check_clock(lambda: next(slow), lambda: 0.001 * next(steps)), "of the real rate", "clock source")
+    steps = itertools.count()
+    fast = (0.002 * number for number in itertools.count())
+    _bad(machine.check_clock(lambda: next(fast), lambda: 0.001 * next(steps)), "of the real rate", "clock source")
+    _bad(machine.check_clock(wall=lambda: 1e6, watched_s=0.0005), "1970.*date is wrong", "set-ntp")
+
+
+@pytest.mark.parametrize("stall", [0, 1, 2, -1, -2, -3])
+def test_a_process_that_stands_still_between_two_clocks_is_no_fault_of_theirs(stall: int) -> None:
+    """It was one: on a busy machine the check said that the clock runs at 1.076 of the real rate."""
+
+    def check(late: int | None) -> tuple[machine.Check, int]:
+        now, read = 0.0, 0
+
+        def clock() -> float:
+            nonlocal now, read
+            now += 0.5 if read == late else 1e-6
+            read += 1
+            return now
+
+        return machine.check_clock(clock, clock, watched_s=0.001), read
+
+    well, count = check(None)
+    _good(well, "monotonic")
+    _good(check(stall % count)[0], "monotonic")
+
+
+# --- the model -------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(MODELS / "default", tmp_path / "copy"))
+
+
+def _segmentation(folder: Path | str) -> PerceptionConfig:
+    return PerceptionConfig(segmentation=SegmentationConfig(model=str(folder), device="openvino", threads=1))
+
+
+def test_a_whole_model_passes_and_a_flipped_bit_is_found(copied: Path) -> None:
+    _good(model.check_model("default"), "SHA-256")
+    data = bytearray((copied / ONNX_INT8).read_bytes())
+    data[len(data) // 2] ^= 1
+    (copied / ONNX_INT8).write_bytes(data)
+    _bad(model.check_model(str(copied)), "SHA-256 differs", "restore the model folder")
+    _bad(model.check_self_test(_segmentation(copied)), "not run: .*SHA-256", "restore")
+    _bad(model.check_model(str(copied / "gone")), "no model", "restore|set perception")
+
+
+def test_a_model_that_has_lost_its_second_look_does_not_pass(copied: Path) -> None:
+    shutil.rmtree(copied / SECOND_LOOK)
+    _bad(model.check_model(str(copied)), "second_look.*missing", "restore the model folder")
+    _bad(model.check_self_test(_segmentation(copied)), "not run: .*second_look", "restore")
+
+
+def test_an_eight_bit_network_that_a_processor_gets_wrong_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model, "_EIGHT_BIT_OFF", 1e-9)  # no eight-bit network is as exact as that
+    _bad(
+        model.check_self_test(_segmentation("default")),
+        "on this processor the eight-bit network is off by 0.00",
+        "precision to fp32",
+    )
+
+
+def test_the_second_looks_eight_bits_are_compared_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first look is exact here, the second one is off where it looks at one window by itself."""
+    apart = model._apart
+    off = iter((0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+    monkeypatch.setattr(model, "_apart", lambda some, others: next(off) + 0.0 * apart(some, others))
+    _bad(model.check_self_test(_segmentation("default")), "eight-bit network is off by 1.000", "precision to fp32")
+
+
+def test_an_exact_network_has_nothing_to_be_compared_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model, "_EIGHT_BIT_OFF", 1e-9)
+    _good(model.check_self_test(PerceptionConfig(segmentation=SegmentationConfig(precision="fp32"))), "OpenVINO CPU fp32")
+
+
+def test_the_shipped_model_passes_its_self_test() -> None:
+    _good(model.check_self_test(_segmentation("default")), "state . .true .., theta off by")
+
+
+def test_a_model_with_swapped_outputs_is_found(copied: Path) -> None:
+    import onnx
+    from onnx import helper, numpy_helper
+
+    network = onnx.load(str(copied / ONNX))
+    output = network.graph.output[0].name
+    for node in network.graph.node:
+        node.output[:] = ["straight" if name == output else name for name in node.output]
+    network.graph.initializer.append(numpy_helper.from_array(np.array([1, 0], np.int64), "order"))
+    network.graph.node.append(helper.make_node("Gather", ["straight", "order"], [output], axis=1))
+    onnx.save(network, str(copied / ONNX))
+    info = json.loads((copied / INFO).read_text())
+    info |= {"onnx_sha256": sha256_of(copied / ONNX), "onnx_int8_sha256": None}
+    (copied / INFO).write_text(json.dumps(info))
+    _good(model.check_model(str(copied)))
+    _bad(model.check_self_test(_segmentation(copied)), "takes the vessel for the robot", "restore|git checkout")
+
+
+# --- cameras ---------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def dev(tmp_path: Path) -> Path:
+    folder = tmp_path / "dev"
+    (folder / "v4l" / "by-id").mkdir(parents=True)
+    return folder
+
+
+@pytest.fixture
+def sys_(tmp_path: Path) -> Path:
+    folder = tmp_path / "sys"
+    folder.mkdir()
+    return folder
+
+
+def _plug_realsense(sys_: Path, mbit_s: str) -> None:
+    folder = sys_ / "bus" / "usb" / "devices" / "2-1"
+    folder.mkdir(parents=True)
+    for name, text in {"idVendor": "8086", "product": "Intel(R) RealSense(TM) L515", "serial": "f1", "speed": mbit_s}.items():
+        (folder / name).write_text(text + "\n")
+
+
+def _plug_webcam(dev: Path, sys_: Path, number: int, title: str) -> None:
+    for index in (0, 1):  # the second node carries metadata
+        folder = sys_ / "class" / "video4linux" / f"video{2 * number + index}"
+        folder.mkdir(parents=True)
+        (folder / "name").write_text(title + "\n")
+        (folder / "index").write_text(f"{index}\n")
+        (dev / folder.name).touch()
+    (dev / "v4l" / "by-id" / f"usb-{title}-index0").symlink_to(dev / f"video{2 * number}")
+
+
+def _rig(**settings: object) -> Config:
+    camera = {name: settings.pop(name) for name in ("serial", "device") if name in settings}
+    return Config.model_validate({"rig": {"robot": "none"} | settings, "camera": camera})
+
+
+def test_the_twin_needs_no_camera_and_a_recording_must_be_there(tmp_path: Path) -> None:
+    _good(device_checks.check_camera(Config()), "twin needs none")
+    config = _rig(camera="video_file", source=str(tmp_path / "v.mp4"))
+    _bad(device_checks.check_camera(config), "is not there", "rig.source")
+    (tmp_path / "v.mp4").touch()
+    _good(device_checks.check_camera(config), "v.mp4")
+    _bad(device_checks.check_camera(_rig(camera="image_folder")), "None is not there", "rig.source")
+
+
+def test_a_realsense_camera(sys_: Path) -> None:
+    config = _rig(camera="realsense")
+    _good(device_checks.check_camera(config, lambda: [L515], sys=sys_), r"L515 f1, firmware 1\.5\.8\.1, USB 3\.2")
+    _bad(device_checks.check_camera(config, lambda: [], sys=sys_), "no RealSense camera", "plug it")
+    other = RealSenseInfo("Intel RealSense D435", "d2")
+    _bad(device_checks.check_camera(config, lambda: [L515, other], sys=sys_), "2 RealSense cameras: f1, d2", "camera.serial")
+    _good(device_checks.check_camera(_rig(camera="realsense", serial="d2"), lambda: [L515, other], sys=sys_), "D435 d2")
+    _bad(
+        device_checks.check_camera(_rig(camera="realsense", serial="x"), lambda: [L515], sys=sys_),
+        "no RealSense camera x",
+        "serial",
+    )
+
+
+def test_usb_2_and_old_firmware_are_found(sys_: Path) -> None:
+    config = _rig(camera="realsense")
+    slow = RealSenseInfo("Intel RealSense L515", "f1", "1.5.8.1", "1.5.8.1", "2.1")
+    _bad(device_checks.check_camera(config, lambda: [slow], sys=sys_), r"USB 2\.1", "USB 3 port")
+    old = RealSenseInfo("Intel RealSense L515", "f1", "1.5.1.3", "1.5.8.1", "3.2")
+    _bad(device_checks.check_camera(config, lambda: [old], sys=sys_), r"1\.5\.1\.3", r"firmware to 1\.5\.8\.1")
+    _plug_realsense(sys_, "480")
+    silent = RealSenseInfo("Intel RealSense L515", "f1")
+    _bad(device_checks.check_camera(config, lambda: [silent], sys=sys_), "L515 f1", "USB 3 port")
+
+
+def test_a_camera_that_is_plugged_in_but_closed_to_us_needs_the_udev_rules(sys_: Path) -> None:
+    _plug_realsense(sys_, "5000")
+    _bad(device_checks.check_camera(_rig(camera="realsense"), lambda: [], sys=sys_), "cannot be opened", "udevadm trigger")
+
+
+def test_webcams(dev: Path, sys_: Path) -> None:
+    _bad(device_checks.check_camera(_rig(camera="webcam"), dev=dev, sys=sys_), "no webcam", "plug it in")
+    _plug_webcam(dev, sys_, 0, "Logi")
+    _plug_webcam(dev, sys_, 1, "Industrial")
+    _good(device_checks.check_camera(_rig(camera="webcam"), dev=dev, sys=sys_), "Logi, the first of 2")
+    stable = dev / "v4l" / "by-id" / "usb-Industrial-index0"
+    _good(device_checks.check_camera(_rig(camera="webcam", device=str(stable)), dev=dev, sys=sys_), "Industrial")
+    _good(device_checks.check_camera(_rig(camera="webcam", device="2"), dev=dev, sys=sys_), "Industrial")
+    gone = _rig(camera="webcam", device=str(dev / "video9"))
+    _bad(device_checks.check_camera(gone, dev=dev, sys=sys_), "video9 is not there; webcams: .*Logi.*Industrial", "camera.device")
+    found = device_checks.list_cameras(lambda: [L515], dev=dev, sys=sys_)
+    _good(found, r"L515 f1.*; Logi \(.*usb-Logi-index0\); Industrial")
+
+
+class _Camera:
+    """Gives `image` `rate` times a second, by its own count of time."""
+
+    name, is_live = "soft", True
+
+    def __init__(self, image: Image, rate: float = 30.0, problem: str | None = None) -> None:
+        self._image, self._rate, self._problem = image, rate, problem
+        self.closed = False
+        self._index = -1
+
+    def open(self) -> None:
+        if self._problem:
+            raise DeviceError(self._problem)
+
+    def read(self, timeout_s: float) -> Frame | None:
+        time.sleep(0.002)
+        self._index += 1
+        return Frame(self._index, self._index / self._rate, self._image)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def _scene() -> Image:
+    return np.random.default_rng(0).integers(40, 200, (120, 160, 3), np.uint8)
+
+
+def test_a_real_camera_is_tried() -> None:
+    config, good = _rig(camera="webcam"), _Camera(_scene())
+    _good(device_checks.check_picture(Config()), "only real cameras")
+    _good(device_checks.check_picture(config, lambda _: good, 0.05), r"160x120, 30\.0 frames/s, 0 lost, brightness 1\d\d of 255")
+    assert good.closed
+    _bad(
+        device_checks.check_picture(config, lambda _: _Camera(_scene(), rate=12.0), 0.05),
+        r"12\.0 frames/s",
+        "should give 30: more light",
+    )
+    _bad(device_checks.check_picture(config, lambda _: _Camera(np.zeros_like(_scene())), 0.05), "black", "lens cap")
+    lost = _Camera(_scene(), problem="webcam cannot be opened")
+    _bad(device_checks.check_picture(config, lambda _: lost, 0.05), "cannot be opened", "close other programs")
+    assert lost.closed
+
+
+# --- servos ----------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def line() -> Iterator[str]:
+    master, slave = pty.openpty()
+    yield os.ttyname(slave)
+    os.close(master)
+    os.close(slave)
+
+
+def test_without_a_port_nothing_is_wrong(sys_: Path) -> None:
+    for check in (
+        device_checks.check_servo_port(None),
+        device_checks.check_servos(ServosConfig()),
+        device_checks.check_latency(None, sys_),
+    ):
+        _good(check, "not configured")
+
+
+def test_the_servo_port(line: str, tmp_path: Path) -> None:
+    _good(device_checks.check_servo_port(line), "is free")
+    _bad(device_checks.check_servo_port(None, wanted=True), "the rig has servos, but no port", "servos.port")
+    stable = tmp_path / "usb-U2D2"
+    stable.symlink_to(line)
+    _good(device_checks.check_servo_port(str(stable)), re.escape(line))
+    _bad(device_checks.check_servo_port(str(tmp_path / "gone")), "is not there", "by-id")
+    (tmp_path / "file").touch()
+    _bad(device_checks.check_servo_port(str(tmp_path / "file")), "no serial port", "servos.port")
+    _bad(device_checks.check_servo_port("/dev/null"), "no serial port", "servos.port")
+
+
+def test_a_port_that_another_program_holds(line: str) -> None:
+    from hardware.servos.dynamixel_port import ServoLine
+
+    other = ServoLine(line, 57600)
+    other.open()
+    try:
+        _bad(device_checks.check_servo_port(line), "in use by another program", f"fuser -v {line}")
+        _bad(device_checks.check_servos(ServosConfig(port=line)), "not asked: .*in use", "see the servo port")
+    finally:
+        other.close()
+    _good(device_checks.check_servo_port(line))
+
+
+def test_a_port_without_permission_names_the_group(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(device_checks.os, "access", lambda *_: False)
+    monkeypatch.setattr(device_checks, "_group", lambda _: "dialout")
+    _bad(
+        device_checks.check_servo_port(line), "no permission for .*group dialout", r"usermod -aG dialout \$USER, then log in again"
+    )
+
+
+@pytest.mark.parametrize(("text", "ok"), [("1", True), ("2", True), ("16", False)])
+def test_the_latency_of_an_ftdi_adapter(sys_: Path, dev: Path, text: str, ok: bool) -> None:
+    port = dev / "ttyUSB0"
+    port.touch()
+    (dev / "usb-U2D2").symlink_to(port)
+    _good(device_checks.check_latency(str(port), sys_), "no latency timer")
+    timer = sys_ / "bus" / "usb-serial" / "devices" / "ttyUSB0" / "latency_timer"
+    timer.parent.mkdir(parents=True)
+    timer.write_text(text + "\n")
+    check = device_checks.check_latency(str(dev / "usb-U2D2"), sys_)
+    if ok:
+        _good(check, f"^{text} ms")
+    else:
+        _bad(check, "^16 ms", f"echo 1 . sudo tee {timer}")
+
+
+@pytest.fixture
+def bus() -> Iterator[SoftServoBus]:
+    servos_ = SoftServoBus(ServosConfig(), wire_time=True)
+    servos_.start()
+    yield servos_
+    servos_.stop()
+
+
+@pytest.mark.real_time
+def test_servos_answer_and_nothing_is_changed(bus: SoftServoBus) -> None:
+    config = ServosConfig(port=bus.port)
+    before = [bytes(bus.servo(joint.id).answer(2, 0, 147).data) for joint in config.joints]
+    _good(device_checks.check_servos(config), r"7 answer, model 1020, firmware \d+; 1\d\.\d V at least, \d+ .C at most, torque off")
+    after = [bytes(bus.servo(joint.id).answer(2, 0, 147).data) for joint in config.joints]
+    tick = slice(120, 122)  # the realtime tick counts on
+    assert [data[: tick.start] + data[tick.stop :] for data in before] == [data[: tick.start] + data[tick.stop :] for data in after]
+    _good(device_checks.check_servo_port(bus.port), "is free")
+
+
+@pytest.mark.real_time
+def test_a_silent_servo_is_named(bus: SoftServoBus) -> None:
+    config = ServosConfig(port=bus.port)
+    bus.faults.mute(3)
+    _bad(device_checks.check_servos(config), r"servo up \(id 3\)", "12 V")
+
+
+@pytest.mark.real_time
+def test_a_weak_supply_and_an_overloaded_servo_are_found(bus: SoftServoBus) -> None:
+    demanding = ServosConfig(port=bus.port, min_voltage_v=20.0)
+    _bad(device_checks.check_servos(demanding), "V at least", "20 V or more")
+    bus.stir(6, lambda servo: servo.heat(75.0))
+    _bad(device_checks.check_servos(ServosConfig(port=bus.port)), "75 .C at most", "cool below 70 .C")
+    bus.stir(2, lambda servo: servo.alert(32))
+    _bad(device_checks.check_servos(ServosConfig(port=bus.port)), "hardware error, .*left: overload", "restart that servo")
+
+
+# --- controls --------------------------------------------------------------------------------------------------------------------
+
+
+def test_controls_that_are_not_configured() -> None:
+    _good(device_checks.check_pedal(PedalConfig()), "not configured")
+    _good(device_checks.check_gamepad(GamepadConfig(enabled=False)), "not configured")
+
+
+def test_a_missing_gamepad_and_a_missing_pedal(tmp_path: Path) -> None:
+    _bad(device_checks.check_gamepad(GamepadConfig(device=str(tmp_path / "js0"))), "is not there", "plug it in")
+    _bad(device_checks.check_pedal(PedalConfig(port=str(tmp_path / "pedal"))), "does not exist", "pedal.port")
+
+
+def test_a_gamepad_is_named(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "js0")
+    _good(device_checks.check_gamepad(GamepadConfig(device=str(tmp_path / "js0"))), "js0")
+
+
+@pytest.mark.real_time
+def test_the_pedal_is_heard() -> None:
+    with SoftPedal() as pedal:
+        config = PedalConfig(port=pedal.port)
+        _good(device_checks.check_pedal(config), "deadman released")
+        pedal.press_stop()
+        _bad(device_checks.check_pedal(config), "STOP is pressed", "release STOP")
+        pedal.release_stop()
+        pedal.mute()
+        _bad(device_checks.check_pedal(config, listen_s=0.1), "is silent", "power")
+
+
+# --- all of it -------------------------------------------------------------------------------------------------------------------
+
+
+def test_all_checks_are_made_one_after_the_other_and_have_names_of_their_own(tmp_path: Path) -> None:
+    config = Config(
+        rig=RigConfig(camera="image_folder", robot="none", source=str(tmp_path)),
+        record=RecordConfig(folder=str(tmp_path), warn_free_mb=0.0, warn_free_share=0.0),
+        perception=_segmentation(tmp_path / "no model"),
+        gamepad=GamepadConfig(enabled=False),
+    )
+    checks = list(run_checks(config, {"QT_QPA_PLATFORM": "offscreen"}))
+    names = [check.name for check in checks]
+    assert len(set(names)) == len(names)
+    assert {"packages", "system libraries", "display", "model", "self-test", "camera", "servo port", "clock"} <= set(names)
+    assert all(check.ok == (check.fix == "") for check in checks)
+    assert {check.name for check in checks if not check.ok} == {"model", "self-test"}
+    assert checks[0].to_json().keys() == {"name", "ok", "detail", "fix"}

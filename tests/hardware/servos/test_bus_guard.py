@@ -1,0 +1,527 @@
+"""What the bus process decides, without a process: the slot, one order's step, jams, and faults 21 to 28 of the safety rules."""
+
+from __future__ import annotations
+
+import math
+import mmap
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from core.config.safety import SafetyConfig, ServosConfig
+from core.control.faults import Cause
+from core.control.gate import Rejection, RejectReason, Source
+from core.types import Command
+from hardware.processes import SharedSlot
+from hardware.servos.bus_guard import BusGuard, OneStep
+from hardware.servos.bus_ipc import BusOrder, Heartbeat, pack_heartbeat, pack_order, unpack_heartbeat, unpack_order
+from hardware.servos.dynamixel_port import NotReady
+from hardware.servos.lockstep import LockStepServos
+from hardware.servos.motion_watch import Jam, JamWatch
+from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
+
+SERVOS, SAFETY = ServosConfig(), SafetyConfig()
+CYCLE_S = 0.02
+
+
+# --- the slot --------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def memory() -> Iterator[mmap.mmap]:
+    with mmap.mmap(-1, SharedSlot.size(16)) as memory:
+        yield memory
+
+
+def test_the_newest_value_wins(memory: mmap.mmap) -> None:
+    writer, reader = SharedSlot(memory, 0, 16), SharedSlot(memory, 0, 16)
+    assert reader.newest() is None
+    for text in (b"one", b"two", b"three", b""):
+        writer.put(text)
+    assert reader.newest() == (4, b"")
+    assert reader.newest() == (4, b"")
+    writer.put(b"x" * 16)
+    assert reader.newest() == (5, b"x" * 16)
+    with pytest.raises(ValueError, match="17 bytes"):
+        writer.put(b"x" * 17)
+
+
+@given(st.integers(0, 31), st.integers(1, 255))
+def test_a_half_written_value_is_none_and_the_one_before_stands(at: int, flip: int) -> None:
+    """Whatever byte of the newest half is not as it should be. (16 bytes of head, 16 of data, the newest in the first half.)"""
+    with mmap.mmap(-1, SharedSlot.size(16)) as memory:
+        writer = SharedSlot(memory, 0, 16)
+        writer.put(b"before" + bytes(10))
+        writer.put(b"after" + bytes(11))
+        memory[at] ^= flip
+        assert SharedSlot(memory, 0, 16).newest() == (1, b"before" + bytes(10))
+
+
+def test_orders_and_heartbeats_come_over_whole() -> None:
+    orders = [
+        BusOrder(Command(0.1, -0.2, 3.0, -4.0), Source.OPERATOR, 12.5),
+        BusOrder(Command(), Source.PROGRAM, 12.5, 12.4),
+        BusOrder(None, Source.OPERATOR, 1e9),
+    ]
+    assert [unpack_order(pack_order(order)) for order in orders] == orders
+    beats = [Heartbeat(1.0, None), Heartbeat(2.0, Source.OPERATOR), Heartbeat(3.0, Source.PROGRAM)]
+    assert [unpack_heartbeat(pack_heartbeat(beat)) for beat in beats] == beats
+    assert unpack_heartbeat(pack_heartbeat(Heartbeat(math.nan, None))) is None
+
+
+@given(st.binary(max_size=64))
+def test_no_bytes_make_an_order_that_is_none(data: bytes) -> None:
+    order, beat = unpack_order(data), unpack_heartbeat(data)
+    assert order is None or isinstance(order.source, Source)
+    assert beat is None or math.isfinite(beat.time_s)
+
+
+# --- one order, one step ---------------------------------------------------------------------------------------------------------
+
+
+def test_one_order_moves_a_joint_by_one_step_at_most() -> None:
+    """The steps are 0.6 mm of a tendon and 1 mm of a feed, from where the joint was when the order was first obeyed."""
+    step, at = OneStep(SERVOS.joints), (0.0,) * 4 + (10.0, 0.0, 0.0)
+    asked = (0.5, -0.7, 0.0, 0.0, 10.9, 2.0, math.nan)
+    bounded = step.bounded(asked, (1.0, "a"), at)
+    assert bounded[:6] == (0.5, -0.6, 0.0, 0.0, 10.9, 1.0)
+    assert math.isnan(bounded[6])
+    moved = (0.5, -0.6, 0.0, 0.0, 10.9, 0.9, 0.0)
+    further = (0.9, -0.9, 0.0, 0.0, 11.5, 1.5, 0.0)
+    assert step.bounded(further, (1.0, "a"), moved) == (0.6, -0.6, 0.0, 0.0, 11.0, 1.0, 0.0)
+    assert step.bounded(further, (1.02, "a"), moved) == further
+
+
+# --- jams ------------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_joint_that_stands_though_its_goal_is_far_is_jammed() -> None:
+    """Far: more than half of the tendon's step of 0.6 mm, for 0.2 s."""
+    watch, goals, at = JamWatch(SERVOS.joints, 0.2), (0.4,) + (0.0,) * 6, (0.0,) * 7
+    seen = [watch.see(goals, at, n * CYCLE_S) for n in range(12)]
+    assert seen[:10] == [None] * 10
+    assert seen[10] == Jam(SERVOS.joints[0], 0.4, 0.2)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        lambda t: (0.29, 0.0),
+        lambda t: (5.0 * t + 0.4, 5.0 * t),
+        lambda t: (0.4 if t % 0.2 < 0.1 else 0.0, 0.0),
+        lambda t: (0.4 if t % 0.2 < 0.1 else -0.4, 0.0),
+    ],
+    ids=["near", "lags but moves", "far now and then", "to and fro"],
+)
+def test_no_jam(path: Callable[[float], tuple[float, float]]) -> None:
+    watch = JamWatch(SERVOS.joints, 0.2)
+    for n in range(100):
+        goal, at = path(n * CYCLE_S)
+        assert watch.see((goal,) + (0.0,) * 6, (at,) + (0.0,) * 6, n * CYCLE_S) is None
+
+
+# --- the guard -------------------------------------------------------------------------------------------------------------------
+
+
+class Bench:
+    """A guard in simulated time with seven servos that are where the goals are, unless a test says else."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+        self.guard = BusGuard(SERVOS, SAFETY, self.now_s)
+        self.positions = [0.0] * 7
+        self.goals = [0.0] * 7
+        self.beating = True
+        self.permitted: Source | None = Source.PROGRAM
+        self.command: Command | None = Command(advance_mm_s=5.0)
+        self.beat: Heartbeat | None = None
+        self.order: BusOrder | None = None
+        self.errors = 0
+        self.alter: Callable[[ServoState], ServoReading] = lambda state: state
+        self.frozen = False
+
+    def readings(self) -> list[ServoReading]:
+        return [
+            self.alter(
+                ServoState(joint.name, joint.id, self.now_s, 0, 0, at, goal, 0.0, 8.0, 12.0, 30.0, HardwareError(0), True, False)
+            )
+            for joint, at, goal in zip(SERVOS.joints, self.positions, self.goals, strict=True)
+        ]
+
+    def cycle(self, pause_s: float = CYCLE_S) -> None:
+        """One turn as the loop makes it."""
+        self.now_s += pause_s
+        if self.beating:
+            self.beat = Heartbeat(self.now_s, self.permitted)
+            self.order = BusOrder(self.command, Source.PROGRAM, self.now_s, self.now_s)
+        fault = self.guard.see(self.readings(), self.errors, self.beat, self.now_s)
+        if fault is not None:
+            self.guard.end_motion(fault)
+        elif self.guard.armed:
+            step = self.guard.step(self.order, self.beat, self.now_s)
+            if step.goals_mm is not None:
+                self.guard.wrote(step.goals_mm, self.order, self.now_s)
+                self.goals = list(step.goals_mm)
+                if not self.frozen:
+                    self.positions = list(step.goals_mm)
+
+    def arm(self) -> None:
+        self.cycle()
+        self.guard.check_arming()
+        self.guard.set_armed(self.now_s)
+
+    def until_disarmed(self, most_s: float) -> float:
+        """Seconds until the guard is disarmed."""
+        start_s = self.now_s
+        while self.guard.armed and self.now_s - start_s < most_s:
+            self.cycle()
+        assert not self.guard.armed
+        return self.now_s - start_s
+
+
+@pytest.fixture
+def bench() -> Bench:
+    bench = Bench()
+    bench.arm()
+    return bench
+
+
+def test_it_boots_disarmed_and_the_first_goals_are_the_positions() -> None:
+    bench = Bench()
+    bench.positions[4] = 3.0
+    bench.cycle()
+    assert not bench.guard.armed
+    assert bench.guard.sent is None
+    bench.arm()
+    bench.cycle()
+    assert bench.guard.sent is not None
+    assert bench.guard.sent.goals_mm[4] == 3.0
+    assert bench.guard.sent.motion.advance_mm_s == 0.0
+
+
+def test_it_follows_orders_and_tells_what_was_sent(bench: Bench) -> None:
+    for _ in range(50):
+        bench.cycle()
+    assert bench.goals[4] == pytest.approx(5.0 * 0.98, abs=0.4)
+    assert bench.guard.sent is not None
+    assert bench.guard.sent.motion.advance_mm_s == pytest.approx(5.0)
+    assert bench.guard.sent.order == bench.order
+
+
+def test_what_was_limited_is_told_as_it_was_sent(bench: Bench) -> None:
+    """Asked for 20 mm/s from rest, the joint may get faster by 200 mm/s^2."""
+    bench.command = Command(advance_mm_s=20.0, bend=1.0)
+    for _ in range(3):
+        bench.cycle()
+    assert bench.guard.clamps
+    assert bench.guard.sent is not None
+    assert bench.guard.sent.motion.advance_mm_s == pytest.approx(8.0)
+    assert 0.0 < bench.guard.sent.motion.bend < 0.3
+
+
+def test_where_nothing_is_written_nothing_is_told_as_sent(bench: Bench) -> None:
+    """Positions that are too old: the servos keep their goals, and the order of long ago was shown as if it still went out."""
+    bench.command = Command(advance_mm_s=5.0, bend=0.5)
+    for _ in range(20):
+        bench.cycle()
+    bench.alter = lambda state: MissingServo(state.name, state.id, state.time_s, 0, "late") if state.id == 3 else state
+    for _ in range(7):
+        bench.cycle()
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.STALE_MEASUREMENT
+    assert bench.guard.sent is not None
+    assert bench.guard.sent.order is None
+    assert bench.guard.sent.motion == Command(bend=pytest.approx(0.5))  # type: ignore[arg-type]
+    assert bench.guard.sent.goals_mm == tuple(bench.goals)
+    bench.alter = lambda state: state
+    bench.cycle()
+    bench.cycle()
+    assert bench.guard.sent.order == bench.order
+
+
+def _silent_one(servo_id: int | None, state: ServoState) -> ServoReading:
+    return MissingServo(state.name, state.id, state.time_s, 1, "silent") if state.id == servo_id else state
+
+
+def test_servos_that_are_silent_in_turns_disarm() -> None:
+    """None misses three answers in a row, and yet there are never positions of all: all stood still, and nothing said why."""
+    bench = Bench()
+    bench.arm()
+    begun_s = bench.now_s
+    for turn in range(100):
+        bench.alter = partial(_silent_one, (1, 5)[turn % 2])
+        bench.cycle()
+        if not bench.guard.armed:
+            break
+    assert not bench.guard.armed
+    assert bench.now_s - begun_s == pytest.approx(SAFETY.bus_disarm_s, abs=2.1 * CYCLE_S)
+    assert bench.guard.latched is not None
+    assert bench.guard.latched.cause is Cause.SERVO_SILENT
+    assert bench.guard.latched.detail == "in turns, right, advance: not all in one cycle for 0.5 s"
+    bench.alter = lambda state: state
+    bench.cycle()
+    bench.guard.acknowledge()
+    bench.guard.check_arming()
+
+
+def test_one_whole_cycle_now_and_then_is_enough() -> None:
+    bench = Bench()
+    bench.arm()
+    for turn in range(100):
+        bench.alter = partial(_silent_one, (1, 5, None)[turn % 3])
+        bench.cycle()
+    assert bench.guard.armed
+
+
+def test_an_order_from_before_the_arming_does_not_count() -> None:
+    bench = Bench()
+    bench.cycle()
+    bench.now_s += 0.001
+    bench.guard.set_armed(bench.now_s)
+    bench.beating = False
+    bench.cycle()
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.NO_COMMAND
+
+
+def test_a_joint_from_where_no_goal_leads_hinders_arming_and_is_named() -> None:
+    bench = Bench()
+    bench.positions[0], bench.positions[4] = 4.0, -7.0
+    with pytest.raises(NotReady) as told:
+        bench.arm()
+    what_to_do = "switch the torque off and move it back by hand, or zero it again"
+    assert str(told.value) == (
+        f"not armed: outside its envelope: right at 4.00 mm (-2.4 to 2.8 mm): {what_to_do}; "
+        f"outside its envelope: advance at -7.00 mm (-5 to 400 mm): {what_to_do}"
+    )
+    assert not bench.guard.armed
+    bench.positions[0], bench.positions[4] = 2.8, -6.0  # one bounded step brings it back
+    bench.arm()
+    bench.cycle()
+    assert bench.guard.sent is not None
+    assert bench.guard.sent.goals_mm[4] == -5.0
+
+
+def test_positions_from_long_ago_and_unknown_ones_hinder_no_arming() -> None:
+    bench = Bench()
+    bench.positions[4] = -7.0
+    bench.cycle()
+    bench.alter = lambda state: replace(state, position_mm=None)  # a lost zero, of which the driver tells
+    for _ in range(6):
+        bench.cycle()
+    bench.guard.check_arming()
+
+
+def test_why_not_even_a_hold_leaves_is_told_also_while_nobody_may_drive() -> None:
+    bench = Bench()
+    bench.permitted = None
+    bench.arm()
+    bench.positions[4] = -7.0  # moved between the check and the first cycle
+    bench.cycle()
+    assert bench.guard.sent is None
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.MEASURED_OUT_OF_ENVELOPE
+    assert bench.guard.rejection.detail == "advance at -7.00 mm (-5 to 400 mm)"
+    bench.positions[4] = 0.0
+    bench.cycle()
+    assert bench.guard.sent is not None
+    assert bench.guard.rejection.reason is RejectReason.NOT_ARMED
+
+
+def test_in_lock_step_the_guard_looks_before_it_arms() -> None:
+    servos = LockStepServos(SERVOS, SAFETY, lambda: 100.0)
+    servos.cycle()
+    servos._at_mm = (0.0, 0.0, 0.0, 0.0, -7.0, 0.0, 0.0)
+    with pytest.raises(NotReady, match=r"advance at -7\.00 mm"):
+        servos.arm()
+    servos.zero(["advance"])
+    servos.arm()
+    servos._at_mm = (0.0, 0.0, 0.0, 0.0, -7.0, 0.0, 0.0)
+    servos.cycle()
+    assert servos.sent_motion() is None
+    assert servos.kept_back() == Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, "advance at -7.00 mm (-5 to 400 mm)")
+    servos.disarm()
+    assert servos.kept_back() is None
+
+
+def test_a_dead_application_moves_a_joint_by_one_step_then_it_holds_then_it_is_disarmed(bench: Bench) -> None:
+    bench.command = Command(advance_mm_s=20.0)
+    for _ in range(30):
+        bench.cycle()
+    last, bench.beating = bench.positions[4], False
+    for _ in range(7):
+        bench.cycle()
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.NOT_ARMED
+    held = bench.positions[4]
+    assert last < held <= last + SERVOS.joints[4].max_step_mm
+    assert 0.34 < bench.until_disarmed(1.0) < 0.40
+    assert bench.positions[4] == held
+    assert bench.guard.latched is not None
+    assert bench.guard.latched.cause is Cause.WORKER_DEAD
+
+
+@pytest.mark.parametrize("permitted", [None, Source.OPERATOR])
+def test_nobody_but_the_permitted_one_moves_the_servos(bench: Bench, permitted: Source | None) -> None:
+    bench.cycle()
+    before, bench.permitted = bench.goals, permitted
+    for _ in range(10):
+        bench.cycle()
+    assert bench.goals == before
+    assert bench.guard.armed
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_rejected_by_name(bench: Bench, number: float) -> None:
+    bench.cycle()
+    before, bench.command = bench.goals, Command(bend=number)
+    bench.cycle()
+    assert bench.guard.rejections[RejectReason.NON_FINITE] == 1
+    assert bench.goals == before
+
+
+def _silent(state: ServoState) -> ServoReading:
+    return MissingServo(state.name, state.id, state.time_s, 3, "no answer") if state.id == 3 else state
+
+
+@pytest.mark.parametrize(
+    ("alter", "cause", "stops"),
+    [
+        (_silent, Cause.SERVO_SILENT, False),
+        (lambda s: replace(s, error=HardwareError.OVERLOAD, torque=False) if s.id == 2 else s, Cause.SERVO_ALERT, True),
+        (lambda s: replace(s, temperature_c=70.0) if s.id == 5 else s, Cause.HOT, False),
+        (lambda s: replace(s, voltage_v=10.5), Cause.VOLTAGE_LOW, False),
+        (lambda s: replace(s, torque=False) if s.id == 7 else s, Cause.REBOOTED, False),
+        (lambda s: MissingServo(s.name, s.id, s.time_s, 0, "", restarted=True) if s.id == 7 else s, Cause.REBOOTED, False),
+        (lambda s: replace(s, watchdog_tripped=True) if s.id == 1 else s, Cause.WATCHDOG, False),
+    ],
+    ids=["21 silent", "23 overload", "24 hot", "24 voltage", "27 torque lost", "27 restarted", "watchdog"],
+)
+def test_faults_of_servos(bench: Bench, alter: Callable[[ServoState], ServoReading], cause: Cause, stops: bool) -> None:
+    bench.cycle()
+    bench.alter = alter
+    bench.cycle()
+    assert (bench.guard.armed, bench.guard.stopped) == (False, stops)
+    assert bench.guard.latched is not None
+    assert bench.guard.latched.cause is cause
+    assert bench.guard.fault_counts[cause] == 1
+    with pytest.raises(NotReady, match="acknowledge first"):
+        bench.guard.check_arming()
+
+
+def test_fault_22_six_bad_packets_in_a_second(bench: Bench) -> None:
+    for errors in (2, 2, 1):
+        bench.errors = errors
+        bench.cycle()
+        assert bench.guard.armed
+    bench.errors = 1
+    bench.cycle()
+    assert bench.guard.latched is not None
+    assert bench.guard.latched.cause is Cause.BUS_NOISE
+
+
+def test_fault_25_a_jam(bench: Bench) -> None:
+    for _ in range(20):
+        bench.cycle()
+    bench.frozen = True
+    assert 0.2 < bench.until_disarmed(2.0) < 0.6
+    assert bench.guard.stopped
+    assert bench.guard.latched is not None
+    assert bench.guard.latched.cause is Cause.TRACKING
+    assert "advance stands" in bench.guard.latched.detail
+
+
+def test_fault_26_the_port_is_lost(bench: Bench) -> None:
+    bench.guard.end_motion(bench.guard.lost_port())
+    assert (bench.guard.armed, bench.guard.stopped) == (False, True)
+    bench.guard.acknowledge()
+    with pytest.raises(NotReady, match="servo port lost"):
+        bench.guard.check_arming()
+
+
+def test_fault_35_the_process_stood_still(bench: Bench) -> None:
+    bench.cycle()
+    bench.cycle(pause_s=1.5)
+    assert bench.guard.latched is not None
+    assert bench.guard.latched.cause is Cause.CLOCK
+
+
+def test_the_first_cause_stays_until_acknowledged_and_nothing_arms_itself(bench: Bench) -> None:
+    bench.alter = lambda state: replace(state, temperature_c=80.0)
+    bench.cycle()
+    bench.alter = lambda state: replace(state, error=HardwareError.OVERLOAD)
+    bench.cycle()
+    assert bench.guard.latched is not None
+    assert bench.guard.latched.cause is Cause.HOT
+    bench.guard.acknowledge()
+    assert bench.guard.latched is None
+    with pytest.raises(NotReady, match="hardware error"):
+        bench.guard.check_arming()
+    bench.alter = lambda state: state
+    for _ in range(5):
+        bench.cycle()
+    assert not bench.guard.armed
+    bench.arm()
+    assert bench.guard.armed
+
+
+# --- whose order: at a hand-over the next one's order is there before his permission ----------------------------------------------
+
+
+def _hand_over(bench: Bench, *, order_first: bool) -> None:
+    """One cycle that falls between the two writes of a hand-over from the program to the operator."""
+    bench.cycle()
+    bench.now_s += CYCLE_S
+    order = BusOrder(Command(advance_mm_s=5.0), Source.OPERATOR, bench.now_s)
+    bench.order, bench.beat = (order, bench.beat) if order_first else (bench.order, Heartbeat(bench.now_s, Source.OPERATOR))
+    bench.beating = False
+    bench.cycle(0.0)
+
+
+def test_the_cycle_between_order_and_permission_goes_on_with_the_order_before(bench: Bench) -> None:
+    _hand_over(bench, order_first=True)
+    assert bench.guard.rejection is None
+    assert bench.guard.followed is not None
+    assert bench.guard.followed.source is Source.PROGRAM
+    bench.beat = Heartbeat(bench.now_s, Source.OPERATOR)
+    bench.cycle()
+    assert bench.guard.rejection is None
+    assert bench.guard.followed.source is Source.OPERATOR
+
+
+def test_a_permission_without_an_order_of_its_own_holds(bench: Bench) -> None:
+    _hand_over(bench, order_first=False)
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.WRONG_SOURCE
+
+
+def test_the_order_before_is_good_for_no_longer_than_an_order_is(bench: Bench) -> None:
+    _hand_over(bench, order_first=True)
+    reasons = []
+    for _ in range(6):  # the program is still permitted, and says nothing any more
+        bench.now_s += CYCLE_S
+        bench.beat = Heartbeat(bench.now_s, Source.PROGRAM)
+        bench.order = BusOrder(Command(advance_mm_s=5.0), Source.OPERATOR, bench.now_s)
+        bench.cycle(0.0)
+        reasons.append(bench.guard.rejection.reason if bench.guard.rejection is not None else None)
+    # at 100 ms sharp either may be
+    assert reasons[:3] == [None] * 3
+    assert reasons[4:] == [RejectReason.WRONG_SOURCE] * 2
+
+
+def test_a_hold_is_everybodys(bench: Bench) -> None:
+    bench.cycle()
+    bench.beating = False
+    bench.order = BusOrder(None, Source.OPERATOR, bench.now_s)
+    bench.beat = Heartbeat(bench.now_s, Source.PROGRAM)
+    bench.cycle()
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.NO_COMMAND
+    bench.order = BusOrder(Command(advance_mm_s=5.0), Source.OPERATOR, bench.now_s)
+    bench.cycle()
+    assert bench.guard.rejection is not None
+    assert bench.guard.rejection.reason is RejectReason.WRONG_SOURCE

@@ -1,0 +1,456 @@
+"""The bus process's loop with a bus and an application of paper: orders of events that are seldom on a real line."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from core.config.safety import SafetyConfig, ServosConfig
+from core.control.faults import Cause, Fault
+from hardware.servos import bus_process, servo_robot
+from hardware.servos.bus_ipc import BusStatus, Request
+from hardware.servos.bus_process import BusLoop
+from hardware.servos.dynamixel_port import LineCounts, NoAnswer, NotReady, ServoError, TorqueStillOn
+from hardware.servos.registers import HardwareError, MissingServo, ServoState
+from hardware.servos.servo_robot import ServoRobot
+
+
+class PaperBus:
+    """Writes down what it is told."""
+
+    is_open, is_armed, zero_ticks = True, False, (0,) * 7
+
+    def __init__(self) -> None:
+        self.counts = LineCounts()
+        self.told: list[str] = []
+        self.torque_stays = False
+        self.missing = ""
+
+    def open(self) -> None:
+        if self.missing:
+            raise NoAnswer(self.missing)
+        self.told.append("open")
+        self.is_open = True
+
+    def let_go(self) -> None:
+        self.told.append("let go")
+        raise TorqueStillOn("torque of up is not proven to be off: cut the servos' power")
+
+    def disarm(self) -> None:
+        self.told.append("hold")
+
+    def arm(self) -> None:
+        self.told.append("arm")
+
+    def read(self) -> tuple[MissingServo, ...]:
+        return tuple(MissingServo(joint.name, joint.id, 0.0, 1, "silent") for joint in ServosConfig().joints)
+
+    def set_zero(self, names: object) -> None:
+        self.told.append("zero")
+
+    def close(self) -> None:
+        self.told.append("close")
+
+    def torque_off(self) -> None:
+        if self.torque_stays:
+            raise TorqueStillOn("torque of right is not proven to be off: cut the servos' power")
+        self.told.append("torque off")
+
+
+class PaperEnd:
+    """The application's side: what waits now."""
+
+    is_alone = False
+    told: BusStatus
+
+    def __init__(self) -> None:
+        self.stop = False
+        self.waiting: Request | None = None
+        self.answers: list[tuple[str, ServoError | None]] = []
+        self.words: list[str] = []
+
+    def wait(self, timeout_s: float) -> tuple[bool, bool]:
+        return self.stop, self.waiting is not None
+
+    def take_stop(self) -> bool:
+        taken, self.stop = self.stop, False
+        return taken
+
+    def take_request(self) -> Request | None:
+        taken, self.waiting = self.waiting, None
+        return taken
+
+    def publish(self, status: BusStatus) -> None:
+        self.told = status
+
+    def last_words(self, text: str) -> None:
+        self.words.append(text)
+
+    def answer(self, request: Request, error: ServoError | None) -> None:
+        self.answers.append((request.what, error))
+
+
+class Paper:
+    """Loop, bus and application, with a clock that the test turns."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, **servos: bool) -> None:
+        self.now_s = 100.0
+        monkeypatch.setattr(bus_process.time, "monotonic", lambda: self.now_s)
+        self.bus, self.end = PaperBus(), PaperEnd()
+        self.loop = BusLoop(self.end, self.bus, ServosConfig(**servos), SafetyConfig())  # type: ignore[arg-type]
+
+    def hear(self, *, stop: bool = False, request: str | None = None) -> None:
+        self.end.stop = stop
+        self.end.waiting = Request(1, request) if request is not None else None
+        self.loop._listen_until(self.now_s)
+
+    def turn(self) -> None:
+        """A cycle in which the servos say nothing new."""
+        self.now_s += 0.02
+        self.loop._guard.see = lambda *_: None  # type: ignore[method-assign]
+        self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
+        self.loop._talk()
+
+    def reads(self, advance_mm: float = 0.0) -> None:
+        """From now on all servos tell that they stand at zero, but for one."""
+        places = zip(ServosConfig().joints, (0.0, 0.0, 0.0, 0.0, advance_mm, 0.0, 0.0), strict=True)
+        states = tuple(
+            ServoState(joint.name, joint.id, self.now_s, 0, 0, at_mm, 0.0, 0.0, 8.0, 12.0, 30.0, HardwareError(0), False, False)
+            for joint, at_mm in places
+        )
+        self.bus.read = lambda: states  # type: ignore[method-assign]
+        self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
+
+    @property
+    def stopped(self) -> bool:
+        return self.loop._guard.stopped
+
+    @property
+    def latched(self) -> Fault | None:
+        return self.loop._guard.latched
+
+
+@pytest.fixture
+def paper(monkeypatch: pytest.MonkeyPatch) -> Iterator[Paper]:
+    yield Paper(monkeypatch)
+
+
+def test_a_stop_that_is_said_again_and_again_holds_once(paper: Paper) -> None:
+    """A broken wire of the pedal; each hold under load would let a tendon creep."""
+    for _ in range(200):
+        paper.hear(stop=True)
+        paper.now_s += 0.02
+    assert paper.bus.told == ["hold"]
+    assert paper.stopped
+
+
+def test_a_second_press_of_stop_holds_again(paper: Paper) -> None:
+    paper.hear(stop=True)
+    paper.now_s += 0.6
+    paper.hear(stop=True)
+    assert paper.bus.told == ["hold", "hold"]
+
+
+def test_a_stop_after_its_acknowledgement_is_a_new_one(paper: Paper) -> None:
+    paper.hear(stop=True)
+    paper.now_s += 0.1
+    paper.hear(request="acknowledge")
+    assert not paper.stopped
+    paper.now_s += 0.1
+    paper.hear(stop=True)
+    assert paper.stopped
+    assert paper.bus.told == ["hold", "hold"]
+
+
+def test_an_acknowledgement_that_was_asked_for_before_stop_does_not_undo_it(paper: Paper) -> None:
+    paper.hear(stop=True, request="acknowledge")
+    assert paper.stopped
+    assert paper.latched is not None
+    what, error = paper.end.answers[0]
+    assert what == "acknowledge"
+    assert isinstance(error, NotReady)
+    assert "STOP was pressed meanwhile" in str(error)
+    paper.now_s += 0.02
+    paper.hear(request="acknowledge")
+    assert not paper.stopped
+
+
+def test_the_first_cause_stays_when_the_torque_cannot_be_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+    paper.loop._guard.end_motion(Fault(Cause.SERVO_SILENT, "up"))
+    paper.bus.torque_stays = True
+    paper.hear(stop=True)
+    assert paper.latched is not None
+    assert paper.latched.cause is Cause.SERVO_SILENT
+    assert "up" in paper.latched.detail
+    assert "cut the servos' power" in paper.latched.detail
+
+
+def test_a_torque_off_that_failed_is_tried_until_the_servos_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One burst of noise takes all three packets, and STOP that is held for seconds counts as one."""
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+    paper.bus.torque_stays = True
+    paper.hear(stop=True)
+    for _ in range(10):
+        paper.hear(stop=True)
+        paper.turn()
+    assert paper.latched is not None
+    assert paper.latched.detail.count("cut the servos' power") == 1
+    assert paper.bus.told == ["hold"], "no second hold, under which a tendon would creep"
+    paper.bus.torque_stays = False
+    for _ in range(3):
+        paper.turn()
+    assert paper.bus.told[:2] == ["hold", "torque off"]
+    assert paper.bus.told.count("torque off") == 1
+    assert "cut the servos' power" not in paper.latched.detail
+
+
+def test_without_that_policy_the_wires_stay_under_tension(paper: Paper) -> None:
+    paper.hear(stop=True)
+    paper.turn()
+    assert "torque off" not in paper.bus.told
+
+
+def test_a_port_that_comes_back_owes_the_torque_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+    paper.loop._lose_port()
+    paper.turn()
+    assert paper.bus.told == ["torque off"]
+
+
+def _off_after(paper: Paper, tries: int) -> None:
+    """The servos say so only after so many tries."""
+    left = [tries]
+
+    def torque_off() -> None:
+        left[0] -= 1
+        if left[0] >= 0:
+            raise TorqueStillOn("torque of right is not proven to be off: cut the servos' power")
+        paper.bus.told.append("torque off")
+
+    paper.bus.torque_off = torque_off  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize("tries", [0, 1, 3])
+def test_a_torque_off_that_is_asked_for_is_tried_again_before_it_is_answered(paper: Paper, tries: int) -> None:
+    _off_after(paper, tries)
+    paper.hear(request="torque off")
+    assert paper.end.answers == [("torque off", None)]
+    assert paper.bus.told == ["torque off"]
+
+
+def test_a_torque_off_that_was_asked_for_in_vain_is_told_and_stays_owed(paper: Paper) -> None:
+    """It was forgotten, and the wires stayed under tension although somebody had let them go."""
+    _off_after(paper, 6)
+    paper.hear(request="torque off")
+    _, error = paper.end.answers[0]
+    assert isinstance(error, TorqueStillOn)
+    assert "cut the servos' power" in paper.end.told.torque_problem
+    for _ in range(3):
+        paper.turn()
+    assert paper.bus.told == ["torque off"]
+    paper.loop._publish(paper.now_s)
+    assert (paper.end.told.torque_offs, paper.end.told.torque_problem) == (1, "")
+
+
+def test_an_arming_that_fails_half_way_and_cannot_be_undone_owes_the_torque_off(paper: Paper) -> None:
+    """It was told, and then nobody tried again: some servos pulled on."""
+
+    def arm() -> None:
+        raise TorqueStillOn("servo 5 did not take it; torque of right is not proven to be off: cut the servos' power")
+
+    paper.bus.arm = arm  # type: ignore[method-assign]
+    paper.reads()
+    paper.bus.torque_stays = True
+    paper.hear(request="arm")
+    assert "servo 5 did not take it" in str(paper.end.answers[0][1])
+    paper.turn()
+    paper.loop._publish(paper.now_s)
+    assert "torque of right is not proven to be off" in paper.end.told.torque_problem
+    paper.bus.torque_stays = False
+    paper.turn()
+    paper.loop._publish(paper.now_s)
+    assert paper.bus.told[-1] == "torque off"
+    assert (paper.end.told.torque_offs, paper.end.told.torque_problem) == (1, "")
+
+
+def test_a_torque_off_that_was_asked_for_while_the_port_was_gone_is_owed(paper: Paper) -> None:
+    paper.loop._lose_port()
+    paper.bus.is_open = False
+    paper.hear(request="torque off")
+    _, error = paper.end.answers[0]
+    assert isinstance(error, TorqueStillOn)
+    paper.bus.is_open = True
+    paper.turn()
+    assert paper.bus.told == ["let go", "torque off"]
+
+
+def test_a_port_that_is_lost_forgets_no_torque_off(paper: Paper) -> None:
+    """Without the policy, too: somebody had asked for it."""
+    _off_after(paper, 4)
+    paper.hear(request="torque off")
+    paper.loop._lose_port()
+    paper.turn()
+    assert paper.bus.told == ["torque off"]
+
+
+def _six_of_seven(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The port is back, and one servo's cable has come off: the bus cannot be opened."""
+    monkeypatch.setattr(bus_process.os.path, "exists", lambda _: True)
+    paper.bus.is_open = False
+    paper.bus.missing = "servo up (id 3): no answer"
+
+
+def test_six_servos_of_seven_let_go_when_the_port_comes_back_without_the_seventh(
+    paper: Paper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bus that cannot be opened never tried the torque-off that it owed, and the six went on pulling."""
+    paper.loop._debt.owe()
+    paper.loop._lose_port()
+    _six_of_seven(paper, monkeypatch)
+    paper.loop._reopen(paper.now_s)
+    assert paper.bus.told == ["let go"]
+    paper.loop._publish(paper.now_s)
+    assert paper.end.told.torque_problem == "torque of up is not proven to be off: cut the servos' power"
+    paper.bus.missing = ""
+    paper.loop._reopen(paper.now_s)
+    paper.turn()
+    assert paper.bus.told == ["let go", "open", "torque off"]
+    paper.loop._publish(paper.now_s)
+    assert (paper.end.told.torque_offs, paper.end.told.torque_problem) == (1, "")
+
+
+def test_they_let_go_when_the_process_ends_too(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    paper.loop._debt.owe()
+    paper.loop._lose_port()
+    _six_of_seven(paper, monkeypatch)
+    paper.loop.end()
+    paper.loop.run()
+    assert paper.bus.told == ["let go", "close"]
+    assert "torque of up is not proven to be off" in paper.end.words[0]
+
+
+def test_nobody_lets_go_of_wires_when_no_torque_off_is_owed(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    paper.loop._lose_port()
+    _six_of_seven(paper, monkeypatch)
+    paper.loop._reopen(paper.now_s)
+    assert paper.bus.told == []
+
+
+def test_arming_says_why_the_port_that_came_back_is_not_open(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cable was in, and all that the operator was told was to plug it in."""
+    paper.loop._lose_port()
+    _six_of_seven(paper, monkeypatch)
+    paper.loop._reopen(paper.now_s)
+    paper.hear(request="arm")
+    assert str(paper.end.answers[0][1]) == "not armed: servo up (id 3): no answer"
+
+
+@pytest.mark.parametrize("how", ["end", "signal", "alone"])
+def test_a_torque_off_that_is_owed_is_paid_before_the_process_ends(paper: Paper, how: str) -> None:
+    _off_after(paper, 6)
+    paper.hear(request="torque off")
+    if how == "end":
+        paper.end.waiting = Request(2, "end")
+    elif how == "signal":
+        paper.loop.end()
+    else:
+        paper.end.is_alone = True
+    paper.loop.run()
+    assert paper.bus.told == ["torque off", "close"]
+    assert paper.end.words == []
+
+
+def test_a_process_that_cannot_prove_it_says_so_with_its_last_words(paper: Paper, caplog: pytest.LogCaptureFixture) -> None:
+    _off_after(paper, 1000)
+    paper.hear(request="torque off")
+    paper.loop.end()
+    paper.loop.run()
+    assert paper.bus.told == ["close"]
+    assert len(paper.end.words) == 1
+    assert "torque of right is not proven to be off: cut the servos' power" in paper.end.words[0]
+    assert "not proven" in caplog.text
+
+
+def test_a_stop_that_nobody_has_heard_is_heard_before_the_process_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+    paper.end.stop = True
+    paper.loop.end()
+    paper.loop.run()
+    assert paper.bus.told == ["hold", "torque off", "close"]
+
+
+def test_arming_looks_where_the_joints_are_now(paper: Paper) -> None:
+    """A quiet bus was not read for long: meanwhile somebody has turned a joint by hand."""
+    for before_mm, now_mm, told in ((0.0, -7.0, []), (-7.0, 0.0, ["arm"])):
+        paper.reads(before_mm)
+        paper.loop._talk()
+        paper.reads(now_mm)
+        paper.hear(request="arm")
+        assert paper.bus.told == told
+    refused, armed = (error for _, error in paper.end.answers)
+    assert "advance at -7.00 mm (-5 to 400 mm)" in str(refused)
+    assert armed is None
+
+
+@pytest.mark.parametrize(("late", "told"), [(1, []), (2, []), (9, [])])
+def test_arming_looks_again_where_an_answer_is_late(paper: Paper, late: int, told: list[str]) -> None:
+    """The guard takes in whole sets only: else one late answer would let a joint outside its envelope be armed."""
+    reads = 0
+
+    def read() -> tuple[MissingServo | ServoState, ...]:
+        nonlocal reads
+        reads += 1
+        states = [
+            ServoState(joint.name, joint.id, paper.now_s, 0, 0, -7.0, 0.0, 0.0, 8.0, 12.0, 30.0, HardwareError(0), False, False)
+            for joint in ServosConfig().joints
+        ]
+        silent = MissingServo(states[6].name, states[6].id, paper.now_s, 1, "no answer")
+        return tuple(states[:6]) + ((silent,) if reads <= late else (states[6],))
+
+    paper.end.heartbeat = lambda: None  # type: ignore[attr-defined]
+    paper.bus.read = read  # type: ignore[method-assign,assignment]
+    paper.hear(request="arm")
+    assert paper.bus.told == told, "where a joint is that does not answer, nobody knows"
+    assert reads == min(late + 1, 3)
+
+
+def test_a_robot_that_is_closed_while_it_connects_keeps_no_bus_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """F5 while "Servos on" starts a lost bus process again: that one would keep the port from the next rig."""
+    opening, go_on = threading.Event(), threading.Event()
+    alive: list[object] = []
+
+    class PaperLink:
+        failure = None
+
+        def __init__(self, *_: object) -> None:
+            alive.append(self)
+
+        def request(self, what: str, timeout_s: float) -> None:
+            opening.set()
+            assert go_on.wait(10.0)
+
+        def close(self) -> None:
+            alive.remove(self)
+
+    monkeypatch.setattr(servo_robot, "BusLink", PaperLink)
+    robot = ServoRobot(ServosConfig(port="/dev/none"), SafetyConfig())
+    failed: list[NotReady] = []
+
+    def connect() -> None:
+        try:
+            robot.connect()
+        except NotReady as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=connect)
+    thread.start()
+    assert opening.wait(10.0)
+    robot.close()
+    go_on.set()
+    thread.join(10.0)
+    assert alive == []
+    assert "closed meanwhile" in str(failed[0])
+    assert robot.bus_status() is None

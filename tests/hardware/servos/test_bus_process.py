@@ -1,0 +1,785 @@
+"""The guarded bus process for real: it is killed, stopped and flooded, and strict software servos tell what came of it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from core.config.calibration import ZeroConfig
+from core.config.models import Config
+from core.config.safety import SafetyConfig, ServosConfig
+from core.control.faults import Cause
+from core.control.gate import RejectReason, Source
+from core.devices import DeviceError, Robot
+from core.types import Command
+from hardware.rig import RigKind, open_rig
+from hardware.servos.bus_ipc import _LOOK_S, BusClient, BusOrder, BusPhase, BusProcess, BusStatus, Heartbeat
+from hardware.servos.dynamixel_port import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
+from hardware.servos.servo_robot import ServoRobot
+from hardware.twin.servos.bus import SoftServoBus
+from tests.hardware.kill_campaign import BOUND_S, BOUND_STEPS, KINDS, strike
+
+pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("no_process_stays_behind")]
+
+ROOT = Path(__file__).resolve().parents[3]
+# Watchdog and heartbeat are patient, so that a machine that stalls does not trip them; what is about them says so.
+CONFIG, SAFETY = ServosConfig(watchdog_s=2.5, heartbeat_timeout_s=3.0), SafetyConfig()
+FORWARD = Command(advance_mm_s=5.0)
+PATIENCE_S = 10.0
+NO_SLACK: dict[str, Any] = {"slack_mm": (0.0,) * 4, "pretension_mm": 0.3}
+
+
+@pytest.fixture
+def servos() -> Iterator[SoftServoBus]:
+    servos = SoftServoBus(CONFIG, wire_time=True, positions=[1000 + joint.id for joint in CONFIG.joints])
+    servos.start()
+    yield servos
+    servos.stop()
+    assert servos.failure is None
+
+
+def _robot(servos: SoftServoBus, **changes: object) -> ServoRobot:
+    return ServoRobot(CONFIG.model_copy(update={"port": servos.port, **changes}), SAFETY)
+
+
+@pytest.fixture
+def robot(servos: SoftServoBus) -> Iterator[ServoRobot]:
+    robot = _robot(servos)
+    robot.connect()
+    yield robot
+    robot.close()
+
+
+@pytest.fixture
+def armed(robot: ServoRobot) -> ServoRobot:
+    robot.zero()
+    robot.arm()
+    return robot
+
+
+def _drive(robot: ServoRobot, seconds: float = PATIENCE_S, until: Callable[[BusStatus], bool] = lambda status: False) -> BusStatus:
+    """Drive forward until something is seen, or for so long; returns the last status."""
+    end_s = time.monotonic() + seconds
+    while True:
+        robot.beat(Source.OPERATOR)
+        robot.send(FORWARD)
+        status = robot.bus_status()
+        assert status is not None
+        if until(status) or time.monotonic() > end_s:
+            return status
+        time.sleep(0.02)
+
+
+def _seen(robot: ServoRobot, wanted: Callable[[BusStatus], bool], beat: bool = True) -> BusStatus:
+    """Wait for a status, as an application that is well but asks for nothing."""
+    end_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end_s:
+        if beat:
+            robot.beat(Source.OPERATOR)
+        status = robot.bus_status()
+        if status is not None and wanted(status):
+            return status
+        time.sleep(0.01)
+    raise AssertionError(f"not seen: {status}")
+
+
+def _latched(cause: Cause) -> Callable[[BusStatus], bool]:
+    return lambda status: status.latched is not None and status.latched.cause is cause
+
+
+def _settle_mm(servos: SoftServoBus, most_s: float = 2.0) -> float:
+    """Where the advance servo is when it stands still."""
+    at_mm, end_s = servos.positions_mm()[4], time.monotonic() + most_s
+    while time.monotonic() < end_s:
+        time.sleep(0.1)
+        before_mm, at_mm = at_mm, servos.positions_mm()[4]
+        if at_mm == before_mm:
+            return at_mm
+    raise AssertionError("the servo goes on and on")
+
+
+# --- from arming to closing ------------------------------------------------------------------------------------------------------
+
+
+def test_it_is_a_robot_that_moves_only_when_armed(servos: SoftServoBus, robot: ServoRobot) -> None:
+    as_protocol: Robot = robot
+    assert as_protocol.send(FORWARD) == Command()
+    _drive(robot, 0.2)
+    assert servos.positions_mm()[4] == 0.0
+    with pytest.raises(NotReady, match="not zeroed"):
+        robot.arm()
+    robot.zero()
+    robot.arm()
+    status = _drive(robot, until=lambda status: servos.positions_mm()[4] > 1.0)
+    assert status.armed
+    assert status.sent is not None
+    assert status.sent.order is not None
+    assert status.sent.order.command == FORWARD
+    assert robot.send(FORWARD).advance_mm_s == pytest.approx(5.0, abs=2.5)
+    assert as_protocol.status().insertion_mm == pytest.approx(servos.positions_mm()[4], abs=0.5)
+    assert servos.positions_mm()[0] == pytest.approx(CONFIG.pretension_mm, abs=0.02)
+
+
+def test_without_a_supervisor_orders_are_signs_of_life_and_with_one_they_are_not(servos: SoftServoBus, armed: ServoRobot) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while servos.positions_mm()[4] < 1.0 and time.monotonic() < end_s:
+        armed.send(FORWARD)
+        time.sleep(0.02)
+    assert servos.positions_mm()[4] >= 1.0
+    armed.beat(Source.OPERATOR)
+    end_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end_s:
+        armed.send(FORWARD)
+        armed.status()
+        status = armed.bus_status()
+        if status is not None and not status.armed:
+            break
+        time.sleep(0.02)
+    assert status is not None
+    assert status.latched is not None
+    assert status.latched.cause is Cause.WORKER_DEAD
+    assert servos.positions_mm()[4] < 4.0
+
+
+def test_hold_stops_and_disarm_refuses_orders(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    armed.hold()
+    _seen(armed, lambda s: s.rejection is not None and s.rejection.reason is RejectReason.NO_COMMAND)
+    _settle_mm(servos)
+    assert _seen(armed, lambda s: True).armed
+    armed.disarm()
+    before_mm = _settle_mm(servos)
+    _drive(armed, 0.2)
+    assert servos.positions_mm()[4] == before_mm
+    assert _seen(armed, lambda s: s.phase is BusPhase.DISARMED).latched is None
+
+
+def test_it_counts_and_times_its_cycles(armed: ServoRobot) -> None:
+    status = _drive(armed, until=lambda status: status.cycle > 100)
+    assert status.times.period_p50_ms == pytest.approx(20.0, abs=10.0)
+    assert 0.0 < status.times.work_p50_ms <= status.times.work_p99_ms
+    assert len(status.servos) == 7
+    report = armed.report()
+    assert report is not None
+    assert report.port_open
+    assert report.misses == (0,) * 7
+
+
+def test_requests_that_cannot_be_done_say_why(armed: ServoRobot) -> None:
+    with pytest.raises(NotReady, match="disarm before zeroing"):
+        armed.zero()
+    with pytest.raises(NotReady, match="already armed"):
+        armed.arm()
+    with pytest.raises(NotReady, match="disarm before a reboot"):
+        armed.reboot(1)
+
+
+@pytest.mark.parametrize("key", ["bend", "pitch", "advance_mm_s", "delivery_mm_s"])
+def test_it_refuses_what_is_not_finite(robot: ServoRobot, key: str) -> None:
+    with pytest.raises(ValueError, match="not finite"):
+        robot.send(Command(**{key: math.nan}))
+
+
+def test_a_port_that_is_none_and_servos_that_are_not_there(servos: SoftServoBus) -> None:
+    with pytest.raises(NotReady, match=r"set servos\.port"):
+        ServoRobot(ServosConfig(), SAFETY).connect()
+    with pytest.raises(PortError, match="does not exist"):
+        ServoRobot(CONFIG.model_copy(update={"port": servos.port + "_not"}), SAFETY).connect()
+    servos.faults.mute(3)
+    with pytest.raises(NoAnswer, match="servo up"):
+        _robot(servos).connect()
+
+
+def test_fault_29_a_second_program_is_refused_and_the_first_one_drives_on(servos: SoftServoBus, armed: ServoRobot) -> None:
+    with pytest.raises(PortTaken, match="close that program first"):
+        _robot(servos).connect()
+    assert _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0).armed
+
+
+def test_closed_in_the_middle_of_a_motion_the_servos_hold(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    armed.close()
+    armed.close()
+    at_mm = servos.positions_mm()[4]
+    assert abs(_settle_mm(servos) - at_mm) <= CONFIG.joints[4].max_step_mm
+    assert servos.servo(5).table["torque"] == 1
+    armed.stop()
+    armed.hold()
+    with pytest.raises(BusProcessLost, match="connect it first"):
+        armed.send(FORWARD)
+
+
+# --- STOP ------------------------------------------------------------------------------------------------------------------------
+
+
+def test_stop_is_latched_and_needs_acknowledgement_and_a_new_arming(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    armed.stop()
+    _drive(armed, until=lambda status: status.phase is BusPhase.STOPPED)
+    at_mm = _settle_mm(servos)
+    _drive(armed, 0.2)
+    assert servos.positions_mm()[4] == at_mm
+    with pytest.raises(NotReady, match="acknowledge first: stop pressed"):
+        armed.arm()
+    armed.acknowledge()
+    _drive(armed, 0.2)
+    assert servos.positions_mm()[4] == at_mm
+    armed.arm()
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > at_mm + 1.0)
+
+
+def test_stop_comes_through_floods_of_orders_and_requests(servos: SoftServoBus, armed: ServoRobot) -> None:
+    done = threading.Event()
+
+    def flood() -> None:
+        while not done.wait(0.0005):
+            armed.beat(Source.OPERATOR)
+            armed.send(FORWARD)
+
+    def ask() -> None:
+        while not done.is_set():
+            with contextlib.suppress(DeviceError):
+                armed.zero()
+
+    threads = [threading.Thread(target=target) for target in (flood, ask)]
+    for thread in threads:
+        thread.start()
+    try:
+        _seen(armed, lambda status: servos.positions_mm()[4] > 0.5)
+        armed.stop()
+        _seen(armed, lambda status: status.phase is BusPhase.STOPPED)
+        _settle_mm(servos)
+    finally:
+        done.set()
+        for thread in threads:
+            thread.join()
+
+
+def test_stop_while_every_way_in_is_full(servos: SoftServoBus, armed: ServoRobot) -> None:
+    """The bus process stands still; requests pile up until no more go in, STOPs too. It wakes up, and stops first."""
+    link = armed._link
+    assert link is not None
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    os.kill(link.pid, signal.SIGSTOP)
+    try:
+        with pytest.raises(BlockingIOError):
+            for number in range(100_000):
+                link._socket.send(b'{"id": %d, "do": "zero"}' % (1_000_000 + number))
+        for _ in range(70_000):
+            link.stop()
+    finally:
+        os.kill(link.pid, signal.SIGCONT)
+    _drive(armed, until=lambda status: status.phase is BusPhase.STOPPED)
+    status = armed.bus_status()
+    assert status is not None
+    assert status.fault_counts[Cause.STOP_PRESSED] > 0
+    _settle_mm(servos)
+
+
+def test_stop_switches_the_torque_off_when_that_is_the_policy(servos: SoftServoBus) -> None:
+    robot = _robot(servos, torque_off_on_stop=True)
+    robot.connect()
+    try:
+        robot.zero()
+        robot.arm()
+        robot.stop()
+        _seen(robot, lambda status: status.phase is BusPhase.STOPPED)
+        assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    finally:
+        robot.close()
+
+
+@pytest.mark.slow  # what hangs is waited for, and then for its end
+def test_a_bus_process_that_hangs_keeps_no_torque_on(armed: ServoRobot, servos: SoftServoBus) -> None:
+    """Asked and asked again it could not answer, and the port was its own: only opening the rig anew got out of it."""
+    assert armed._link is not None
+    os.kill(armed._link.pid, signal.SIGSTOP)
+    armed.torque_off()
+    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    assert armed.failure is not None, "this process is not the one that drives"
+
+
+@pytest.mark.parametrize("comes_back", [True, False])
+def test_a_torque_off_that_is_owed_is_paid_when_the_application_closes(
+    servos: SoftServoBus, comes_back: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The cable falls out, STOP is pressed, the cable is back, and the window closes before the process has looked for it again."""
+    robot = _robot(servos, torque_off_on_stop=True)
+    robot.connect()
+    try:
+        robot.zero()
+        robot.arm()
+        servos.vanish()
+        robot.stop()
+        status = _seen(robot, lambda status: status.phase is BusPhase.CLOSED and status.torque_problem != "")
+        assert "cut the servos' power" in status.torque_problem
+        assert any(servos.servo(joint.id).table["torque"] for joint in CONFIG.joints)
+        if comes_back:
+            servos.reappear()
+    finally:
+        robot.close()
+    assert any(servos.servo(joint.id).table["torque"] for joint in CONFIG.joints) is not comes_back
+    assert ("the torque is not proven to be off" in caplog.text) is not comes_back
+
+
+def test_torque_that_went_off_on_a_port_that_cannot_be_opened_is_told_at_once(robot: ServoRobot) -> None:
+    """All seven had let go, but one of them was another one than before: told only when somebody had changed it back."""
+    link, status = robot._link, _seen(robot, lambda status: bool(status.servos))
+    assert link is not None
+    closed = replace(status, phase=BusPhase.CLOSED, servos=(), cycle=status.cycle + 1000, torque_offs=1)
+    link.status = lambda: closed  # type: ignore[method-assign]
+    report = robot.report()
+    assert report is not None
+    assert (report.port_open, report.torque_off) == (False, True)
+    closed = replace(closed, cycle=closed.cycle + 1)
+    report = robot.report()
+    assert report is not None
+    assert (report.port_open, report.torque_off) == (False, False)
+
+
+def test_without_a_bus_process_and_without_a_servo_the_others_still_let_go(servos: SoftServoBus, armed: ServoRobot) -> None:
+    """Nobody can connect seven servos of which one is missing, and six went on pulling."""
+    link = armed._link
+    assert link is not None
+    os.kill(link.pid, signal.SIGKILL)
+    end_s = time.monotonic() + PATIENCE_S
+    while armed.failure is None and time.monotonic() < end_s:
+        time.sleep(0.01)
+    servos.faults.mute(3)
+    with pytest.raises(NoAnswer, match="servo up"):
+        armed.connect()
+    with pytest.raises(TorqueStillOn, match="torque of up is not proven to be off"):
+        armed.torque_off()
+    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints if joint.id != 3] == [0] * 6
+    servos.faults.clear()
+    armed.torque_off()
+    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    assert armed.failure is not None  # nobody drives with it before it was connected again
+    armed.connect()
+    assert armed.failure is None
+    armed.close()
+    with pytest.raises(BusProcessLost, match="connect it first"):
+        armed.torque_off()
+
+
+def test_a_bus_process_that_tells_nothing_any_more_sends_nothing(servos: SoftServoBus, armed: ServoRobot) -> None:
+    """It stands still, then it is gone: its last status would say for ever that the robot is being driven."""
+    link = armed._link
+    assert link is not None
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    sent = armed.sent_motion()
+    assert sent is not None
+    assert sent.source is Source.OPERATOR
+    os.kill(link.pid, signal.SIGSTOP)
+    try:
+        time.sleep(SAFETY.bus_hold_s + 0.1)
+        sent = armed.sent_motion()
+        assert sent is not None
+        assert (sent.source, sent.motion.advance_mm_s) == (None, 0.0)
+        assert armed.send(FORWARD).advance_mm_s == 0.0
+    finally:
+        os.kill(link.pid, signal.SIGKILL)
+        os.kill(link.pid, signal.SIGCONT)
+    end_s = time.monotonic() + PATIENCE_S
+    while armed.failure is None and time.monotonic() < end_s:
+        time.sleep(0.01)
+    assert armed.sent_motion() is None
+
+
+# --- the application falls silent ------------------------------------------------------------------------------------------------
+
+
+def test_silence_holds_then_disarms_then_quiet_then_the_servos_own_watchdog(servos: SoftServoBus) -> None:
+    robot = _robot(servos, watchdog_s=0.4, heartbeat_timeout_s=0.3)
+    robot.connect()
+    try:
+        robot.zero()
+        robot.arm()
+        _drive(robot, until=lambda status: servos.positions_mm()[4] > 1.0)
+        at_mm = servos.positions_mm()[4]
+        status = _seen(robot, lambda status: status.phase is BusPhase.QUIET, beat=False)
+        assert status.latched is not None
+        assert status.latched.cause is Cause.WORKER_DEAD
+        assert status.servos == ()
+        assert abs(servos.positions_mm()[4] - at_mm) <= CONFIG.joints[4].max_step_mm
+        heard = len(servos.log)
+        time.sleep(0.6)
+        assert len(servos.log) == heard
+        assert servos.servo(5).table["watchdog"] == -1
+        # it wakes up, and nothing moves before it was acknowledged and armed
+        status = _drive(robot, 0.3)
+        assert status.phase is BusPhase.DISARMED
+        with pytest.raises(NotReady, match="no heartbeat of the application"):
+            robot.arm()
+        robot.acknowledge()
+        robot.arm()
+        at_mm = servos.positions_mm()[4]
+        _drive(robot, until=lambda status: servos.positions_mm()[4] > at_mm + 1.0)
+    finally:
+        robot.close()
+
+
+def test_a_heartbeat_without_orders_holds_and_stays_armed(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    status = _seen(armed, lambda s: s.rejection is not None and s.rejection.reason is RejectReason.STALE_COMMAND)
+    assert status.armed
+    at_mm = _settle_mm(servos)
+    for _ in range(40):
+        armed.beat(None)
+        time.sleep(0.02)
+    assert servos.positions_mm()[4] == at_mm
+    assert _seen(armed, lambda s: True).armed
+
+
+# --- bad orders ------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_an_order_that_is_not_finite_is_rejected_in_the_bus_process_too(
+    servos: SoftServoBus, armed: ServoRobot, number: float
+) -> None:
+    link = armed._link
+    assert link is not None
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 0.5)
+    end_s = time.monotonic() + PATIENCE_S
+    status = armed.bus_status()
+    while status is not None and not status.rejections.get(RejectReason.NON_FINITE) and time.monotonic() < end_s:
+        now_s = time.monotonic()
+        link.put_heartbeat(Heartbeat(now_s, Source.OPERATOR))
+        link.put_order(BusOrder(Command(bend=number, advance_mm_s=number), Source.OPERATOR, now_s))
+        time.sleep(0.02)
+        status = armed.bus_status()
+    assert status is not None
+    assert status.rejections[RejectReason.NON_FINITE] > 0
+    assert status.armed
+
+
+def test_whoever_is_not_permitted_is_not_followed(servos: SoftServoBus, armed: ServoRobot) -> None:
+    for _ in range(20):
+        armed.beat(Source.OPERATOR)
+        armed.send(FORWARD, source=Source.PROGRAM, captured_s=time.monotonic())
+        time.sleep(0.02)
+    assert servos.positions_mm()[4] == 0.0
+    status = armed.bus_status()
+    assert status is not None
+    assert status.rejections[RejectReason.WRONG_SOURCE] > 0
+
+
+# --- faults of bus and servos ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("inject", "cause", "phase"),
+    [
+        (lambda s: s.faults.mute(3), Cause.SERVO_SILENT, BusPhase.DISARMED),
+        (lambda s: s.faults.crc(60), Cause.BUS_NOISE, BusPhase.DISARMED),
+        (lambda s: s.stir(2, lambda servo: servo.alert(32)), Cause.SERVO_ALERT, BusPhase.STOPPED),
+        (lambda s: s.stir(5, lambda servo: servo.heat(75.0)), Cause.HOT, BusPhase.DISARMED),
+        (lambda s: s.stir(5, lambda servo: setattr(servo, "supply_v", 10.0)), Cause.VOLTAGE_LOW, BusPhase.DISARMED),
+        (lambda s: s.stir(5, lambda servo: servo.freeze(True)), Cause.TRACKING, BusPhase.STOPPED),
+    ],
+    ids=["21 silent", "22 noise", "23 overload", "24 hot", "24 voltage", "25 jam"],
+)
+def test_faults_end_the_motion(
+    servos: SoftServoBus, armed: ServoRobot, inject: Callable[[SoftServoBus], None], cause: Cause, phase: BusPhase
+) -> None:
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    inject(servos)
+    status = _drive(armed, until=_latched(cause))
+    assert status.latched is not None
+    assert status.latched.cause is cause
+    assert status.phase is phase
+    assert status.fault_counts[cause] == 1
+    servos.faults.clear()
+    _settle_mm(servos)
+
+
+def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot) -> None:
+    """It is silent for 0.3 s, and then has lost its settings and its zero."""
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    servos.stir(6, lambda servo: servo.restart())
+    status = _drive(armed, until=lambda status: status.latched is not None)
+    assert not status.armed
+    _seen(armed, lambda status: status.restarts > 0)
+    armed.acknowledge()
+    _seen(armed, lambda status: all(fault.cause is not Cause.SERVO_SILENT for fault in status.active))
+    with pytest.raises(NotReady, match="not zeroed: delivery_1"):
+        armed.arm()
+    armed.zero(["delivery_1"])
+    armed.arm()
+
+
+def test_arming_tells_that_the_rigs_zero_was_lost_with_the_power(servos: SoftServoBus) -> None:
+    """The register of right was a whole turn farther when the rig was calibrated."""
+    kept = ZeroConfig(ticks=tuple(1000 + joint.id + 4096 * (joint.id == 1) for joint in CONFIG.joints), **NO_SLACK)
+    robot = ServoRobot(CONFIG.model_copy(update={"port": servos.port}), SAFETY, kept_zero=kept)
+    robot.connect()
+    try:
+        _seen(robot, lambda status: len(status.servos) == 7)
+        with pytest.raises(NotReady, match=r"zero before arming \(the zero of the rig file does not hold.*turns \(right by -1\)"):
+            robot.arm()
+        robot.zero()
+        robot.arm()
+        robot.stop()
+        with pytest.raises(NotReady) as refused:
+            robot.arm()
+        assert "rig file" not in str(refused.value), "the joints are zeroed"
+    finally:
+        robot.close()
+
+
+def test_fault_26_the_port_vanishes_and_comes_back(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    servos.vanish()
+    status = _drive(armed, until=lambda status: status.phase is BusPhase.CLOSED)
+    assert _latched(Cause.PORT_LOST)(status)
+    report = armed.report()
+    assert report is not None
+    assert not report.port_open
+    with pytest.raises(NotReady, match="port is not open"):
+        armed.arm()
+    servos.reappear()
+    _drive(armed, until=lambda status: status.phase is BusPhase.STOPPED)
+    with pytest.raises(NotReady, match="acknowledge first"):
+        armed.arm()
+    armed.acknowledge()
+    with pytest.raises(NotReady, match="not zeroed"):
+        armed.arm()
+    armed.zero()
+    armed.arm()
+    at_mm = servos.positions_mm()[4]
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > at_mm + 1.0)
+
+
+# --- the bus process dies --------------------------------------------------------------------------------------------------------
+
+
+def test_a_killed_bus_process_is_seen_and_said(servos: SoftServoBus, armed: ServoRobot) -> None:
+    link = armed._link
+    assert link is not None
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    assert armed.failure is None
+    os.kill(link.pid, signal.SIGKILL)
+    end_s = time.monotonic() + PATIENCE_S
+    while armed.failure is None and time.monotonic() < end_s:
+        time.sleep(0.01)
+    assert armed.failure == (
+        "the servo bus process ended (killed by SIGKILL): the servos stopped by themselves; connect the robot again"
+    )
+    for action in (lambda: armed.send(FORWARD), armed.status, armed.arm, armed.acknowledge):
+        with pytest.raises(BusProcessLost, match="killed by SIGKILL"):
+            action()
+    armed.stop()
+    armed.hold()
+    armed.connect()
+    assert armed.failure is None
+    armed.zero()
+    armed.arm()
+
+
+def test_a_bus_process_that_hangs_reports_nothing_new(servos: SoftServoBus, armed: ServoRobot) -> None:
+    link = armed._link
+    assert link is not None
+    _seen(armed, lambda status: len(status.servos) == 7)
+    assert armed.report() is not None
+    os.kill(link.pid, signal.SIGSTOP)
+    time.sleep(0.05)
+    armed.report()
+    time.sleep(0.1)
+    assert armed.report() is None
+    assert armed.failure is None
+    os.kill(link.pid, signal.SIGCONT)
+
+
+def test_it_dies_while_somebody_waits_for_an_answer(servos: SoftServoBus, robot: ServoRobot) -> None:
+    link = robot._link
+    assert link is not None
+    os.kill(link.pid, signal.SIGSTOP)
+    killer = threading.Timer(0.1, os.kill, (link.pid, signal.SIGKILL))
+    killer.start()
+    with pytest.raises(BusProcessLost, match="killed by SIGKILL"):
+        robot.zero()
+    killer.join()
+
+
+def test_a_bus_process_that_hangs_is_ended_by_close(servos: SoftServoBus, robot: ServoRobot) -> None:
+    link = robot._link
+    assert link is not None
+    os.kill(link.pid, signal.SIGSTOP)
+    robot.close()
+    assert not psutil.pid_exists(link.pid)
+
+
+def test_asked_to_end_it_holds_and_ends_with_zero(servos: SoftServoBus, armed: ServoRobot) -> None:
+    link = armed._link
+    assert link is not None
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    os.kill(link.pid, signal.SIGTERM)
+    assert link._process.wait(PATIENCE_S) == 0
+    _settle_mm(servos)
+
+
+# --- the application dies --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("victim", "number"), KINDS, ids=lambda value: getattr(value, "name", value))
+def test_fault_32_killed_or_stopped_every_servo_stops_in_time_and_within_one_step(victim: str, number: signal.Signals) -> None:
+    servos = SoftServoBus(ServosConfig(), wire_time=True)
+    servos.start()
+    try:
+        outcome = strike(servos, victim, number, delay_s=0.5)
+    finally:
+        servos.stop()
+    assert outcome.before_mm > 0.1
+    assert outcome.stop_ms <= 1000.0 * BOUND_S
+    assert outcome.steps <= BOUND_STEPS
+    if number is signal.SIGKILL:
+        assert outcome.bus_gone
+
+
+def test_an_application_that_forgets_to_close_leaves_nothing_behind(servos: SoftServoBus) -> None:
+    """Its interpreter just ends; a forked child of it keeps all its ends open, and even so the bus process ends."""
+    program = (
+        "import os, sys, time\nfrom core.config.safety import SafetyConfig\nfrom core.config.safety import ServosConfig\n"
+        "from hardware.servos.servo_robot import ServoRobot\n"
+        "robot = ServoRobot(ServosConfig(port=sys.argv[1]), SafetyConfig())\nrobot.connect()\nrobot.zero()\nrobot.arm()\n"
+        "child = os.fork()\nif child == 0:\n    time.sleep(30)\n    os._exit(0)\n"
+        "print(robot._link.pid, child, flush=True)\nos._exit(0)\n"
+    )
+    run = subprocess.Popen([sys.executable, "-c", program, servos.port], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    assert run.stdout is not None
+    bus_pid, child = map(int, run.stdout.readline().split())
+    try:
+        end_s = time.monotonic() + PATIENCE_S
+        while _lives(bus_pid) and time.monotonic() < end_s:
+            time.sleep(0.02)
+        assert not _lives(bus_pid)
+    finally:
+        os.kill(child, signal.SIGKILL)
+        run.wait()
+        run.stdout.close()
+
+
+def _lives(pid: int) -> bool:
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
+    return False
+
+
+# --- the link by itself, and the rig ---------------------------------------------------------------------------------------------
+
+
+def test_a_link_whose_process_fails_at_once_says_why() -> None:
+    link = BusClient(ServosConfig(), SAFETY)
+    try:
+        with pytest.raises(BusProcessLost, match="no servo port is configured"):
+            link.request("open", PATIENCE_S)
+    finally:
+        link.close()
+    with pytest.raises(BusProcessLost, match="not connected"):
+        link.request("open", PATIENCE_S)
+
+
+def test_a_process_that_was_started_ahead_waits_for_its_servos_as_long_as_they_take() -> None:
+    process = BusProcess()
+    time.sleep(2.5 * _LOOK_S)
+    link = BusClient(ServosConfig(), SAFETY, process)
+    try:
+        assert link.pid == process.process.pid
+        with pytest.raises(BusProcessLost, match="no servo port is configured"):
+            link.request("open", PATIENCE_S)
+    finally:
+        link.close()
+        process.end()  # which is the link's, by then
+
+
+def test_a_process_that_is_gone_before_its_servos_are_named_is_replaced() -> None:
+    process = BusProcess()
+    process.process.kill()
+    process.process.wait()
+    link = BusClient(ServosConfig(), SAFETY, process)
+    try:
+        assert link.pid != process.process.pid
+        with pytest.raises(BusProcessLost, match="no servo port is configured"):
+            link.request("open", PATIENCE_S)
+    finally:
+        link.close()
+
+
+def test_a_robot_that_is_never_connected_ends_the_process_that_loads_for_it() -> None:
+    process = BusProcess()
+    ServoRobot(ServosConfig(), SAFETY, process=process).close()
+    assert process.process.poll() is not None
+
+
+LETS_GO = """
+import os, signal, sys
+from core.config.safety import SafetyConfig
+from core.config.safety import ServosConfig
+from hardware.servos.bus_ipc import BusLink
+
+link = BusLink(ServosConfig(port=sys.argv[1]), SafetyConfig())
+link._socket.send(b'{"id": 1, "do": "torque off"}')
+print(link.pid, flush=True)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_torque_off_is_done_though_the_application_dies_while_its_bus_process_loads(servos: SoftServoBus) -> None:
+    for joint in CONFIG.joints:
+        servos.servo(joint.id).table["torque"] = 1
+    done = subprocess.run([sys.executable, "-c", LETS_GO, servos.port], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    until_s = time.monotonic() + PATIENCE_S
+    while _lives(int(done.stdout)) and time.monotonic() < until_s:
+        time.sleep(0.02)
+    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+
+
+def test_an_application_that_goes_before_it_names_servos_leaves_a_process_that_ends_by_itself() -> None:
+    process = BusProcess()
+    process.socket.shutdown(socket.SHUT_RDWR)
+    assert process.process.wait(PATIENCE_S) == 0
+    process.end()
+
+
+def test_the_twins_rig_with_servos() -> None:
+    config = Config.model_validate(
+        {
+            "twin": {"image_width_px": 160, "image_height_px": 120},
+            "servos": {"driver": "dynamixel", "watchdog_s": 2.5, "heartbeat_timeout_s": 3.0},
+        }
+    )
+    rig = open_rig(config)
+    try:
+        robot = rig.robot
+        assert isinstance(robot, ServoRobot)
+        assert rig.kind is RigKind.SIM
+        before_mm = robot.status().insertion_mm
+        robot.arm()
+        _drive(robot, until=lambda status: robot.status().insertion_mm > before_mm + 0.5)
+        assert robot.status().insertion_mm > before_mm + 0.5
+    finally:
+        rig.close()
+
+
+def test_the_twins_rig_refuses_a_real_port() -> None:
+    config = Config.model_validate(
+        {"twin": {"image_width_px": 160, "image_height_px": 120}, "servos": {"driver": "dynamixel", "port": "/dev/ttyUSB0"}}
+    )
+    with pytest.raises(DeviceError, match=r"leave servos\.port"):
+        open_rig(config)

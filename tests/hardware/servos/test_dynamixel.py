@@ -1,0 +1,961 @@
+"""The driver of the seven servos, through the real SDK, against strict software servos on a pseudo-terminal."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from core.config.safety import JOINT_NAMES, JointConfig, ServosConfig
+from core.devices import DeviceError
+from hardware.servos import registers
+from hardware.servos.dynamixel_bus import ServoBus
+from hardware.servos.dynamixel_port import (
+    NoAnswer,
+    NotReady,
+    PortError,
+    PortLost,
+    PortTaken,
+    ServoLine,
+    StuffingHandler,
+    TorqueStillOn,
+    WriteRefused,
+    WrongServo,
+)
+from hardware.servos.registers import HardwareError, MissingServo, ServoState
+from hardware.twin.servos.bus import SoftServoBus
+from hardware.twin.servos.protocol import Instruction
+
+pytestmark = pytest.mark.real_time
+
+ROOT = Path(__file__).resolve().parents[3]
+# The servos' watchdog is long, so that a machine that stalls does not trip it; the tests of the watchdog turn the servos' clock.
+CONFIG = ServosConfig(watchdog_s=2.0)
+TENDON, ADVANCE = CONFIG.joints[0], CONFIG.joints[4]
+
+
+def _joint(**changes: object) -> JointConfig:
+    return TENDON.model_copy(update=changes)
+
+
+class Clock:
+    """The servos' time: the wall's, plus what a test lets pass at once."""
+
+    def __init__(self) -> None:
+        self.ahead_s = 0.0
+
+    def __call__(self) -> float:
+        return time.monotonic() + self.ahead_s
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def twin(clock: Clock) -> Iterator[SoftServoBus]:
+    twin = SoftServoBus(CONFIG, clock=clock, positions=[1000 + joint.id for joint in CONFIG.joints])
+    twin.start()
+    yield twin
+    twin.stop()
+    assert twin.failure is None
+
+
+@pytest.fixture
+def closed(twin: SoftServoBus) -> Iterator[ServoBus]:
+    bus = ServoBus(CONFIG, twin.port)
+    yield bus
+    bus.close()
+
+
+@pytest.fixture
+def bus(closed: ServoBus) -> ServoBus:
+    closed.open()
+    return closed
+
+
+@pytest.fixture
+def armed(bus: ServoBus) -> ServoBus:
+    bus.set_zero()
+    bus.arm()
+    return bus
+
+
+def _states(bus: ServoBus) -> list[ServoState]:
+    """A read that must be whole. Machines that stall lose an answer now and then, so it is tried again."""
+    for _ in range(20):
+        readings = bus.read()
+        if all(isinstance(reading, ServoState) for reading in readings):
+            break
+        time.sleep(0.02)
+    states = [reading for reading in readings if isinstance(reading, ServoState)]
+    assert len(states) == 7, readings
+    return states
+
+
+def _until(bus: ServoBus, index: int, wanted: Callable[[object], bool]) -> object:
+    """Read until the reading of one servo is as wanted."""
+    for _ in range(100):
+        reading = bus.read()[index]
+        if wanted(reading):
+            return reading
+        time.sleep(0.01)
+    raise AssertionError(f"not seen: {reading}")
+
+
+# --- millimetres and registers ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "zero", "position_mm", "ticks"),
+    [
+        ({"mm_per_turn": 40.0}, 0, 40.0, 4096),
+        ({"mm_per_turn": 40.0}, 1000, 10.0, 2024),
+        ({"mm_per_turn": 40.0, "sign": -1}, 1000, 10.0, -24),
+        ({"mm_per_turn": 20.0}, -5, -5.0, -1029),
+        ({"mm_per_turn": 40.0}, 0, 0.0049, 1),
+        ({"mm_per_turn": 40.0}, 0, 0.0048, 0),
+    ],
+)
+def test_millimetres_to_ticks(changes: dict[str, object], zero: int, position_mm: float, ticks: int) -> None:
+    joint = _joint(**changes)
+    assert registers.to_ticks(joint, position_mm, zero) == ticks
+    assert registers.to_mm(joint, ticks, zero) == pytest.approx(position_mm, abs=0.005)
+
+
+@given(st.sampled_from([-1, 1]), st.floats(1.0, 500.0), st.integers(-9000, 9000), st.integers(-20000, 20000))
+def test_ticks_come_back_exactly(sign: int, mm_per_turn: float, zero: int, ticks: int) -> None:
+    joint = _joint(sign=sign, mm_per_turn=mm_per_turn)
+    assert registers.to_ticks(joint, registers.to_mm(joint, ticks, zero), zero) == ticks
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300, 10241.0])
+def test_no_ticks_for_what_is_no_place(bad: float) -> None:
+    with pytest.raises(ValueError, match="joint right"):
+        registers.to_ticks(TENDON, bad, 0)
+
+
+def test_profiles_by_hand() -> None:
+    """10 mm/s at 40 mm a turn: 15 rpm, 65.5 units of 0.229 rpm. 200 mm/s^2: 5 rev/s^2 = 18000 rev/min^2 = 83.9 of 214.577."""
+    assert registers.profile_velocity(TENDON) == 65
+    assert registers.profile_acceleration(TENDON) == 83
+    assert registers.profile_velocity(ADVANCE) == 131
+    assert registers.velocity_mm_s(TENDON, 65) == pytest.approx(9.92, abs=0.01)
+    assert registers.velocity_mm_s(_joint(sign=-1), 65) == pytest.approx(-9.92, abs=0.01)
+
+
+def test_a_slow_joint_never_gets_a_profile_of_zero_which_means_unlimited() -> None:
+    slow = _joint(max_speed_mm_s=0.01, max_acceleration_mm_s2=0.01, mm_per_turn=500.0)
+    assert (registers.profile_velocity(slow), registers.profile_acceleration(slow)) == (1, 1)
+    fast = _joint(max_speed_mm_s=200.0, max_acceleration_mm_s2=10_000.0, mm_per_turn=1.0)
+    assert (registers.profile_velocity(fast), registers.profile_acceleration(fast)) == (1023, 32767)
+
+
+@pytest.mark.parametrize(("seconds", "steps"), [(0.2, 10), (0.02, 1), (0.05, 3), (2.54, 127)])
+def test_watchdog_in_steps_of_20_ms(seconds: float, steps: int) -> None:
+    assert registers.watchdog_units(seconds) == steps
+
+
+def test_currents_by_model() -> None:
+    assert registers.current_ma(1020, -100) == pytest.approx(-269.0)
+    assert registers.current_ma(1200, 100) == 100.0
+    assert registers.current_ma(1060, 100) is None
+
+
+def test_a_status_block_by_hand() -> None:
+    block = bytes.fromhex("02 01 20 FF 00FCFF 0AFF BFFF FFFFFD 78 2D")
+    state = registers.state_of(TENDON, 1020, -131_073, block, 5.0)
+    assert state is not None
+    assert (state.torque, state.error, state.watchdog_tripped) == (True, HardwareError.OVERLOAD, True)
+    assert (state.goal_ticks, state.ticks, state.position_mm) == (-1024, -131_073, 0.0)
+    assert (state.current_ma, state.voltage_v, state.temperature_c) == (pytest.approx(-246 * 2.69), 12.0, 45.0)
+    assert state.velocity_mm_s == pytest.approx(-65 * 0.229 / 60 * 40)
+
+
+def test_zeros_are_no_servo_at_zero() -> None:
+    assert registers.state_of(TENDON, 1020, 0, bytes(16), 0.0) is None
+    with pytest.raises(ValueError, match="15 bytes"):
+        registers.state_of(TENDON, 1020, 0, bytes(15), 0.0)
+
+
+def test_the_block_fits_the_smallest_servos() -> None:
+    assert len(registers.indirect_addresses()) <= 2 * 20
+    assert (registers.indirect_data(1020), registers.indirect_data(1200)) == (224, 208)
+
+
+def test_hardware_errors_in_words() -> None:
+    assert registers.describe(HardwareError(36)) == "overheating, overload"
+    assert registers.describe(HardwareError(64)) == "error 64"
+
+
+# --- stuffing --------------------------------------------------------------------------------------------------------------------
+
+
+class Tape:
+    """Stands in for the SDK's port: keeps what is sent, plays what is to be received."""
+
+    def __init__(self, play: bytes = b"") -> None:
+        self.is_using, self.sent, self.play = False, b"", play
+
+    def clearPort(self) -> None:
+        pass
+
+    def writePort(self, packet: list[int]) -> int:
+        self.sent += bytes(packet)
+        return len(packet)
+
+    def readPort(self, size: int) -> bytes:
+        data, self.play = self.play[: max(0, size)], self.play[max(0, size) :]
+        return data
+
+    def setPacketTimeout(self, length: int) -> None:
+        pass
+
+    def isPacketTimeout(self) -> bool:
+        return True
+
+
+def test_a_payload_with_a_header_is_sent_stuffed() -> None:
+    tape = Tape()
+    StuffingHandler().write4ByteTxOnly(tape, 1, 116, 0xFFFDFFFF)
+    # header, id, length 9 + 1, write, 116, FF FF FD FD FF
+    assert tape.sent[:-2] == bytes.fromhex("FFFFFD00 01 0A00 03 7400 FFFFFDFD FF")
+
+
+@given(st.lists(st.sampled_from([0xFF, 0xFD, 0x00]), max_size=30).map(bytes))
+def test_answers_are_read_unstuffed(data: bytes) -> None:
+    from hardware.twin.servos.protocol import status_packet
+
+    packet, result = StuffingHandler().rxPacket(Tape(status_packet(9, 0, data)), False)
+    assert result == 0
+    assert bytes(packet[9:-2]) == data
+    assert packet[5] | packet[6] << 8 == len(data) + 4
+
+
+_BITS_OF_ANSWERS = st.sampled_from(
+    [b"\xff\xff\xfd\x00", b"\x01\x00\x00", b"\x02\x04\x00\x55", b"\x01\x03\x00\x55", b"\xff\xff\xfd\xfd", b"\xff", b"\xfd", b"\x55"]
+)
+
+
+@given(st.lists(st.one_of(st.binary(max_size=30), _BITS_OF_ANSWERS), max_size=30).map(b"".join))
+def test_no_bytes_on_the_line_make_a_group_read_fail(heard: bytes) -> None:
+    line = ServoLine("nowhere", 1_000_000)
+    line._port, line._owner = Tape(heard), threading.get_ident()
+    answer = line.group_read([1, 2, 3], 224, 16)
+    assert set(answer.data) | set(answer.missed) == {1, 2, 3}
+    assert not line._port.is_using
+
+
+def test_requests_that_follow_each_other_ask_for_different_lengths(twin: SoftServoBus, bus: ServoBus) -> None:
+    """Two reads in between for which nobody was asked made the next request look like the one before; its late answers passed."""
+    bus.read()
+    line = bus._line
+    line._quiet_until = {joint.id: math.inf for joint in CONFIG.joints}
+    for _ in range(2):
+        assert all(isinstance(reading, MissingServo) for reading in bus.read())
+    line._quiet_until.clear()
+    bus.read()
+    *_, before, last = [p.parameters[2:4] for p in twin.log if p.instruction == Instruction.SYNC_READ]
+    assert before != last
+
+
+def test_a_goal_with_a_header_arrives_and_is_read_back(twin: SoftServoBus, bus: ServoBus) -> None:
+    """-131073 ticks are FF FF FD FF in the packet to the servo, and FF FF FD in its answer."""
+    twin.stir(1, lambda servo: servo.turn(-131_073 - servo.table["present_position"]))
+    bus.set_zero()
+    bus.arm()
+    assert bus.write([0.0] * 7) == (0.0,) * 7
+    state = _states(bus)[0]
+    assert (state.ticks, state.goal_ticks) == (-131_073, -131_073)
+    assert bus.counts.corrupt == 0
+
+
+# --- opening ---------------------------------------------------------------------------------------------------------------------
+
+
+def test_open_names_the_seven_and_moves_nothing(twin: SoftServoBus, bus: ServoBus) -> None:
+    assert [(i.name, i.id, i.model, i.firmware) for i in bus.identities] == [
+        (n, k + 1, 1020, 46) for k, n in enumerate(JOINT_NAMES)
+    ]
+    assert bus.is_open
+    assert not bus.is_armed
+    assert not any(state.torque for state in _states(bus))
+    assert twin.positions_mm() == (0.0,) * 7
+
+
+def test_a_missing_port() -> None:
+    with pytest.raises(PortError, match="does not exist: plug") as caught:
+        ServoBus(CONFIG, "/nowhere/ttyUSB0").open()
+    assert "\n" not in str(caught.value)
+    assert isinstance(caught.value, DeviceError)
+
+
+def test_no_permission(monkeypatch: pytest.MonkeyPatch, twin: SoftServoBus) -> None:
+    import serial
+
+    def refuse(*_: object, **__: object) -> None:
+        raise serial.SerialException(13, "could not open port")
+
+    monkeypatch.setattr(serial, "Serial", refuse)
+    with pytest.raises(PortError, match="group dialout"):
+        ServoBus(CONFIG, twin.port).open()
+
+
+def test_a_file_is_no_port(tmp_path: Path) -> None:
+    (tmp_path / "port").write_text("")
+    with pytest.raises(PortError, match="cannot be used as servo port"):
+        ServoBus(CONFIG, str(tmp_path / "port")).open()
+
+
+def test_no_port_is_configured() -> None:
+    with pytest.raises(NotReady, match=r"set servos\.port"):
+        ServoBus(CONFIG)
+
+
+def test_a_speed_that_the_sdk_does_not_know(twin: SoftServoBus) -> None:
+    bus = ServoBus(CONFIG.model_copy(update={"baud": 12345}), twin.port)
+    with pytest.raises(PortError, match="baud 12345"):
+        bus.open()
+
+
+def test_wrong_baud_tells_the_right_one(twin: SoftServoBus) -> None:
+    bus = ServoBus(CONFIG.model_copy(update={"baud": 57600}), twin.port)
+    with pytest.raises(NoAnswer, match=r"set servos\.baud = 1000000"):
+        bus.open()
+    assert not bus.is_open
+
+
+def test_servos_without_power(twin: SoftServoBus) -> None:
+    for joint in CONFIG.joints:
+        twin.faults.mute(joint.id)
+    with pytest.raises(NoAnswer, match="no servo answers"):
+        ServoBus(CONFIG, twin.port).open()
+
+
+def test_a_servo_with_another_id_is_named_and_so_are_those_found(twin: SoftServoBus) -> None:
+    joints = tuple(j.model_copy(update={"id": 9}) if j.name == "up" else j for j in CONFIG.joints)
+    bus = ServoBus(CONFIG.model_copy(update={"joints": joints}), twin.port)
+    with pytest.raises(NoAnswer, match=r"servo up \(id 9\): no answer; ids on the line: 1, 2, 3, 4, 5, 6, 7"):
+        bus.open()
+    assert not bus.is_open
+
+
+def test_a_wrong_model_is_refused(twin: SoftServoBus, closed: ServoBus) -> None:
+    twin.stir(4, lambda servo: servo.table.__setitem__("model_number", 1060))
+    with pytest.raises(WrongServo, match=r"servo down \(id 4\) is model 1060, not 1020"):
+        closed.open()
+    assert not closed.is_open
+
+
+def test_a_wrong_id_inside_is_refused(twin: SoftServoBus, closed: ServoBus) -> None:
+    twin.stir(4, lambda servo: servo.table.__setitem__("id", 5))
+    with pytest.raises(WrongServo, match=r"servo down \(id 4\) says that its id is 5"):
+        closed.open()
+
+
+def test_a_mode_that_was_altered_is_mended_but_must_be_zeroed(twin: SoftServoBus, armed: ServoBus) -> None:
+    armed.torque_off()
+    twin.stir(2, lambda servo: servo.answer(3, 11, data=b"\3"))
+    with pytest.raises(NotReady, match="not zeroed: left"):
+        armed.arm()
+    assert not armed.is_armed
+    assert twin.servo(2).table["operating_mode"] == 4
+    armed.set_zero()
+    armed.arm()
+
+
+def test_a_second_program_is_refused(twin: SoftServoBus, bus: ServoBus) -> None:
+    program = (
+        "import sys\nfrom core.config.safety import ServosConfig\nfrom hardware.servos.dynamixel_bus import ServoBus\n"
+        "from core.devices import UserError\n"
+        "try:\n    ServoBus(ServosConfig(), sys.argv[1]).open()\n"
+        "except UserError as error:\n    sys.exit(f'{type(error).__name__}: {error}')\n"
+    )
+    run = subprocess.run([sys.executable, "-c", program, twin.port], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 1
+    assert run.stderr.startswith("PortTaken: servo port ")
+    assert "close that program first" in run.stderr
+    assert len(_states(bus)) == 7
+
+
+def test_within_one_program_too_and_free_after_close(twin: SoftServoBus, bus: ServoBus) -> None:
+    other = ServoBus(CONFIG, twin.port)
+    with pytest.raises(PortTaken):
+        other.open()
+    bus.close()
+    bus.close()
+    other.open()
+    other.close()
+
+
+def test_one_thread_owns_it(bus: ServoBus) -> None:
+    caught: list[BaseException] = []
+
+    def read() -> None:
+        try:
+            bus.read()
+        except RuntimeError as error:
+            caught.append(error)
+
+    thread = threading.Thread(target=read)
+    thread.start()
+    thread.join()
+    assert "belongs to the thread" in str(caught[0])
+    assert len(_states(bus)) == 7
+
+
+def test_a_servo_that_was_told_not_to_answer_writes_is_told_otherwise(twin: SoftServoBus, closed: ServoBus) -> None:
+    twin.stir(1, lambda servo: servo.table.__setitem__("status_return", 1))
+    closed.open()
+
+
+# --- arming ----------------------------------------------------------------------------------------------------------------------
+
+
+def _writes(twin: SoftServoBus, servo_id: int) -> list[tuple[int, bytes]]:
+    """Address and first bytes of all that was written to a servo, group writes included, and reads of its position (as 132)."""
+    found = []
+    for packet in twin.log:
+        if packet.id == servo_id and packet.instruction == Instruction.WRITE:
+            found.append((int.from_bytes(packet.parameters[:2], "little"), packet.parameters[2:]))
+        elif packet.id == servo_id and packet.instruction == Instruction.READ and packet.parameters[0] == 132:
+            found.append((132, b""))
+        elif packet.instruction == Instruction.SYNC_WRITE:
+            items = packet.parameters[4:]
+            found += [(packet.parameters[0], items[at + 1 : at + 5]) for at in range(0, len(items), 5) if items[at] == servo_id]
+    return found
+
+
+def test_the_arming_order(twin: SoftServoBus, closed: ServoBus) -> None:
+    closed.open()
+    opened = [address for address, _ in _writes(twin, 3)]
+    assert opened == [64, 9, 11, 44, 168]  # torque off, then what differs from what we need, then the status block
+    closed.set_zero()
+    twin.log.clear()
+    closed.arm()
+    goal = (1003).to_bytes(4, "little")
+    profile = (83).to_bytes(4, "little") + (65).to_bytes(4, "little")
+    assert _writes(twin, 3) == [(98, b"\0"), (64, b"\0"), (108, profile), (132, b""), (116, goal), (64, b"\1"), (98, bytes([100]))]
+    order = [(packet.id, packet.parameters[0]) for packet in twin.log if packet.instruction == Instruction.WRITE]
+    assert order.index((1, 64)) > order.index((7, 98)), "all watchdogs off before the first torque is touched"
+    assert closed.is_armed
+
+
+def _torques(twin: SoftServoBus) -> list[int]:
+    return [twin.servo(joint.id).table["torque"] for joint in CONFIG.joints]
+
+
+@pytest.mark.parametrize(("model", "servo_id"), [(1060, 4), (1020, 5)])
+def test_a_servo_that_was_changed_since_the_opening_is_not_armed(
+    twin: SoftServoBus, armed: ServoBus, model: int, servo_id: int
+) -> None:
+    """Nor does it cost the others their hold."""
+    armed.disarm()
+    twin.stir(4, lambda servo: (servo.table.__setitem__("model_number", model), servo.table.__setitem__("id", servo_id)))
+    with pytest.raises(WrongServo, match=r"servo down \(id 4\)"):
+        armed.arm()
+    assert not armed.is_armed
+    assert _torques(twin) == [1] * 7
+
+
+def test_a_servo_that_keeps_another_profile_is_not_armed(
+    twin: SoftServoBus, bus: ServoBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would go to its goals as fast as it can."""
+    bus.set_zero()
+    write = ServoLine.write
+    monkeypatch.setattr(
+        ServoLine, "write", lambda line, i, address, data: None if address == 108 else write(line, i, address, data)
+    )
+    with pytest.raises(WriteRefused, match=r"servo right \(id 1\) did not take its greatest speed"):
+        bus.arm()
+    assert _torques(twin) == [0] * 7
+
+
+@pytest.mark.parametrize("register", ["velocity_limit", "return_delay"])
+def test_connecting_lets_go_of_no_wire(twin: SoftServoBus, armed: ServoBus, register: str) -> None:
+    """Another speed in the settings is another velocity limit, and that can only be written with the torque off."""
+    armed.close()
+    twin.stir(3, lambda servo: servo.table.__setitem__(register, 7))
+    before = twin.positions_mm()
+    armed.open()
+    assert _torques(twin) == [1] * 7
+    assert twin.servo(3).table[register] == 7
+    armed.set_zero()
+    assert _torques(twin) == [1] * 7
+    armed.arm()
+    assert twin.servo(3).table[register] == {"velocity_limit": 65, "return_delay": 0}[register]
+    assert twin.positions_mm() == before
+
+
+def test_a_servo_that_holds_in_another_mode_is_not_zeroed_before_it_was_let_go(twin: SoftServoBus, armed: ServoBus) -> None:
+    armed.close()
+    twin.stir(3, lambda servo: servo.table.__setitem__("drive_mode", 1))
+    armed.open()
+    assert _torques(twin) == [1] * 7
+    with pytest.raises(NotReady, match=r"servo up \(id 3\) holds in a mode of another program: switch the torque off"):
+        armed.set_zero()
+    armed.torque_off()
+    armed.set_zero()
+    assert twin.servo(3).table["drive_mode"] == 0
+    armed.arm()
+
+
+def test_opened_again_the_eeprom_is_not_written_again(twin: SoftServoBus, bus: ServoBus) -> None:
+    bus.close()
+    twin.log.clear()
+    bus.open()
+    assert _writes(twin, 3) == []
+
+
+def test_arming_does_not_move_anything(twin: SoftServoBus, bus: ServoBus) -> None:
+    twin.stir(5, lambda servo: servo.turn(700))  # its goal register still says the old place
+    bus.set_zero()
+    before = twin.positions_mm()
+    bus.arm()
+    time.sleep(0.05)
+    assert twin.positions_mm() == before
+    assert all(state.torque and state.position_mm == 0.0 for state in _states(bus))
+
+
+def test_not_armed_without_zeros(bus: ServoBus) -> None:
+    bus.set_zero(["right", "left"])
+    with pytest.raises(NotReady, match="not zeroed: up, down, advance, delivery_1, delivery_2"):
+        bus.arm()
+    assert bus.zero_ticks[:3] == (1001, 1002, None)
+
+
+def test_not_armed_with_a_hardware_error(twin: SoftServoBus, bus: ServoBus) -> None:
+    bus.set_zero()
+    twin.stir(6, lambda servo: servo.alert(32))
+    with pytest.raises(NotReady, match=r"servo delivery_1 \(id 6\) reports overload: .* reboot"):
+        bus.arm()
+
+
+def test_arming_that_fails_midway_leaves_no_torque(twin: SoftServoBus, bus: ServoBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    bus.set_zero()
+    write = ServoLine.write
+
+    def fail_at_the_fifth(line: ServoLine, servo_id: int, address: int, data: bytes) -> None:
+        if (servo_id, address, data) == (5, 64, b"\1"):
+            raise WriteRefused("servo 5 did not take it")
+        write(line, servo_id, address, data)
+
+    monkeypatch.setattr(ServoLine, "write", fail_at_the_fifth)
+    with pytest.raises(WriteRefused):
+        bus.arm()
+    assert [twin.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    assert not bus.is_armed
+
+
+def test_arming_that_fails_says_of_which_servo_the_torque_may_be_on(
+    twin: SoftServoBus, bus: ServoBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus.set_zero()
+    write = ServoLine.write
+
+    def fail_at_the_fifth(line: ServoLine, servo_id: int, address: int, data: bytes) -> None:
+        if (servo_id, address, data) == (5, 64, b"\1"):
+            twin.faults.mute(1)
+            raise WriteRefused("servo 5 did not take it")
+        write(line, servo_id, address, data)
+
+    monkeypatch.setattr(ServoLine, "write", fail_at_the_fifth)
+    with pytest.raises(TorqueStillOn, match=r"servo 5 did not take it; torque of right is not proven to be off: cut the servos'"):
+        bus.arm()
+    assert not bus.is_armed
+
+
+def test_armed_it_cannot_be_zeroed(armed: ServoBus) -> None:
+    with pytest.raises(NotReady, match="disarm"):
+        armed.set_zero()
+
+
+def test_not_open_it_says_so(closed: ServoBus) -> None:
+    for action in (closed.read, closed.arm, closed.set_zero, closed.hold, closed.torque_off):
+        with pytest.raises(NotReady, match="open"):
+            action()
+    with pytest.raises(NotReady):
+        closed.write([0.0] * 7)
+
+
+# --- goals -----------------------------------------------------------------------------------------------------------------------
+
+
+def test_goals_are_reached_in_the_joints_direction(twin: SoftServoBus) -> None:
+    joints = tuple(joint.model_copy(update={"sign": -1 if joint.name == "left" else 1}) for joint in CONFIG.joints)
+    bus = ServoBus(CONFIG.model_copy(update={"joints": joints}), twin.port)
+    bus.open()
+    bus.set_zero()
+    bus.arm()
+    goals = (0.3, 0.2, -0.1, 0.0, 0.5, 0.4, 0.4)
+    sent = bus.write(goals)
+    assert sent == pytest.approx(goals, abs=0.005)
+    for _ in range(100):
+        states = _states(bus)
+        if [state.ticks for state in states] == [state.goal_ticks for state in states]:
+            break
+        time.sleep(0.01)
+    assert tuple(state.position_mm for state in states) == pytest.approx(sent)
+    assert [state.goal_ticks for state in states][:2] == [1001 + 31, 1002 - 20]
+    bus.close()
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, 1e9])
+def test_a_bad_goal_sends_nothing(twin: SoftServoBus, armed: ServoBus, bad: float) -> None:
+    twin.log.clear()
+    with pytest.raises(ValueError, match="joint down"):
+        armed.write([0.1, 0.1, 0.1, bad, 0.1, 0.1, 0.1])
+    with pytest.raises(ValueError, match="argument"):
+        armed.write([0.1] * 6)
+    assert not twin.log
+
+
+def test_no_goals_before_arming_and_after_disarming(armed: ServoBus) -> None:
+    armed.disarm()
+    with pytest.raises(NotReady, match="not armed"):
+        armed.write([0.0] * 7)
+    assert all(state.torque for state in _states(armed))
+
+
+def test_hold_stops_where_it_is(twin: SoftServoBus, armed: ServoBus) -> None:
+    armed.write([0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0])
+    _until(armed, 4, lambda reading: isinstance(reading, ServoState) and reading.velocity_mm_s > 5.0)
+    held = armed.hold()[4]
+    assert isinstance(held, ServoState)
+    assert held.position_mm is not None
+    state = _until(armed, 4, lambda reading: isinstance(reading, ServoState) and reading.ticks == reading.goal_ticks)
+    assert isinstance(state, ServoState)
+    assert state.position_mm == pytest.approx(held.position_mm)
+    assert state.position_mm < 40.0
+
+
+def test_torque_off_is_one_packet_three_times_read_back(twin: SoftServoBus, armed: ServoBus) -> None:
+    twin.log.clear()
+    armed.torque_off()
+    broadcasts = [packet for packet in twin.log if packet.id == 254 and packet.instruction == Instruction.WRITE]
+    assert [packet.parameters for packet in broadcasts] == [bytes([64, 0, 0])] * 3
+    assert not armed.is_armed
+    assert not any(state.torque for state in _states(armed))
+
+
+def test_torque_off_without_proof_is_an_error(twin: SoftServoBus, armed: ServoBus) -> None:
+    twin.faults.mute(3)
+    with pytest.raises(TorqueStillOn, match=r"torque of .*up.*cut the servos' power"):
+        armed.torque_off()
+    assert twin.servo(3).table["torque"] == 0
+
+
+def test_who_hears_it_lets_go_though_the_seven_are_not_complete(twin: SoftServoBus, armed: ServoBus) -> None:
+    armed.close()
+    twin.faults.mute(3)
+    with pytest.raises(NoAnswer, match=r"up \(id 3\)"):
+        armed.open()
+    with pytest.raises(TorqueStillOn, match="torque of up is not proven"):
+        armed.let_go()
+    assert [twin.servo(joint.id).table["torque"] for joint in CONFIG.joints if joint.name != "up"] == [0] * 6
+    assert not armed.is_open
+
+
+def test_close_holds_and_keeps_the_wires_tight(twin: SoftServoBus, armed: ServoBus) -> None:
+    armed.write([0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0])
+    _until(armed, 4, lambda reading: isinstance(reading, ServoState) and reading.velocity_mm_s > 5.0)
+    armed.close()
+    table = twin.servo(5).table
+    assert table["goal_position"] < 1005 + 45 * 102.4
+    assert table["torque"] == 1
+
+
+# --- faults 21 to 27 of the bench's list -----------------------------------------------------------------------------------------
+
+
+def test_21_a_silent_servo_is_missing_not_zero_and_the_others_are_read(twin: SoftServoBus, armed: ServoBus) -> None:
+    twin.faults.mute(3)
+    seen = []
+    for _ in range(8):
+        readings = armed.read()
+        assert isinstance(readings[2], MissingServo)
+        seen.append(readings[2].misses)
+        time.sleep(0.02)
+    assert seen == sorted(seen)
+    assert seen[-1] >= 3
+    assert any(all(isinstance(r, ServoState) for i, r in enumerate(armed.read()) if i != 2) for _ in range(5))
+    twin.faults.mute(3, False)
+    _until(armed, 2, lambda reading: isinstance(reading, ServoState))
+    assert armed.is_armed
+
+
+def test_21_all_silent_ends_in_bounded_time(twin: SoftServoBus, armed: ServoBus) -> None:
+    for joint in CONFIG.joints:
+        twin.faults.mute(joint.id)
+    for _ in range(6):
+        readings = armed.read()
+        time.sleep(0.05)
+    assert all(isinstance(reading, MissingServo) and reading.misses >= 3 for reading in readings)
+
+
+def test_21_three_silent_servos_do_not_hide_the_rest_for_long(twin: SoftServoBus, armed: ServoBus) -> None:
+    for servo_id in (1, 2, 3):
+        twin.faults.mute(servo_id)
+    for _ in range(10):
+        readings = armed.read()
+        if all(isinstance(reading, ServoState) for reading in readings[3:]):
+            break
+        time.sleep(0.02)
+    assert all(isinstance(reading, ServoState) for reading in readings[3:])
+    assert all(isinstance(reading, MissingServo) for reading in readings[:3])
+
+
+def test_22_one_damaged_answer_is_asked_for_again(twin: SoftServoBus, armed: ServoBus) -> None:
+    twin.faults.crc(1)
+    assert len(_states(armed)) == 7
+    assert armed.counts.corrupt == 1
+    assert armed.counts.retries >= 1
+
+
+def test_22_many_damaged_answers_are_counted_and_missing(twin: SoftServoBus, armed: ServoBus) -> None:
+    twin.faults.crc(1000)
+    readings = armed.read()
+    assert all(isinstance(reading, MissingServo) and reading.reason == "damaged answer" for reading in readings)
+    assert armed.counts.corrupt > 5
+    twin.faults.crc(0)
+    assert len(_states(armed)) == 7
+
+
+@pytest.mark.parametrize("count", [1, 3, 11, 100, 500])
+def test_22_garbage(twin: SoftServoBus, armed: ServoBus, count: int) -> None:
+    twin.faults.garbage(count)
+    armed.read()
+    assert len(_states(armed)) == 7
+
+
+@pytest.mark.parametrize("fault", ["truncate", "short"])
+def test_22_truncated_and_short_answers(twin: SoftServoBus, armed: ServoBus, fault: str) -> None:
+    getattr(twin.faults, fault)(4, 1)
+    armed.read()
+    assert armed.counts.corrupt >= 1
+    assert len(_states(armed)) == 7
+
+
+@pytest.mark.parametrize("fault", ["truncate", "short"])
+def test_22_in_single_requests_too(twin: SoftServoBus, bus: ServoBus, fault: str) -> None:
+    getattr(twin.faults, fault)(4, 1)
+    bus.set_zero()
+    getattr(twin.faults, fault)(4, 10)
+    with pytest.raises(NoAnswer, match="servo 4: damaged answer, 3 times"):
+        bus.set_zero()
+
+
+def test_22_a_late_answer_is_never_taken_for_a_new_one(twin: SoftServoBus, bus: ServoBus) -> None:
+    """The horn turns between two reads; the answer to the first comes while the second waits, and tells the old place."""
+    _states(bus)
+    twin.faults.delay(4, 0.08)
+    assert isinstance(bus.read()[3], MissingServo)
+    twin.stir(4, lambda servo: servo.turn(500))
+    twin.faults.delay(4, 0.0)
+    for _ in range(10):
+        reading = bus.read()[3]
+        assert isinstance(reading, MissingServo) or reading.ticks == 1504
+        time.sleep(0.01)
+    assert isinstance(reading, ServoState)
+
+
+def test_22_a_late_answer_to_a_single_request(twin: SoftServoBus, bus: ServoBus) -> None:
+    twin.faults.delay(4, 0.05)
+    with pytest.raises(NoAnswer, match="servo 4: no answer, 3 times"):
+        bus.set_zero()
+    twin.stir(4, lambda servo: servo.turn(500))
+    twin.faults.delay(4, 0.0)
+    bus.set_zero()
+    assert bus.zero_ticks[3] == 1504
+
+
+@pytest.mark.parametrize("bits", [1, 4, 32])
+def test_23_an_alert_is_read(twin: SoftServoBus, armed: ServoBus, bits: int) -> None:
+    twin.stir(2, lambda servo: servo.alert(bits))
+    state = _states(armed)[1]
+    assert state.error == HardwareError(bits)
+    assert state.torque == (bits == 1)
+    assert armed.is_armed == (bits == 1)
+
+
+def test_24_heat_and_voltage_are_told(twin: SoftServoBus, armed: ServoBus) -> None:
+    twin.stir(2, lambda servo: servo.heat(72.0))
+    twin.stir(5, lambda servo: setattr(servo, "supply_v", 10.2))
+    states = _states(armed)
+    assert states[1].temperature_c == pytest.approx(72.0)
+    assert states[4].voltage_v == pytest.approx(10.2)
+    assert states[4].error == HardwareError(0)
+
+
+def test_25_a_jam_shows_as_distance_current_and_then_overload(twin: SoftServoBus, clock: Clock) -> None:
+    bus = ServoBus(CONFIG, twin.port)
+    bus.open()
+    bus.set_zero()
+    bus.arm()
+    twin.stir(1, lambda servo: servo.freeze(True))
+    bus.write([2.0] + [0.0] * 6)
+    time.sleep(0.3)
+    state = _states(bus)[0]
+    assert (state.position_mm, state.goal_mm) == (0.0, pytest.approx(2.0, abs=0.005))
+    assert state.current_ma is not None
+    assert state.current_ma > 1500.0
+    clock.ahead_s += 1.1
+    state = _states(bus)[0]
+    assert (state.error, state.torque) == (HardwareError.OVERLOAD, False)
+    bus.close()
+
+
+def test_26_a_vanished_port_is_lost_and_opens_again_clean(twin: SoftServoBus, armed: ServoBus) -> None:
+    twin.vanish()
+    with pytest.raises(PortLost, match="check the USB cable") as caught:
+        armed.read()
+    assert "\n" not in str(caught.value)
+    assert not armed.is_open
+    assert not armed.is_armed
+    with pytest.raises(PortError, match="does not exist"):
+        armed.open()
+    twin.reappear()
+    armed.open()
+    assert len(_states(armed)) == 7
+    assert not armed.is_armed
+    assert armed.zero_ticks == (None,) * 7
+
+
+@pytest.mark.parametrize("action", ["write", "hold", "torque_off", "arm", "set_zero"])
+def test_26_whatever_is_asked_of_a_vanished_port(twin: SoftServoBus, armed: ServoBus, action: str) -> None:
+    if action in {"arm", "set_zero"}:
+        armed.disarm()
+    twin.vanish()
+    with pytest.raises(PortLost):
+        getattr(armed, action)(*([[0.0] * 7] if action == "write" else []))
+    armed.close()
+
+
+def test_26_it_vanishes_while_an_answer_is_waited_for(twin: SoftServoBus, armed: ServoBus) -> None:
+    for joint in CONFIG.joints:
+        twin.faults.delay(joint.id, 1.0)
+    timer = threading.Timer(0.01, twin.vanish)
+    timer.start()
+    with pytest.raises(PortLost):
+        for _ in range(20):
+            armed.read()
+    timer.join()
+
+
+def test_26_an_adapter_that_takes_no_bytes_is_lost_at_once(
+    twin: SoftServoBus, armed: ServoBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hardware.servos.dynamixel_port.os.write", lambda _fd, data: len(data) - 1)
+    with pytest.raises(PortLost, match="takes no more bytes"):
+        armed.write([0.0] * 7)
+    monkeypatch.undo()
+    armed.open()
+
+
+def test_27_a_restarted_servo_is_noticed_disarmed_and_must_be_zeroed(twin: SoftServoBus, armed: ServoBus) -> None:
+    twin.stir(3, lambda servo: servo.restart(silent_s=0.0))
+    reading = armed.read()[2]
+    assert isinstance(reading, MissingServo)
+    assert reading.restarted
+    assert not armed.is_armed
+    assert armed.zero_ticks[2] is None
+    states = _states(armed)
+    assert states[2].position_mm is None
+    assert not states[2].torque
+    with pytest.raises(NotReady, match="not zeroed: up"):
+        armed.arm()
+    armed.set_zero(["up"])
+    armed.arm()
+    assert armed.is_armed
+
+
+def test_27_a_servo_that_restarts_between_disarming_and_arming_is_not_armed(twin: SoftServoBus, armed: ServoBus) -> None:
+    """Nobody has read it meanwhile: the block that it has forgotten is the only sign, and arming must not wipe it off."""
+    armed.disarm()
+    twin.stir(5, lambda servo: servo.restart(silent_s=0.0))
+    with pytest.raises(NotReady, match="not zeroed: advance "):
+        armed.arm()
+    assert not armed.is_armed
+    assert not any(state.torque for state in _states(armed))
+    assert [ticks is None for ticks in armed.zero_ticks] == [False] * 4 + [True] + [False] * 2
+    armed.set_zero(["advance"])
+    armed.arm()
+    assert armed.is_armed
+
+
+def test_27_a_reboot_clears_the_error_and_the_turns(twin: SoftServoBus, bus: ServoBus) -> None:
+    twin.stir(5, lambda servo: servo.turn(3 * 4096))
+    twin.stir(5, lambda servo: servo.alert(32))
+    bus.set_zero()
+    bus.reboot(5)
+    assert bus.zero_ticks[4] is None
+    state = _states(bus)[4]
+    assert (state.error, state.ticks, state.position_mm) == (HardwareError(0), 1005, None)
+    bus.set_zero(["advance"])
+    bus.arm()
+
+
+def test_27_a_reboot_without_return(twin: SoftServoBus, armed: ServoBus) -> None:
+    twin.faults.mute(5)
+    with pytest.raises(NoAnswer, match="did not come back"):
+        armed.reboot(5)
+    assert not armed.is_armed
+    with pytest.raises(WrongServo, match="no servo with id 99"):
+        armed.reboot(99)
+
+
+# --- the servos' own watchdog ----------------------------------------------------------------------------------------------------
+
+
+def test_a_tripped_watchdog_is_seen_though_writes_succeed_and_is_cleared(twin: SoftServoBus, armed: ServoBus, clock: Clock) -> None:
+    clock.ahead_s += 2.1
+    armed.write([0.2] * 7)
+    states = _states(armed)
+    assert all(state.watchdog_tripped and state.torque and state.goal_mm == 0.0 for state in states)
+    armed.clear_watchdog()
+    armed.write([0.2] * 7)
+    states = _states(armed)
+    assert not any(state.watchdog_tripped for state in states)
+    assert [state.goal_mm for state in states] == pytest.approx([0.2] * 7, abs=0.005)
+    table = twin.servo(1).table
+    assert (table["profile_velocity"], table["profile_acceleration"], table["watchdog"]) == (65, 83, 100)
+
+
+def test_who_stops_talking_is_held_by_the_watchdog(twin: SoftServoBus, armed: ServoBus, clock: Clock) -> None:
+    armed.write([0.0, 0.0, 0.0, 0.0, 100.0, 0.0, 0.0])
+    _states(armed)  # who answers has heard the goals
+    places = []
+    for _ in range(40):
+        clock.ahead_s += 0.1
+        places.append(twin.positions_mm()[4])
+    assert places[10] > 10.0
+    assert places[-1] == places[-10]
+    assert places[-1] == pytest.approx(2.0 * 20.0, abs=5.0)
+
+
+def test_the_watchdog_is_cleared_by_arming_when_not_armed(bus: ServoBus) -> None:
+    with pytest.raises(NotReady, match="arming clears"):
+        bus.clear_watchdog()
+
+
+def test_without_power_for_a_moment_all_must_be_zeroed(twin: SoftServoBus, armed: ServoBus) -> None:
+    for joint in CONFIG.joints:
+        twin.stir(joint.id, lambda servo: servo.restart())
+    for _ in range(60):
+        readings = armed.read()
+        if all(isinstance(reading, ServoState) for reading in readings):
+            break
+        time.sleep(0.02)
+    assert all(isinstance(reading, ServoState) for reading in readings)
+    assert armed.zero_ticks == (None,) * 7
+    assert not armed.is_armed

@@ -1,0 +1,216 @@
+"""The twin in a process of its own: pictures, truth and servos come through, and neither side outlives the other unnoticed."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import cv2
+import numpy as np
+import psutil
+import pytest
+
+from core.config.models import Config, load_config
+from core.config.rig_file import RigFileError
+from core.control.gate import Source
+from core.devices import DeviceError
+from core.types import Command, Frame, RobotStatus
+from hardware.processes import SharedSlot
+from hardware.rig import RigKind, open_rig, start_ahead
+from hardware.servos.bus_ipc import BusProcess
+from hardware.servos.dynamixel_port import BusProcessLost
+from hardware.servos.servo_robot import ServoRobot
+from hardware.twin.process import RemoteTwin, _serve, pack_frame, pack_status, unpack_frame, unpack_status
+from hardware.twin.world import TwinWorld
+
+CONFIG = Config.model_validate({"twin": {"image_width_px": 160, "image_height_px": 120}})
+
+
+@pytest.fixture
+def twin() -> Iterator[RemoteTwin]:
+    made = RemoteTwin(CONFIG, 40.0)
+    yield made
+    made.close()
+
+
+def next_frame(twin: RemoteTwin) -> Frame:
+    until_s = time.monotonic() + 20.0
+    while time.monotonic() < until_s:
+        frame = twin.read(0.5)
+        if frame is not None:
+            return frame
+    raise AssertionError("no frame")
+
+
+def test_what_is_packed_is_unpacked() -> None:
+    image = np.random.default_rng(0).integers(0, 255, (12, 16, 3), dtype=np.uint8)
+    frame = unpack_frame(pack_frame(Frame(7, 1.25, image)))
+    assert (frame.index, frame.captured_s) == (7, 1.25)
+    assert np.array_equal(frame.image, image)
+    for contact_n in (None, 0.25):
+        status = RobotStatus(1.0, 2.0, 3.0, (0.1, 0.2, 0.3, 0.4), (1.0, 2.0, 3.0, 4.0), contact_n)
+        assert unpack_status(pack_status(status)) == status
+
+
+def test_frames_come_in_order_and_each_once(twin: RemoteTwin) -> None:
+    asked_s = time.monotonic()
+    frames = [next_frame(twin) for _ in range(4)]
+    indices = [frame.index for frame in frames]
+    assert indices == sorted(set(indices))
+    assert frames[0].image.shape == (120, 160, 3)
+    assert asked_s <= frames[-1].captured_s <= time.monotonic(), "on this process's clock"
+    assert [frame.captured_s for frame in frames] == sorted(frame.captured_s for frame in frames)
+    assert not np.array_equal(frames[0].image, frames[-1].image), "noise of a camera"
+
+
+def test_the_truth_comes_through(twin: RemoteTwin) -> None:
+    next_frame(twin)
+    assert twin.status().insertion_mm == pytest.approx(40.0, abs=2.0)
+    assert twin.status().wall_contact_n is not None
+
+
+def test_a_process_that_is_gone_is_a_device_error(twin: RemoteTwin) -> None:
+    next_frame(twin)
+    os.kill(twin._process.pid, signal.SIGKILL)
+    with pytest.raises(DeviceError, match=r"the bench twin stopped.*F5"):
+        for _ in range(200):
+            twin.read(0.05)
+
+
+def test_closing_ends_the_process(twin: RemoteTwin) -> None:
+    pid = twin._process.pid
+    twin.close()
+    assert not psutil.pid_exists(pid)
+    twin.close()
+
+
+def test_an_application_that_was_ended_is_no_error_of_the_twin() -> None:
+    """Its pipe may be closed before its end of standard input is seen."""
+    image = np.zeros((2, 2, 3), np.uint8)
+    status = RobotStatus(1.0, 2.0, 3.0, (0.1, 0.2, 0.3, 0.4), (1.0, 2.0, 3.0, 4.0), None)
+    world = SimpleNamespace(
+        failure=None, frames=SimpleNamespace(take=lambda _: Frame(0, 0.0, image)), physics=SimpleNamespace(status=lambda: status)
+    )
+    slot = SimpleNamespace(put=lambda _: None)
+    listening, wake = os.pipe()
+    os.close(listening)
+    try:
+        _serve(cast("TwinWorld", world), cast("SharedSlot", slot), cast("SharedSlot", slot), wake, threading.Event())
+    finally:
+        os.close(wake)
+
+
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_what_is_wrong_is_said_in_one_line() -> None:
+    config = Config.model_validate({"twin": {"phantom": "no such phantom"}})
+    with pytest.raises(DeviceError, match="no such phantom"):
+        RemoteTwin(config, 40.0)
+
+
+@pytest.mark.real_time
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_what_was_started_ahead_becomes_the_rig() -> None:
+    ahead = start_ahead(CONFIG)
+    assert ahead is not None
+    rig = open_rig(CONFIG, ahead)
+    try:
+        assert {child.pid for child in psutil.Process().children()} >= {ahead.twin.pid, ahead.bus.process.pid}
+        assert isinstance(rig.robot, ServoRobot)
+        assert rig.robot._link is not None
+        assert rig.robot._link.pid == ahead.bus.process.pid
+        frame = rig.camera.read(20.0)
+        assert frame is not None
+        assert frame.image.shape == (120, 160, 3)
+        rig.robot.connect()
+        assert rig.robot._link.pid != ahead.bus.process.pid, "the second connection has a process of its own"
+    finally:
+        rig.close()
+
+
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_what_was_started_ahead_of_a_twin_that_cannot_be_is_ended() -> None:
+    ahead = start_ahead(CONFIG)
+    assert ahead is not None
+    with pytest.raises(DeviceError, match="no such phantom"):
+        open_rig(Config.model_validate({"twin": {"phantom": "no such phantom"}}), ahead)
+
+
+@pytest.mark.parametrize(
+    "changed", [{"twin": {"own_process": False}}, {"rig": {"robot": "none"}}, {"servos": {"driver": "direct"}}]
+)
+def test_only_a_twin_with_servos_of_its_own_is_started_ahead(changed: dict[str, Any]) -> None:
+    assert start_ahead(load_config(overrides=changed)) is None
+
+
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_what_was_started_ahead_of_a_rig_whose_file_is_gone_is_ended(tmp_path: Path) -> None:
+    ahead = start_ahead(CONFIG)
+    assert ahead is not None
+    with pytest.raises(RigFileError):
+        open_rig(load_config(overrides={"rig": {"file": str(tmp_path / "gone.toml")}}), ahead)
+
+
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_what_was_started_ahead_of_another_rig_is_ended(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    open_before = psutil.Process().num_fds()
+    ahead = start_ahead(CONFIG)
+    assert ahead is not None
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((48, 64, 3), np.uint8))
+    rig = {"camera": "image_folder", "robot": "none", "source": str(tmp_path)}
+    open_rig(load_config(overrides={"rig": rig}), ahead).close()
+    ahead.end()  # once more
+    assert psutil.Process().num_fds() == open_before
+    assert capfd.readouterr().err == ""
+
+
+def test_a_process_that_cannot_be_started_is_a_device_error_when_the_rig_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused() -> tuple[int, int]:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    open_before = psutil.Process().num_fds()
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "pipe", refused)
+        assert start_ahead(CONFIG) is None
+        with pytest.raises(DeviceError, match=r"the bench twin cannot be started \(Too many open files\)"):
+            open_rig(CONFIG)
+        with pytest.raises(BusProcessLost, match=r"the servo bus process cannot be started \(Too many open files\)"):
+            BusProcess()
+    assert psutil.Process().num_fds() == open_before
+
+
+def test_an_application_that_ends_before_it_needs_a_twin_leaves_a_process_that_ends_by_itself() -> None:
+    ends = os.memfd_create("bench_twin"), os.open(os.devnull, os.O_WRONLY)
+    command = [sys.executable, "-m", "hardware.twin.process", *map(str, ends)]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, pass_fds=ends, check=False)
+    for end in ends:
+        os.close(end)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+
+
+@pytest.mark.real_time
+def test_the_rig_on_it_is_driven_by_the_real_driver() -> None:
+    rig = open_rig(CONFIG)
+    try:
+        assert rig.kind is RigKind.SIM
+        assert rig.robot is not None
+        assert rig.camera.name.startswith("bench twin: ")
+        rig.robot.arm()
+        start_mm = rig.robot.status().insertion_mm
+        until_s = time.monotonic() + 5.0
+        while rig.robot.status().insertion_mm < start_mm + 2.0 and time.monotonic() < until_s:
+            rig.robot.beat(Source.OPERATOR)
+            rig.robot.send(Command(advance_mm_s=8.0))
+            time.sleep(0.02)
+        assert rig.robot.status().insertion_mm > start_mm + 1.0
+        assert rig.robot.status().tendon_pull_mm is not None
+    finally:
+        rig.close()

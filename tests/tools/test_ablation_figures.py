@@ -1,0 +1,375 @@
+"""The ablation's variants, their figures with values counted by hand, and how steadiness in a stream is measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.config.models import GapConfig, PerceptionConfig, PoseConfig, QualityConfig, load_config
+from core.evaluation.accuracy import FrameScore, TrueMasks
+from core.perception.pipeline import Pipeline
+from core.perception.vectors import fit_line
+from core.types import Frame, Image, Reason
+from tests.core.drawing import curve, depth
+from tools.ablation import (
+    MEASURES,
+    OURS,
+    PAPER,
+    STEPS,
+    TRACKING,
+    SameMasks,
+    StreamFrame,
+    are_enough,
+    draw_weights,
+    estimate,
+    figures,
+    frame_rows,
+    make_variants,
+    refusals,
+    stream_figures,
+)
+
+LITERAL = load_config(preset="paper").perception
+DEFAULTS = load_config().perception
+
+
+# ---- variants ----
+
+
+def test_the_rows_lead_from_the_papers_preset_to_ours() -> None:
+    variants = make_variants(LITERAL, DEFAULTS)
+    cumulative = [variant for variant in variants if variant.kind == "cumulative"]
+    assert cumulative[0].name == PAPER
+    literal = LITERAL.model_copy(update={"segmentation": DEFAULTS.segmentation})  # the same masks for all rows
+    assert cumulative[0].config == literal, "every setting of the preset belongs to a step"
+    assert cumulative[-1].config == DEFAULTS
+    assert [variant.name for variant in cumulative[1:]] == [f"+ {step.name}" for step in STEPS]
+    assert [variant.compared_with for variant in cumulative] == [None, *range(len(STEPS))]
+
+
+def test_every_step_switches_something_and_nothing_else() -> None:
+    variants = make_variants(LITERAL, DEFAULTS)
+    own = DEFAULTS.model_dump()
+    for step, variant in zip(STEPS, variants[len(STEPS) + 1 :], strict=True):
+        assert variant.name == f"{OURS} without {step.name}"
+        assert variants[variant.compared_with or 0].config == DEFAULTS
+        changed = [
+            (section, key)
+            for section, values in variant.config.model_dump().items()
+            if isinstance(values, dict)
+            for key, value in values.items()
+            if value != own[section][key]
+        ]
+        assert changed, step.name
+        assert all(f"{section}.{key}" in step.settings or section in step.settings for section, key in changed)
+
+
+def test_a_step_that_is_left_out_stays_on_in_all_rows() -> None:
+    variants = make_variants(LITERAL, DEFAULTS, [step for step in STEPS if step.name != TRACKING])
+    assert all(variant.config.tracking.enabled for variant in variants)
+    assert TRACKING not in " ".join(variant.name for variant in variants)
+
+
+def test_a_difference_that_no_step_switches_is_an_error() -> None:
+    with pytest.raises(ValueError, match=r"no step of the ablation switches pose\.d_allow_px"):
+        make_variants(DEFAULTS, DEFAULTS.model_copy(update={"pose": PoseConfig(d_allow_px=7.0)}))
+    with pytest.raises(ValueError, match="no step of the ablation switches working_size_px"):
+        make_variants(DEFAULTS, DEFAULTS.model_copy(update={"working_size_px": 320}))
+
+
+def test_what_a_users_file_sets_is_kept_in_all_rows() -> None:
+    ours = DEFAULTS.model_copy(update={"gaps": GapConfig(gap_threshold_px=12.0)})
+    paper = LITERAL.model_copy(update={"gaps": GapConfig(rule="every_pair", gap_threshold_px=12.0)})
+    assert all(variant.config.gaps.gap_threshold_px == 12.0 for variant in make_variants(paper, ours))
+
+
+# ---- switches that the steps need ----
+
+VESSEL = curve((-20.0, 240.0), (300.0, 240.0), (660.0, 240.0))
+
+
+def perceived(robot_depth: np.ndarray, config: PerceptionConfig) -> Reason | None:
+    masks = TrueMasks()
+    masks.show(depth(VESSEL, 22.0) > 0, robot_depth > 0)
+    scene = Pipeline(masks, config).perceive_single(Frame(0, 0.0, grey_bars()))
+    return scene.refusal.reason if scene.refusal is not None else None
+
+
+def grey_bars() -> Image:
+    """A picture that is neither dark nor bright nor blurred."""
+    picture = np.full((480, 640, 3), 60, np.uint8)
+    picture[:, ::2] = 180
+    return picture
+
+
+@pytest.mark.parametrize(
+    ("robot", "expected"),
+    [
+        (curve((-10.0, 240.0), (300.0, 240.0), (660.0, 240.0)), Reason.AMBIGUOUS_PATH),
+        (curve((-10.0, 100.0), (150.0, 100.0), (300.0, 100.0)), Reason.OUTSIDE_VESSEL),
+    ],
+)
+def test_without_the_quality_gate_every_pose_that_can_be_computed_is_given(robot: np.ndarray, expected: Reason) -> None:
+    silent = DEFAULTS.model_copy(update={"quality": QualityConfig(enabled=False)})
+    assert perceived(depth(robot, 4.0), DEFAULTS) is expected
+    assert perceived(depth(robot, 4.0), silent) is None
+    assert perceived(np.full((480, 640), -1.0), silent) is Reason.NO_ROBOT, "there is nothing to answer"
+
+
+def test_linear_regression_takes_errors_in_one_direction_only() -> None:
+    zigzag = np.array([[0.0, 0.0], [4.0, 2.0], [8.0, 0.0], [12.0, 2.0]])
+    # Regression by hand: x - 6 = -6 -2 2 6, y - 1 = -1 1 -1 1, sum xy = 8, sum xx = 80: slope 1/10.
+    along = fit_line(zigzag, "least_squares")
+    upright = fit_line(zigzag[:, ::-1], "least_squares")
+    assert along is not None
+    assert upright is not None
+    assert along.direction[1] / along.direction[0] == pytest.approx(0.1)
+    assert upright.direction[0] / upright.direction[1] == pytest.approx(0.1)
+    assert along.start[0] < along.end[0]
+    assert upright.start[1] < upright.end[1]
+
+
+def test_both_fits_find_a_straight_line() -> None:
+    line = np.column_stack([np.arange(20.0), 3.0 * np.arange(20.0)])
+    for fit in ("total_least_squares", "least_squares"):
+        found = fit_line(line, fit)  # type: ignore[arg-type]
+        assert found is not None
+        assert found.direction == pytest.approx((1 / np.sqrt(10), 3 / np.sqrt(10)))
+
+
+# ---- masks ----
+
+
+def test_the_network_runs_once_per_frame() -> None:
+    class Counting:
+        engine = "counted"
+        runs = 0
+
+        def __call__(self, image: Image) -> tuple[np.ndarray, np.ndarray]:
+            self.runs += 1
+            return np.zeros(image.shape[:2], np.float32), np.ones(image.shape[:2], np.float32)
+
+    network, nothing = Counting(), np.zeros((4, 4), bool)
+    masks = SameMasks(network)
+    image = np.zeros((4, 4, 3), np.uint8)
+    first = masks(image)[0]
+    assert masks(image)[0] is first
+    masks.next_frame(nothing, nothing)
+    assert masks(image)[0] is not first
+    assert network.runs == 2
+    assert masks.engine == "counted"
+
+
+def test_true_masks_are_shown_frame_by_frame() -> None:
+    masks = SameMasks(TrueMasks())
+    left = np.array([[True, False]])
+    image = np.zeros((1, 2, 3), np.uint8)
+    masks.next_frame(left, ~left)
+    assert (masks(image)[0] > 0.5).tolist() == [[True, False]]
+    masks.next_frame(~left, left)
+    assert (masks(image)[0] > 0.5).tolist() == [[False, True]]
+
+
+# ---- figures ----
+
+
+@pytest.mark.parametrize("quantile", [0.5, 0.95, 0.0, 1.0, None])
+def test_estimates_are_those_of_the_repeated_values(quantile: float | None) -> None:
+    rng = np.random.default_rng(3)
+    values, weights = rng.normal(size=15), rng.integers(0, 4, (20, 15))
+    found = estimate(values, weights, quantile)
+    for row, value in zip(weights, found, strict=True):
+        repeated = np.repeat(values, row)
+        assert value == pytest.approx(repeated.mean() if quantile is None else np.quantile(repeated, quantile))
+
+
+def test_estimates_leave_out_what_is_not_known() -> None:
+    values, weights = np.array([1.0, np.nan, 5.0]), np.array([[1, 7, 1], [0, 3, 2], [0, 4, 0]])
+    np.testing.assert_array_equal(estimate(values, weights, None), [3.0, 5.0, np.nan])
+    np.testing.assert_array_equal(estimate(values, weights, 0.5), [3.0, 5.0, np.nan])
+
+
+def test_whole_phantoms_are_drawn_where_there_are_enough() -> None:
+    groups = [number // 2 for number in range(20)]
+    weights = draw_weights(groups, seed=1, resamples=50)
+    assert are_enough(groups)
+    assert weights.shape == (50, 20)
+    np.testing.assert_array_equal(weights[:, ::2], weights[:, 1::2])
+    assert (weights.sum(axis=1) == 20).all()
+    np.testing.assert_array_equal(weights, draw_weights(groups, seed=1, resamples=50))
+    assert (weights != draw_weights(groups, seed=2, resamples=50)).any()
+
+
+def test_of_too_few_phantoms_no_difference_has_an_interval() -> None:
+    """Drawn one by one, twenty frames of two phantoms would make it too narrow."""
+    rng = np.random.default_rng(4)
+    rows = [[score(float(theta), stem=str(k)) for k, theta in enumerate(rng.normal(shift, 1.0, 20))] for shift in (3.0, 6.0)]
+    assert not are_enough([0] * 10 + [1] * 10)
+    few = figures(rows, [None, 0], [k // 10 for k in range(20)])[1]["theta_mean_deg"]
+    enough = figures(rows, [None, 0], [k // 2 for k in range(20)])[1]["theta_mean_deg"]
+    assert few.difference == enough.difference
+    assert (few.low, few.high, few.is_clear) == (None, None, False)
+    assert enough.is_clear
+    assert draw_weights([], seed=1, resamples=5).shape == (5, 0)
+
+
+def score(theta: float | None, head: float = 1.0, state: str = "C", stem: str = "a") -> FrameScore:
+    answered = theta is not None
+    return FrameScore(
+        stem=stem,
+        vessel_dice=1.0,
+        robot_dice=1.0,
+        expected=True,
+        answered=answered,
+        reason=None if answered else Reason.LOW_CONFIDENCE,
+        head_error_px=head if answered else None,
+        theta_error_deg=theta,
+        theta_deg=theta,
+        true_theta_deg=0.0,
+        state=state if answered else None,
+        true_state="C",
+        confidence=0.7 if answered else 0.0,
+    )
+
+
+def test_figures_by_hand() -> None:
+    nobody = replace(score(None), expected=False, true_state=None)
+    before = [score(1.0), score(-3.0, head=16.0), score(11.0, state="B"), score(2.0), nobody]
+    after = [score(1.0), score(None), score(-5.0), score(2.0, head=3.0), nobody]
+    first, second = figures([before, after], [None, 0], list("abcde"))
+    assert {key: figure.value for key, figure in first.items()} == pytest.approx(
+        {
+            "theta_median_deg": 2.5,  # of 1, 2, 3 and 11: the size counts, not the sign
+            "theta_mean_deg": 4.25,
+            "theta_p95_deg": 3 + 0.85 * 8,
+            "head_median_px": 1.0,
+            "head_p95_px": 1 + 0.85 * 15,
+            "state_agreement": 3 / 4,
+            "answered_share": 1.0,
+            "wrong_share": 2 / 4,  # one by its angle, one by its head
+        }
+    )
+    assert first["theta_median_deg"].difference is None
+    assert second["theta_median_deg"].value == 2.0
+    assert second["theta_median_deg"].difference == -0.5
+    assert second["answered_share"].value == 3 / 4, "the frame without a robot does not count"
+    assert second["wrong_share"].difference == pytest.approx(-1 / 2)
+
+
+def test_intervals_hold_the_difference_and_say_when_it_is_clear() -> None:
+    rng = np.random.default_rng(0)
+    worse = [score(float(value)) for value in rng.uniform(4, 8, 60)]
+    better = [replace(one, theta_error_deg=(one.theta_error_deg or 0.0) - 2.0) for one in worse]
+    table = figures([worse, better, better], [None, 0, 1], list(range(60)))
+    change = table[1]["theta_mean_deg"]
+    assert (change.difference, change.low, change.high) == pytest.approx((-2.0, -2.0, -2.0))  # paired: each frame by as much
+    assert change.is_clear
+    median = table[1]["theta_median_deg"]
+    assert median.low is not None
+    assert median.high is not None
+    assert median.difference is not None
+    assert median.low <= median.difference <= median.high
+    same = table[2]["theta_mean_deg"]
+    assert (same.difference, same.low, same.high) == (0.0, 0.0, 0.0)
+    assert not same.is_clear
+    again = figures([worse, better, better], [None, 0, 1], list(range(60)))
+    assert again == table, "the same seed gives the same intervals"
+
+
+def test_a_row_that_never_answers_has_no_errors() -> None:
+    table = figures([[score(1.0)] * 3, [score(None)] * 3], [None, 0], list("abc"))
+    silent = table[1]
+    assert silent["answered_share"].value == 0.0
+    assert silent["answered_share"].difference == -1.0
+    for measure in MEASURES:
+        if measure.key != "answered_share":
+            figure = silent[measure.key]
+            assert (figure.value, figure.difference, figure.low, figure.high) == (None, None, None, None)
+
+
+def test_refusals_are_counted_and_frames_listed() -> None:
+    unseen = replace(score(None), reason=Reason.NO_ROBOT)
+    scores = [score(None), unseen, unseen, score(1.0), replace(unseen, expected=False)]
+    assert list(refusals(scores).items()) == [("no robot", 2), ("low confidence", 1)]
+    rows = frame_rows(make_variants(LITERAL, DEFAULTS, STEPS[:1])[:1], [scores[:1]])
+    assert rows == [
+        {
+            "stem": "a",
+            "variant": PAPER,
+            "theta_error_deg": None,
+            "head_error_px": None,
+            "state": None,
+            "true_state": "C",
+            "confidence": None,
+            "reason": "low confidence",
+        }
+    ]
+
+
+# ---- streams ----
+
+
+def seen(
+    theta: float | None, true_theta: float, head: tuple[float, float] = (100.0, 0.0), state: str = "C", swapped: bool = False
+) -> StreamFrame:
+    """A robot from (0, 0) to (100, 0); without theta there is no answer."""
+    if theta is None:
+        return StreamFrame(None, None, None, None, (100.0, 0.0), (0.0, 0.0), true_theta, "C")
+    found = (head, (0.0, 0.0)) if not swapped else ((0.0, 0.0), head)
+    return StreamFrame(*found, theta, state, (100.0, 0.0), (0.0, 0.0), true_theta, "C")
+
+
+def test_swaps_jumps_and_changes_are_counted() -> None:
+    stream = [
+        seen(5.0, 5.0),
+        seen(5.0, 5.0, head=(110.0, 0.0), state="B"),  # 10 px is no jump
+        seen(None, 5.0),
+        seen(5.0, 5.0, head=(131.0, 0.0)),  # 21 px since the last answer is one
+        seen(-175.0, 5.0, swapped=True),  # and so is the way to the other end
+        seen(5.0, 5.0),  # and back
+    ]
+    found = stream_figures([stream, [seen(5.0, 5.0, state="A")]])
+    assert found["frames"] == 7
+    assert found["answered_share"] == 6 / 7
+    assert found["state_agreement"] == 4 / 6
+    assert (found["theta_median_deg"], found["theta_mean_deg"]) == (0.0, 180.0 / 6)
+    assert found["head_median_px"] == 5.0  # of 0, 10, 31, 100, 0 and 0
+    assert found["wrong_share"] == 2 / 6, "the one that jumped, and the one that is turned round"
+    assert found["swapped_frames"] == 1
+    assert found["jumps"] == 3
+    assert found["state_changes"] == 2  # C B C within the first stream; the second stands alone
+    assert found["true_state_changes"] == 0
+    assert found["theta_lag_frames"] is None, "too short"
+
+
+@pytest.mark.parametrize("delay", [0.0, 1.0, 2.5])
+def test_the_lag_of_theta_is_found(delay: float) -> None:
+    def theta(frame: float) -> float:
+        return 170.0 + 25.0 * float(np.sin(frame / 9.0))  # across the seam at 180 degrees
+
+    def signed(value: float) -> float:
+        return (value + 180.0) % 360.0 - 180.0
+
+    noise = np.random.default_rng(1).normal(0.0, 0.3, 120)
+    stream = [seen(signed(theta(frame - delay) + noise[frame]), signed(theta(frame))) for frame in range(120)]
+    lag = stream_figures([stream])["theta_lag_frames"]
+    assert lag == pytest.approx(delay, abs=0.1)
+
+
+def test_no_lag_is_told_where_nothing_turns() -> None:
+    assert stream_figures([[seen(3.0, 3.0)] * 80])["theta_lag_frames"] is None
+    nothing = stream_figures([])
+    assert [nothing[key] for key in ("theta_lag_frames", "theta_median_deg", "head_median_px", "wrong_share")] == [None] * 4
+
+
+def test_jitter_is_the_spread_of_the_errors_change() -> None:
+    rng = np.random.default_rng(2)
+    stream = [seen(10.0 + rng.normal(0.0, 2.0), 10.0, head=(100.0 + rng.normal(0, 1.0), rng.normal(0, 1.0))) for _ in range(2000)]
+    found = stream_figures([stream])
+    # The difference of two independent errors has the square root of two times their spread.
+    assert found["theta_jitter_deg"] == pytest.approx(2.0 * np.sqrt(2.0), rel=0.06)
+    assert found["head_jitter_px"] == pytest.approx(np.sqrt(2.0), rel=0.06)
+    still = stream_figures([[seen(12.0, 10.0)] * 5])
+    assert still["theta_jitter_deg"] == still["head_jitter_px"] == 0.0, "a steady error is no jitter"

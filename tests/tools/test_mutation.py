@@ -1,0 +1,100 @@
+"""The mutation script: its mutants are changes of today's code, and what it explains away is still among them."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import sys
+from collections import Counter
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def mutation() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("mutation_script", ROOT / "scripts" / "mutation.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # its dataclass asks for its own module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_small_module_has_all_its_mutants(mutation: ModuleType) -> None:
+    source = "def f(a, b):\n    if a > 1 and not b:\n        return min(a, -b)\n    return 0\n"
+    found = {mutant.change: mutant.source.splitlines() for mutant in mutation.mutants("gate", source)}
+    assert found["Gt -> GtE"][1] == "    if a >= 1 and (not b):"
+    assert found["And -> Or"][1] == "    if a > 1 or not b:"
+    assert found["without term 1"][1] == "    if not b:"
+    assert found["without Not"][1] == "    if a > 1 and b:"
+    assert found["if True"][1] == "    if True:"
+    assert found["min -> max"][2] == "        return max(a, -b)"
+    assert found["without USub"][2] == "        return min(a, b)"
+    assert found["returns None"][2] == "        return None"
+    assert found["1 -> 2"][1] == "    if a > 2 and (not b):"
+    assert found["0 -> 1"][3] == "    return 1"
+
+
+def test_every_explained_survivor_is_a_change_of_todays_code(mutation: ModuleType) -> None:
+    known: Counter[tuple[str, str, str]] = Counter()
+    for module, tests in mutation.TESTS.items():
+        source = (ROOT / mutation.FOLDER / f"{module}.py").read_text(encoding="utf-8")
+        same = "\n".join(map(ast.unparse, ast.parse(source).body))
+        for mutant in mutation.mutants(module, source):
+            assert mutant.source != same, f"{module}:{mutant.number}: {mutant.change}"
+            known[module, mutant.line, mutant.change] += 1
+        assert all((ROOT / "tests" / "core" / name).exists() for name in (*tests, *mutation.LONG_TESTS))
+    assert {key: known[key] for key in mutation.EXPLAINED} == dict.fromkeys(mutation.EXPLAINED, 1), "one change each"
+
+
+def test_changes_that_read_alike_say_what_they_change(mutation: ModuleType) -> None:
+    source = "def f(a, b, c):\n    return a and (b and c or a)\n"
+    changes = {mutant.change for mutant in mutation.mutants("gate", source)}
+    assert {
+        "without term 1 of a and (b and c or a)",
+        "without term 1 of b and c or a",
+        "without term 1 of b and c",
+        "Or -> And",
+    } <= changes
+    assert "without term 1" not in changes
+
+
+def test_a_test_that_fails_as_it_is_finds_nothing(
+    mutation: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "tests" / "core").mkdir(parents=True)
+    (tmp_path / "tests" / "core" / "test_red.py").write_text("def test_red():\n    assert False\n")
+    (tmp_path / "tests" / "core" / "test_green.py").write_text("def test_green():\n    pass\n")
+    monkeypatch.setattr(mutation, "LONG_TESTS", ("test_green.py",))
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)  # what is asked of all tests, a report's file say, is not asked of these
+    monkeypatch.setattr(mutation, "TESTS", {"gate": ("test_red.py", "test_missing.py")})
+    monkeypatch.setattr(mutation, "copy_project", lambda _folder: tmp_path)
+    assert mutation.main(["gate"]) == 2
+    said = capsys.readouterr().err
+    assert said == "test_missing.py, test_red.py: does not pass as it is; mend it first, or every change seems to be found\n"
+    monkeypatch.setattr(mutation, "TESTS", {"gate": ("test_green.py",)})
+    assert mutation.broken_tests(["gate"], tmp_path) == []
+
+
+def test_a_survivor_without_an_explanation_is_a_failure(mutation: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
+    key = next(iter(mutation.EXPLAINED))
+    explained = mutation.Mutant(key[0], 3, key[1], key[2], "")
+    new = mutation.Mutant("gate", 7, "if a > b:", "Gt -> GtE", "")
+    fate = mutation.Fate
+    assert mutation.report([(explained, fate.SURVIVES), (new, fate.FOUND), (new, fate.HANGS)]) == 0
+    assert "3 mutants, 1 found by tests, 1 by tests that stand still, 1 survive, 0 of them unexplained" in capsys.readouterr().out
+    assert mutation.report([(explained, fate.SURVIVES), (new, fate.SURVIVES)]) == 1
+    assert "core/control/gate.py:7: Gt -> GtE\n    if a > b:\n    NOT EXPLAINED" in capsys.readouterr().out
+
+
+def test_an_unknown_module_is_one_line(mutation: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
+    assert mutation.main(["pedal"]) == 2
+    assert (
+        capsys.readouterr().err
+        == "unknown: pedal; known are gate, gate_checks, joint_limits, supervisor, health, bus_watch, deadman\n"
+    )

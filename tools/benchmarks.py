@@ -1,0 +1,456 @@
+"""``benchmark --player``: how fast the player opens a long session and seeks in it, and what it needs of memory.
+
+``benchmark --recording``: how much a recording slows perception down, measured in turns in one run.
+
+``benchmark --window``: the operator window as it runs, with a robot that is being driven: pace, blocking, memory.
+
+An operator without a person, for ``benchmark --window``: moves the robot to and fro by hand, then hands over to the program.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+from PySide6.QtCore import QObject, QTimer
+
+from app.commands.benchmark import quantiles
+from app.commands.progress import progress_bar
+from app.operator.manual_drive import REPEAT_MS
+from app.operator.rig_engine import leaving_a_core
+from app.operator.window import OperatorWindow
+from app.ui.texts import OperatorStep
+from core.config.models import Config, PursuitConfig, TwinConfig
+from core.control.modes import DRIVING_MODES, Mode
+from core.control.motion import AT_REST, Jog
+from core.control.pursuit import look_ahead
+from core.devices import UserError
+from core.evaluation.metrics import MIN_GROUPS, RESAMPLES
+from core.perception.centerline import plan_route
+from core.perception.pipeline import Pipeline, open_pipeline
+from core.session.manifest import about_rig
+from core.session.writer import SessionWriter
+from core.system import begin_as_worker
+from core.types import Frame, Image, Point, Scene, Tick
+
+FRAMES_PER_SECOND = 30.0
+_BLOCK = 30
+"""Frames until it is the other's turn: one second, so that a busy moment of the computer strikes both alike."""
+_WARM_UP = 10
+_STEPS = 24
+
+
+def measure_recording(config: Config, frames: int) -> dict[str, Any]:
+    """Perceive a paced stream of 640x480 pictures, a second without and a second with a recording, in turn.
+
+    The recorder encodes, makes rows and writes to the system's temporary folder beside perception, as it does in the window; the
+    network leaves a core to the rest of the program, as there.
+
+    Parameters
+    ----------
+    frames : of each kind; rounded up to whole seconds.
+
+    Returns
+    -------
+    dict
+        ``without_ms`` and ``with_ms`` (of perceiving), ``slowdown`` (ratio of the medians; 1.0 = none) with a 95 % interval over
+        the blocks, ``dropped`` frames, ``mb_per_minute``.
+    """
+    pipeline = open_pipeline(leaving_a_core(config.perception))
+    images = one_way_and_back()
+    settings = config.record.model_copy(update={"ring_s": 0.0, "stop_free_mb": 0.0})
+    blocks = -(-frames // _BLOCK)
+    without: list[list[float]] = []
+    recorded: list[list[float]] = []
+    with tempfile.TemporaryDirectory(prefix="lumenpilot_benchmark_") as folder, progress_bar() as bar:
+        writer = SessionWriter(settings, about_rig(config, "SIM", "benchmark"), folder=Path(folder))
+        task = bar.add_task("frames", total=2 * blocks * _BLOCK)
+        try:
+            writer.start()
+            _stream(pipeline, images, _WARM_UP, 0, writer)
+            for block in range(blocks):
+                # the order changes, so that warming up or cooling down favours nobody
+                for is_recorded in (False, True) if block % 2 else (True, False):
+                    first = _WARM_UP + (2 * block + is_recorded) * _BLOCK
+                    times = _stream(pipeline, images, _BLOCK, first, writer if is_recorded else None)
+                    (recorded if is_recorded else without).append(times)
+                    bar.advance(task, _BLOCK)
+        finally:
+            is_whole = writer.close()
+        status = writer.status()
+    minutes = max(status.frames, 1) / FRAMES_PER_SECOND / 60.0
+    return {
+        "without_ms": quantiles([ms for block in without for ms in block]),
+        "with_ms": quantiles([ms for block in recorded for ms in block]),
+        **_slowdown(without, recorded),
+        "frames": blocks * _BLOCK,
+        "recorded": status.frames,
+        "dropped": status.dropped,
+        "mb_per_minute": round(status.bytes / 1e6 / minutes, 1),
+        "problem": status.problem or (None if is_whole else "the disk does not answer"),
+        "engine": pipeline.engine,
+        "cores": os.cpu_count(),
+    }
+
+
+def one_way_and_back() -> list[Image]:
+    """A robot that goes in and comes back, as a stream shows it: unrelated pictures would cost more room."""
+    from hardware.twin.world import TwinWorld
+
+    world = TwinWorld(TwinConfig(), seed=0)
+    way: list[Image] = []
+    for step in range(_STEPS):
+        world.insert(50.0 + 1.5 * step)
+        way.append(world.frame().image)
+    return way + way[-2:0:-1]
+
+
+def _stream(pipeline: Pipeline, images: Sequence[Image], count: int, first: int, writer: SessionWriter | None) -> list[float]:
+    """Perceive `count` frames at the camera's pace; milliseconds of each."""
+    times: list[float] = []
+    began_s = time.monotonic()
+    for place in range(count):
+        time.sleep(max(0.0, began_s + place / FRAMES_PER_SECOND - time.monotonic()))
+        frame = Frame(first + place, time.monotonic(), images[place % len(images)])
+        before_s = time.perf_counter()
+        scene = pipeline.perceive_single(frame)
+        times.append(1e3 * (time.perf_counter() - before_s))
+        if writer is not None:
+            writer.put(Tick(frame, scene, None, None, None, 0, FRAMES_PER_SECOND))
+    return times
+
+
+def _slowdown(without: list[list[float]], recorded: list[list[float]]) -> dict[str, Any]:
+    """Ratio of the medians, with a percentile bootstrap over the blocks, drawn in pairs; None as interval of too few."""
+    plain, beside = np.array(without), np.array(recorded)
+    ratio = float(np.median(beside) / np.median(plain))
+    if len(plain) < MIN_GROUPS:
+        return {"slowdown": round(ratio, 3), "slowdown_ci95": None}
+    rng = np.random.default_rng(0)
+    draws = rng.integers(0, len(plain), (RESAMPLES, len(plain)))
+    ratios = np.median(beside[draws].reshape(RESAMPLES, -1), axis=1) / np.median(plain[draws].reshape(RESAMPLES, -1), axis=1)
+    low, high = np.percentile(ratios, (2.5, 97.5))
+    return {"slowdown": round(ratio, 3), "slowdown_ci95": [round(float(low), 3), round(float(high), 3)]}
+
+
+_CYCLE = 300
+"""Frames that are perceived and encoded; the session repeats them, which takes seconds and not the hour."""
+_SEEKS = 60
+_WAIT_S = 120.0
+
+
+def measure_player(config: Config, minutes: float) -> dict[str, Any]:
+    """Make a session of so many minutes, open it in the player window, and seek in it at random.
+
+    Returns
+    -------
+    dict
+        ``opens_s`` until the first picture is on the screen and ``known_s`` until every row can be reached, both from when the
+        reader gets the folder; ``seek_ms`` from the wish to that row's picture on the screen; ``memory_mb`` of this process at the
+        end, which did not make the session; and the session's size.
+    """
+    with tempfile.TemporaryDirectory(prefix="lumenpilot_benchmark_") as parent:
+        child = multiprocessing.get_context("spawn").Process(target=_make_session, args=(config, minutes, parent))
+        child.start()
+        try:
+            child.join()
+        finally:
+            child.terminate()  # nothing runs any more unless it was interrupted
+        if child.exitcode:
+            raise UserError(f"{parent}: the session could not be made (exit code {child.exitcode}); is the disk full?")
+        (folder,) = Path(parent).iterdir()
+        size_mb = sum(file.stat().st_size for file in folder.iterdir()) / 1e6
+        return _measure(folder, config) | {"minutes": minutes, "size_mb": round(size_mb, 1)}
+
+
+def _make_session(config: Config, minutes: float, parent: str) -> None:
+    begin_as_worker()
+    from core.perception.pipeline import open_pipeline
+    from core.session.files import EncodedFrame, SessionFiles
+    from core.session.format import row_of
+    from core.session.manifest import about_rig
+    from core.session.video import FrameEncoder
+    from core.types import Frame, Tick
+
+    pipeline, images = open_pipeline(config.perception), one_way_and_back()
+    height, width = images[0].shape[:2]
+    encoder = FrameEncoder((width, height), config.record)
+    cycle = []
+    for place in range(_CYCLE):
+        frame = Frame(place, place / FRAMES_PER_SECOND, images[place % len(images)])
+        tick = Tick(frame, pipeline(frame), None, None, None, 0, FRAMES_PER_SECOND)
+        packet = encoder.encode(frame.image, frame.captured_s, force_key=place == 0)
+        cycle.append((packet, row_of(tick, None)))
+    files = SessionFiles(Path(parent), about_rig(config, "SIM", "benchmark"), config.record, first_s=0.0, now_s=0.0)
+    for index in range(round(60.0 * minutes * FRAMES_PER_SECOND)):
+        packet, row = cycle[index % _CYCLE]
+        at_s = index / FRAMES_PER_SECOND
+        packet = replace(packet, pts_ms=round(1000.0 * at_s))
+        line = json.dumps(row | {"index": index, "captured_s": round(at_s, 6)}, allow_nan=False, separators=(",", ":"))
+        files.write_frame(EncodedFrame(at_s, packet, encoder, line))
+    problem = files.close("benchmark", 0)
+    encoder.close()
+    if problem:
+        raise SystemExit(problem)
+
+
+def _measure(folder: Path, config: Config) -> dict[str, Any]:
+    from PySide6.QtCore import QEvent
+
+    from app.player.window import PlayerWindow
+    from app.ui.window_base import make_application
+    from core.session.reader import SessionReader
+
+    application = make_application()
+
+    def until(condition: Callable[[], bool]) -> float:
+        """Seconds until it is true, while the window runs."""
+        began_s = time.monotonic()
+        while not condition():
+            if time.monotonic() - began_s > _WAIT_S:
+                raise UserError(f"the player did not show what was asked for within {_WAIT_S:.0f} s")
+            application.processEvents()
+            time.sleep(0.0005)
+        return time.monotonic() - began_s
+
+    began_s = time.monotonic()
+    with SessionReader(folder) as reader:
+        window = PlayerWindow(reader, config)
+        window.show()
+        window.start()
+        until(lambda: window.place >= 0)
+        opens_s = time.monotonic() - began_s
+        until(lambda: reader.wait(0.0) and window.rows == len(reader))
+        known_s = time.monotonic() - began_s
+        rng, seeks_ms = np.random.default_rng(0), []
+        for place in rng.integers(0, window.rows, _SEEKS).tolist():
+            window.go(place)
+            seeks_ms.append(1000.0 * until(lambda wanted=place: window.place == wanted))  # type: ignore[misc]
+        rows, memory_mb = window.rows, psutil.Process().memory_info().rss / 2**20
+        window.close()
+        window.deleteLater()
+        application.sendPostedEvents(window, QEvent.Type.DeferredDelete.value)
+    return {
+        "opens_s": round(opens_s, 2),
+        "known_s": round(known_s, 2),
+        "seek_ms": quantiles(seeks_ms),
+        "memory_mb": round(memory_mb, 1),
+        "rows": rows,
+    }
+
+
+_MOVE_S = 1.5
+_MOVES = (Jog(bend=0.4, advance=0.8), Jog(bend=-0.6, advance=0.6), Jog(bend=0.2, advance=-1.0), AT_REST)
+_ASK_EVERY_S = 0.5
+_LEAST_WAY_PX = 60.0
+_LOOK_AHEAD = PursuitConfig()
+
+
+class ScriptedOperator(QObject):
+    """Drives by hand for the first `by_hand_s` seconds after ``start``, then wants the program to drive, as long as it is there.
+
+    ``driven_s`` is how long the program drove. Servos that were switched off stay so: he only does what needs no looking.
+    """
+
+    def __init__(self, window: OperatorWindow, by_hand_s: float) -> None:
+        super().__init__(window)
+        self._window, self._by_hand_s = window, by_hand_s
+        self._since_s = self._asked_s = 0.0
+        self.driven_s = 0.0
+        self._timer = QTimer(self)
+        self._timer.setInterval(REPEAT_MS)
+        self._timer.timeout.connect(self._act)
+
+    def start(self) -> None:
+        self._timer.start()
+
+    def stop(self) -> None:
+        self._timer.stop()
+        self._window.desk.hold_deadman(False)
+
+    def _act(self) -> None:
+        self._since_s += REPEAT_MS / 1000.0
+        if self._since_s < self._by_hand_s:
+            # As a held key does, the motion is repeated: silence counts as let go.
+            self._window.drive(_MOVES[int(self._since_s / _MOVE_S) % len(_MOVES)])
+            return
+        view = self._window.desk.view
+        if view is not None and view.mode in DRIVING_MODES:
+            self.driven_s += REPEAT_MS / 1000.0 * (view.mode is Mode.AUTONOMOUS)
+        self._asked_s += REPEAT_MS / 1000.0
+        if view is not None and self._asked_s >= _ASK_EVERY_S:
+            self._asked_s = 0.0
+            self._ask(view.mode, view.latched is not None)
+
+    def _ask(self, mode: Mode, latched: bool) -> None:
+        desk, tick = self._window.desk, self._window.shown_tick
+        if latched:
+            desk.take(OperatorStep.ACKNOWLEDGE)
+        elif mode is Mode.ADVISORY:
+            desk.hold_deadman(False)
+            desk.take(OperatorStep.ARM)
+        elif mode in {Mode.ARMED, Mode.HOLD}:
+            if tick is not None and mode is Mode.ARMED and (target := _far_ahead(tick.scene)) is not None:
+                self._window.choose_target(*target)
+            desk.hold_deadman(True)
+            desk.take(OperatorStep.HAND_OVER)
+
+
+def _far_ahead(scene: Scene) -> Point | None:
+    """The end of the vessel with the longest way that begins ahead of the head, in source pixels; None when no way is long."""
+    if scene.path is None or scene.vessel_graph is None:
+        return None
+    graph, head = scene.vessel_graph, scene.path.head
+    times = Counter(node for edge in graph.edges for node in (edge.start, edge.end))
+    ends = [graph.nodes[node].tolist() for node, count in times.items() if count == 1]
+    routes = [(route, end) for end in ends if (route := plan_route(graph, head, (end[0], end[1]))) is not None]
+    # Here in the window's thread each look ahead counts: the longest way first, and mostly it is the only one.
+    for route, (x, y) in sorted(routes, key=lambda found: -found[0].length_px):
+        if route.length_px <= _LEAST_WAY_PX:
+            break
+        way = look_ahead(replace(scene, route=route), _LOOK_AHEAD.look_ahead_px, _LOOK_AHEAD)
+        if way is not None and not way.behind:
+            return scene.to_source((x, y))
+    return None
+
+
+_WARM_UP_S = 10.0
+_FIRST_WITHIN_S = 60.0
+"""A rig that shows nothing for so long is not waited for."""
+_LOOK_EVERY_MS = 5
+
+
+@dataclass(slots=True)
+class _Readings:
+    shown: int = 0
+    last_index: int = -1
+    first_shown_s: float | None = None
+    dropped: int = 0
+    blocks: list[tuple[float, float, str]] = field(default_factory=list)
+    bus_p99_ms: float | None = None
+    latency_ms: list[float] = field(default_factory=list)
+    servo_ms: list[float] = field(default_factory=list)
+    memory_mb: list[tuple[float, float]] = field(default_factory=list)
+
+
+class WindowWatch(QObject):
+    """Takes readings, from the first picture on for `seconds`, then closes the window.
+
+    Half of that is driven by hand, the rest handed over.
+    """
+
+    def __init__(self, window: OperatorWindow, seconds: float) -> None:
+        super().__init__(window)
+        self._window = window
+        self._seconds = seconds
+        self._ended_s = time.monotonic() + _FIRST_WITHIN_S
+        self.ended_early = False
+        self._process = psutil.Process()
+        self.readings = _Readings()
+        self._operator = ScriptedOperator(window, seconds / 2.0)
+        self._timers: list[QTimer] = []
+        for interval_ms, slot in ((_LOOK_EVERY_MS, self._look), (1000, self._weigh)):
+            timer = QTimer(self)
+            timer.timeout.connect(slot)
+            timer.start(interval_ms)
+            self._timers.append(timer)
+
+    def _look(self) -> None:
+        tick, now = self._window.shown_tick, time.monotonic()
+        if tick is not None and tick.frame.index != self.readings.last_index:
+            self.readings.last_index = tick.frame.index
+            self.readings.shown += 1
+            self.readings.dropped = tick.dropped_frames
+            self.readings.latency_ms.append((now - tick.frame.captured_s) * 1e3)
+            if self.readings.first_shown_s is None:
+                self.readings.first_shown_s = now
+                self._ended_s = now + self._seconds
+                self._weigh()
+                self._operator.start()
+        view, servo_ms = self._window.desk.view, self.readings.servo_ms
+        if view is not None and view.latency_s is not None and servo_ms[-1:] != [view.latency_s * 1e3]:
+            servo_ms.append(view.latency_s * 1e3)
+        if now >= self._ended_s:
+            for timer in self._timers:
+                timer.stop()
+            self._operator.stop()
+            self._window.close()
+
+    def _weigh(self) -> None:
+        """Once a second from the first picture on; the heartbeat keeps a block for ten, so one longer than any before is new."""
+        seen = self.readings
+        if seen.first_shown_s is None:
+            return
+        at_s = time.monotonic() - seen.first_shown_s
+        view, bus, block_ms = self._window.desk.view, self._window.desk.bus, self._window.max_block_ms
+        if block_ms > max((ms for _, ms, _ in seen.blocks), default=0.0):
+            seen.blocks.append((at_s, block_ms, view.mode.value if view is not None else ""))
+        if bus is not None and at_s >= _WARM_UP_S:
+            seen.bus_p99_ms = max(seen.bus_p99_ms or 0.0, bus.times.period_p99_ms)
+        seen.memory_mb.append((at_s, self._process.memory_info().rss / 2**20))
+
+    def end(self) -> None:
+        """The window has gone, perhaps before its time."""
+        now = time.monotonic()
+        self.ended_early, self._ended_s = now < self._ended_s, min(now, self._ended_s)
+
+    def result(self) -> dict[str, Any]:
+        """Pace since the first shown frame; memory 10 s after it, at the end, and its growth per minute in between.
+
+        The bus's cycle is the worst 99th percentile of ten seconds after these; of the blocks, from 10 s before the first frame on,
+        those that were the longest so far.
+        """
+        seen = self.readings
+        if seen.first_shown_s is None:
+            return {"shown_fps": 0.0}
+        lasted_s = max(self._ended_s - seen.first_shown_s, 1e-9)
+        steady = [(at, mb) for at, mb in seen.memory_mb if at >= _WARM_UP_S] or seen.memory_mb[-1:]
+        span_min = max((steady[-1][0] - steady[0][0]) / 60.0, 1e-9)
+        return {
+            "seconds": round(lasted_s, 1),
+            "shown_fps": round(seen.shown / lasted_s, 2),
+            "frames_dropped": seen.dropped,
+            "capture_to_screen_ms": quantiles(seen.latency_ms),
+            "capture_to_servo_ms": quantiles(seen.servo_ms) if seen.servo_ms else None,
+            "driven_by_program_s": round(self._operator.driven_s, 1),
+            "bus_cycle_p99_ms": round(seen.bus_p99_ms, 1) if seen.bus_p99_ms is not None else None,
+            "gui_max_block_ms": round(seen.blocks[-1][1], 1) if seen.blocks else 0.0,
+            "gui_longer_blocks": [{"at_s": round(at_s, 1), "ms": round(ms, 1), "mode": mode} for at_s, ms, mode in seen.blocks],
+            "memory_mb": {"after_10_s": round(steady[0][1], 1), "end": round(steady[-1][1], 1)},
+            "memory_growth_mb_per_min": round((steady[-1][1] - steady[0][1]) / span_min, 2) if len(steady) > 1 else None,
+        }
+
+
+def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
+    """Run the window on the twin for some seconds and tell how it went."""
+    from app.operator.startup import finish_loading, make_window, window_config
+    from app.ui.window_base import make_application, quit_on_signal
+
+    config, kind = window_config("twin", config_path, None)
+    application = make_application()
+    finish_loading()
+    window = make_window(config, kind)
+    application.aboutToQuit.connect(window.shut_down)
+    window.show()
+    window.start()
+    watch = WindowWatch(window, seconds)
+    signals = quit_on_signal(application)
+    application.exec()
+    signals.stop()
+    watch.end()
+    if watch.readings.first_shown_s is None:
+        sys.stderr.write("note: no picture was shown; start the window (python main.py) to see why\n")
+    elif watch.ended_early:
+        sys.stderr.write(f"note: closed before its {seconds:g} s; the figures are of the time until then\n")
+    return watch.result()

@@ -1,0 +1,295 @@
+"""``make mutation``: does a test fail for every small change of the code that safety rests on?
+
+Each mutant of gate and supervisor differs from the code in one place: a comparison, an operator, a condition, a number, a returned
+value. Its own unit tests are run against it, then the long ones (state machines, pilot). A mutant that they all pass is a survivor:
+either a test is missing, or the change changes nothing, which ``EXPLAINED`` has to say. Ends with 1 when a survivor is unexplained,
+and with 2 when the tests do not pass without any mutant: then they would find everything.
+
+Works on copies in a temporary folder; takes a quarter of an hour on two cores. `python tools/mutation.py NAME ...` does only the
+modules of these names.
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+import os
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from queue import Queue
+
+from rich.progress import Progress
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = "core/control"
+TESTS = {
+    "gate": ("test_gate.py",),
+    "gate_checks": ("test_gate.py",),
+    "joint_limits": ("test_gate.py",),
+    "supervisor": ("test_supervisor.py", "test_health.py"),
+    "health": ("test_supervisor.py", "test_health.py"),
+    "bus_watch": ("test_bus_watch.py", "test_supervisor.py", "test_health.py"),
+    "deadman": ("test_deadman.py", "test_supervisor.py"),
+}
+"""Module -> the tests that should find its mutants."""
+LONG_TESTS = ("test_safety_machine.py", "test_pilot.py", "test_pilot_machine.py")
+JOBS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+TIMEOUT_S = 300.0
+
+MISTRUST = "without a measurement to believe there is an objection already; it stands there for the type checker"
+MOVING = "who moves has goals and a time; it stands there for the type checker"
+TIE = "differs only where two numbers are equal to the last bit, a billionth of a millimetre apart"
+EXPLAINED = {
+    ("gate", "if objection is not None or request is None or believed is None:", "without term 3"): MISTRUST,
+    (
+        "gate",
+        "believed = tuple(measurement.positions_mm) if measurement is not None and mistrust is None else None",
+        "without term 1",
+    ): MISTRUST,
+    ("gate", "if not self.moving or self.goals_mm is None or self.time_s is None:", "without term 2"): MOVING,
+    ("gate", "if not self.moving or self.goals_mm is None or self.time_s is None:", "without term 3"): MOVING,
+    ("gate", "if abs(goal_mm - from_mm) > joint.max_speed_mm_s * passed_s + _RECORDED_MM:", "Gt -> GtE"): TIE,
+    ("gate", "if abs(asked - goal) > _RECORDED_MM", "Gt -> GtE"): TIE,
+    ("gate", "if limit is not None and abs(asked_mm - goal_mm) > _RECORDED_MM:", "Gt -> GtE"): TIE,
+    (
+        "gate",
+        "if limit is not None and abs(asked_mm - goal_mm) > _RECORDED_MM:",
+        "without term 1",
+    ): "a goal that no limit touched is the one asked for; it stands there for the type checker",
+    ("joint_limits", "direction = 1.0 if asked_mm > last_mm else -1.0", "Gt -> GtE"): "where both are equal the step is 0",
+    (
+        "joint_limits",
+        "to_end_mm = joint.high_mm - last_mm if direction > 0 else last_mm - joint.low_mm",
+        "Gt -> GtE",
+    ): "a direction is 1 or -1",
+    (
+        "joint_limits",
+        "faster_mm_s = max(0.0, speed_mm_s * direction) + joint.max_acceleration_mm_s2 * passed_s",
+        "Mult -> Div of speed_mm_s * direction",
+    ): "a direction is 1 or -1",
+    ("joint_limits", "return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit", "Gt -> GtE"): TIE,
+    (
+        "joint_limits",
+        "found.append((kept_mm, Limit.TOGETHER) if abs(kept_mm - goal_mm) > _ROUNDING_MM else (goal_mm, limit))",
+        "Gt -> GtE",
+    ): TIE,
+    ("deadman", "reported_s: float = 0.0", "0.0 -> 1.0"): "before the first report nothing is pressed, whenever that was",
+}
+
+COMPARISONS = {
+    ast.Lt: ast.LtE,
+    ast.LtE: ast.Lt,
+    ast.Gt: ast.GtE,
+    ast.GtE: ast.Gt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+}
+ARITHMETIC = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
+OPPOSITES = {"min": "max", "max": "min", "any": "all", "all": "any"}
+HARMLESS = {"strict", "frozen", "slots"}
+"""Keywords that forbid what does not happen; whether they are there changes no result."""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A module with one change.
+
+    ``line`` is the changed line's old text, ``change`` says what was done to it, and to which part where the line has several.
+    """
+
+    module: str
+    number: int
+    line: str
+    change: str
+    source: str
+
+
+def mutants(module: str, source: str) -> Iterator[Mutant]:
+    """All mutants of a module's source. Each parses; none is the source."""
+    statements = ast.parse(source).body
+    texts = [ast.unparse(statement) for statement in statements]
+    lines = source.splitlines()
+    found = [
+        (place, node, change, new, lines[getattr(node, "lineno", 0) - 1].strip())
+        for place, statement in enumerate(statements)
+        for node, change, new in _changes_in(statement)
+    ]
+    alike = Counter((line, change) for _, _, change, _, line in found)
+    for place, node, change, new, line in found:
+        part = f" of {ast.unparse(node).splitlines()[0]}" if alike[line, change] > 1 else ""
+        changed = ast.unparse(_Swap(node, new).visit(statements[place]))
+        _Swap(new, node).visit(statements[place])
+        whole = "\n".join([*texts[:place], changed, *texts[place + 1 :]])
+        yield Mutant(module, getattr(node, "lineno", 0), line, change + part, whole)
+
+
+def _changes_in(tree: ast.stmt) -> Iterator[tuple[ast.AST, str, ast.AST]]:
+    harmless = {id(word.value) for word in ast.walk(tree) if isinstance(word, ast.keyword) and word.arg in HARMLESS}
+    for node in ast.walk(tree):
+        if id(node) not in harmless:
+            for change, new in _changes(node):
+                yield node, change, new
+
+
+class _Swap(ast.NodeTransformer):
+    def __init__(self, old: ast.AST, new: ast.AST) -> None:
+        self._old, self._new = old, new
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        return self._new if node is self._old else self.generic_visit(node)
+
+
+def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+    """What a node may be replaced by, and in words."""
+    new = copy.deepcopy(node)
+    if isinstance(new, ast.Compare):
+        for place, op in enumerate(new.ops):
+            if (other := COMPARISONS.get(type(op))) is not None:
+                changed = copy.deepcopy(new)
+                changed.ops[place] = other()
+                yield f"{type(op).__name__} -> {other.__name__}", changed
+    elif isinstance(new, ast.BoolOp):
+        other_op = ast.Or() if isinstance(new.op, ast.And) else ast.And()
+        yield f"{type(new.op).__name__} -> {type(other_op).__name__}", ast.BoolOp(other_op, new.values)
+        for place in range(len(new.values)):
+            rest = new.values[:place] + new.values[place + 1 :]
+            yield f"without term {place + 1}", rest[0] if len(rest) == 1 else ast.BoolOp(new.op, rest)
+    elif isinstance(new, ast.BinOp) and (arithmetic := ARITHMETIC.get(type(new.op))) is not None:
+        yield f"{type(new.op).__name__} -> {arithmetic.__name__}", ast.BinOp(new.left, arithmetic(), new.right)
+    elif isinstance(new, ast.UnaryOp) and isinstance(new.op, ast.Not | ast.USub):
+        yield f"without {type(new.op).__name__}", new.operand
+    elif isinstance(new, ast.Constant) and isinstance(new.value, bool | int | float):
+        value = not new.value if isinstance(new.value, bool) else new.value + 1
+        yield f"{new.value} -> {value}", ast.Constant(value)
+    elif isinstance(new, ast.IfExp):
+        yield "branches swapped", ast.IfExp(new.test, new.orelse, new.body)
+    elif isinstance(new, ast.If):
+        for value in (True, False):
+            yield f"if {value}", ast.If(ast.Constant(value), new.body, new.orelse)
+    elif isinstance(new, ast.Call) and isinstance(new.func, ast.Name) and new.func.id in OPPOSITES:
+        opposite = OPPOSITES[new.func.id]
+        yield f"{new.func.id} -> {opposite}", ast.Call(ast.Name(opposite), new.args, new.keywords)
+    elif isinstance(new, ast.Return) and new.value is not None and not isinstance(new.value, ast.Constant):
+        yield "returns None", ast.Return(ast.Constant(None))
+
+
+class Fate(Enum):
+    """What became of a mutant. A test that stands still or is killed has found it, too, but told nobody why."""
+
+    FOUND = "found"
+    HANGS = "hangs"
+    SURVIVES = "survives"
+
+
+def fate_of(mutant: Mutant, tree: Path) -> Fate:
+    """What the tests say in `tree`, a copy of the project, with the mutant in it."""
+    path = tree / FOLDER / f"{mutant.module}.py"
+    path.write_text(mutant.source, encoding="utf-8")
+    try:
+        fates = (run_tests(tree, tests) for tests in (TESTS[mutant.module], LONG_TESTS))
+        return next((fate for fate in fates if fate is not Fate.SURVIVES), Fate.SURVIVES)
+    finally:
+        path.write_bytes((ROOT / FOLDER / path.name).read_bytes())
+
+
+def run_tests(tree: Path, tests: tuple[str, ...]) -> Fate:
+    """SURVIVES: they all pass."""
+    command = [
+        sys.executable,
+        "-B",
+        "-m",
+        "pytest",
+        "-x",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        *(f"tests/core/{name}" for name in tests),
+    ]
+    try:
+        code = subprocess.run(command, cwd=tree, capture_output=True, timeout=TIMEOUT_S, check=False).returncode
+    except subprocess.TimeoutExpired:
+        return Fate.HANGS
+    return Fate.SURVIVES if code == 0 else Fate.FOUND if code > 0 else Fate.HANGS
+
+
+def broken_tests(modules: list[str], tree: Path) -> list[str]:
+    """Of the tests that are to find mutants of the modules those that do not pass on the code as it is."""
+    asked = {name for module in modules for name in TESTS[module]} | set(LONG_TESTS)
+    return [name for name in sorted(asked) if run_tests(tree, (name,)) is not Fate.SURVIVES]
+
+
+def copy_project(folder: Path) -> Path:
+    """A copy of the project as it lies here, with what is new and without what is ignored."""
+    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--"]
+    parts = ["core", "hardware", "tests", "resources", "*.toml"]
+    files = subprocess.run([*listed, *parts], cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0")
+    for name in filter(None, files):
+        if (ROOT / name).is_file():  # not one that was just deleted
+            target = folder / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes((ROOT / name).read_bytes())
+    return folder
+
+
+def main(modules: list[str]) -> int:
+    """Try all mutants of the modules; returns the exit code."""
+    if unknown := set(modules) - TESTS.keys():
+        sys.stderr.write(f"unknown: {', '.join(sorted(unknown))}; known are {', '.join(TESTS)}\n")
+        return 2
+    modules = modules or list(TESTS)
+    todo = [
+        mutant for module in modules for mutant in mutants(module, (ROOT / FOLDER / f"{module}.py").read_text(encoding="utf-8"))
+    ]
+    with tempfile.TemporaryDirectory() as folder, Progress() as bar, ThreadPoolExecutor(JOBS) as pool:
+        copies = [copy_project(Path(folder) / str(job)) for job in range(JOBS)]
+        if broken := broken_tests(modules, copies[0]):
+            sys.stderr.write(f"{', '.join(broken)}: does not pass as it is; mend it first, or every change seems to be found\n")
+            return 2
+        trees: Queue[Path] = Queue()
+        for tree in copies:
+            trees.put(tree)
+        task = bar.add_task("mutants", total=len(todo))
+
+        def judge(mutant: Mutant) -> Fate:
+            tree = trees.get()
+            try:
+                return fate_of(mutant, tree)
+            finally:
+                trees.put(tree)
+                bar.advance(task)
+
+        fates = list(zip(todo, pool.map(judge, todo), strict=True))
+    return report(fates)
+
+
+def report(fates: list[tuple[Mutant, Fate]]) -> int:
+    """Tell what survives, and why it may; returns the exit code."""
+    counts = Counter(fate for _, fate in fates)
+    unexplained = 0
+    for mutant, fate in fates:
+        if fate is Fate.FOUND:
+            continue
+        why = EXPLAINED.get((mutant.module, mutant.line, mutant.change)) if fate is Fate.SURVIVES else "the tests stood still"
+        unexplained += why is None
+        place = f"{FOLDER}/{mutant.module}.py:{mutant.number}"
+        sys.stdout.write(f"{place}: {mutant.change}\n    {mutant.line}\n    {why or 'NOT EXPLAINED'}\n")
+    sys.stdout.write(
+        f"{len(fates)} mutants, {counts[Fate.FOUND]} found by tests, {counts[Fate.HANGS]} by tests that stand still, "
+        f"{counts[Fate.SURVIVES]} survive, {unexplained} of them unexplained\n"
+    )
+    return 1 if unexplained else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
