@@ -27,6 +27,9 @@ from numpy.typing import NDArray
 from core.devices import UserError
 from core.types import Image
 
+VIDEO_ENDINGS = (".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v")
+"""Files that are read as videos."""
+
 LEFT_AFTER_S = 60.0
 """A file aside that nobody has written to for so long was left by a process that was killed."""
 _ASIDE = re.compile(r"\.[0-9a-f]{16}\.part")

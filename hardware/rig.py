@@ -7,13 +7,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from core.config.calibration import ZeroConfig
-from core.config.models import Config, RigConfig
-from core.config.rig_file import calibration_of
+from core.config.models import Config, RigConfig, load_config, merge
+from core.config.rig_file import RESERVED, calibration_of, find_rig, with_rig
 from core.control.robot import GuardedRobot
-from core.devices import Camera, DeviceError
+from core.devices import Camera, DeviceError, UserError
 from core.types import RobotStatus
 from hardware.cameras.undistorted import UndistortedCamera
 
@@ -259,3 +259,79 @@ def _twin_servos(
         robot.close()
         raise
     return robot
+
+
+_REALSENSE_ENDING = ".bag"
+
+
+def rig_config(
+    rig: str | None, config_path: Path | None, source: Path | None, own: dict[str, Any] | None = None
+) -> tuple[Config, RigKind]:
+    """The configuration of a rig or of a recorded source, and its kind.
+
+    Parameters
+    ----------
+    rig : a built-in rig or a rig file's name; None: the one that the configuration names.
+    source : a recording, file or folder of pictures, instead of a rig.
+    own : settings of the user, over the defaults.
+
+    Raises
+    ------
+    UserError
+        For contradicting or unknown names; DeviceError for a source that cannot be read.
+    """
+    if rig is not None and source is not None:
+        raise UserError("--source is looked at instead of a rig's camera: leave --rig out")
+    if source is None:
+        config = load_config(config_path, overrides=own)
+        if rig is None:
+            return config, kind_of(config.rig)
+        if rig in RESERVED:
+            config = _built_in_rig(config, rig)
+        else:
+            path, found = find_rig(rig)
+            config = with_rig(config, found, path)
+        return config, kind_of(config.rig)
+    try:
+        exists = source.exists()
+    except OSError as error:
+        raise DeviceError(f"{source}: cannot be read ({error.strerror})") from None
+    if not exists:
+        raise DeviceError(f"{source}: no such file or folder")
+    from core.files import VIDEO_ENDINGS
+
+    ending = source.suffix.lower()
+    camera = "video_file" if ending in VIDEO_ENDINGS else "realsense" if ending == _REALSENSE_ENDING else "image_folder"
+    if camera == "image_folder" and source.is_file():
+        _check_picture(source)
+    chosen = {"rig": {"camera": camera, "robot": "none", "source": str(source), "file": None}}
+    config = load_config(config_path, overrides=merge(own or {}, chosen))
+    return config, kind_of(config.rig)
+
+
+def _check_picture(file: Path) -> None:
+    """A file that is no video by its name must be a picture: refused here, not in a window that would show nothing."""
+    from core.files import VIDEO_ENDINGS, ImageError, read_image
+    from core.learning.dataset import IMAGE_ENDINGS
+
+    try:
+        read_image(file)
+    except ImageError as error:
+        if file.suffix.lower() in IMAGE_ENDINGS:
+            raise
+        endings = ", ".join((*IMAGE_ENDINGS, *VIDEO_ENDINGS, _REALSENSE_ENDING))
+        raise UserError(f"{error}; --source takes a folder of pictures, or a file that ends in {endings}") from None
+
+
+def _built_in_rig(config: Config, rig: str) -> Config:
+    """Another rig than the configuration's own: a real camera drives real servos when their port is known."""
+    if config.rig.camera == rig and config.rig.source is None:
+        return config
+    servos = config.servos
+    if rig == "twin":
+        robot, servos = "twin", servos.model_copy(update={"port": None})
+    else:
+        robot = "servos" if servos.port is not None else "none"
+    # Without its file: what was calibrated is another camera's.
+    chosen = config.rig.model_copy(update={"name": rig, "camera": rig, "robot": robot, "source": None, "file": None})
+    return config.model_copy(update={"rig": chosen, "servos": servos})

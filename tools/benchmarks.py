@@ -434,10 +434,11 @@ class WindowWatch(QObject):
 
 def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     """Run the window on the twin for some seconds and tell how it went."""
-    from app.operator.startup import finish_loading, make_window, window_config
+    from app.operator.startup import finish_loading, make_window
     from app.ui.window_base import make_application, quit_on_signal
+    from hardware.rig import rig_config
 
-    config, kind = window_config("twin", config_path, None)
+    config, kind = rig_config("twin", config_path, None)
     application = make_application()
     finish_loading()
     window = make_window(config, kind)

@@ -27,11 +27,9 @@ from app.widgets.overlay_image import draw_overlay
 from core.config.models import choose_model, load_config
 from core.control.policies import table_policy
 from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream, UserError
-from core.files import ImageError, read_image
+from core.files import VIDEO_ENDINGS, ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS, write_mask, write_png
 from core.types import Frame, Image, Mask, Point, Points, Reason, Refusal, Scene, Vector
-
-VIDEO_ENDINGS = (".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,8 +18,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from app.operator.startup import window_config
-from app.ui.i18n import mark, tr, tr_text
+from app.ui.texts import calibrated_parts, calibration_lines, rig_line
 from core.calibration.camera import BoardError, BoardSpec
 from core.config.models import Config
 from core.config.rig_file import (
@@ -37,10 +36,9 @@ from core.config.rig_file import (
 from core.devices import UserError
 from hardware.preflight import checks as program
 from hardware.preflight.checks import RENEW, Check, one_line
-from hardware.rig import RigKind
+from hardware.rig import RigKind, rig_config
 
 if TYPE_CHECKING:
-    from hardware.calibration.bench import See
     from hardware.calibration.rig_draft import RigDraft
 
 
@@ -69,7 +67,7 @@ def run_list(*, as_json: bool) -> None:
         sys.stdout.write(json.dumps({"folder": str(rigs_folder()), "built_in": list(RESERVED), "rigs": rows}) + "\n")
         return
     for one in listed:
-        sys.stdout.write(f"{one.name}: {describe(one.rig) if one.rig is not None else one.problem}\n")
+        sys.stdout.write(f"{one.name}: {rig_line(one.rig) if one.rig is not None else one.problem}\n")
     if not listed:
         sys.stdout.write(
             f"no rig files in {rigs_folder()}; make one: main.py rig calibrate NAME --auto, or menu Rig in the window\n"
@@ -82,7 +80,7 @@ def run_show(name: str, *, as_json: bool) -> None:
     if as_json:
         sys.stdout.write(json.dumps({"path": str(path), **rig.model_dump(mode="json")}) + "\n")
         return
-    sys.stdout.write("\n".join([f"{rig.name} ({path})", describe(rig), *calibration_lines(rig)]) + "\n")
+    sys.stdout.write("\n".join([f"{rig.name} ({path})", rig_line(rig), *calibration_lines(rig)]) + "\n")
 
 
 def run_board(out: Path, spec: BoardSpec) -> None:
@@ -99,6 +97,7 @@ def run_calibrate(options: CalibrateOptions) -> None:
 
     Steps that were done until then are saved, as if no others had been asked for.
     """
+    from app.operator.rig_engine import quick_sight
     from hardware.calibration.bench import open_bench
     from hardware.calibration.rig_draft import RigDraft
 
@@ -133,7 +132,7 @@ def run_calibrate(options: CalibrateOptions) -> None:
     if options.as_json:
         sys.stdout.write(json.dumps({"path": str(path), "notes": draft.notes, **rig.model_dump(mode="json")}) + "\n")
         return
-    sys.stdout.write("\n".join([f"{rig.name} ({path})", describe(rig), *calibration_lines(rig), *draft.notes]) + "\n")
+    sys.stdout.write("\n".join([f"{rig.name} ({path})", rig_line(rig), *calibration_lines(rig), *draft.notes]) + "\n")
 
 
 def calibrate(draft: RigDraft, steps: tuple[str, ...], pictures: int) -> Iterator[str]:
@@ -169,94 +168,6 @@ def calibrate(draft: RigDraft, steps: tuple[str, ...], pictures: int) -> Iterato
         yield from ["steering"] if was_kept or "zero" not in steps else ["zero", "steering"]
 
 
-def quick_sight(config: Config) -> See:
-    """Perception of single frames as the calibration wants it: quickly, with a core left for servos and camera."""
-    from app.operator.rig_engine import leaving_a_core
-    from core.perception.pipeline import open_pipeline
-
-    perception = leaving_a_core(config.perception)
-    plain = perception.segmentation.model_copy(update={"mirrored": "never"})
-    return open_pipeline(perception.model_copy(update={"segmentation": plain})).perceive_single
-
-
-def describe(rig: RigFile) -> str:
-    """One line for people."""
-    camera = {
-        "twin": tr("bench twin"),
-        "realsense": f"RealSense {rig.camera.serial or ''}",
-        "webcam": tr("webcam {device}", device=rig.camera.device or ""),
-    }
-    servos = {"twin": tr("its own servos"), "servos": tr("servos on {port}", port=rig.servos.port), "none": tr("no servos")}
-    return tr(
-        "{camera}, {servos}; {calibrated}; made {made:%Y-%m-%d}",
-        camera=camera[rig.kind].strip(),
-        servos=servos[rig.robot],
-        calibrated=_calibrated(rig),
-        made=rig.made_utc,
-    )
-
-
-def calibration_lines(rig: RigFile) -> list[str]:
-    """What was calibrated, a line each."""
-    known = rig.calibration
-    if known is None:
-        return [tr("not calibrated")]
-    lines = []
-    if known.lens is not None:
-        lines.append(
-            tr(
-                "lens: k1 {k1:+.4f}, k2 {k2:+.4f}, {left:.2f} px left over",
-                k1=known.lens.k1,
-                k2=known.lens.k2,
-                left=known.lens.residual_px,
-            )
-        )
-    if known.scale is not None:
-        scale = known.scale
-        share = 100 * scale.uncertainty_share
-        text = tr(
-            "scale: {scale:.4f} mm/px in the middle, \N{PLUS-MINUS SIGN}{share:.2f} % (by {method})",
-            scale=scale.mm_per_px,
-            share=share,
-            method=tr_text(scale.method),
-        )
-        lines.append(text)
-    servos = ", ".join(f"{tr_text(joint.name)} {'+' if joint.sign > 0 else '-'}{joint.id}" for joint in rig.servos.joints)
-    lines.append(tr("servos (direction and id): {servos}", servos=servos))
-    ways = ", ".join(f"{tr_text(joint.name)} {joint.mm_per_turn:g}" for joint in rig.servos.joints)
-    lines.append(tr("way at one turn of the horn, as it is set and not measured: {ways} mm", ways=ways))
-    if known.assumed:
-        lines.append(
-            tr(
-                "assumed: {joints} by the order of their ids, since one camera cannot tell them apart; look at the head, and swap "
-                "them in the rig wizard if it goes the other way",
-                joints=tr(" and ").join(tr_text(name) for name in known.assumed),
-            )
-        )
-    if known.steering is not None:
-        ways = ", ".join(
-            f"{tr_text(tendon.name)} {tr('out of the picture') if tendon.direction_deg is None else f'{tendon.direction_deg:.0f}°'}"
-            for tendon in known.steering.tendons
-        )
-        lines.append(
-            tr(
-                "steering, 0° to the right and 90° down in the picture: {ways}; roll {roll:+.0f}°",
-                ways=ways,
-                roll=known.steering.roll_deg,
-            )
-        )
-    if known.zero is not None:
-        slack = ", ".join(f"{value:+.2f}" for value in known.zero.slack_mm)
-        lines.append(
-            tr(
-                "zero: wires were slack by {slack} mm; pretension {pretension:g} mm",
-                slack=slack,
-                pretension=known.zero.pretension_mm,
-            )
-        )
-    return lines
-
-
 def _start(options: CalibrateOptions) -> tuple[Config, RigFile | None]:
     """The configuration to calibrate, and the rig that it comes from."""
     try:
@@ -271,25 +182,15 @@ def _start(options: CalibrateOptions) -> tuple[Config, RigFile | None]:
     if source is None:
         source = name if has_rig(name) else "twin"
     if source in RESERVED:
-        return window_config(source, options.config_path, None)[0], None
+        return rig_config(source, options.config_path, None)[0], None
     path, rig = find_rig(source)
-    return with_rig(window_config(None, options.config_path, None)[0], rig, path), rig
-
-
-_PARTS = (mark("lens"), mark("scale"), mark("steering"), mark("zero"))
+    return with_rig(rig_config(None, options.config_path, None)[0], rig, path), rig
 
 
 def _brief(rig: RigFile | None) -> dict[str, Any]:
     if rig is None:
         return {"kind": None, "robot": None, "made_utc": None, "calibrated": []}
-    known = rig.calibration
-    done = [part for part in _PARTS if known is not None and getattr(known, part) is not None]
-    return {"kind": rig.kind, "robot": rig.robot, "made_utc": rig.made_utc.isoformat(), "calibrated": done}
-
-
-def _calibrated(rig: RigFile) -> str:
-    parts = _brief(rig)["calibrated"]
-    return tr("calibrated: {parts}", parts=", ".join(tr(part) for part in parts)) if parts else tr("not calibrated")
+    return {"kind": rig.kind, "robot": rig.robot, "made_utc": rig.made_utc.isoformat(), "calibrated": calibrated_parts(rig)}
 
 
 def _say(line: str) -> None:
@@ -317,7 +218,6 @@ def _checks(rig: str | None, config_path: Path | None) -> Iterator[Check]:
         problem = f"{program.OPENCV}: {problem}"
     else:
         try:
-            from app.operator.startup import window_config
             from hardware.preflight.preflight import run_checks
         except ImportError as error:
             problem = one_line(error)
@@ -325,7 +225,7 @@ def _checks(rig: str | None, config_path: Path | None) -> Iterator[Check]:
         yield from (check() for check in program.OF_THE_PROGRAM)
         yield Check("all others", False, f"not made, since the program does not load: {problem}", RENEW)
         return
-    config, _ = window_config(rig, config_path, None)
+    config, _ = rig_config(rig, config_path, None)
     yield from run_checks(config)
 
 

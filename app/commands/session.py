@@ -22,7 +22,6 @@ from rich.table import Table
 
 from app.commands.progress import Interrupt, progress_bar
 from app.operator.rig_engine import EngineMaker
-from app.operator.startup import window_config
 from core.config.files import own_config
 from core.config.models import Config, sessions_folder
 from core.config.rig_file import as_calibrated
@@ -37,6 +36,7 @@ from core.session.reader import SessionReader, losses, rows_cut_off
 from core.session.recovery import expected_loss, payload_bytes, recover
 from core.session.writer import SessionWriter
 from core.types import Image, PoseState, Tick
+from hardware.rig import rig_config
 
 if TYPE_CHECKING:
     from app.operator.rig_engine import RigEngine
@@ -235,7 +235,7 @@ def run_record(
     A camera that is lost meanwhile is waited for until the time is over, and how long it was away is told; one that is still away
     then is an error, as every failure is, which names what was recorded.
     """
-    config, kind = window_config(rig, config_path, None)
+    config, kind = rig_config(rig, config_path, None)
     settings = config.record.model_copy(update={"ring_s": 0.0} | ({"codec": "lossless"} if lossless else {}))
     config = config.model_copy(update={"record": settings})
     folder = out if out is not None else sessions_folder(settings.folder)

@@ -144,3 +144,10 @@ def leaving_a_core(config: PerceptionConfig) -> PerceptionConfig:
         return config
     threads = max(1, cores() - 1)
     return config.model_copy(update={"segmentation": config.segmentation.model_copy(update={"threads": threads})})
+
+
+def quick_sight(config: Config) -> Perceive:
+    """Perception of single frames as the calibration wants it: quickly, with a core left for servos and camera."""
+    perception = leaving_a_core(config.perception)
+    plain = perception.segmentation.model_copy(update={"mirrored": "never"})
+    return open_pipeline(perception.model_copy(update={"segmentation": plain})).perceive_single

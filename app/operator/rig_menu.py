@@ -11,13 +11,14 @@ from PySide6.QtCore import QObject, QTimer, Slot
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu
 
-from app.commands.rig import describe, quick_sight
 from app.operator.engine_thread import EnginePhase
+from app.operator.rig_engine import quick_sight
 from app.operator.window import OperatorWindow
 from app.rig_wizard.model import MakeSight, OpenBench, RigWizardModel
 from app.rig_wizard.wizard import RigWizard
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.texts import rig_line
 from core.config.calibration import CalibrationConfig, PortConfig
 from core.config.models import Config
 from core.config.rig_file import ListedRig, RigFileError, calibration_of, find_rig, list_rigs, set_port, with_rig
@@ -127,7 +128,7 @@ class RigMenuController(QObject):
         action.setCheckable(True)
         action.setChecked(self._window.config.rig.file == str(rig.path))
         action.setEnabled(rig.rig is not None)
-        action.setToolTip(describe(rig.rig) if rig.rig is not None else rig.problem)
+        action.setToolTip(rig_line(rig.rig) if rig.rig is not None else rig.problem)
         action.triggered.connect(partial(self.choose, rig.name))
         self._group.addAction(action)
         self._menu.addAction(action)

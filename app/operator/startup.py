@@ -15,7 +15,7 @@ import time
 from enum import Enum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import platformdirs
 from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
@@ -23,7 +23,6 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QMessageBox
 
 from app.annotator.sources import default_store
-from app.commands.perceive import VIDEO_ENDINGS
 from app.operator.engine_thread import EnginePhase
 from app.operator.models import ModelMenu
 from app.operator.preflight import PreflightModel
@@ -38,85 +37,16 @@ from app.ui.window_base import check_display, make_application, run_until_closed
 from app.widgets.messages import Offer, OfferButton
 from app.widgets.preflight_list import PreflightList
 from core.config.files import settings_of_windows
-from core.config.models import Config, load_config, merge, sessions_folder
-from core.config.rig_file import RESERVED, find_rig, with_rig
+from core.config.models import Config, sessions_folder
 from core.control.modes import ARMED_MODES, Act, Mode
-from core.devices import DeviceError, UserError
-from core.files import ImageError, read_image
-from core.learning.dataset import IMAGE_ENDINGS
 from core.perception.compiled import loops
 from core.session.writer import RecordStatus
 from core.types import Reason
-from hardware.rig import RigKind, kind_of, start_ahead
+from hardware.rig import RigKind, rig_config, start_ahead
 from hardware.twin.phantom import PHANTOM_TITLES
 
 if TYPE_CHECKING:
     from app.operator.rig_engine import EngineMaker
-
-
-RIGS = RESERVED
-_REALSENSE_ENDING = ".bag"
-
-
-def window_config(
-    rig: str | None, config_path: Path | None, source: Path | None, own: dict[str, Any] | None = None
-) -> tuple[Config, RigKind]:
-    """The configuration of a rig or of a recorded source, and what the banner says; raises UserError.
-
-    Without `rig` it is the one that the configuration names; with it, the configuration says how that rig is set. `own` is what the
-    user has set, over the defaults.
-    """
-    if rig is not None and source is not None:
-        raise UserError("--source is looked at instead of a rig's camera: leave --rig out")
-    if source is None:
-        config = load_config(config_path, overrides=own)
-        if rig is not None:
-            config = _choose(config, rig) if rig in RIGS else _from_file(config, rig)
-    else:
-        try:
-            found = source.exists()
-        except OSError as error:
-            raise DeviceError(f"{source}: cannot be read ({error.strerror})") from None
-        if not found:
-            raise DeviceError(f"{source}: no such file or folder")
-        camera = "video_file" if source.suffix.lower() in VIDEO_ENDINGS else "image_folder"
-        camera = "realsense" if source.suffix.lower() == _REALSENSE_ENDING else camera
-        if camera == "image_folder" and source.is_file():
-            _check_picture(source)
-        chosen = {"rig": {"camera": camera, "robot": "none", "source": str(source), "file": None}}
-        config = load_config(config_path, overrides=merge(own or {}, chosen))
-    return config, kind_of(config.rig)
-
-
-def _check_picture(file: Path) -> None:
-    """A file that is no video by its name must be a picture: said here, and not in a window that would show nothing."""
-    try:
-        read_image(file)
-    except ImageError as error:
-        if file.suffix.lower() in IMAGE_ENDINGS:
-            raise
-        endings = ", ".join((*IMAGE_ENDINGS, *VIDEO_ENDINGS, _REALSENSE_ENDING))
-        raise UserError(f"{error}; --source takes a folder of pictures, or a file that ends in {endings}") from None
-
-
-def _from_file(config: Config, name: str) -> Config:
-    """A rig that the wizard has made; raises RigFileError."""
-    path, rig = find_rig(name)
-    return with_rig(config, rig, path)
-
-
-def _choose(config: Config, rig: str) -> Config:
-    """Another rig than the configuration's own: a real camera drives real servos when their port is known."""
-    if config.rig.camera == rig and config.rig.source is None:
-        return config
-    servos = config.servos
-    if rig == "twin":
-        robot, servos = "twin", servos.model_copy(update={"port": None})
-    else:
-        robot = "servos" if servos.port is not None else "none"
-    # Without its file: what was calibrated is another camera's.
-    chosen = config.rig.model_copy(update={"name": rig, "camera": rig, "robot": robot, "source": None, "file": None})
-    return config.model_copy(update={"rig": chosen, "servos": servos})
 
 
 def finish_loading() -> None:
@@ -144,7 +74,7 @@ def run_window(
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     file = settings_of_windows(config_path)
     is_own = config_path is None and not until_first_frame  # what is measured does not depend on who measures
-    config, kind = window_config(rig, config_path, source, file.data if is_own else None)
+    config, kind = rig_config(rig, config_path, source, file.data if is_own else None)
     ahead = start_ahead(config)  # before all that is slow to load here
 
     from app.operator.manual_drive import OperatorDevices

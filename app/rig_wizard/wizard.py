@@ -24,7 +24,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.commands.rig import calibration_lines, describe
 from app.operator.manual_drive import StopKeys
 from app.rig_wizard.camera_pages import CameraPage, ScalePage
 from app.rig_wizard.model import RigWizardModel
@@ -32,6 +31,7 @@ from app.rig_wizard.pages_base import WizardPage, WizardPicture, button, mark_ma
 from app.rig_wizard.servo_pages import IdentifyPage, PortPage, SteeringPage, ZeroPage
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.texts import calibration_lines, rig_line
 from app.ui.window_base import is_asked_to_end
 from app.widgets.basics import Card, StillWheel, takes_enter
 from app.widgets.messages import QuestionStrip
@@ -74,7 +74,7 @@ class SummaryPage(WizardPage):
         if rig is None or draft is None:
             return
         lines = [
-            f"{rig.name}: {describe(rig)}",
+            f"{rig.name}: {rig_line(rig)}",
             "",
             *calibration_lines(rig),
             "",

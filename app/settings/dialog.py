@@ -45,7 +45,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.commands.perceive import VIDEO_ENDINGS
 from app.operator.manual_drive import NUMBERS_ONLY
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
@@ -55,6 +54,7 @@ from core.config.files import Profile, ProfileError, Profiles, changed_keys
 from core.config.models import RESOURCES, Config, load_config
 from core.config.rig_file import rigs_folder, sections_of_rig
 from core.config.schema import Effect, FieldKind, Section, Setting, schema, settings_by_key, value_at, with_value
+from core.files import VIDEO_ENDINGS
 
 _SEPARATORS = re.compile(r"[\s_.,]+")
 

@@ -14,6 +14,7 @@ from enum import Enum
 
 from app.ui.i18n import ENGLISH, language_in_use, mark, tr, tr_text
 from core.config.models import PoseConfig
+from core.config.rig_file import RigFile
 from core.control.alerts import ALERTS, AlertKey
 from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
 from core.control.gate import Source
@@ -558,3 +559,90 @@ def _filled(text: str) -> str:
         lines[-1] += part
         room -= width
     return "\n".join(lines)
+
+
+def rig_line(rig: RigFile) -> str:
+    """Camera, servos and calibration of a rig in one line."""
+    camera = {
+        "twin": tr("bench twin"),
+        "realsense": f"RealSense {rig.camera.serial or ''}",
+        "webcam": tr("webcam {device}", device=rig.camera.device or ""),
+    }
+    servos = {"twin": tr("its own servos"), "servos": tr("servos on {port}", port=rig.servos.port), "none": tr("no servos")}
+    parts = calibrated_parts(rig)
+    return tr(
+        "{camera}, {servos}; {calibrated}; made {made:%Y-%m-%d}",
+        camera=camera[rig.kind].strip(),
+        servos=servos[rig.robot],
+        calibrated=tr("calibrated: {parts}", parts=", ".join(map(tr, parts))) if parts else tr("not calibrated"),
+        made=rig.made_utc,
+    )
+
+
+def calibration_lines(rig: RigFile) -> list[str]:
+    """What was calibrated, a line each."""
+    known = rig.calibration
+    if known is None:
+        return [tr("not calibrated")]
+    lines = []
+    if known.lens is not None:
+        lines.append(
+            tr(
+                "lens: k1 {k1:+.4f}, k2 {k2:+.4f}, {left:.2f} px left over",
+                k1=known.lens.k1,
+                k2=known.lens.k2,
+                left=known.lens.residual_px,
+            )
+        )
+    if known.scale is not None:
+        scale = known.scale
+        share = 100 * scale.uncertainty_share
+        text = tr(
+            "scale: {scale:.4f} mm/px in the middle, \N{PLUS-MINUS SIGN}{share:.2f} % (by {method})",
+            scale=scale.mm_per_px,
+            share=share,
+            method=tr_text(scale.method),
+        )
+        lines.append(text)
+    servos = ", ".join(f"{tr_text(joint.name)} {'+' if joint.sign > 0 else '-'}{joint.id}" for joint in rig.servos.joints)
+    lines.append(tr("servos (direction and id): {servos}", servos=servos))
+    ways = ", ".join(f"{tr_text(joint.name)} {joint.mm_per_turn:g}" for joint in rig.servos.joints)
+    lines.append(tr("way at one turn of the horn, as it is set and not measured: {ways} mm", ways=ways))
+    if known.assumed:
+        lines.append(
+            tr(
+                "assumed: {joints} by the order of their ids, since one camera cannot tell them apart; look at the head, and swap "
+                "them in the rig wizard if it goes the other way",
+                joints=tr(" and ").join(tr_text(name) for name in known.assumed),
+            )
+        )
+    if known.steering is not None:
+        ways = ", ".join(
+            f"{tr_text(tendon.name)} {tr('out of the picture') if tendon.direction_deg is None else f'{tendon.direction_deg:.0f}°'}"
+            for tendon in known.steering.tendons
+        )
+        lines.append(
+            tr(
+                "steering, 0° to the right and 90° down in the picture: {ways}; roll {roll:+.0f}°",
+                ways=ways,
+                roll=known.steering.roll_deg,
+            )
+        )
+    if known.zero is not None:
+        slack = ", ".join(f"{value:+.2f}" for value in known.zero.slack_mm)
+        lines.append(
+            tr(
+                "zero: wires were slack by {slack} mm; pretension {pretension:g} mm",
+                slack=slack,
+                pretension=known.zero.pretension_mm,
+            )
+        )
+    return lines
+
+
+_CALIBRATED = (mark("lens"), mark("scale"), mark("steering"), mark("zero"))
+
+
+def calibrated_parts(rig: RigFile) -> list[str]:
+    """The names of the parts of a rig that are calibrated, in English."""
+    return [part for part in _CALIBRATED if rig.calibration is not None and getattr(rig.calibration, part) is not None]

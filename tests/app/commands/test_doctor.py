@@ -11,12 +11,11 @@ from pathlib import Path
 import pytest
 
 from app.commands.rig import run_doctor
-from app.operator.startup import window_config
 from core.config.models import Config
 from core.config.rig_file import RigFileError
 from hardware.preflight import checks as program
 from hardware.preflight.checks import Check
-from hardware.rig import RigKind
+from hardware.rig import RigKind, rig_config
 
 MAIN = Path(__file__).resolve().parents[3] / "main.py"
 
@@ -106,35 +105,35 @@ def _bench(tmp_path: Path, text: str) -> Path:
 
 
 def test_without_a_name_the_configured_rig_is_meant(tmp_path: Path) -> None:
-    config, kind = window_config(None, None, None)
+    config, kind = rig_config(None, None, None)
     assert (config.rig.camera, kind) == ("twin", RigKind.SIM)
     path = _bench(tmp_path, '[rig]\nname = "bench 2"\ncamera = "webcam"\nrobot = "none"\n')
-    config, kind = window_config(None, path, None)
+    config, kind = rig_config(None, path, None)
     assert (config.rig.name, kind) == ("bench 2", RigKind.LIVE)
-    assert window_config("webcam", path, None)[0] == config
+    assert rig_config("webcam", path, None)[0] == config
 
 
 @pytest.mark.parametrize("name", ["realsense", "webcam"])
 def test_a_real_camera_drives_servos_only_when_their_port_is_known(name: str, tmp_path: Path) -> None:
-    config, kind = window_config(name, None, None)
+    config, kind = rig_config(name, None, None)
     assert (config.rig.name, config.rig.camera, config.rig.robot, kind) == (name, name, "none", RigKind.LIVE)
-    config, kind = window_config(name, _bench(tmp_path, '[servos]\nport = "/dev/ttyUSB7"\n'), None)
+    config, kind = rig_config(name, _bench(tmp_path, '[servos]\nport = "/dev/ttyUSB7"\n'), None)
     assert (config.rig.robot, config.servos.port, kind) == ("servos", "/dev/ttyUSB7", RigKind.LIVE)
 
 
 def test_the_twin_never_touches_the_bench(tmp_path: Path) -> None:
     path = _bench(tmp_path, '[rig]\ncamera = "realsense"\nrobot = "servos"\n[servos]\nport = "/dev/ttyUSB7"\n')
-    config, kind = window_config("twin", path, None)
+    config, kind = rig_config("twin", path, None)
     assert (config.rig.camera, config.rig.robot, config.servos.port, kind) == ("twin", "twin", None, RigKind.SIM)
 
 
 def test_a_realsense_recording_is_played(tmp_path: Path) -> None:
     (tmp_path / "run.bag").touch()
-    config, kind = window_config(None, None, tmp_path / "run.bag")
+    config, kind = rig_config(None, None, tmp_path / "run.bag")
     assert (config.rig.camera, config.rig.robot, kind) == ("realsense", "none", RigKind.PLAYBACK)
 
 
 def test_an_unknown_rig_names_the_known_ones() -> None:
     with pytest.raises(RigFileError, match="unknown rig 'moon'; known: twin, realsense, webcam"):
-        window_config("moon", None, None)
+        rig_config("moon", None, None)
     assert Config().rig.camera == "twin"

@@ -128,7 +128,7 @@ class _Bench:
 def bench(monkeypatch: pytest.MonkeyPatch) -> _Bench:
     made = _Bench()
     monkeypatch.setattr("hardware.calibration.bench.open_bench", lambda *_: made)
-    monkeypatch.setattr("app.commands.rig.quick_sight", lambda _: None)
+    monkeypatch.setattr("app.operator.rig_engine.quick_sight", lambda _: None)
     return made
 
 
@@ -137,7 +137,7 @@ def test_a_rig_that_cannot_be_saved_is_told_before_the_bench_is_opened(tmp_path:
         raise AssertionError("opened")
 
     monkeypatch.setattr("hardware.calibration.bench.open_bench", open_bench)
-    monkeypatch.setattr("app.commands.rig.quick_sight", lambda _: None)
+    monkeypatch.setattr("app.operator.rig_engine.quick_sight", lambda _: None)
     rig_path("bench 1").mkdir(parents=True)
     with pytest.raises(UserError, match=r"bench 1.toml: cannot be saved \(Is a directory\)"):
         _run("calibrate", "bench 1", "--auto", "--from", "twin")

@@ -11,7 +11,6 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
-from tests.app.test_servo_widgets import bus
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.manual_drive import Motion
@@ -26,6 +25,7 @@ from core.devices import DeviceError, EndOfStream
 from hardware.rig import RigKind
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, until
+from tests.app.widgets.test_servo_widgets import bus
 
 Key = Qt.Key
 

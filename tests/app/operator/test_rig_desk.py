@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
-from tests.app.test_rig_wizard import StillCamera
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.manual_drive import OperatorDevices
@@ -28,6 +27,7 @@ from hardware.calibration.bench import CalibrationBench
 from hardware.inputs.gamepad import GamepadState
 from hardware.servos.discovery import Found, FoundCamera
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until
+from tests.app.rig_wizard.test_rig_wizard import StillCamera
 
 KNOWN = CalibrationConfig(
     made_utc=datetime.now(UTC).replace(microsecond=0),

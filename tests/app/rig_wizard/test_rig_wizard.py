@@ -15,10 +15,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QFileDialog, QSpinBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.commands.rig import calibration_lines
 from app.rig_wizard import servo_pages
 from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.wizard import RigWizard
+from app.ui.texts import calibration_lines
 from app.ui.window_base import close_all, is_asked_to_end
 from core.calibration.camera import BoardView
 from core.calibration.servos import Assignment

@@ -24,8 +24,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
-from tests.app.test_preflight import BAD, GOOD, done, says
-from tests.app.test_rig_wizard import StillCamera
 
 from app.operator.preflight import PreflightModel
 from app.rig_wizard.model import RigWizardModel
@@ -41,6 +39,8 @@ from core.control.pilot import DriveView
 from hardware.calibration.bench import CalibrationBench
 from hardware.servos.discovery import Found, FoundCamera, FoundServo, FoundServos
 from tests.app.fakes import make_scene, until
+from tests.app.operator.test_preflight import BAD, GOOD, done, says
+from tests.app.rig_wizard.test_rig_wizard import StillCamera
 
 Key = Qt.Key
 IDLE = DriveView(0.0)

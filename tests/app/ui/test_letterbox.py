@@ -84,11 +84,11 @@ def test_a_command_whose_window_closes_while_it_speaks_is_heard_no_more(qtbot: Q
 AT_THE_END = """
 import threading
 from PySide6.QtCore import QCoreApplication, QObject
-from app.ui.workers import Letters
+from app.ui.workers import QueuedCallback
 
 app = QCoreApplication([])
 desk = QObject()
-letters = Letters(desk)
+letters = QueuedCallback(desk)
 begun = threading.Event()
 
 def send():

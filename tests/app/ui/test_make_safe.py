@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from PySide6.QtWidgets import QMessageBox
 from pytestqt.qtbot import QtBot
-from tests.app.test_rig_wizard import StillCamera
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.rig_menu import RigMenuController
@@ -25,6 +24,7 @@ from core.devices import DeviceError
 from hardware.calibration.bench import CalibrationBench
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until
+from tests.app.rig_wizard.test_rig_wizard import StillCamera
 
 DRIVING = DriveView(0.0, Mode.AUTONOMOUS, Source.PROGRAM, servos_on=True, deadman=True)
 AT_REST = DriveView(0.0)

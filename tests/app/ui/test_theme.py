@@ -12,7 +12,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
-from tests.app.test_palette import _as_deuteranope
 
 from app.operator.window import OperatorWindow
 from app.player.session_model import MARK_LOOK
@@ -29,6 +28,7 @@ from app.widgets.trend_plot import TrendPlot
 from core.config.models import PoseConfig
 from core.types import PoseState
 from tests.app.fakes import make_pose, make_scene, until
+from tests.app.ui.test_palette import _as_deuteranope
 
 ROLES = [field.name for field in fields(Scheme)]
 SURFACES = ("WINDOW", "PANEL", "RAISED")

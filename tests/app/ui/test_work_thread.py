@@ -84,13 +84,13 @@ def test_one_that_computes_for_long_waits_behind_the_window(qtbot: QtBot) -> Non
 DESTROYED = """
 import random, threading, time
 from PySide6.QtCore import QCoreApplication, QEvent, QObject
-from app.ui.workers import WorkThread
+from app.ui.workers import Worker
 
 app = QCoreApplication([])
 heard = []
 for _ in range(400):
     window = QObject()
-    threads = [WorkThread("test", window) for _ in range(4)]
+    threads = [Worker("test", window) for _ in range(4)]
     for thread in threads:
         thread.done.connect(lambda *_: heard.append(1))
         for k in range(30):
