@@ -12,6 +12,7 @@ from typing import Protocol
 
 from PySide6.QtCore import QObject, QThread, Signal
 
+from app.ui.workers import error_line
 from core.config.models import PerceptionConfig
 from core.control.modes import Act
 from core.control.pilot import Pilot
@@ -165,9 +166,12 @@ class EngineThread(QThread):
         try:
             self._serve(order)
         except EndOfStream as error:
-            return EngineStatus(EnginePhase.ENDED, _one_line(error))
+            return EngineStatus(EnginePhase.ENDED, error_line(error))
         except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible fault
-            return EngineStatus(EnginePhase.FAULT, _one_line(error))
+            line = error_line(error)
+            if line.startswith("unexpected"):
+                _log.error("the engine stopped", exc_info=error)
+            return EngineStatus(EnginePhase.FAULT, line)
         return EngineStatus(EnginePhase.IDLE)
 
     def _serve(self, open_engine: OpenEngine) -> None:
@@ -218,12 +222,3 @@ class EngineThread(QThread):
     def _report(self, status: EngineStatus) -> None:
         if not self._stopping:
             self.status_changed.emit(status)
-
-
-def _one_line(error: Exception) -> str:
-    """The message of an expected error; for any other one its type too, with the traceback in the log."""
-    text = " ".join(str(error).split()) or type(error).__name__
-    if type(error).__module__.partition(".")[0] in {"core", "hardware"}:
-        return text
-    _log.error("the engine stopped", exc_info=error)
-    return f"unexpected {type(error).__name__}: {text}"

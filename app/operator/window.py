@@ -322,7 +322,7 @@ class OperatorWindow(WindowFrame):
 
     def take_settings(self, config: Config) -> None:
         """What acts without opening the rig anew: thresholds of perception, folders. What is recorded from here on says so."""
-        self._snapshots.set_folder(pictures_folder(config.window.pictures_folder))
+        self._snapshots.folder = pictures_folder(config.window.pictures_folder)
         if config.perception != self._config.perception:
             self.preview(config.perception)
         self._config = config

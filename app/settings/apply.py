@@ -58,7 +58,7 @@ class SettingsController(QObject):
         """The dialog's settings while some of them are tried out, else None."""
         self._wants_back = False
         self.dialog: SettingsDialog | None = None
-        self._stills = Worker("preview", self)
+        self._stills = Worker("preview", self, latest_only=True)
         self._stills.done.connect(self._on_still)
         self._stills.failed.connect(lambda _key, line: window.say(line, is_fault=True))
         self._timer = QTimer(self)
@@ -162,7 +162,6 @@ class SettingsController(QObject):
         tick = self._window.last_tick
         if not self._window.preview(perception) and tick is not None:
             target = tick.scene.to_source(tick.scene.route.target) if tick.scene.route is not None else None
-            self._stills.forget()
             self._stills.submit("still", partial(self._perceive_again, tick.frame, target, perception))
 
     @Slot(object, object)
@@ -193,7 +192,7 @@ class SettingsController(QObject):
         if note is None:
             return
         self._drafted = None
-        self._stills.forget()
+        self._stills.cancel_waiting()
         self._window.take_settings(with_changes(self._window.config, before, config, _NOW))
         self._saved_over = self._window.config
         self._window.show_still(None)  # of a rig that is over, what was tried out on its last picture must not stay: it looks alive

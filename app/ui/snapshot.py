@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import json
-import logging
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from itertools import count
 from pathlib import Path
 
 import cv2
 import platformdirs
-from PySide6.QtCore import QObject, QRunnable, QThreadPool, Signal
+from PySide6.QtCore import QObject, Signal
 
 from app.commands.perceive import scene_to_json
-from app.ui.i18n import tr
-from app.ui.workers import QueuedCallback
+from app.ui.i18n import mark, tr
+from app.ui.workers import Worker
 from app.widgets.overlay_image import draw_overlay
+from core.devices import UserError
 from core.types import Image, Tick
 
 _FINISH_WITHIN_MS = 5_000
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,56 +81,34 @@ def _png(image: Image) -> bytes:
 
 
 class SnapshotWriter(QObject):
-    """Writes in a thread of its own. ``saved`` and ``failed`` carry the line to show."""
+    """Writes snapshots in a thread of its own. ``saved`` and ``failed`` carry the line to show."""
 
     saved = Signal(str)
     failed = Signal(str)
 
     def __init__(self, folder: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._folder = folder
-        self._pool = QThreadPool(self)
-        self._pool.setMaxThreadCount(1)
-
-    @property
-    def folder(self) -> Path:
-        return self._folder
-
-    def set_folder(self, folder: Path) -> None:
+        self.folder = folder
         """Where the next ones go."""
-        self._folder = folder
+        self._work = Worker("snapshots", self)
+        self._work.done.connect(lambda _key, path: self.saved.emit(tr(_SAVED, path=path)))
+        self._work.failed.connect(lambda _key, why: self.failed.emit(tr("Snapshot not saved: {why}", why=why)))
 
     def write(self, tick: Tick, origin: Origin) -> None:
         """Start to write; returns at once."""
-        self._pool.start(_Job(QueuedCallback(self), self._folder, tick, origin, datetime.now()))
+        self._work.submit("snapshot", partial(_write, self.folder, tick, origin, datetime.now()))
 
     def finish(self, within_ms: int = _FINISH_WITHIN_MS) -> bool:
-        """Wait until everything is on the disk; False when the disk has not answered in time."""
-        return self._pool.waitForDone(within_ms)
+        """End after everything is on the disk; False when the disk has not answered in time."""
+        self._work.stop(finish=True)
+        return self._work.wait(within_ms)
 
 
-class _Job(QRunnable):
-    def __init__(self, letters: QueuedCallback[SnapshotWriter], folder: Path, tick: Tick, origin: Origin, now: datetime) -> None:
-        super().__init__()
-        self._letters = letters
-        self._folder = folder
-        self._tick = tick
-        self._origin = origin
-        self._now = now
+_SAVED = mark("Snapshot saved: {path} (with _overlay.png and .json)")
 
-    def run(self) -> None:
-        try:
-            path = write_snapshot(self._folder, self._tick, self._origin, self._now)
-        except OSError as error:
-            self._fail(tr("Snapshot not saved: {file}: {why}", file=error.filename or self._folder, why=error.strerror or error))
-        except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible line
-            _log.error("the snapshot was not written", exc_info=error)
-            self._fail(
-                tr("Snapshot not saved: unexpected {kind}: {why}", kind=type(error).__name__, why=" ".join(str(error).split()))
-            )
-        else:
-            line = tr("Snapshot saved: {path} (with _overlay.png and .json)", path=path)
-            self._letters.send(lambda writer: writer.saved.emit(line))
 
-    def _fail(self, line: str) -> None:
-        self._letters.send(lambda writer: writer.failed.emit(line))
+def _write(folder: Path, tick: Tick, origin: Origin, now: datetime) -> Path:
+    try:
+        return write_snapshot(folder, tick, origin, now)
+    except OSError as error:
+        raise UserError(f"{error.filename or folder}: {error.strerror or error}") from error

@@ -1,16 +1,4 @@
-"""A thread that does one job after the other, so that the window never waits for a disk or a network.
-
-What a thread has to say to an object of the window, which may be gone by then: Qt destroys it with its window.
-
-A signal that a thread emits of an object that is just being destroyed is that of half-freed memory, and ends the program now and
-then. ``QObject.destroyed`` comes too late to prevent it: what makes up the object in Python is gone before. So threads touch no
-object of the window at all. They post letters, and the window's own thread, in which objects are destroyed too, reads them out to
-those that are still there.
-
-A command of this program in a process of its own, beside the window: long work must take no time from the hand on the robot.
-
-Limits how often texts and plots are renewed: digits that change thirty times a second cannot be read.
-"""
+"""Work beside the window: callbacks queued from threads, a thread of jobs, child processes, and the pace of displays."""
 
 from __future__ import annotations
 
@@ -28,6 +16,7 @@ import time
 import weakref
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
 from typing import IO, Any, Generic, TypeVar
@@ -37,11 +26,14 @@ from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 from core.system import let_the_window_first
 
-Addressee = TypeVar("Addressee", bound=QObject)
+Receiver = TypeVar("Receiver", bound=QObject)
+Job = Callable[[], object]
+
+_log = logging.getLogger(__name__)
 
 
-class _Letterbox(QObject):
-    """The program's one, of the thread that asks for it first: the window's. It belongs to no window."""
+class _CallbackQueue(QObject):
+    """One for the program, in the window's thread, which creates it; it belongs to no window."""
 
     _posted = Signal(object)
 
@@ -49,190 +41,182 @@ class _Letterbox(QObject):
         super().__init__()
         self._lock = threading.Lock()
         self._is_open = True
-        self._posted.connect(self._read, Qt.ConnectionType.QueuedConnection)
+        self._posted.connect(self._run, Qt.ConnectionType.QueuedConnection)
         atexit.register(self._close)  # before PySide's own, which destroys all objects that are left
 
-    def post(self, letter: Callable[[], None]) -> None:
+    def post(self, callback: Callable[[], None]) -> None:
         with self._lock:
             if self._is_open:
-                self._posted.emit(letter)
+                self._posted.emit(callback)
 
     def _close(self) -> None:
         with self._lock:
             self._is_open = False
 
     @Slot(object)
-    def _read(self, letter: Callable[[], None]) -> None:
-        letter()
+    def _run(self, callback: Callable[[], None]) -> None:
+        callback()
 
 
 @cache
-def _letterbox() -> _Letterbox:
-    return _Letterbox()
+def _callback_queue() -> _CallbackQueue:
+    return _CallbackQueue()
 
 
-class QueuedCallback(Generic[Addressee]):
-    """Letters to one object, made in its thread and sent from any.
+class QueuedCallback(Generic[Receiver]):
+    """Calls from any thread to one object of the window's thread, which makes this.
 
-    It keeps no object alive: what the sender holds of it, a thread could have to destroy.
+    Threads must not emit signals of a window's objects: of an object that is just being destroyed the signal lies in freed memory,
+    and ``QObject.destroyed`` comes too late to prevent it. The receiver is held weakly, so that no thread ever destroys it.
     """
 
-    def __init__(self, addressee: Addressee) -> None:
-        self._addressee = weakref.ref(addressee)
-        self._letterbox = _letterbox()
+    def __init__(self, receiver: Receiver) -> None:
+        self._receiver = weakref.ref(receiver)
+        self._queue = _callback_queue()
 
-    def send(self, say: Callable[[Addressee], None]) -> None:
-        """Have `say` called with the object, in the window's thread and in the order of sending; never once it is gone."""
-        self._letterbox.post(lambda: self._deliver(say))
+    def send(self, call: Callable[[Receiver], None]) -> None:
+        """Have `call` called with the receiver, in the window's thread and in the order of sending; never once it is gone."""
+        self._queue.post(lambda: self._deliver(call))
 
-    def _deliver(self, say: Callable[[Addressee], None]) -> None:
-        addressee = self._addressee()
-        if addressee is not None and shiboken6.isValid(addressee):
-            say(addressee)
+    def _deliver(self, call: Callable[[Receiver], None]) -> None:
+        receiver = self._receiver()
+        if receiver is not None and shiboken6.isValid(receiver):
+            call(receiver)
 
 
-_log = logging.getLogger(__name__)
+@dataclass(eq=False)
+class _JobQueue:
+    """What a worker and its thread share; the thread holds no reference to the worker."""
+
+    jobs: deque[tuple[Hashable, Job]] = field(default_factory=deque)
+    changed: threading.Condition = field(default_factory=threading.Condition)
+    running: Hashable | None = None
+    is_stopped: bool = False
+
+    def stop(self, *, finish: bool = True) -> None:
+        with self.changed:
+            self.is_stopped = True
+            if not finish:
+                self.jobs.clear()
+            self.changed.notify()
 
 
 class Worker(QObject):
-    """Jobs in the order in which they come, urgent ones first. ``stop`` lets those be finished that must not be lost.
+    """A thread that does named jobs, all in order or the latest only.
 
-    ``done`` carries a job's key and what it gave, ``failed`` its key and one line; ``ended`` comes after the last job once it is
+    ``done`` carries a job's key and its result, ``failed`` its key and one line; ``ended`` comes after the last job once it is
     stopped. Destroyed with its window, it reports nothing more, and its thread ends after its jobs. It is no QThread: Qt aborts the
     program where one is destroyed that still runs, and a driver or a disk that hangs cannot be ended.
 
     Parameters
     ----------
-    behind : it computes for long: the window, and a rig that is driven beside it, come first.
+    latest_only : a new job replaces those that wait.
+    behind : its jobs compute for long, at a lower priority than the window and a rig that is driven beside it.
     """
 
     done = Signal(object, object)
     failed = Signal(object, str)
     ended = Signal()
 
-    def __init__(self, name: str, parent: QObject | None = None, *, behind: bool = False) -> None:
+    def __init__(self, name: str, parent: QObject | None = None, *, latest_only: bool = False, behind: bool = False) -> None:
         super().__init__(parent)
         self.setObjectName(name)
-        self._worker = _Worker(name, QueuedCallback(self), behind=behind)
-        self.destroyed.connect(self._worker.end)
+        self._latest_only, self._behind = latest_only, behind
+        self._queue = _JobQueue()
+        self._thread: threading.Thread | None = None
+        self.destroyed.connect(self._queue.stop)
 
     @property
     def pending(self) -> int:
-        """Jobs that are not finished, the one in hand included."""
-        return self._worker.pending
+        """Jobs that are not finished, the running one included."""
+        with self._queue.changed:
+            return len(self._queue.jobs) + (self._queue.running is not None)
 
-    def submit(self, key: Hashable, job: Callable[[], object], *, urgent: bool = False, once: bool = False) -> None:
-        """Queue a job; with `once` not beside a waiting one of the same key (an urgent call moves that to the front)."""
-        self._worker.submit(key, job, urgent=urgent, once=once)
+    def submit(self, key: Hashable, job: Job, *, urgent: bool = False, once: bool = False) -> None:
+        """Queue a job, an urgent one first; with `once` a key waits once only (an urgent call moves it to the front)."""
+        queue = self._queue
+        with queue.changed:
+            if queue.is_stopped:
+                return
+            if self._latest_only:
+                queue.jobs.clear()
+            if once and (key == queue.running or any(key == waiting for waiting, _ in queue.jobs)):
+                if not urgent or key == queue.running:
+                    return
+                queue.jobs = deque(waiting for waiting in queue.jobs if waiting[0] != key)
+            if urgent:
+                queue.jobs.appendleft((key, job))
+            else:
+                queue.jobs.append((key, job))
+            queue.changed.notify()
+            if self._thread is None:
+                arguments = (self.objectName(), queue, QueuedCallback(self), self._behind)
+                self._thread = threading.Thread(target=_work, args=arguments, name=self.objectName(), daemon=True)
+                self._thread.start()
 
-    def forget(self) -> None:
-        """Take back what has not begun."""
-        self._worker.forget()
+    def cancel_waiting(self) -> None:
+        """Drop the jobs that have not begun."""
+        with self._queue.changed:
+            self._queue.jobs.clear()
 
     def stop(self, *, finish: bool) -> None:
         """Ask the thread to end, with `finish` after all jobs; returns at once."""
-        if not self._worker.end(finish=finish):
+        self._queue.stop(finish=finish)
+        if self._thread is None:
             self.ended.emit()
 
     def wait(self, within_ms: float | None = None) -> bool:
-        """Until it has ended, once it is stopped; False when it did not in time. None: for as long as it takes."""
-        return self._worker.wait(within_ms)
+        """Wait for the end of the stopped thread, None: for as long as it takes; False when it did not end in time."""
+        if self._thread is None:
+            return True
+        self._thread.join(None if within_ms is None else within_ms / 1000)
+        return not self._thread.is_alive()
 
 
-class _Worker:
-    """The thread and its jobs, which know the object that they work for by letters only."""
+def _work(name: str, queue: _JobQueue, worker: QueuedCallback[Worker], behind: bool) -> None:
+    """The thread of a worker."""
+    if behind:
+        let_the_window_first()
+    while True:
+        with queue.changed:
+            queue.changed.wait_for(lambda: queue.jobs or queue.is_stopped)
+            if not queue.jobs:
+                break
+            key, job = queue.jobs.popleft()
+            queue.running = key
+        report = _outcome(name, key, job)
+        with queue.changed:
+            queue.running = None  # before the report arrives, so that ``pending`` counts the job no more
+        worker.send(report)
+        del key, job, report  # what they hold is not kept until the next job comes
+    worker.send(lambda it: it.ended.emit())
 
-    def __init__(self, name: str, letters: QueuedCallback[Worker], *, behind: bool) -> None:
-        self._name = name
-        self._letters = letters
-        self._behind = behind
-        self._changed = threading.Condition()
-        self._jobs: deque[tuple[Hashable, Callable[[], object]]] = deque()
-        self._stopping = False
-        self._busy: Hashable | None = None
-        self._thread: threading.Thread | None = None
 
-    @property
-    def pending(self) -> int:
-        with self._changed:
-            return len(self._jobs) + (self._busy is not None)
+def _outcome(name: str, key: Hashable, job: Job) -> Callable[[Worker], None]:
+    try:
+        result = job()
+    except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible fault
+        line = error_line(error)
+        if line.startswith("unexpected"):
+            _log.error("a job of %s failed", name, exc_info=error)
+        return lambda it: it.failed.emit(key, line)
+    return lambda it: it.done.emit(key, result)
 
-    def submit(self, key: Hashable, job: Callable[[], object], *, urgent: bool, once: bool) -> None:
-        with self._changed:
-            if self._stopping:
-                return
-            if once and (key == self._busy or any(key == waiting for waiting, _ in self._jobs)):
-                if not urgent or key == self._busy:
-                    return
-                self._jobs = deque(waiting for waiting in self._jobs if waiting[0] != key)
-            if urgent:
-                self._jobs.appendleft((key, job))
-            else:
-                self._jobs.append((key, job))
-            self._changed.notify()
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
-                self._thread.start()
 
-    def forget(self) -> None:
-        with self._changed:
-            self._jobs.clear()
-
-    def end(self, *, finish: bool = True) -> bool:
-        """Whether there is a thread that will say so."""
-        with self._changed:
-            self._stopping = True
-            if not finish:
-                self._jobs.clear()
-            self._changed.notify()
-            return self._thread is not None
-
-    def wait(self, within_ms: float | None) -> bool:
-        thread = self._thread
-        if thread is not None:
-            thread.join(None if within_ms is None else within_ms / 1000)
-        return thread is None or not thread.is_alive()
-
-    def _run(self) -> None:
-        """The thread."""
-        if self._behind:
-            let_the_window_first()
-        self._work()
-        self._letters.send(lambda it: it.ended.emit())
-
-    def _work(self) -> None:
-        while True:
-            with self._changed:
-                self._busy = None
-                while not self._jobs and not self._stopping:
-                    self._changed.wait()
-                if not self._jobs:
-                    return
-                key, job = self._jobs.popleft()
-                self._busy = key
-            say = self._outcome(key, job)
-            with self._changed:
-                self._busy = None  # before it is heard, so that "all saved" is true then
-            self._letters.send(say)
-            del key, job, say  # what they hold is not kept until the next job comes
-
-    def _outcome(self, key: Hashable, job: Callable[[], object]) -> Callable[[Worker], None]:
-        try:
-            result = job()
-        except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible fault
-            line = " ".join(str(error).split()) or type(error).__name__
-            if type(error).__module__.partition(".")[0] not in {"core", "hardware"}:
-                _log.error("a job of %s failed", self._name, exc_info=error)
-                line = f"unexpected {type(error).__name__}: {line}"
-            return lambda it: it.failed.emit(key, line)
-        return lambda it: it.done.emit(key, result)
+def error_line(error: Exception) -> str:
+    """The message of an expected error (of ``core`` and ``hardware``) in one line; of any other one its type, too."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    expected = type(error).__module__.partition(".")[0] in {"core", "hardware"}
+    return text if expected else f"unexpected {type(error).__name__}: {text}"
 
 
 ROOT = Path(__file__).resolve().parents[2]
 LOW_PRIORITY = 14
+"""Added to the niceness of commands beside a window."""
 NOT_STARTED = 127
-"""Exit code of a process that there never was, as a shell has it."""
+"""Exit code of a process that could not be started, as a shell has it."""
 _TAIL_BYTES = 8192
+"""Of standard error: its last line is in there."""
 
 
 def command_of(*arguments: str) -> list[str]:
@@ -241,15 +225,15 @@ def command_of(*arguments: str) -> list[str]:
 
 
 def module_of(name: str, *arguments: str) -> list[str]:
-    """The command line of one of this program's modules that is no command for people."""
+    """The command line of a module of this program that is not a command for people."""
     return [sys.executable, "-m", name, *arguments]
 
 
 class ChildProcess(QObject):
-    """One process, from ``start`` to ``ended``.
+    """A process beside the window, from ``start`` to ``ended``: long work takes no time from the operator's controls.
 
     ``told`` carries every line of its standard output that is a JSON object, as a dictionary. ``ended`` carries its exit code
-    (negative: the signal that ended it) and the last line that it wrote to standard error, "" when there is none.
+    (negative: the signal that ended it) and the last line that it wrote to standard error, "" when there was none.
 
     Parameters
     ----------
@@ -268,7 +252,7 @@ class ChildProcess(QObject):
         self._command, self._given, self._priority = list(command), given, priority
         self._process: subprocess.Popen[bytes] | None = None
         self._is_left = False
-        self._letters = QueuedCallback(self)
+        self._callback = QueuedCallback(self)
 
     @property
     def is_running(self) -> bool:
@@ -279,7 +263,7 @@ class ChildProcess(QObject):
         return self._process.pid if self._process is not None else None
 
     def start(self) -> None:
-        """Start it; what hinders that comes by ``ended``."""
+        """Start it; what prevents that comes by ``ended``."""
         errors: IO[bytes] | None = None
         try:
             errors = tempfile.TemporaryFile()  # which a full disk or a read-only one refuses
@@ -295,29 +279,29 @@ class ChildProcess(QObject):
             if errors is not None:
                 errors.close()
             why = f"cannot be started ({error.strerror or error})"
-            self._letters.send(lambda it: it._on_over(NOT_STARTED, why))
+            self._callback.send(lambda it: it._on_over(NOT_STARTED, why))
             return
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, self._process.pid, os.getpriority(os.PRIO_PROCESS, 0) + self._priority)
-        listening = (self._process, errors, self._given, self._letters)
-        threading.Thread(target=_listen, args=listening, name="child process", daemon=True).start()
+        arguments = (self._process, errors, self._given, self._callback)
+        threading.Thread(target=_read_child, args=arguments, name="child process", daemon=True).start()
 
     def ask_to_end(self) -> None:
-        """A termination request: long work keeps what it has."""
+        """Send a termination request: long work keeps what it has."""
         self._signal(signal.SIGTERM)
 
     def kill(self) -> None:
         self._signal(signal.SIGKILL)
 
     def leave(self) -> None:
-        """Hear no more of it; it goes on by itself."""
+        """Report nothing more of it; the process goes on by itself."""
         self._is_left = True
 
     def _signal(self, number: int) -> None:
         if self.is_running and self._process is not None:
             self._process.send_signal(number)
 
-    def _on_heard(self, record: dict[str, Any]) -> None:
+    def _on_record(self, record: dict[str, Any]) -> None:
         if not self._is_left:
             self.told.emit(record)
 
@@ -326,40 +310,29 @@ class ChildProcess(QObject):
             self.ended.emit(code, last)
 
 
-def _listen(process: subprocess.Popen[bytes], errors: IO[bytes], given: str, letters: QueuedCallback[ChildProcess]) -> None:
-    """The thread."""
+def _read_child(process: subprocess.Popen[bytes], errors: IO[bytes], given: str, child: QueuedCallback[ChildProcess]) -> None:
+    """The thread that reads a child's output."""
     if process.stdin is not None:
         with contextlib.suppress(OSError), process.stdin:  # one that ends without having read it all is no fault here
             process.stdin.write(given.encode())
     assert process.stdout is not None
     with process.stdout as lines:
         for line in lines:
-            record = _record(line)
-            if record is not None:
-                letters.send(partial(ChildProcess._on_heard, record=record))
-    code, last = process.wait(), _last_line(errors)
-    letters.send(lambda it: it._on_over(code, last))
-
-
-def _record(line: bytes) -> dict[str, Any] | None:
-    try:
-        record = json.loads(line)
-    except (ValueError, RecursionError):
-        return None
-    return record if isinstance(record, dict) else None
-
-
-def _last_line(errors: IO[bytes]) -> str:
-    """What a command said last, without the word that all errors begin with."""
+            with contextlib.suppress(ValueError, RecursionError):
+                record = json.loads(line)
+                if isinstance(record, dict):
+                    child.send(partial(ChildProcess._on_record, record=record))
+    code = process.wait()
     with errors:
         size = errors.seek(0, os.SEEK_END)
         errors.seek(max(0, size - _TAIL_BYTES))
-        lines = [line.strip() for line in errors.read().decode(errors="replace").splitlines() if line.strip()]
-    return lines[-1].removeprefix("error: ") if lines else ""
+        said = [line.strip() for line in errors.read().decode(errors="replace").splitlines() if line.strip()]
+    last = said[-1].removeprefix("error: ") if said else ""
+    child.send(lambda it: it._on_over(code, last))
 
 
 class Pace:
-    """``due()`` is True at most once per ``interval_s``, and the first time."""
+    """``due()`` is True at most once per ``interval_s``, and the first time: digits that change at 30 Hz cannot be read."""
 
     def __init__(self, interval_s: float, clock: Callable[[], float] = time.monotonic) -> None:
         self._interval_s = interval_s
