@@ -821,13 +821,13 @@ def annotator(studio: Studio) -> None:
 
 
 def _annotate(studio: Studio, window: AnnotatorWindow) -> None:
-    desk = window.desk
-    studio.until(lambda: desk.is_open, "the picture in the annotator")
+    model = window.model
+    studio.until(lambda: model.is_open, "the picture in the annotator")
     window.toggle_proposal()
-    studio.until(lambda: desk.proposal is not None, "the algorithm's proposal")
+    studio.until(lambda: model.proposal is not None, "the algorithm's proposal")
     studio.wait(0.1)
-    window.take_proposal()
-    pose = desk.measure(desk.annotation).pose
+    window.apply_proposal()
+    pose = model.measure(model.annotation).pose
     if pose is None:
         raise UserError("the algorithm had no lines for the annotator's picture; is the model the default one?")
     window.set_state(pose.state)

@@ -1,13 +1,7 @@
-"""The picture that is annotated: turns mouse and keys into what the hand does, and paints it.
-
-Draws an annotation over its picture: lines, the 40 px that count, angle, masks, and the algorithm's proposal.
-
-The loupe of the annotator: what lies under the cursor, magnified, in the corner that is least in the way.
-"""
+"""The picture of the annotator: an annotation drawn over its image, a loupe, and the mouse and keys that edit it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -24,10 +18,9 @@ from PySide6.QtGui import (
     QPolygonF,
     QTransform,
 )
-from PySide6.QtGui import QPainterPath as Path
 from PySide6.QtWidgets import QSizePolicy
 
-from app.annotator.editing import AnnotationEditor, Drawing, Edit, Ending, Measure, Reach, Tool, handle_lines
+from app.annotator.editing import AnnotationEditor, Drawing, Edit, Measure, Tool, handle_lines
 from app.ui import theme
 from app.ui.i18n import mark, tr
 from app.ui.theme import ON_PICTURE
@@ -35,15 +28,16 @@ from app.widgets.image_canvas import PictureCanvas, PictureView, render
 from app.widgets.scene_overlay import foot
 from app.widgets.scene_painter import ScenePainter
 from core.annotation.model import ROBOT, VESSEL, Annotation, Line, MaskTarget, Readout, Touch, line_of
-from core.types import Image, Point, Points, Vector
+from core.types import Image, Point, Points
 
 _MASK_COLOUR = {MaskTarget.VESSEL: ON_PICTURE.VESSEL, MaskTarget.ROBOT: ON_PICTURE.ROBOT}
-_MARKER = 11.0
+_MARKER_PX = 11.0
+"""Width of the marker over the part of a line that the vectors are fitted to."""
 _LINE_COLOUR = {ROBOT: ON_PICTURE.ROBOT, VESSEL: ON_PICTURE.VESSEL}
 
 
 def draw(painter: QPainter, to_screen: QTransform, drawing: Drawing, label_px: int, *, is_loupe: bool = False) -> None:
-    """Paint through `to_screen` (picture to widget); labels in that size, 0 for none. In a loupe masks are outlines only."""
+    """Paint through `to_screen` (picture to widget); labels of `label_px`, 0 for none. In a loupe masks are outlines only."""
     annotation, readout = drawing.annotation, drawing.readout
     if drawing.masks_shown:
         for target in MaskTarget:
@@ -58,9 +52,8 @@ def draw(painter: QPainter, to_screen: QTransform, drawing: Drawing, label_px: i
         points = line_of(annotation, line)
         if len(points) > 1:
             pencil.polylines((np.array(points),), name, 1.5)
-    if drawing.rubber:
-        name = drawing.tool.value.colour
-        pencil.polylines((np.array(drawing.rubber),), name, 1.5, Qt.PenStyle.DashLine)
+    if drawing.rubber_band:
+        pencil.polylines((np.array(drawing.rubber_band),), drawing.tool.value.colour, 1.5, Qt.PenStyle.DashLine)
     if len(drawing.draft) > 1:
         pencil.polylines((np.array(drawing.draft),), drawing.tool.value.colour, 2.0)
     _draw_readout(pencil, readout)
@@ -69,11 +62,11 @@ def draw(painter: QPainter, to_screen: QTransform, drawing: Drawing, label_px: i
 
 
 def _highlight(painter: QPainter, to_screen: QTransform, piece: Points, name: str) -> None:
-    """The part of a line that counts, as with a marker pen: what lies below stays visible."""
-    path = Path(_at(to_screen, tuple(piece[0])))
+    """The part of a line that the vector is fitted to, translucent as by a marker pen."""
+    path = QPainterPath(_at(to_screen, tuple(piece[0])))
     for point in piece[1:]:
         path.lineTo(_at(to_screen, tuple(point)))
-    pen = QPen(theme.colour(name, 0.42), _MARKER)
+    pen = QPen(theme.colour(name, 0.42), _MARKER_PX)
     pen.setCapStyle(Qt.PenCapStyle.FlatCap)
     pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
     painter.save()
@@ -95,27 +88,22 @@ def _draw_readout(pencil: ScenePainter, readout: Readout) -> None:
         return
     pencil.measure(foot(vessel, robot.end), robot.end, ON_PICTURE.D_HEAD, Qt.PenStyle.SolidLine)
     pencil.measure(foot(vessel, robot.start), robot.start, ON_PICTURE.D_TAIL, Qt.PenStyle.DotLine)
-    pencil.angle(robot.start, _arc(vessel, robot), ON_PICTURE.THETA)
+    # a unit arc from the vessel's direction to the robot's
+    start = np.arctan2(vessel.direction[1], vessel.direction[0])
+    turn = (np.arctan2(robot.direction[1], robot.direction[0]) - start + np.pi) % (2 * np.pi) - np.pi
+    angles = start + np.linspace(0.0, turn, 24)
+    pencil.angle(robot.start, np.column_stack([np.cos(angles), np.sin(angles)]), ON_PICTURE.THETA)
     side = 1.0 if pose.c_head_px < 0 else -1.0
     pencil.label_beside(vessel.center, vessel, side, f"\N{GREEK SMALL LETTER THETA} {pose.theta_deg:.1f}°", ON_PICTURE.THETA)
 
 
-def _arc(vessel: Vector, robot: Vector) -> np.ndarray:
-    """Unit arc from the vessel's direction to the robot's."""
-    start = np.arctan2(vessel.direction[1], vessel.direction[0])
-    turn = (np.arctan2(robot.direction[1], robot.direction[0]) - start + np.pi) % (2 * np.pi) - np.pi
-    angles = start + np.linspace(0.0, turn, 24)
-    return np.column_stack([np.cos(angles), np.sin(angles)])
-
-
 def _draw_proposal(pencil: ScenePainter, proposal: Annotation, readout: Readout | None) -> None:
-    """The algorithm's lines, dotted and white: nobody takes them for his own."""
+    """The algorithm's lines are dotted and white, so that no rater takes them for their own."""
     for line in (proposal.robot, proposal.vessel):
         if len(line) > 1:
             pencil.polylines((np.array(line),), ON_PICTURE.TEXT, 2.0, Qt.PenStyle.DotLine)
     for mask in proposal.masks:
-        outline = np.array((*mask.points, mask.points[0]))
-        pencil.polylines((outline,), _MASK_COLOUR[mask.target], 1.2, Qt.PenStyle.DotLine)
+        pencil.polylines((np.array((*mask.points, mask.points[0])),), _MASK_COLOUR[mask.target], 1.2, Qt.PenStyle.DotLine)
     if readout is not None and readout.vessel_vector is not None and readout.pose is not None and proposal.robot:
         pencil.tag(proposal.robot[-1], tr("algorithm: θ {theta:.1f}°", theta=readout.pose.theta_deg), ON_PICTURE.TEXT)
 
@@ -123,10 +111,10 @@ def _draw_proposal(pencil: ScenePainter, proposal: Annotation, readout: Readout 
 def _fill_masks(
     painter: QPainter, to_screen: QTransform, annotation: Annotation, target: MaskTarget, *, is_active: bool, is_loupe: bool
 ) -> None:
-    area = Path()
+    area = QPainterPath()
     area.setFillRule(Qt.FillRule.WindingFill)
     for mask in annotation.masks:
-        if mask.target is target and not (mask.is_hole and area.isEmpty()):  # a hole in nothing, as older files may have it
+        if mask.target is target and not (mask.is_hole and area.isEmpty()):  # older files may hold a hole without an outline
             # Outlines run one way round and holes the other, so that pieces join and holes stay open without costly unions.
             points = mask.points if (_area(mask.points) > 0) is not mask.is_hole else mask.points[::-1]
             area.addPolygon(QPolygonF([_at(to_screen, point) for point in points]))
@@ -176,14 +164,15 @@ def _at(to_screen: QTransform, point: Point) -> QPointF:
     return to_screen.map(QPointF(point[0] + 0.5, point[1] + 0.5))
 
 
-_SIDE = 210
-_ZOOM = 4.0
-_ZOOM_RANGE = (4.0, 40.0)
-_NEAR_PX = 40.0
+_LOUPE_SIDE_PX = 210
+_LOUPE_ZOOM, _LOUPE_ZOOM_RANGE = 4.0, (4.0, 40.0)
+"""Times the zoom of the picture, and the limits of the product."""
+_LOUPE_NEAR_PX = 40.0
+"""The loupe changes its corner when the cursor or a drawn line comes nearer than this."""
 
 
 class AnnotationLoupe:
-    """Paints itself onto the canvas. It changes its corner only when the cursor or the drawn lines come near."""
+    """Paints the magnified surroundings of a point into a corner of the canvas."""
 
     def __init__(self) -> None:
         self._corner = 0
@@ -199,17 +188,16 @@ class AnnotationLoupe:
     ) -> None:
         """Magnify the surroundings of `focus`, a place of the image."""
         width, height = view.room
-        side = min(_SIDE, width // 3, height // 2)
+        side = min(_LOUPE_SIDE_PX, width // 3, height // 2)
         keep_clear = [focus, *drawing.annotation.robot, *drawing.annotation.vessel]
         frame = self._place(side, view.room, [view.to_screen(point) for point in keep_clear])
-        ratio = painter.device().devicePixelRatioF()
-        zoom = min(max(_ZOOM * view.zoom, _ZOOM_RANGE[0]), _ZOOM_RANGE[1])
+        zoom = min(max(_LOUPE_ZOOM * view.zoom, _LOUPE_ZOOM_RANGE[0]), _LOUPE_ZOOM_RANGE[1])
         inner = PictureView(view.size, (side, side), zoom, focus)
         glass = QPainterPath()
         glass.addRoundedRect(frame, theme.RADIUS, theme.RADIUS)
         painter.save()
         painter.setClipPath(glass)
-        painter.drawImage(frame.topLeft(), render(levels[:1], inner, ratio, *light))
+        painter.drawImage(frame.topLeft(), render(levels[:1], inner, painter.device().devicePixelRatioF(), *light))
         shift = inner.transform
         shift.setMatrix(shift.m11(), 0, 0, 0, shift.m22(), 0, shift.dx() + frame.left(), shift.dy() + frame.top(), 1)
         draw(painter, shift, drawing, 0, is_loupe=True)
@@ -220,15 +208,13 @@ class AnnotationLoupe:
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRoundedRect(frame, theme.RADIUS, theme.RADIUS)
 
-    def _place(self, side: int, room: tuple[int, int], keep_clear: Iterable[Point]) -> QRectF:
+    def _place(self, side: int, room: tuple[int, int], keep_clear: list[Point]) -> QRectF:
         frames = [QRectF(x, y, side, side) for y in (10, room[1] - side - 10) for x in (room[0] - side - 10, 10)]
-        points = list(keep_clear)
-        gaps = [min(_gap(frame, point) for point in points) for frame in frames]
-        if gaps[self._corner] < _NEAR_PX:
-            # the cursor counts for more than the lines: never below it
-            self._corner = int(
-                np.argmax([min(_gap(frame, points[0]), 200.0) + gap for frame, gap in zip(frames, gaps, strict=True)])
-            )
+        gaps = [min(_gap(frame, point) for point in keep_clear) for frame in frames]
+        if gaps[self._corner] < _LOUPE_NEAR_PX:
+            # the cursor, which is the first point, counts for more than the lines: it is never covered
+            scores = [min(_gap(frame, keep_clear[0]), 200.0) + gap for frame, gap in zip(frames, gaps, strict=True)]
+            self._corner = int(np.argmax(scores))
         return frames[self._corner]
 
 
@@ -248,9 +234,8 @@ def paint_cross(painter: QPainter, at: QPointF, reach: float) -> None:
             painter.drawLine(at + QPointF(x, y) * 3.0, at + QPointF(x, y) * reach)
 
 
-_POINT_REACH = 10.0
-_EDGE_REACH = 6.0
-_CLICK_SLACK = 4.0
+_CLICK_SLACK_PX = 4.0
+"""A right click that moves less than this is no pan."""
 _LABEL_PX = 15
 _ARROWS = {
     Qt.Key.Key_Left: (-1.0, 0.0),
@@ -268,7 +253,7 @@ CANVAS_KEYS = (
     (mark("Space+drag"), mark("move the picture")),
     ("Esc", mark("let go of the line or the point")),
 )
-"""The keys that the picture hears itself: all others are in the menus."""
+"""The keys that the picture handles itself; all others are in the menus."""
 
 
 class AnnotationCanvas(PictureCanvas):
@@ -276,7 +261,7 @@ class AnnotationCanvas(PictureCanvas):
 
     ``edited`` carries what was done, in words, and the new annotation. ``previewed`` carries the annotation and its readout while a
     point moves or a line grows under the cursor. ``line_ended`` carries the tool whose line was ended; ``ended`` comes when Enter
-    has nothing to end; ``tool_changed`` when a line of the other tool was taken hold of.
+    has nothing to end; ``tool_changed`` when a point of the other tool's line was grabbed.
     """
 
     edited = Signal(str, object)
@@ -293,7 +278,7 @@ class AnnotationCanvas(PictureCanvas):
         self.setMouseTracking(True)
         self.setAccessibleName(tr("Picture to annotate"))
         self.setAccessibleDescription(tr("Click sets points; arrow keys move the selected point or the cross, Insert sets a point"))
-        self._hand = AnnotationEditor()
+        self.editor = AnnotationEditor()
         self._loupe = AnnotationLoupe()
         self._loupe_on = True
         self._brush_on = False
@@ -306,64 +291,47 @@ class AnnotationCanvas(PictureCanvas):
 
     @property
     def tool(self) -> Tool:
-        return self._hand.tool
-
-    @property
-    def annotation(self) -> Annotation:
-        """What is drawn now, a point that is being dragged included."""
-        return self._hand.annotation
-
-    @property
-    def selected(self) -> Touch | None:
-        return self._hand.drawing.selected
-
-    @property
-    def proposal(self) -> Annotation | None:
-        return self._hand.drawing.proposal
+        return self.editor.tool
 
     @property
     def is_moving(self) -> bool:
         """Whether a point moves or a line reaches to the cursor: the readout is not final."""
-        return self._hand.held is not None or bool(self._hand.drawing.rubber)
+        return self.editor.held is not None or bool(self.editor.drawing.rubber_band)
 
     @property
     def brush_on(self) -> bool:
         return self._brush_on and self.tool.is_mask
 
-    @property
-    def brush_px(self) -> float:
-        return self._brush_px
-
     def show_image(self, levels: tuple[Image, ...], annotation: Annotation, measure: Measure) -> None:
         """Another image, the whole of it."""
         size = levels[0].shape[1], levels[0].shape[0]
-        self._hand.take_image(size, annotation, measure)
+        self.editor.set_image(size, annotation, measure)
         self._brush_on = self._cross_by_key = False
         self.show_levels(levels)
 
     def blank(self) -> None:
-        """Nothing is shown."""
-        self._hand.take_image(self.view.size, Annotation(), lambda _annotation: Readout())
+        """Show no image."""
+        self.editor.set_image(self.view.size, Annotation(), lambda _annotation: Readout())
         self.show_levels(())
 
     def show_annotation(self, annotation: Annotation) -> None:
-        """What is true now, after an edit, undo or redo."""
-        self._hand.take_annotation(annotation)
+        """The annotation after an edit, undo or redo."""
+        self.editor.set_annotation(annotation)
         self.update()
 
     def show_proposal(self, proposal: Annotation | None) -> None:
         """The algorithm's lines and masks beside the rater's, or None."""
-        self._hand.show_proposal(proposal)
+        self.editor.show_proposal(proposal)
         self.update()
 
     def set_tool(self, tool: Tool) -> None:
-        """Take a tool; taking the same line tool again opens its line for more points."""
-        self._hand.take_tool(tool)
+        """Choose a tool; choosing the same line tool again reopens its line for more points."""
+        self.editor.set_tool(tool)
         self.update()
 
     def close_line(self) -> None:
-        """No more points on the line: the next click takes hold of points instead of setting some."""
-        self._hand.close_line()
+        """No more points on the line: the next click grabs points instead of setting some."""
+        self.editor.close_line()
         self.update()
 
     def set_brush(self, on: bool) -> None:
@@ -379,7 +347,7 @@ class AnnotationCanvas(PictureCanvas):
         self.update()
 
     def set_masks_shown(self, on: bool) -> None:
-        self._hand.drawing = replace(self._hand.drawing, masks_shown=on)
+        self.editor.drawing = replace(self.editor.drawing, masks_shown=on)
         self.update()
 
     def zoom(self, factor: float) -> None:
@@ -389,34 +357,29 @@ class AnnotationCanvas(PictureCanvas):
 
     def close_up(self) -> None:
         """The robot's head, or without one what is under the cursor, several times as large; once more: the whole image."""
-        robot, (width, height) = self.annotation.robot, self.view.size
+        robot, (width, height) = self.editor.annotation.robot, self.view.size
         self.close_up_at(robot[-1] if robot else self._cursor or ((width - 1) / 2, (height - 1) / 2))
 
     def complete(self) -> None:
-        """Before something else happens to the picture: nothing that was drawn by hand is lost."""
-        edit = self._hand.complete(self._brush_px)
-        if edit is not None:
-            self._tell(edit)
-        self.update()
+        """Complete what is being drawn, before something else happens to the picture."""
+        self._emit_edit(self.editor.complete(self._brush_px))
 
-    def take_back_draft_point(self) -> bool:
-        """Undo while an outline is drawn: its last point goes; False when none is drawn."""
-        if not self._hand.drawing.draft:
-            return False
-        self._hand.drop_draft_point()
+    def undo_draft_point(self) -> bool:
+        """Undo while an outline is drawn: remove its last point; False when none is drawn."""
+        had = self.editor.drop_draft_point()
         self.update()
-        return True
+        return had
 
     def simplify_masks(self, tolerance_px: float = 1.0) -> None:
         """Fewer points on the outlines of the tool's masks."""
-        self._tell(self._hand.simplify(tolerance_px))
+        self._emit_edit(self.editor.simplify(tolerance_px))
 
     # ---- mouse
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if not self.levels:
             return
-        if (self._hand.stroke or self._hand.held is not None) and event.buttons() != event.button():
+        if (self.editor.stroke or self.editor.held is not None) and event.buttons() != event.button():
             return  # another button, by mistake, while one draws
         self._pressed_at = event.position()
         point, button = self._under(event.position()), event.button()
@@ -425,14 +388,14 @@ class AnnotationCanvas(PictureCanvas):
             self.begin_pan(event.position())
         elif self.brush_on and button in (Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton):
             shift = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
-            self._hand.begin_stroke(point, erase=shift or button == Qt.MouseButton.RightButton)
+            self.editor.begin_stroke(point, erase=shift or button == Qt.MouseButton.RightButton)
         elif button == Qt.MouseButton.LeftButton:
             tool = self.tool
-            if not self._hand.press(point, self._reach()):
+            if not self.editor.press(point, self._scale):
                 self.begin_pan(event.position())
             if self.tool is not tool:
                 self.tool_changed.emit(self.tool)
-            self._tell_preview()
+            self._emit_preview()
         elif button == Qt.MouseButton.RightButton:
             self.begin_pan(event.position())
         self.update()
@@ -444,65 +407,66 @@ class AnnotationCanvas(PictureCanvas):
         self._cursor, self._cross_by_key = point, False
         if self.is_panning:
             self.pan_to(event.position())
-        elif self._hand.stroke:
-            self._hand.stroke.append(point)
-        elif self._hand.held is not None:
-            self._hand.drag_to(point)
-            self._tell_preview()
-        elif self._hand.stretch(point, self._reach()):
-            self._tell_preview()
+        elif self.editor.stroke:
+            self.editor.stroke.append(point)
+        elif self.editor.held is not None:
+            self.editor.drag_to(point)
+            self._emit_preview()
+        elif self.editor.stretch(point, self._scale):
+            self._emit_preview()
         self.update()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         moved = event.position() - self._pressed_at
-        is_click = abs(moved.x()) + abs(moved.y()) <= _CLICK_SLACK
-        if self._hand.stroke:
-            self._tell(self._hand.end_stroke(self._brush_px))
-        elif self._hand.held is not None and event.button() == Qt.MouseButton.LeftButton:
-            self._tell(self._hand.release())
+        if self.editor.stroke:
+            self._emit_edit(self.editor.end_stroke(self._brush_px))
+        elif self.editor.held is not None and event.button() == Qt.MouseButton.LeftButton:
+            self._emit_edit(self.editor.release())
         elif self.is_panning:
             self.end_pan()
-            if event.button() == Qt.MouseButton.RightButton and is_click:
-                self._tell_ending(self._hand.take_out(self._under(event.position()), self._reach()) or self._hand.end())
+            if event.button() == Qt.MouseButton.RightButton and abs(moved.x()) + abs(moved.y()) <= _CLICK_SLACK_PX:
+                removal = self.editor.remove_point_at(self._under(event.position()), self._scale)
+                if removal is not None:
+                    self._emit_edit(removal)
+                else:
+                    self._end()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        """The first of its clicks has set the last point."""
+        """End the line; the first of the clicks has set its last point."""
         if not self.levels:
             return
         ends = event.button() == Qt.MouseButton.LeftButton and not self.brush_on and not self.is_pannable
-        # Where nothing is being drawn it is a second quick grab; Enter alone takes a state, or goes on.
-        if not (ends and self._tell_ending(self._hand.end())):
+        # Where nothing is being drawn it is a second quick grab; only Enter takes a state, or goes on.
+        if not (ends and self._end()):
             self.mousePressEvent(event)
         self.update()
 
     def leaveEvent(self, event: QEvent) -> None:
         if not self._cross_by_key:
             self._cursor = None
-            if self._hand.unstretch():
-                self._tell_preview()
+            if self.editor.unstretch():
+                self._emit_preview()
         self.update()
 
     def end_line(self) -> None:
-        """Enter: the outline or line that is being drawn is complete."""
-        if not self._tell_ending(self._hand.end()):
+        """Enter: complete the outline or line that is being drawn, or emit ``ended``."""
+        if not self._end():
             self.ended.emit()
         self.update()
 
-    def _tell_ending(self, ending: Ending | Edit) -> bool:
-        """What a key or click has ended; False when there was nothing to end."""
-        edit = ending.edit if isinstance(ending, Ending) else ending
-        if edit is not None:
-            self._tell(edit)
-        elif isinstance(ending, Ending) and ending.tool is not None:
-            self.line_ended.emit(ending.tool)
+    def _end(self) -> bool:
+        """Complete what is being drawn; False when there was nothing."""
+        ended = self.editor.end()
+        if isinstance(ended, Tool):
+            self.line_ended.emit(ended)
         else:
-            return False
-        return True
+            self._emit_edit(ended)
+        return ended is not None
 
-    def let_go(self) -> bool:
+    def cancel(self) -> bool:
         """Escape: drop what is being drawn or selected; False when there was nothing."""
-        was_held = self._hand.held is not None
-        had = self._hand.let_go() or self._brush_on
+        was_held = self.editor.held is not None
+        had = self.editor.cancel() or self._brush_on
         self._brush_on = False
         if was_held:
             self.edited.emit("", None)
@@ -518,15 +482,21 @@ class AnnotationCanvas(PictureCanvas):
         elif key in _ARROWS:
             step = 0.1 if modifiers & Qt.KeyboardModifier.ControlModifier else 1.0
             step *= 10.0 if modifiers & Qt.KeyboardModifier.ShiftModifier else 1.0
-            self._go(_ARROWS[key][0] * step, _ARROWS[key][1] * step)
+            self._nudge(_ARROWS[key][0] * step, _ARROWS[key][1] * step)
         elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            if not event.isAutoRepeat():  # one that is held a little too long would take a state and go on, unseen
+            if not event.isAutoRepeat():  # an Enter that is held too long would take a state and go on, unseen
                 self.end_line()
+        elif key == Qt.Key.Key_Delete and modifiers & Qt.KeyboardModifier.ShiftModifier:
+            self._emit_edit(self.editor.clear())
         elif key in (Qt.Key.Key_Insert, Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
-            if key == Qt.Key.Key_Delete and modifiers & Qt.KeyboardModifier.ShiftModifier:
-                self._tell(self._hand.clear())
-            else:
-                self._by_key(puts=key == Qt.Key.Key_Insert)
+            inserts = key == Qt.Key.Key_Insert
+            if self.brush_on and self._cursor is not None:
+                self.editor.begin_stroke(self._cursor, erase=not inserts)
+                self._emit_edit(self.editor.end_stroke(self._brush_px))
+            elif not inserts:
+                self._emit_edit(self.editor.delete())
+            elif self._cursor is not None:
+                self._emit_edit(self.editor.insert(self._cursor))
         elif key == Qt.Key.Key_Space:
             self.set_pannable(True)
         else:
@@ -547,57 +517,46 @@ class AnnotationCanvas(PictureCanvas):
         """Tab goes from point to point as long as there are any; else it goes to the next control."""
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
             if event.key() in (Qt.Key.Key_Tab, Qt.Key.Key_Backtab):
-                place = self._hand.select_next(-1 if event.key() == Qt.Key.Key_Backtab else 1)
+                place = self.editor.select_next(-1 if event.key() == Qt.Key.Key_Backtab else 1)
                 if place is not None:
                     self.see(place)
                     self._cursor = None
-                    self._tell_preview()
+                    self._emit_preview()
                     self.update()
                     return True
         return super().event(event)
 
-    def _go(self, dx: float, dy: float) -> None:
-        """The selected point, or without one the cross, a little farther."""
-        selected = self.selected
-        edit = self._hand.nudge(dx, dy)
+    def _nudge(self, dx: float, dy: float) -> None:
+        """Move the selected point, or without one the cross."""
+        selected = self.editor.drawing.selected
+        edit = self.editor.nudge(dx, dy)
         if edit is not None and selected is not None:
             self._cursor = None  # the loupe shows the point
             self.see(line_of(edit[1], selected.line)[selected.place])
-            self._tell(edit)
+            self._emit_edit(edit)
             return
         (x, y), (width, height) = self._cursor or self.view.center, self.view.size
         self._cursor = min(max(x + dx, 0.0), width - 1.0), min(max(y + dy, 0.0), height - 1.0)
         self._cross_by_key = True
         self.see(self._cursor)
-        if self._hand.stretch(self._cursor, Reach(0.0, 0.0)):
-            self._tell_preview()
+        if self.editor.stretch(self._cursor, 0.0):
+            self._emit_preview()
         self.update()
 
-    def _by_key(self, *, puts: bool) -> None:
-        """Insert and Delete: points, or the brush at the cross."""
-        if self.brush_on and self._cursor is not None:
-            self._hand.begin_stroke(self._cursor, erase=not puts)
-            self._tell(self._hand.end_stroke(self._brush_px))
-        elif not puts:
-            self._tell(self._hand.delete())
-        elif self._cursor is not None:
-            self._tell(self._hand.insert(self._cursor))
-        self.update()
-
-    # ---- behind it
-
-    def _tell(self, edit: Edit | None) -> None:
+    def _emit_edit(self, edit: Edit | None) -> None:
         if edit is not None:
-            self._tell_preview()
+            self._emit_preview()
             self.edited.emit(*edit)
         self.update()
 
-    def _tell_preview(self) -> None:
+    def _emit_preview(self) -> None:
         """With a line that reaches to the cursor the readout is of that line, and the annotation still without it."""
-        self.previewed.emit(self.annotation, self._hand.drawing.readout)
+        self.previewed.emit(self.editor.annotation, self.editor.drawing.readout)
 
-    def _reach(self) -> Reach:
-        return Reach(_POINT_REACH / self.view.zoom, _EDGE_REACH / self.view.zoom)
+    @property
+    def _scale(self) -> float:
+        """Image pixels per screen pixel."""
+        return 1.0 / self.view.zoom
 
     def _under(self, position: QPointF) -> Point:
         return self.view.to_image(position.x(), position.y())
@@ -609,8 +568,9 @@ class AnnotationCanvas(PictureCanvas):
         if not self.paint_picture(painter):
             painter.end()
             return
+        drawing = self.editor.drawing
         painter.save()
-        draw(painter, self.view.transform, replace(self._hand.drawing, handles_shown=not self.brush_on), _LABEL_PX)
+        draw(painter, self.view.transform, replace(drawing, handles_shown=not self.brush_on), _LABEL_PX)
         painter.restore()
         if self.brush_on:
             self._paint_brush(painter)
@@ -618,18 +578,18 @@ class AnnotationCanvas(PictureCanvas):
             paint_cross(painter, QPointF(*self.view.to_screen(self._cursor)), 16.0)
         focus = self._loupe_point()
         if focus is not None:
-            self._loupe.paint(painter, self.levels, self.view, self._hand.drawing, focus, self.light)
+            self._loupe.paint(painter, self.levels, self.view, drawing, focus, self.light)
         painter.end()
 
     def _paint_brush(self, painter: QPainter) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        radius = self._brush_px * self.view.zoom
-        if self._hand.stroke:
-            path = QPainterPath(QPointF(*self.view.to_screen(self._hand.stroke[0])))
-            for point in self._hand.stroke:
+        radius, stroke = self._brush_px * self.view.zoom, self.editor.stroke
+        if stroke:
+            path = QPainterPath(QPointF(*self.view.to_screen(stroke[0])))
+            for point in stroke:
                 path.lineTo(QPointF(*self.view.to_screen(point)))
             path.lineTo(path.currentPosition() + QPointF(0.01, 0.0))
-            ink = ON_PICTURE.INK if self._hand.stroke_erases else self.tool.value.colour
+            ink = ON_PICTURE.INK if self.editor.stroke_erases else self.tool.value.colour
             pen = QPen(theme.colour(ink, 0.6), 2 * radius)
             pen.setCapStyle(Qt.PenCapStyle.RoundCap)
             pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
@@ -643,11 +603,11 @@ class AnnotationCanvas(PictureCanvas):
                 painter.drawEllipse(QPointF(*self.view.to_screen(self._cursor)), radius, radius)
 
     def _loupe_point(self) -> Point | None:
-        """What the loupe magnifies: the point in the hand, what lies under the cursor, or the selected point."""
+        """What the loupe magnifies: the held point, what lies under the cursor, or the selected point."""
         if not self._loupe_on:
             return None
-        held = self._hand.held or (self.selected if self._cursor is None else None)
+        held = self.editor.held or (self.editor.drawing.selected if self._cursor is None else None)
         if held is not None:
-            points = line_of(self.annotation, held.line)
+            points = line_of(self.editor.annotation, held.line)
             return points[held.place] if held.place < len(points) else None
         return self._cursor

@@ -1,7 +1,4 @@
-"""What the rater's hand does: lines grow, points move, a brush paints. No widget is in it, so that mouse and keys mean the same.
-
-What the rater's hand does in the picture: the tools, with key, name and meaning.
-"""
+"""Annotation editing without widgets: the tools, and an editor that turns presses, moves and keys into edits."""
 
 from __future__ import annotations
 
@@ -32,10 +29,13 @@ from core.annotation.model import (
 )
 from core.types import Point
 
+_POINT_REACH_PX, _EDGE_REACH_PX = 10.0, 6.0
+"""How near a press must be to a point, or to an edge between two, in screen pixels."""
+
 
 @dataclass(frozen=True, slots=True)
 class ToolText:
-    """``line`` is what a line tool draws, ``target`` what a mask tool covers; ``hint`` is shown below the picture."""
+    """``line`` is what a line tool draws, ``target`` what a mask tool covers; ``first`` and ``then`` are its hint."""
 
     key: str
     label: str
@@ -52,7 +52,6 @@ class ToolText:
 
     @property
     def hint(self) -> str:
-        """What to do first, and then."""
         return f"{tr(self.first)} \N{MIDDLE DOT} {tr(self.then)}"
 
 
@@ -83,17 +82,16 @@ BRUSH_HINT = mark(
     "Drag paints, Shift + drag or right drag takes away · [ ] size · Insert and Delete paint at the cross · T back to points"
 )
 
-
 Measure = Callable[[Annotation], Readout]
 Edit = tuple[str, Annotation]
-"""What was done, in words, and what it led to."""
+"""What was done, in words, and the annotation that it led to."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
     """All that is drawn over the picture, in pixels of the image as it is shown.
 
-    ``rubber`` is the way from the line's end to the cursor, ``draft`` an outline that is not closed yet.
+    ``rubber_band`` goes from the line's end to the cursor, ``draft`` is an outline that is not closed yet.
     """
 
     annotation: Annotation
@@ -102,30 +100,14 @@ class Drawing:
     selected: Touch | None = None
     proposal: Annotation | None = None
     proposal_readout: Readout | None = None
-    rubber: Line = ()
+    rubber_band: Line = ()
     draft: Line = ()
     masks_shown: bool = True
     handles_shown: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Reach:
-    """How near a point or an edge must be to be taken hold of, in image pixels."""
-
-    point_px: float
-    edge_px: float
-
-
-@dataclass(frozen=True, slots=True)
-class Ending:
-    """What Enter ended: an outline (an edit), a line (its tool), or nothing."""
-
-    edit: Edit | None = None
-    tool: Tool | None = None
-
-
 def handle_lines(annotation: Annotation, tool: Tool) -> list[int]:
-    """The lines whose points can be taken hold of with a tool."""
+    """The lines whose points can be grabbed with a tool."""
     if not tool.is_mask:
         return [ROBOT, VESSEL]
     return [place for place, mask in enumerate(annotation.masks) if mask.target is tool.value.target]
@@ -134,8 +116,8 @@ def handle_lines(annotation: Annotation, tool: Tool) -> list[int]:
 class AnnotationEditor:
     """Turns presses, moves and keys into edits. A method that completes one returns it; what is under way is in ``drawing``.
 
-    A line is *open* while it is drawn: a press on an empty place adds a point. Ended, it is taken hold of only; taking its tool
-    again opens it anew, and then it grows at the nearer end.
+    A line is *open* while it is drawn: a press on an empty place adds a point. A line that was ended only lets its points be moved;
+    choosing its tool again reopens it, and then it grows at the nearer end. ``scale`` arguments are image pixels per screen pixel.
     """
 
     def __init__(self) -> None:
@@ -143,119 +125,113 @@ class AnnotationEditor:
         self.size = (1, 1)
         self.stroke: list[Point] = []
         self.stroke_erases = False
+        self.held: Touch | None = None
+        """The point that is being dragged."""
         self._measure: Measure = lambda _annotation: Readout()
         self._is_open = True
         self._is_reopened = False
-        self._held: Touch | None = None
         self._held_action = ""
         self._grip = (0.0, 0.0)
 
     @property
     def annotation(self) -> Annotation:
-        """What is drawn now, a point that is being dragged included."""
+        """What is drawn now, with a point that is being dragged."""
         return self.drawing.annotation
 
     @property
     def tool(self) -> Tool:
         return self.drawing.tool
 
-    @property
-    def held(self) -> Touch | None:
-        """The point that is being dragged."""
-        return self._held
-
-    def take_image(self, size: tuple[int, int], annotation: Annotation, measure: Measure) -> None:
+    def set_image(self, size: tuple[int, int], annotation: Annotation, measure: Measure) -> None:
         """Another image of `size` (width, height), with the robot tool."""
         self.size, self._measure = size, measure
-        self._held, self.stroke = None, []
+        self.held, self.stroke = None, []
         shown = self.drawing.masks_shown
         self.drawing = Drawing(annotation, measure(annotation), Tool.ROBOT, masks_shown=shown)
         self._is_open, self._is_reopened = len(annotation.robot) < 2, False
 
-    def take_annotation(self, annotation: Annotation) -> None:
-        """What is true now, after an edit, undo or redo."""
-        self._held = None
+    def set_annotation(self, annotation: Annotation) -> None:
+        """The annotation after an edit, undo or redo."""
+        self.held = None
         selected = self.drawing.selected
         if selected is not None and selected.place >= len(line_of(annotation, selected.line)):
             selected = None
-        self.drawing = replace(self.drawing, annotation=annotation, readout=self._measure(annotation), selected=selected, rubber=())
+        self._change(annotation=annotation, readout=self._measure(annotation), selected=selected, rubber_band=())
         line = self.tool.value.line
         if line is not None and len(line_of(annotation, line)) < 2:
             self._is_open, self._is_reopened = True, False
 
-    def take_tool(self, tool: Tool) -> None:
-        """Take a tool; taking the same line tool again opens its line."""
-        line = tool.value.line
-        again = tool is self.tool
-        self._held, self.stroke = None, []
-        self.drawing = replace(self.drawing, tool=tool, selected=None, draft=(), rubber=(), readout=self._measure(self.annotation))
+    def set_tool(self, tool: Tool) -> None:
+        """Choose a tool; choosing the same line tool again reopens its line."""
+        line, again = tool.value.line, tool is self.tool
+        self.held, self.stroke = None, []
+        self._change(tool=tool, selected=None, draft=(), rubber_band=(), readout=self._measure(self.annotation))
         if line is not None:
             is_drawn = len(line_of(self.annotation, line)) >= 2
             self._is_reopened = again and is_drawn
             self._is_open = self._is_reopened or not is_drawn
 
     def show_proposal(self, proposal: Annotation | None) -> None:
-        readout = self._measure(proposal) if proposal is not None else None
-        self.drawing = replace(self.drawing, proposal=proposal, proposal_readout=readout)
+        self._change(proposal=proposal, proposal_readout=self._measure(proposal) if proposal is not None else None)
 
     # ---- lines and points
 
-    def press(self, point: Point, reach: Reach) -> bool:
-        """Take hold of what is there, or set a point; False on an empty place with nothing to draw."""
-        touch = self.under(point, reach)
+    def press(self, point: Point, scale: float) -> bool:
+        """Grab what is there, or set a point; False on an empty place with nothing to draw."""
+        touch = self.touch_at(point, scale)
         if touch is not None and touch.is_edge:
             self._hold(Touch(touch.line, touch.place), "put in a point", put(self.annotation, touch.line, touch.place, point))
         elif touch is not None:
             self._hold(touch, "move a point", self.annotation, point)
         elif self.tool.is_mask:
-            self.drawing = replace(self.drawing, draft=(*self.drawing.draft, self._inside(point)), selected=None)
+            self._change(draft=(*self.drawing.draft, self._inside(point)), selected=None)
         elif self._is_open:
             self._grow(point)
         else:
-            self.drawing = replace(self.drawing, selected=None)
+            self._change(selected=None)
             return False
         return True
 
-    def under(self, point: Point, reach: Reach) -> Touch | None:
-        """What can be taken hold of at a place. Where a line is drawn, the other one is not in the way."""
+    def touch_at(self, point: Point, scale: float) -> Touch | None:
+        """What can be grabbed at a place. While a line is drawn, the other one cannot."""
         line = self.tool.value.line
         if self.tool.is_mask and not self.drawing.masks_shown:
             return None
         lines = [line] if self._is_open and line is not None else handle_lines(self.annotation, self.tool)
-        return touched(self.annotation, lines, point, reach.point_px, reach.edge_px)
+        return touched(self.annotation, lines, point, _POINT_REACH_PX * scale, _EDGE_REACH_PX * scale)
 
     def drag_to(self, point: Point) -> None:
-        """The point in the hand goes along."""
-        if self._held is not None:
+        """The held point follows the cursor."""
+        if self.held is not None:
             at = self._inside((point[0] + self._grip[0], point[1] + self._grip[1]))
-            self._preview(move(self.annotation, self._held.line, self._held.place, at))
+            self._preview(move(self.annotation, self.held.line, self.held.place, at))
 
     def release(self) -> Edit | None:
-        """What was dragged is done."""
-        if self._held is None:
+        """The drag ends."""
+        if self.held is None:
             return None
-        self._held = None
+        self.held = None
         return self._done(self._held_action, self.annotation)
 
-    def stretch(self, point: Point, reach: Reach) -> bool:
+    def stretch(self, point: Point, scale: float) -> bool:
         """While a line is drawn it reaches to the cursor, and the readout says what a press would give; True when that changed."""
         line, draft = self.tool.value.line, self.drawing.draft
         if self.tool.is_mask and draft:
-            self.drawing = replace(self.drawing, rubber=(draft[-1], point, draft[0]))
+            self._change(rubber_band=(draft[-1], point, draft[0]))
             return False
         points = line_of(self.annotation, line) if line is not None else ()
-        if line is None or not self._is_open or not points or self.under(point, reach) is not None:
+        if line is None or not self._is_open or not points or self.touch_at(point, scale) is not None:
             return self.unstretch()
         place = self._growing_end(line, point)
         grown = put(self.annotation, line, place, self._inside(point))
-        self.drawing = replace(self.drawing, rubber=(points[min(place, len(points) - 1)], point), readout=self._measure(grown))
+        self._change(rubber_band=(points[min(place, len(points) - 1)], point), readout=self._measure(grown))
         return True
 
     def unstretch(self) -> bool:
-        """The readout is of what is drawn; True when it was not."""
-        if not self.drawing.rubber:
+        """Remove the rubber band; True when there was one."""
+        if not self.drawing.rubber_band:
             return False
-        self.drawing = replace(self.drawing, rubber=(), readout=self._measure(self.annotation))
+        self._change(rubber_band=(), readout=self._measure(self.annotation))
         return True
 
     def close_line(self) -> None:
@@ -263,81 +239,84 @@ class AnnotationEditor:
         self._is_open = self._is_reopened = False
         self.unstretch()
 
-    def end(self) -> Ending:
-        """Enter: what is being drawn is complete."""
+    def end(self) -> Edit | Tool | None:
+        """Complete what is being drawn: the edit of an outline, or the tool of what ended without one; None: nothing was drawn."""
         target, line, draft = self.tool.value.target, self.tool.value.line, self.drawing.draft
         if target is not None and draft:
-            self.drawing = replace(self.drawing, draft=(), rubber=())
+            self._change(draft=(), rubber_band=())
             if len(draft) < 3:
-                return Ending(tool=self.tool)
-            polygon = MaskPolygon(target, draft)
-            edit = self._done(f"draw {target.value} mask", replace(self.annotation, masks=(*self.annotation.masks, polygon)))
-            return Ending(edit)
+                return self.tool
+            masks = (*self.annotation.masks, MaskPolygon(target, draft))
+            return self._done(f"draw {target.value} mask", replace(self.annotation, masks=masks))
         if line is not None and self._is_open and len(line_of(self.annotation, line)) >= 2:
             self.close_line()
-            return Ending(tool=self.tool)
-        return Ending()
+            return self.tool
+        return None
 
     def complete(self, radius_px: float) -> Edit | None:
-        """Whatever is under way is done: a stroke of the brush, a point that is dragged, an outline that has an inside."""
+        """Complete a brush stroke, a drag, or an outline that has an inside."""
         if self.stroke:
             return self.end_stroke(radius_px)
-        return self.release() if self._held is not None else self.end().edit if self.drawing.draft else None
+        if self.held is not None:
+            return self.release()
+        ended = self.end() if self.drawing.draft else None
+        return ended if isinstance(ended, tuple) else None
 
-    def take_out(self, point: Point, reach: Reach) -> Edit | None:
-        """The point at a place goes; None where there is none."""
-        touch = self.under(point, reach)
+    def remove_point_at(self, point: Point, scale: float) -> Edit | None:
+        touch = self.touch_at(point, scale)
         if touch is None or touch.is_edge:
             return None
-        self.drawing = replace(self.drawing, selected=None)
+        self._change(selected=None)
         return self._done("take out a point", remove(self.annotation, touch.line, touch.place))
 
     def insert(self, point: Point) -> Edit | None:
         """A point at the cross, by key; nothing is selected afterwards, so that the cross can move on."""
         if self.tool.is_mask:
-            self.drawing = replace(self.drawing, draft=(*self.drawing.draft, self._inside(point)), selected=None)
+            self._change(draft=(*self.drawing.draft, self._inside(point)), selected=None)
             return None
         if not self._is_open:
             return None
         self._grow(point)
         edit = self.release()
-        self.drawing = replace(self.drawing, selected=None)
+        self._change(selected=None)
         return edit
 
     def nudge(self, dx: float, dy: float) -> Edit | None:
-        """The selected point a little farther; None when none is."""
+        """Move the selected point by so many pixels."""
         selected = self.drawing.selected
-        if selected is None or self._held is not None:
+        if selected is None or self.held is not None:
             return None
         x, y = line_of(self.annotation, selected.line)[selected.place]
         to = self._inside((round(x + dx, 6), round(y + dy, 6)))
         return self._done("nudge a point", move(self.annotation, selected.line, selected.place, to))
 
     def delete(self) -> Edit | None:
-        """The selected point; without one, the last point of what is being drawn."""
-        selected, line, draft = self.drawing.selected, self.tool.value.line, self.drawing.draft
-        if draft:
+        """Remove the selected point; without one, the last point of what is being drawn."""
+        selected, line = self.drawing.selected, self.tool.value.line
+        if self.drawing.draft:
             self.drop_draft_point()
         elif selected is not None:
             fewer = remove(self.annotation, selected.line, selected.place)
             is_left = selected.line < len(fewer.masks) and len(fewer.masks) == len(self.annotation.masks)
             left = len(line_of(fewer, selected.line)) if is_left else 0
-            keep = Touch(selected.line, min(selected.place, left - 1)) if left else None
-            self.drawing = replace(self.drawing, selected=keep)
+            self._change(selected=Touch(selected.line, min(selected.place, left - 1)) if left else None)
             return self._done("take out a point", fewer)
         elif line is not None and line_of(self.annotation, line):
             return self._done("take out a point", remove(self.annotation, line, len(line_of(self.annotation, line)) - 1))
         return None
 
-    def drop_draft_point(self) -> None:
-        """The last point of the outline that is being drawn goes."""
-        self.drawing = replace(self.drawing, draft=self.drawing.draft[:-1], rubber=())
+    def drop_draft_point(self) -> bool:
+        """Remove the last point of the outline that is being drawn; False when none is drawn."""
+        if not self.drawing.draft:
+            return False
+        self._change(draft=self.drawing.draft[:-1], rubber_band=())
+        return True
 
     def clear(self) -> Edit | None:
-        """The whole line or outline of the selected point; without one, the line of the tool."""
+        """Remove the whole line or outline of the selected point; without one, the line of the tool."""
         selected, line = self.drawing.selected, self.tool.value.line
         chosen = selected.line if selected is not None else line
-        self.drawing = replace(self.drawing, selected=None, draft=(), rubber=())
+        self._change(selected=None, draft=(), rubber_band=())
         if chosen is None or not line_of(self.annotation, chosen):
             return None
         what = self.tool.value.label.lower() if chosen < 0 else "outline"
@@ -345,11 +324,8 @@ class AnnotationEditor:
 
     def select_next(self, step: int) -> Point | None:
         """Select the next (or previous) point of the tool's lines, beginning with the head; returns where it is."""
-        places = [
-            Touch(line, place)
-            for line in handle_lines(self.annotation, self.tool)
-            for place in range(len(line_of(self.annotation, line)))
-        ]
+        annotation, lines = self.annotation, handle_lines(self.annotation, self.tool)
+        places = [Touch(line, place) for line in lines for place in range(len(line_of(annotation, line)))]
         if not places:
             return None
         if self.drawing.selected in places:
@@ -358,15 +334,15 @@ class AnnotationEditor:
             own = [touch for touch in places if touch.line == self.tool.value.line] or places
             chosen = own[-1] if step > 0 else own[0]
         self.unstretch()
-        self.drawing = replace(self.drawing, selected=chosen)
-        return line_of(self.annotation, chosen.line)[chosen.place]
+        self._change(selected=chosen)
+        return line_of(annotation, chosen.line)[chosen.place]
 
-    def let_go(self) -> bool:
-        """Escape: drop what is being drawn or selected; False when there was nothing."""
+    def cancel(self) -> bool:
+        """Drop what is being drawn or selected; False when there was nothing."""
         drawing = self.drawing
-        had = self._held is not None or bool(self.stroke) or drawing.selected is not None or bool(drawing.draft)
-        self._held, self.stroke = None, []
-        self.drawing = replace(drawing, selected=None, draft=(), rubber=())
+        had = self.held is not None or bool(self.stroke) or drawing.selected is not None or bool(drawing.draft)
+        self.held, self.stroke = None, []
+        self._change(selected=None, draft=(), rubber_band=())
         return had
 
     # ---- masks
@@ -380,7 +356,7 @@ class AnnotationEditor:
         target = self.tool.value.target
         if target is None or len(stroke) == 0:
             return None
-        self.drawing = replace(self.drawing, selected=None)
+        self._change(selected=None)
         masks = paint(self.annotation.masks, target, stroke, radius_px, self.size, erase=self.stroke_erases)
         word = "erase" if self.stroke_erases else "paint"
         return self._done(f"{word} {target.value} mask", replace(self.annotation, masks=masks))
@@ -390,11 +366,14 @@ class AnnotationEditor:
         target = self.tool.value.target
         if target is None:
             return None
-        self.drawing = replace(self.drawing, selected=None)
+        self._change(selected=None)
         fewer = replace(self.annotation, masks=simplify(self.annotation.masks, target, tolerance_px))
         return self._done(f"simplify {target.value} mask", fewer)
 
-    # ---- behind it
+    # ---- private
+
+    def _change(self, **fields: object) -> None:
+        self.drawing = replace(self.drawing, **fields)  # type: ignore[arg-type]
 
     def _grow(self, point: Point) -> None:
         line = self.tool.value.line
@@ -410,18 +389,18 @@ class AnnotationEditor:
         return 0 if to_first < to_last else len(points)
 
     def _hold(self, touch: Touch, action: str, annotation: Annotation, grip: Point | None = None) -> None:
-        """`grip` is where the point was taken hold of: it does not jump to the cursor. The tool becomes that of the line."""
+        """`grip` is where the point was grabbed: it does not jump to the cursor. The tool becomes that of the line."""
         x, y = line_of(annotation, touch.line)[touch.place]
-        self._held, self._held_action = touch, action
+        self.held, self._held_action = touch, action
         self._grip = (x - grip[0], y - grip[1]) if grip is not None else (0.0, 0.0)
         tool = next((tool for tool in Tool if tool.value.line == touch.line and touch.line < 0), self.tool)
         if tool is not self.tool:
             self._is_open = self._is_reopened = False
-        self.drawing = replace(self.drawing, tool=tool, selected=touch, rubber=())
+        self._change(tool=tool, selected=touch, rubber_band=())
         self._preview(annotation)
 
     def _preview(self, annotation: Annotation) -> None:
-        self.drawing = replace(self.drawing, annotation=annotation, readout=self._measure(annotation), rubber=())
+        self._change(annotation=annotation, readout=self._measure(annotation), rubber_band=())
 
     def _done(self, action: str, annotation: Annotation) -> Edit:
         self._preview(annotation)

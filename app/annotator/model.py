@@ -1,4 +1,4 @@
-"""What the annotator window works on: the queue of images, the one in hand, its edits; disk and network in threads of their own."""
+"""The model of the annotator window: the queue of images, the open one, its edits; files and the algorithm in their own threads."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, QTimer, Signal
 
@@ -36,42 +35,42 @@ from core.types import Frame, Image, Scene
 _log = logging.getLogger(__name__)
 
 _SAVE_WITHIN_MS = 20_000
+"""How long closing waits for each thread."""
 _SETTLE_S = 1.0
+"""How long ``settle`` waits for the disk."""
 _RETRY_MS = 3000
+"""Edits that could not be written are tried again after this time."""
 _KEPT_IMAGES = 4
+"""Decoded images in memory."""
 _IDLE_S = 60.0
-
-Perceive = Callable[[Frame], Scene]
+"""Without mouse or key for longer than this the rater is not at work: the time does not count."""
 
 
 @dataclass(frozen=True, slots=True)
 class QueueEntry:
-    """One entry of the queue: an image, as it is shown, and under which key its annotation is kept."""
+    """One image of the queue, how it is shown, and under which key its annotation is stored."""
 
     image: FoundImage
     key: ItemKey
     view: ImageView = ImageView.AS_IS
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LoadedItem:
-    """An image as it is shown, with its halvings, and the edits that were made on it before."""
-
-    levels: tuple[Image, ...]
-    history: History
-
-
 class AnnotationModel(QObject):
-    """The model of the annotator window. Annotations go in and out as they lie in the view; the store has them in source pixels.
+    """Queue, edits and proposals. Annotations go in and out as they lie in the view; the store has them in source pixels.
 
-    ``opened`` comes when the chosen item is loaded; ``changed`` after every edit, undo and redo of it; ``listed`` with the place of
-    an item whose status changed; ``saved`` when all is on the disk; ``failed`` with one line and whether edits wait to be written;
-    ``proposed`` when there is a proposal for the item in hand.
+    ``opened`` comes when the chosen item is loaded; ``changed`` after every edit, undo and redo of it; ``status_changed`` with the
+    place of an item; ``saved`` when everything is on the disk; ``failed`` with one line and whether edits wait to be written;
+    ``proposed`` when there is a proposal for the open item.
+
+    Parameters
+    ----------
+    store : its methods may be called from any thread.
+    blind : a study in which the algorithm's answer and the names are hidden.
     """
 
     opened = Signal()
     changed = Signal()
-    listed = Signal(int)
+    status_changed = Signal(int)
     saved = Signal()
     failed = Signal(str, bool)
     proposed = Signal()
@@ -86,56 +85,40 @@ class AnnotationModel(QObject):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._store = store
+        self.store = store
         self.items = tuple(items)
         self.config = config
         self.blind = blind
         self.index = -1
-        self._loaded: dict[int, LoadedItem] = {}
+        self._levels: dict[int, tuple[Image, ...]] = {}
+        self._histories: dict[int, History] = {}
         self._contents: dict[ItemKey, Annotation] = {}
         self._status: dict[ItemKey, Status] = {}
         self._times: dict[ItemKey, float] = {}
         self._proposals: dict[str, Proposal] = {}
-        self._looks: set[ItemKey] = set()
-        self._histories: dict[int, History] = {}
-        self._perceive: Perceive | None = None
+        self._seen_proposals: set[ItemKey] = set()
+        self._perceive: Callable[[Frame], Scene] | None = None
         self._to_write: deque[Callable[[], None]] = deque()
-        self._retry = QTimer(self)
-        self._retry.setSingleShot(True)
-        self._retry.setInterval(_RETRY_MS)
         self._is_shut = False
-        self._last_sign_s = self._counted_s = time.monotonic()
+        self._last_activity_s = self._counted_s = time.monotonic()
         self._loading, self._saving = (Worker(name, self) for name in ("loading", "saving"))
         self._perceiving = Worker("perceiving", self, behind=True)
+        self._retry = QTimer(self, singleShot=True, interval=_RETRY_MS)
         self._retry.timeout.connect(lambda: self._saving.submit("edit", self._write_all))
         self._loading.done.connect(self._on_loaded)
-        self._loading.failed.connect(self._on_load_failed)
+        self._loading.failed.connect(lambda place, line: self.failed.emit(line, False) if place == self.index else None)
         self._saving.done.connect(self._on_saved)
         self._saving.failed.connect(self._on_save_failed)
         self._perceiving.done.connect(self._on_perceived)
-        self._perceiving.failed.connect(self._on_perceive_failed)
-        self._read_annotations()
+        self._perceiving.failed.connect(lambda _sha256, line: self.failed.emit(line, False))
+        if self.items:
+            key = self.items[0].key
+            for one in store.annotations(key.study, key.rater):
+                self._contents[one.key] = one.content
+                self._status[one.key] = status_of(one.content, measured=one.theta_deg is not None)
+                self._times[one.key] = one.time_spent_s
 
-    def _read_annotations(self) -> None:
-        """All that is kept of the queue, before the window opens: a few kilobytes an image."""
-        if not self.items:
-            return
-        key = self.items[0].key
-        for one in self._store.annotations(key.study, key.rater):
-            self._contents[one.key] = one.content
-            self._status[one.key] = status_of(one.content, measured=one.theta_deg is not None)
-            self._times[one.key] = one.time_spent_s
-
-    @property
-    def store_path(self) -> Path:
-        return self._store.path
-
-    @property
-    def store(self) -> AnnotationStore:
-        """The open file; its methods may be called from any thread."""
-        return self._store
-
-    # ---- the item in hand
+    # ---- the open item
 
     @property
     def item(self) -> QueueEntry | None:
@@ -143,24 +126,22 @@ class AnnotationModel(QObject):
 
     @property
     def is_open(self) -> bool:
-        """Whether the item in hand is loaded."""
-        return self.index in self._loaded
+        """Whether the chosen item is loaded."""
+        return self.index in self._levels
 
     @property
     def levels(self) -> tuple[Image, ...]:
-        return self._loaded[self.index].levels
+        """The image as it is shown, with its halvings."""
+        return self._levels[self.index]
 
     @property
     def annotation(self) -> Annotation:
-        """As it lies in the view."""
         item = self.item
-        if item is None:
-            return Annotation()
-        return turn_annotation(self._contents.get(item.key, Annotation()), item.view, item.image.record.size)
+        return self._in_view(self._contents.get(item.key, Annotation())) if item is not None else Annotation()
 
     @property
     def history(self) -> History:
-        """Of the item in hand; empty until it is loaded."""
+        """Empty until the item is loaded."""
         return self._histories.get(self.index) or History()
 
     def status(self, place: int) -> Status:
@@ -185,68 +166,64 @@ class AnnotationModel(QObject):
         item = self.item
         return measure_lines(shown, item.image.record.size, self.config) if item is not None else Readout()
 
+    def _in_view(self, annotation: Annotation) -> Annotation:
+        """From source pixels into the view of the open item, or back: each view is its own inverse."""
+        item = self.item
+        return turn_annotation(annotation, item.view, item.image.record.size) if item is not None else annotation
+
     # ---- going through the queue
 
     def open(self, place: int) -> None:
-        """Take an item in hand; it is there when ``opened`` comes (at once when it was fetched before)."""
+        """Open an item; it is there when ``opened`` comes (at once when it was loaded before)."""
         if not 0 <= place < len(self.items) or self._is_shut:
             return
-        self._keep_time()
+        self._save_time()
         self.index = place
-        if place in self._loaded:
+        if place in self._levels:
             self.opened.emit()
-        else:
-            self._load(place, urgent=True)
-        for near in (place + 1, place - 1):
-            if 0 <= near < len(self.items) and near not in self._loaded:
-                self._load(near)
+        for near in (place, place + 1, place - 1):
+            if 0 <= near < len(self.items) and near not in self._levels:
+                self._load(near, urgent=near == place)
 
-    def next_open(self, start: int, step: int = 1) -> int | None:
+    def next_open(self, start: int) -> int | None:
         """The next item that is not answered, around the end; None when all are."""
         count = len(self.items)
-        places = ((start + step * k) % count for k in range(1, count + 1))
+        places = ((start + k) % count for k in range(1, count + 1))
         return next((place for place in places if self.status(place) in (Status.NEW, Status.BEGUN)), None)
 
-    def _load(self, place: int, *, urgent: bool = False) -> None:
-        item, store = self.items[place], self._store
+    def _load(self, place: int, *, urgent: bool) -> None:
+        item, store = self.items[place], self.store
 
-        def load() -> LoadedItem:
+        def load() -> tuple[tuple[Image, ...], History]:
             image = read_image(item.image.path)
             if (image.shape[1], image.shape[0]) != item.image.record.size:
                 raise AnnotationError(f"{item.image.path}: has changed since it was listed; start annotate again")
-            return LoadedItem(halvings(turn_image(image, item.view)), store.history(item.key))
+            return halvings(turn_image(image, item.view)), store.history(item.key)
 
         self._loading.submit(place, load, urgent=urgent, once=True)
 
-    def _on_loaded(self, place: int, loaded: LoadedItem) -> None:
-        if place in self._loaded:
-            return  # asked for once more before the first answer was heard: what has been begun since stays
-        self._loaded[place] = loaded
-        if place not in self._histories:  # one that was edited meanwhile knows more than the disk
-            history, kept = loaded.history, self._contents.get(self.items[place].key)
+    def _on_loaded(self, place: int, loaded: tuple[tuple[Image, ...], History]) -> None:
+        if place in self._levels:
+            return  # requested twice before the first answer came: edits made since stay
+        self._levels[place], history = loaded
+        if place not in self._histories:  # one that was edited meanwhile is newer than the disk
             self._histories[place] = history
-            if kept is None:  # never begun, or its record is damaged: then the journal has what it said
+            content = self._contents.get(self.items[place].key)
+            if content is None:  # never begun, or its record is damaged: the journal counts
                 self._write(place, history.renewed("restored"), history.current)
-            elif history.current != kept:  # the journal is damaged: what counts is the annotation
-                self._write(place, history.edit("restored", kept), kept)
-        while len(self._loaded) > _KEPT_IMAGES:
-            del self._loaded[max(self._loaded, key=lambda other: abs(other - self.index))]
+            elif history.current != content:  # the journal is damaged: the annotation counts
+                self._write(place, history.edit("restored", content), content)
+        while len(self._levels) > _KEPT_IMAGES:
+            del self._levels[max(self._levels, key=lambda other: abs(other - self.index))]
         if place == self.index:
             self.opened.emit()
-
-    def _on_load_failed(self, place: int, line: str) -> None:
-        if place == self.index:
-            self.failed.emit(line, False)
 
     # ---- edits
 
     def edit(self, action: str, shown: Annotation) -> None:
         """Put an annotation (as it lies in the view) in force and on the disk."""
-        item = self.item
-        if item is None or not self.is_open:
-            return
-        content = turn_annotation(shown, item.view, item.image.record.size)
-        self._apply(self.history.edit(action, content))
+        if self.is_open:
+            self._apply(self.history.edit(action, self._in_view(shown)))
 
     def undo(self) -> None:
         self._apply(self.history.undo() if self.is_open else None)
@@ -255,14 +232,13 @@ class AnnotationModel(QObject):
         self._apply(self.history.redo() if self.is_open else None)
 
     def _apply(self, entry: JournalEntry | None) -> None:
-        if entry is not None:
-            self._write(self.index, entry, self.history.current)
+        self._write(self.index, entry, self.history.current)
         self.changed.emit()
 
     def _write(self, place: int, entry: JournalEntry | None, content: Annotation) -> None:
         if entry is None:
             return
-        item, store = self.items[place], self._store
+        item, store = self.items[place], self.store
         readout = measure_lines(content, item.image.record.size, self.config)
         self._count_time()
         spent = self._times.get(item.key, 0.0)
@@ -270,7 +246,7 @@ class AnnotationModel(QObject):
         self._status[item.key] = status_of(content, measured=readout.pose is not None)
         self._to_write.append(lambda: store.save(item.key, item.view, entry, content, readout, spent))
         self._saving.submit("edit", self._write_all)
-        self.listed.emit(place)
+        self.status_changed.emit(place)
 
     def _write_all(self) -> None:
         """In the saving thread: everything that waits, in order. What fails stays in front and is tried again."""
@@ -289,36 +265,38 @@ class AnnotationModel(QObject):
 
     # ---- time
 
-    def sign_of_life(self) -> None:
+    def record_activity(self) -> None:
         """The rater did something: time counts on."""
         self._count_time()
-        self._last_sign_s = time.monotonic()
+        self._last_activity_s = time.monotonic()
 
     def _count_time(self) -> None:
-        """Time since the last count, as far as the rater was at work: a coffee break is none."""
         now = time.monotonic()
-        worked = min(now, self._last_sign_s + _IDLE_S) - self._counted_s
+        worked = min(now, self._last_activity_s + _IDLE_S) - self._counted_s
         self._counted_s = now
         if worked > 0 and self.item is not None and self.is_open:
             self._times[self.item.key] = self._times.get(self.item.key, 0.0) + worked
 
-    def _keep_time(self) -> None:
+    def _save_time(self) -> None:
         self._count_time()
-        item, store = self.item, self._store
+        item, store = self.item, self.store
         if item is not None and item.key in self._contents:
             spent = self._times.get(item.key, 0.0)
             self._saving.submit("time", lambda: store.save_time(item.key, spent))
-        self._last_sign_s = time.monotonic()
+        self._last_activity_s = time.monotonic()
 
     # ---- the algorithm
 
     @property
     def proposal(self) -> Proposal | None:
-        """For the item in hand, as it lies in the view; None: not asked for yet, or a blind study."""
+        """For the open item, in source pixels; None: not asked for yet, or a blind study."""
         item = self.item
-        if item is None or self.blind or item.image.sha256 not in self._proposals:
-            return None
-        return self._proposals[item.image.sha256]
+        return None if item is None or self.blind else self._proposals.get(item.image.sha256)
+
+    @property
+    def proposed_annotation(self) -> Annotation:
+        """That of the proposal, as it lies in the view."""
+        return self._in_view(self.proposal.annotation) if self.proposal is not None else Annotation()
 
     def propose(self) -> None:
         """Ask the algorithm; ``proposed`` comes when it has answered. Never in a blind study."""
@@ -328,21 +306,21 @@ class AnnotationModel(QObject):
         if self.proposal is not None:
             self.proposed.emit()
             return
-        sha256, path = item.image.sha256, item.image.path
+        path = item.image.path
 
         def perceive() -> Proposal:
             if self._perceive is None:
                 self._perceive = open_pipeline(self.config).perceive_single
             return proposal_of(self._perceive(Frame(0, 0.0, read_image(path))))
 
-        self._perceiving.submit(sha256, perceive, urgent=True, once=True)
+        self._perceiving.submit(item.image.sha256, perceive, urgent=True, once=True)
 
-    def keep_look(self) -> None:
-        """The rater sees the algorithm's answer to the item in hand: what he draws from now on is told apart."""
-        item, store = self.item, self._store
-        if item is None or self.proposal is None or item.key in self._looks:
+    def record_proposal_seen(self) -> None:
+        """The rater sees the algorithm's answer to the open item: later answers are told apart."""
+        item, store = self.item, self.store
+        if item is None or self.proposal is None or item.key in self._seen_proposals:
             return
-        self._looks.add(item.key)
+        self._seen_proposals.add(item.key)
         after = self.history.last
         self._to_write.append(lambda: store.keep_look(item.key, after))
         self._saving.submit("edit", self._write_all)
@@ -352,13 +330,10 @@ class AnnotationModel(QObject):
         if self.item is not None and self.item.image.sha256 == sha256:
             self.proposed.emit()
 
-    def _on_perceive_failed(self, _sha256: str, line: str) -> None:
-        self.failed.emit(line, False)
-
     # ---- the end
 
     def settle(self) -> None:
-        """Give the disk a moment to take what waits: ``unsaved`` then tells what it does not take."""
+        """Wait a moment for the disk: ``unsaved`` then tells what could not be written."""
         if self._to_write and not self._is_shut:
             self._saving.submit("edit", self._write_all, once=True)
         until_s = time.monotonic() + _SETTLE_S
@@ -367,10 +342,10 @@ class AnnotationModel(QObject):
             time.sleep(0.002)
 
     def shut_down(self) -> tuple[str, ...]:
-        """Finish writing and end the threads; a line for each that did not end in its time. What the disk refused is logged."""
+        """Finish writing and end the threads; a line for each that did not end in time."""
         if self._is_shut:
             return ()
-        self._keep_time()
+        self._save_time()
         self._is_shut = True
         self._retry.stop()
         if self._to_write:
@@ -380,7 +355,7 @@ class AnnotationModel(QObject):
             thread.stop(finish=False)
         running = [thread for thread in (self._saving, self._loading, self._perceiving) if not thread.wait(_SAVE_WITHIN_MS)]
         if not running:
-            self._store.close()
+            self.store.close()
         if self._to_write:
-            _log.error("%d edits could not be written to %s", len(self._to_write), self.store_path)
+            _log.error("%d edits could not be written to %s", len(self._to_write), self.store.path)
         return tuple(f"{thread.objectName()} did not end in {_SAVE_WITHIN_MS / 1000:g} s" for thread in running)

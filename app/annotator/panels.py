@@ -1,11 +1,4 @@
-"""The tools below the picture as chips with their keys, and one line on how the chosen one is used.
-
-Above the picture: which image, for whom, and whether everything is on the disk.
-
-The queue: every image with its status, as a list; and how far the rater is.
-
-The angle in large figures, the distances, and the rater's state beside what his lines say.
-"""
+"""The panels of the annotator window: tool bar, header, list of images, readout."""
 
 from __future__ import annotations
 
@@ -37,17 +30,13 @@ from core.annotation.model import Annotation, Readout, Status
 
 _DRAWN = ("ROBOT", "VESSEL")
 """Roles that the picture shows in their own colours."""
-_SEEN = 3.0
+_LEGIBLE_CONTRAST = 3.0
+"""A colour with less contrast than this to its chip is replaced by grey."""
 _SWITCHES = (
     ("L", mark("Loupe"), "TEXT", mark("The surroundings of the cursor, magnified")),
     ("K", mark("Masks"), "VESSEL", mark("Show the drawn masks")),
     ("T", mark("Brush"), "ORANGE", mark("Paint the mask instead of moving its points")),
-    (
-        "H",
-        mark("Algorithm"),
-        "TEXT",
-        mark("Show what the algorithm says: answers after it are told apart. Not in a blind study"),
-    ),
+    ("H", mark("Algorithm"), "TEXT", mark("Show what the algorithm says: answers after it are told apart. Not in a blind study")),
 )
 
 
@@ -66,12 +55,8 @@ class AnnotationBar(QWidget):
         self._tools: dict[Tool, _Chip] = {}
         group = QButtonGroup(self)
         for tool in Tool:
-            chip = _Chip(
-                tool.value.key,
-                tr(tool.value.label),
-                tool.value.role,
-                tr("{meaning}  (key {key})", meaning=tr(tool.value.label), key=tool.value.key),
-            )
+            key, label = tool.value.key, tr(tool.value.label)
+            chip = _Chip(key, label, tool.value.role, tr("{meaning}  (key {key})", meaning=label, key=key))
             chip.clicked.connect(lambda _on=False, which=tool: self.tool_chosen.emit(which))
             group.addButton(chip)
             row.addWidget(chip)
@@ -101,7 +86,7 @@ class AnnotationBar(QWidget):
         return self._hint.text()
 
     def show_tool(self, tool: Tool, *, brush_on: bool) -> None:
-        """The tool in hand and how it is used."""
+        """The chosen tool and how it is used."""
         self._tools[tool].setChecked(True)
         self.set_switch("T", brush_on)
         self._switches["T"].setEnabled(tool.is_mask)
@@ -120,7 +105,6 @@ class AnnotationBar(QWidget):
         return self._switches[key].isChecked()
 
     def toggle(self, key: str) -> None:
-        """As a click on the switch."""
         chip = self._switches.get(key)
         if chip is not None and chip.isEnabled():
             chip.toggle()
@@ -157,8 +141,8 @@ class _Chip(QAbstractButton):
         painter.setFont(theme.semi_bold(11))
         painter.drawText(QRectF(9, 0, 12, self.height()), Qt.AlignmentFlag.AlignCenter, self._key)
         name = getattr(ON_PICTURE, self._role) if self._role in _DRAWN else theme.of(self._role)
-        is_lost = theme.contrast(name, theme.RAISED) < _SEEN  # a pale colour on a light chip
-        painter.setPen(QPen(QColor(theme.TEXT_FAINT if is_lost else name), 1.5))
+        is_illegible = theme.contrast(name, theme.RAISED) < _LEGIBLE_CONTRAST  # a pale colour on a light chip
+        painter.setPen(QPen(QColor(theme.TEXT_FAINT if is_illegible else name), 1.5))
         painter.setBrush(QColor(name) if on else Qt.BrushStyle.NoBrush)
         painter.drawRoundedRect(QRectF(27, self.height() / 2 - 4, 8, 8), 2, 2)
         painter.setPen(QColor(theme.TEXT if on else theme.TEXT_DIM))
@@ -201,13 +185,8 @@ class AnnotationHeader(QWidget):
 
     def show_unsaved(self, count: int, why: str) -> None:
         """Edits that could not be written, and why."""
-        self._show(
-            tr("\N{WARNING SIGN}  NOT SAVED: 1 edit")
-            if count == 1
-            else tr("\N{WARNING SIGN}  NOT SAVED: {count} edits", count=count),
-            "FAULT",
-            why,
-        )
+        one, more = tr("\N{WARNING SIGN}  NOT SAVED: 1 edit"), tr("\N{WARNING SIGN}  NOT SAVED: {count} edits", count=count)
+        self._show(one if count == 1 else more, "FAULT", why)
 
     def _show(self, text: str, role: str, tip: str) -> None:
         self._saved.setText(text)
@@ -217,18 +196,8 @@ class AnnotationHeader(QWidget):
 
 _ROW = 30
 _MARK = {Status.NEW: "", Status.BEGUN: "\N{HORIZONTAL ELLIPSIS}", Status.DONE: "\N{CHECK MARK}", Status.CANNOT_TELL: "?"}
-_WORD = {
-    Status.NEW: mark("new"),
-    Status.BEGUN: mark("begun"),
-    Status.DONE: mark("done"),
-    Status.CANNOT_TELL: mark("can't tell"),
-}
-_ROLE = {
-    Status.NEW: "TEXT_FAINT",
-    Status.BEGUN: "ORANGE",
-    Status.DONE: "ALLOWED",
-    Status.CANNOT_TELL: "SKY",
-}
+_WORD = {Status.NEW: mark("new"), Status.BEGUN: mark("begun"), Status.DONE: mark("done"), Status.CANNOT_TELL: mark("can't tell")}
+_ROLE = {Status.NEW: "TEXT_FAINT", Status.BEGUN: "ORANGE", Status.DONE: "ALLOWED", Status.CANNOT_TELL: "SKY"}
 _STYLE = """
 QListView { background: @PANEL; outline: none; }
 QScrollBar:vertical { background: transparent; width: 8px; margin: 0; }
@@ -240,7 +209,7 @@ _Index = QModelIndex | QPersistentModelIndex
 
 
 class QueueModel(QAbstractListModel):
-    """Rows of name, status, and whether there are masks; the window tells when one changes."""
+    """Rows of name, status, and whether there are masks."""
 
     def __init__(self, names: list[str], status: Callable[[int], Status], has_masks: Callable[[int], bool]) -> None:
         super().__init__()
@@ -264,7 +233,8 @@ class QueueModel(QAbstractListModel):
             return f"{row + 1}: {self._names[row]}: {tr(_WORD[self._status(row)])}{masks}"
         return None
 
-    def renew(self, row: int) -> None:
+    def update_row(self, row: int) -> None:
+        """The status of a row has changed."""
         index = self.index(row)
         self.dataChanged.emit(index, index)
 
@@ -312,6 +282,7 @@ class QueueList(QWidget):
     def __init__(self, model: QueueModel) -> None:
         super().__init__()
         self._model = model
+        self.update_row = model.update_row
         model.setParent(self)
         self._view = QListView()
         self._view.setModel(model)
@@ -324,6 +295,7 @@ class QueueList(QWidget):
         self._view.activated.connect(lambda index: self.chosen.emit(index.row()))
         self._view.clicked.connect(lambda index: self.chosen.emit(index.row()))
         self._progress = _ProgressBar()
+        self.show_progress = self._progress.show_progress
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(6)
@@ -334,19 +306,12 @@ class QueueList(QWidget):
     def progress_text(self) -> str:
         return self._progress.text
 
-    def renew(self, row: int) -> None:
-        """The status of a row has changed."""
-        self._model.renew(row)
-
     def show_current(self, row: int) -> None:
         index = self._model.index(row)
         self._view.setCurrentIndex(index)
         self._view.scrollTo(index)
 
-    def show_progress(self, finished: int, count: int) -> None:
-        self._progress.show_progress(finished, count)
-
-    def take_focus(self) -> None:
+    def focus_list(self) -> None:
         self._view.setFocus()
 
 
@@ -361,9 +326,8 @@ class _ProgressBar(QWidget):
     @property
     def text(self) -> str:
         left = self._count - self._finished
-        return tr("{finished} of {count} done", finished=self._finished, count=self._count) + (
-            tr(", {left} left", left=left) if left else ""
-        )
+        done = tr("{finished} of {count} done", finished=self._finished, count=self._count)
+        return done + tr(", {left} left", left=left) if left else done
 
     def show_progress(self, finished: int, count: int) -> None:
         self._finished, self._count = finished, count
@@ -391,9 +355,8 @@ _HEIGHT = 232
 class AnnotationReadout(QWidget):
     """Shows one annotation with its readout; without both lines it says what is still to be drawn."""
 
-    def __init__(self, wanted_px: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._wanted_px = wanted_px
         self._annotation = Annotation()
         self._readout = Readout()
         self._is_preview = False
@@ -450,31 +413,29 @@ class AnnotationReadout(QWidget):
         painter.end()
 
     def _paint_angle(self, painter: QPainter) -> None:
-        pose = self._readout.pose
+        pose, left = self._readout.pose, self.width() * 0.62
+        flags = Qt.AlignmentFlag.AlignVCenter
         painter.setPen(QColor(theme.THETA if pose is not None else theme.TEXT_FAINT))
         painter.setFont(theme.bold(58 if pose is not None else 34))
-        box = QRectF(0, 0, self.width() * 0.62, 72)
-        painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, self.angle_text)
-        left = self.width() * 0.62
+        painter.drawText(QRectF(0, 0, left, 72), Qt.AlignmentFlag.AlignLeft | flags, self.angle_text)
         painter.setFont(theme.semi_bold(14))
         painter.setPen(QColor(theme.TEXT if pose is not None else theme.TEXT_FAINT))
         turn = side(pose.theta_signed_deg) if pose is not None and pose.theta_deg >= 0.05 else ""
-        painter.drawText(
-            QRectF(left, 14, self.width() - left, 20), Qt.AlignmentFlag.AlignVCenter, f"\N{GREEK SMALL LETTER THETA} {turn}"
-        )
+        painter.drawText(QRectF(left, 14, self.width() - left, 20), flags, f"\N{GREEK SMALL LETTER THETA} {turn}")
         painter.setFont(theme.font(12))
         painter.setPen(QColor(theme.TEXT_DIM))
-        painter.drawText(
-            QRectF(left, 36, self.width() - left, 18), Qt.AlignmentFlag.AlignVCenter, tr("moving") if self._is_preview else ""
-        )
+        painter.drawText(QRectF(left, 36, self.width() - left, 18), flags, tr("moving") if self._is_preview else "")
 
     def _paint_distances(self, painter: QPainter) -> None:
+        """Distances, and the arc lengths that the vectors are fitted to: shorter ones are less certain."""
         pose, readout = self._readout.pose, self._readout
+        robot_px, vessel_px = round(readout.robot_length_px), round(readout.vessel_length_px)
+        lengths = f"{robot_px} + {vessel_px} px" if vessel_px else f"{robot_px} px"
         cells = (
             ("d_head", f"{pose.d_head_px:.1f} px" if pose else _DASH, theme.D_HEAD),
             ("d_tail", f"{pose.d_tail_px:.1f} px" if pose else _DASH, theme.D_TAIL),
             (tr("crossed"), (tr("yes") if pose.crossed else tr("no")) if pose else _DASH, theme.TEXT),
-            (tr("lines used"), self._lengths() if readout.robot_vector is not None else _DASH, theme.TEXT),
+            (tr("lines used"), lengths if readout.robot_vector is not None else _DASH, theme.TEXT),
         )
         width = self.width() / len(cells)
         for place, (name, value, colour) in enumerate(cells):
@@ -484,11 +445,6 @@ class AnnotationReadout(QWidget):
             painter.setFont(theme.fitted(theme.semi_bold(15), value, int(width - 4)))
             painter.setPen(QColor(colour if pose or place == 3 else theme.TEXT_FAINT))
             painter.drawText(QRectF(place * width, 98, width, 20), Qt.AlignmentFlag.AlignVCenter, value)
-
-    def _lengths(self) -> str:
-        """Arc lengths that the vectors are fitted to; less than wanted is less certain."""
-        robot, vessel = round(self._readout.robot_length_px), round(self._readout.vessel_length_px)
-        return f"{robot} + {vessel} px" if vessel else f"{robot} px"
 
     def _paint_state(self, painter: QPainter) -> None:
         annotation, pose = self._annotation, self._readout.pose

@@ -16,16 +16,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.annotator.sources import (
-    FRAMES,
     AnnotateOptions,
     StudyOptions,
-    asked_files,
-    asked_rater,
     default_store,
+    image_files,
     listed_images,
     of_rater,
+    print_warnings,
+    rater_name,
     read_annotated,
-    tell_problems,
 )
 from app.commands.progress import check_can_write, progress_bar
 from app.ui.i18n import tr
@@ -55,10 +54,10 @@ def queue_of(
         settings = _settings(store, images, options, config)
         missing = [sha256 for sha256 in settings.images if sha256 not in here]
         others = len(set(here) - set(settings.images))
-        tell_problems([f"{others} images are here that do not belong to study {options.name!r}; left out"] if others else [])
+        print_warnings([f"{others} images are here that do not belong to study {options.name!r}; left out"] if others else [])
         if missing:
             names = store.images()
-            tell_problems(
+            print_warnings(
                 [f"{names[m].name if m in names else m[:12]}: belongs to the study, but is not here; left out" for m in missing]
             )
         queue = [task for task in tasks(settings, rater) if task.sha256 in here]
@@ -149,7 +148,7 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
     from core.evaluation.evaluation import write_measurements
 
     assert options.out is not None
-    annotations, images = read_annotated(store_path, paths, options.frames or FRAMES)
+    annotations, images = read_annotated(store_path, paths, options.frames)
     asked, everybodys = options.study.asked, annotations
     if asked is not None:
         annotations = [one for one in everybodys if one.key.study == asked]
@@ -162,20 +161,20 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         if asked is not None:
             drawn, measured = of_rater(everybodys, options.study.rater), finished(annotations)
         count, problems = export_training_set(drawn, images, options.out, measured=measured)
-        tell_problems(problems)
+        print_warnings(problems)
         sys.stderr.write(f"{count} frames with both masks in {options.out}: train --data {options.out}\n")
     elif options.export == "coco":
         count = export_coco(annotations, images, options.out)
         sys.stderr.write(f"masks of {count} images in {options.out}\n")
     else:
-        from app.annotator.sources import compared_rows, fitted_alike
+        from app.annotator.comparison import comparable_answers, compare_with_algorithm
 
         if options.out.exists():
             raise AnnotationError(f"{options.out}: is there already; choose another --out")
         check_can_write(options.out, "--out")
-        done, notes = fitted_alike(annotations, images, config, options.study.asked, str(store_path))
-        tell_problems(notes)
-        rows, _, _, missed = compared_rows(done, images, config)
+        done, notes = comparable_answers(annotations, images, config, options.study.asked, str(store_path))
+        print_warnings(notes)
+        rows, _, _, missed = compare_with_algorithm(done, images, config)
         try:
             write_measurements(options.out, rows)
         except OSError as error:
@@ -195,8 +194,8 @@ def import_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         raise AnnotationError(f"{options.imports[0]}: no .json file in it")
     if not any(source.is_file() for source in sources):  # before an annotation file is made for them
         raise AnnotationError(f"{sources[0]}: no such file; nothing was imported")
-    rater = asked_rater(options.study)
-    files = asked_files(paths, options.frames)
+    rater = rater_name(options.study)
+    files = image_files(paths, options.frames)
     counts: Counter[str] = Counter()
     with AnnotationStore(store_path) as store:
         images = listed_images(files, store)
@@ -215,7 +214,7 @@ def import_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
             existing[key] = content
             counts[one.image.sha256] += 1
         problems += store.problems
-    tell_problems(problems)
+    print_warnings(problems)
     if not counts:
         raise AnnotationError("nothing was imported")
     sys.stderr.write(f"{len(counts)} images got annotations, for rater {rater}, in {store_path}\n")
@@ -240,7 +239,7 @@ def join_annotations(store_path: Path, options: AnnotateOptions) -> int:
         if is_new:
             store_path.unlink(missing_ok=True)
         raise
-    tell_problems(joined.told)
+    print_warnings(joined.told)
     for path, persons in joined.persons.items():
         who = ", ".join(here if here == there else f"{here} (there: {there})" for there, here in sorted(persons.items()))
         sys.stderr.write(f"{path}: {who or 'nobody has answered in it'}\n")
@@ -254,7 +253,7 @@ def salvage_annotations(store_path: Path, out: Path | None) -> int:
 
     target = out or store_path.with_name(f"salvaged_{store_path.name}")
     kept, problems = salvage(store_path, target)
-    tell_problems(problems)
+    print_warnings(problems)
     sys.stderr.write(f"{kept} annotations saved into {target}; the damaged file is as it was\n")
     return 0
 
@@ -307,8 +306,8 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     from app.ui.window_base import check_display, make_application, run_until_closed
 
     check_display()
-    rater = asked_rater(options.study)
-    files = asked_files(paths, options.frames)
+    rater = rater_name(options.study)
+    files = image_files(paths, options.frames)
     with AnnotationStore(store_path) as store:
         images = listed_images(files, store)
         items = queue_of(store, images, rater, options.study, config)
@@ -319,22 +318,22 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
         from app.annotator.window import AnnotatorWindow
         from app.ui.layout_state import LayoutState, Parts, Switch, toggling
 
-        desk = AnnotationModel(store, items, config.perception, blind=bool(options.study.name))
-        tell_problems(store.problems)
+        model = AnnotationModel(store, items, config.perception, blind=bool(options.study.name))
+        print_warnings(store.problems)
         who = (
             tr("study {name}, rater {rater}, blind", name=options.study.name, rater=rater)
             if options.study.name
             else tr("rater {rater}", rater=rater)
         )
-        window = AnnotatorWindow(desk, who)
+        window = AnnotatorWindow(model, who)
         bar = window.panels.bar
         switches = {name: Switch(partial(bar.is_on, key), toggling(partial(bar.toggle, key))) for name, key in _KEPT}
         LayoutState(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
-        return run_until_closed(application, window, window.say)
+        return run_until_closed(application, window, window.show_message)
 
 
 def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
-    from app.annotator.sources import groups_of_answered
+    from app.annotator.comparison import groups_of_answered
     from core.annotation.agreement_report import (
         agreement_report,
         choose_study,
@@ -350,7 +349,7 @@ def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
         annotations, notes = measured_alike(of_rater(annotations, options.study.rater), images, config.perception)
         names = {sha256: image.name for sha256, image in images.items()}
         groups = groups_of_answered(annotations, {sha256: store_path.parent / name for sha256, name in names.items()})
-        tell_problems([*store.problems, *rater_notes(annotations), *group_notes(annotations, groups), *notes])
+        print_warnings([*store.problems, *rater_notes(annotations), *group_notes(annotations, groups), *notes])
     study = annotations[0].key.study
     report = {"study": study} | agreement_report(annotations, names, options.study.seed or 0, groups)
     if options.out is not None:
@@ -366,7 +365,7 @@ def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
     if options.as_json:
         sys.stdout.write(json.dumps(report, allow_nan=False) + "\n")
     else:
-        from app.annotator.sources import print_agreement
+        from app.annotator.comparison import print_agreement
 
         print_agreement(report)
         if options.out is not None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.annotator.sources import print_agreement
+from app.annotator.comparison import print_agreement
 from app.commands.evaluation_report import print_tables, render_report
 from app.commands.perceive import LeftOut
 from app.commands.progress import asked_teller, check_no_input, progress_bar
@@ -190,7 +190,8 @@ def _perceive_annotated(
     annotations: Path, config: Config, preset: str | None, model: str | None, study: str | None, seed: int, *, as_recorded: bool
 ) -> _Study:
     """Images that were annotated by hand, against the algorithm; those of a session as it was set in the session."""
-    from app.annotator.sources import compared_rows, fitted_alike, raters_agreement, read_annotated
+    from app.annotator.comparison import comparable_answers, compare_with_algorithm, rater_agreement
+    from app.annotator.sources import read_annotated
 
     answers, images = read_annotated(annotations, _places_of(annotations))
     notes = []
@@ -199,9 +200,9 @@ def _perceive_annotated(
         config, told = recorded
         notes += told
     notes += _how_answered(annotations, answers, images, study)
-    done, told = fitted_alike(answers, images, config, study, str(annotations))
+    done, told = comparable_answers(answers, images, config, study, str(annotations))
     notes += told
-    rows, reasons, engine, missed = compared_rows(done, images, config)
+    rows, reasons, engine, missed = compare_with_algorithm(done, images, config)
     source: dict[str, Any] = {
         "kind": "annotated by hand",
         "name": name_as_text(name_of(annotations.parent)),
@@ -210,7 +211,7 @@ def _perceive_annotated(
     unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
     notes += [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
     notes += [f"Interrupted after {len(rows)} of {len(rows) + missed} images."] if missed else []
-    agreement = raters_agreement(done, images, seed)
+    agreement = rater_agreement(done, images, seed)
     source |= {"preset": preset, "engine": engine, "refused": reasons, "study": study}
     return _Study(rows, source, notes, agreement, interrupted=missed > 0)
 

@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from app.annotator.sources import agreement_tables, between_words
+from app.annotator.comparison import agreement_tables, between_words
 from core.config.models import RESOURCES
 from core.evaluation.metrics import RESAMPLES
 from core.evaluation.paper import ANGLE_FIGURES, CLASS_SCORES, PAPER, STATE_FIGURES, FigureFormat, FigureKind, Verdict, verdict

@@ -284,10 +284,10 @@ def test_the_annotator_window_trains_on_its_own_open_file(qtbot: QtBot, tmp_path
     path = annotate_masks(tmp_path / "images", 3)
     with AnnotationStore(path) as store:  # locked for all others while the window has it
         images, _ = find_images(sorted(path.parent.glob("*.png")), store)
-        desk = AnnotationModel(
+        model = AnnotationModel(
             store, [QueueEntry(one, ItemKey(one.sha256, "", "ann", 1)) for one in images], PerceptionConfig(), blind=False
         )
-        window = AnnotatorWindow(desk, "rater ann")
+        window = AnnotatorWindow(model, "rater ann")
         qtbot.addWidget(window)
         window.show()
         window.start()

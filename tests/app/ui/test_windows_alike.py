@@ -239,7 +239,7 @@ def test_the_picture_to_annotate_hears_the_keys_that_the_page_tells(qtbot: QtBot
     window.resize(1280, 720)
     window.show()
     window.start()
-    qtbot.waitUntil(lambda: window.desk.is_open)
+    qtbot.waitUntil(lambda: window.model.is_open)
     canvas = window.panels.canvas
     for point in ((100.0, 100.0), (200.0, 120.0)):  # so that Tab has a point to go to
         qtbot.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=QPoint(*(round(value) for value in canvas.view.to_screen(point))))

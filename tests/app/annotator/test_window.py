@@ -18,6 +18,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.annotator.canvas import AnnotationCanvas
 from app.annotator.editing import Tool
 from app.annotator.model import AnnotationModel, QueueEntry
 from app.annotator.window import AnnotatorWindow
@@ -41,7 +42,7 @@ _DIAGONAL = tuple((float(at), float(at)) for at in (80, 120, 200, 290, 350, 420)
 
 
 class Rater:
-    """A window over some pictures, and hands that send real events; it counts them."""
+    """A window over some pictures; sends it real events and counts them."""
 
     def __init__(self, qtbot: QtBot, folder: Path, views: tuple[ImageView, ...], blind: bool) -> None:
         self.store_path = folder / "a.sqlite"
@@ -62,15 +63,23 @@ class Rater:
         self.window.resize(1280, 720)
         self.window.show()
         self.window.start()
-        qtbot.waitUntil(lambda: self.desk.is_open)
+        qtbot.waitUntil(lambda: self.model.is_open)
 
     @property
-    def desk(self) -> AnnotationModel:
-        return self.window.desk
+    def model(self) -> AnnotationModel:
+        return self.window.model
 
     @property
-    def canvas(self):
+    def canvas(self) -> AnnotationCanvas:
         return self.window.panels.canvas
+
+    @property
+    def drawn(self) -> Annotation:
+        return self.model.annotation
+
+    @property
+    def message(self) -> str:
+        return self.window.panels.toast.text()
 
     def at(self, point: Point) -> QPoint:
         return QPoint(*(round(value) for value in self.canvas.view.to_screen(point)))
@@ -92,8 +101,8 @@ class Rater:
         for key in keys:
             QTest.keyClick(QApplication.focusWidget() or self.canvas, key, modifier)
             self.events += 1
-            if not self.desk.is_open:
-                self.qtbot.waitUntil(lambda: self.desk.is_open)
+            if not self.model.is_open:
+                self.qtbot.waitUntil(lambda: self.model.is_open)
 
     def kept(self) -> list[StoredAnnotation]:
         """What a reader finds in the file, once the window is closed."""
@@ -123,17 +132,13 @@ def rater(make: MakeRater) -> Rater:
     return make()
 
 
-def drawn(rater: Rater) -> Annotation:
-    return rater.desk.annotation
-
-
 def test_an_image_in_at_most_twelve_events_with_the_angle_of_the_method(rater: Rater) -> None:
     rater.click(*ROBOT)
     rater.press(Key.Key_Return)
     rater.click(*VESSEL)
     rater.press(Key.Key_Return, Key.Key_Return, Key.Key_Return)
     assert rater.events <= 12
-    assert rater.desk.index == 1, "on to the next"
+    assert rater.model.index == 1, "on to the next"
     (one,) = rater.kept()
     placed = measure_lines(one.content, SIZE, PerceptionConfig()).pose
     asked = measure_lines(Annotation(ROBOT, VESSEL), SIZE, PerceptionConfig()).pose
@@ -153,11 +158,11 @@ def test_an_enter_that_is_held_ends_one_thing(rater: Rater) -> None:
         for key in (Key.Key_Return, Key.Key_Enter) if is_repeat else (Key.Key_Return,):
             press = QKeyEvent(QEvent.Type.KeyPress, key, Qt.KeyboardModifier.NoModifier, "\r", is_repeat)
             QApplication.sendEvent(rater.canvas, press)
-    assert len(drawn(rater).vessel) == 2
-    assert drawn(rater).state is None, "the line is ended; nobody has chosen a state"
-    assert rater.desk.index == 0
+    assert len(rater.drawn.vessel) == 2
+    assert rater.drawn.state is None, "the line is ended; nobody has chosen a state"
+    assert rater.model.index == 0
     rater.press(Key.Key_Return)
-    assert drawn(rater).state is not None
+    assert rater.drawn.state is not None
 
 
 def test_the_readout_is_live_and_says_what_is_missing(rater: Rater) -> None:
@@ -177,9 +182,9 @@ def test_the_readout_is_live_and_says_what_is_missing(rater: Rater) -> None:
     rater.press(Key.Key_D)
     assert readout.state_text == "Crossed"
     rater.press(Key.Key_X)
-    assert (readout.state_text, drawn(rater).state) == ("Can't tell", None)
+    assert (readout.state_text, rater.drawn.state) == ("Can't tell", None)
     rater.press(Key.Key_X)
-    assert (readout.state_text, drawn(rater).state) == ("Crossed", PoseState.D), "as it was before"
+    assert (readout.state_text, rater.drawn.state) == ("Crossed", PoseState.D), "as it was before"
 
 
 def test_everything_by_keyboard(rater: Rater) -> None:
@@ -190,7 +195,7 @@ def test_everything_by_keyboard(rater: Rater) -> None:
     rater.press(Key.Key_Insert)
     rater.press(*[Key.Key_Right] * 6, modifier=shift)
     rater.press(Key.Key_Insert, Key.Key_Return)
-    assert drawn(rater).robot == ((309.5, 239.5), (369.5, 239.5))
+    assert rater.drawn.robot == ((309.5, 239.5), (369.5, 239.5))
     assert rater.canvas.tool is Tool.VESSEL
     rater.press(Key.Key_Down, modifier=shift)
     rater.press(Key.Key_Insert)
@@ -200,28 +205,28 @@ def test_everything_by_keyboard(rater: Rater) -> None:
     rater.press(Key.Key_1, Key.Key_Tab)
     rater.press(Key.Key_Up)
     rater.press(Key.Key_Right, modifier=ctrl)
-    assert drawn(rater).robot[-1] == pytest.approx((369.6, 238.5))
+    assert rater.drawn.robot[-1] == pytest.approx((369.6, 238.5))
     rater.press(Key.Key_Delete)
-    assert len(drawn(rater).robot) == 1
+    assert len(rater.drawn.robot) == 1
     rater.press(Key.Key_Z, modifier=ctrl)
-    assert drawn(rater).robot[-1] == pytest.approx((369.6, 238.5))
+    assert rater.drawn.robot[-1] == pytest.approx((369.6, 238.5))
 
 
 def test_undo_and_redo_reach_over_a_restart(make: MakeRater) -> None:
     ctrl, both = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
     first = make()
     first.click(*ROBOT)
-    before = drawn(first)
+    before = first.drawn
     first.press(Key.Key_Z, modifier=ctrl)
     first.window.close()
     again = make()
-    assert again.desk.index == 0
+    assert again.model.index == 0
     again.press(Key.Key_Z, modifier=both)
-    assert drawn(again) == before
+    assert again.drawn == before
     again.press(*[Key.Key_Z] * 3, modifier=ctrl)
-    assert drawn(again) == Annotation()
+    assert again.drawn == Annotation()
     again.press(Key.Key_Z, modifier=ctrl)
-    assert again.window.panels.toast.text() == "Nothing to undo"
+    assert again.message == "Nothing to undo"
 
 
 def test_points_are_dragged_put_in_and_taken_out(rater: Rater) -> None:
@@ -229,18 +234,18 @@ def test_points_are_dragged_put_in_and_taken_out(rater: Rater) -> None:
     rater.press(Key.Key_Return, Key.Key_1)
     rater.canvas.close_line()
     rater.drag((320.0, 180.0), (330.0, 200.0))
-    assert drawn(rater).robot[1] == pytest.approx((330.0, 200.0), abs=1.0)
+    assert rater.drawn.robot[1] == pytest.approx((330.0, 200.0), abs=1.0)
     rater.drag((265.0, 190.0), (265.0, 160.0))
-    assert drawn(rater).robot[1] == pytest.approx((265.0, 160.0), abs=1.0)
+    assert rater.drawn.robot[1] == pytest.approx((265.0, 160.0), abs=1.0)
     rater.click((265.0, 160.0), button=Qt.MouseButton.RightButton)
-    assert len(drawn(rater).robot) == 2
+    assert len(rater.drawn.robot) == 2
 
 
 def _both_lines(rater: Rater) -> None:
     rater.click(*ROBOT)
-    rater.press(Qt.Key.Key_Return)
+    rater.press(Key.Key_Return)
     rater.click(*VESSEL)
-    rater.press(Qt.Key.Key_Return)
+    rater.press(Key.Key_Return)
 
 
 def test_a_right_click_that_misses_answers_nothing(rater: Rater) -> None:
@@ -248,54 +253,54 @@ def test_a_right_click_that_misses_answers_nothing(rater: Rater) -> None:
     beside = rater.at(ROBOT[1]) + QPoint(0, 14)
     for _ in range(2):
         QTest.mouseClick(rater.canvas, Qt.MouseButton.RightButton, pos=beside)
-    assert (drawn(rater).state, rater.desk.index, len(drawn(rater).robot)) == (None, 0, 3)
+    assert (rater.drawn.state, rater.model.index, len(rater.drawn.robot)) == (None, 0, 3)
 
 
 OUTLINE: tuple[Point, ...] = ((300.0, 300.0), (400.0, 300.0), (400.0, 400.0), (300.0, 400.0))
 
 
-@pytest.mark.parametrize("key", [Qt.Key.Key_4, Qt.Key.Key_N, Qt.Key.Key_B])
+@pytest.mark.parametrize("key", [Key.Key_4, Key.Key_N, Key.Key_B])
 def test_an_outline_is_not_lost_by_what_comes_next(rater: Rater, key: Qt.Key) -> None:
-    rater.press(Qt.Key.Key_3)
+    rater.press(Key.Key_3)
     rater.click(*OUTLINE)
     rater.press(key)
-    if rater.desk.index:
-        rater.press(Qt.Key.Key_P)
-    (mask,) = drawn(rater).masks
+    if rater.model.index:
+        rater.press(Key.Key_P)
+    (mask,) = rater.drawn.masks
     assert len(mask.points) == 4
-    rater.press(Qt.Key.Key_3)
+    rater.press(Key.Key_3)
     rater.click(*((x + 150.0, y) for x, y in OUTLINE))
     assert len(rater.kept()[0].content.masks) == 2, "closing the window completes it, too"
 
 
 def test_undo_takes_back_the_outline_that_is_being_drawn_first(rater: Rater) -> None:
     _both_lines(rater)
-    rater.press(Qt.Key.Key_3)
+    rater.press(Key.Key_3)
     rater.click(*OUTLINE)
-    rater.press(Qt.Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
-    assert len(rater.canvas._hand.drawing.draft) == 3
-    assert len(drawn(rater).vessel) == len(VESSEL)
+    rater.press(Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
+    assert len(rater.canvas.editor.drawing.draft) == 3
+    assert len(rater.drawn.vessel) == len(VESSEL)
 
 
 def test_a_key_while_the_button_is_down_loses_no_point(rater: Rater) -> None:
     rater.click(*ROBOT[:2])
     QTest.mouseMove(rater.canvas, rater.at(ROBOT[2]))
     QTest.mousePress(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at(ROBOT[2]))
-    rater.press(Qt.Key.Key_B)
+    rater.press(Key.Key_B)
     QTest.mouseRelease(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at(ROBOT[2]))
-    assert (len(drawn(rater).robot), drawn(rater).state) == (3, PoseState.B)
+    assert (len(rater.drawn.robot), rater.drawn.state) == (3, PoseState.B)
 
 
 def test_a_stroke_is_not_lost_by_a_key_or_another_button(rater: Rater) -> None:
-    rater.press(Qt.Key.Key_3, Qt.Key.Key_T)
+    rater.press(Key.Key_3, Key.Key_T)
     QTest.mousePress(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((300.0, 300.0)))
     QTest.mouseMove(rater.canvas, rater.at((350.0, 300.0)))
     QTest.mousePress(rater.canvas, Qt.MouseButton.RightButton, pos=rater.at((350.0, 300.0)))
     QTest.mouseMove(rater.canvas, rater.at((400.0, 300.0)))
-    rater.press(Qt.Key.Key_N)
+    rater.press(Key.Key_N)
     QTest.mouseRelease(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((400.0, 300.0)))
-    rater.press(Qt.Key.Key_P)
-    (mask,) = drawn(rater).masks
+    rater.press(Key.Key_P)
+    (mask,) = rater.drawn.masks
     xs = [x for x, _ in mask.points]
     assert max(xs) - min(xs) > 100.0
 
@@ -304,34 +309,34 @@ def test_a_double_click_ends_the_line(rater: Rater) -> None:
     rater.click((200.0, 180.0), (320.0, 180.0))
     QTest.mouseDClick(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((320.0, 180.0)))
     assert rater.canvas.tool is Tool.VESSEL
-    assert len(drawn(rater).robot) == 2
+    assert len(rater.drawn.robot) == 2
 
 
 def test_a_second_quick_grab_of_a_point_takes_no_state_and_leaves_no_image(rater: Rater) -> None:
     rater.click((200.0, 180.0), (320.0, 180.0))
-    rater.press(Qt.Key.Key_Return)
+    rater.press(Key.Key_Return)
     rater.click((200.0, 200.0), (320.0, 200.0))
-    rater.press(Qt.Key.Key_Return)
-    assert drawn(rater).state is None
+    rater.press(Key.Key_Return)
+    assert rater.drawn.state is None
     for _ in range(2):
         QTest.mouseDClick(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((320.0, 180.0)))
         QTest.mouseRelease(rater.canvas, Qt.MouseButton.LeftButton, pos=rater.at((320.0, 180.0)))
-    assert drawn(rater).state is None
-    assert rater.desk.index == 0
-    rater.press(Qt.Key.Key_Return)
-    assert drawn(rater).state is not None, "Enter does"
+    assert rater.drawn.state is None
+    assert rater.model.index == 0
+    rater.press(Key.Key_Return)
+    assert rater.drawn.state is not None, "Enter does"
 
 
 def test_a_record_that_is_damaged_comes_back_from_its_journal(make: MakeRater) -> None:
     """Opening its image must not put an empty one in its place."""
     rater = make()
     rater.click((200.0, 180.0), (320.0, 180.0))
-    rater.press(Qt.Key.Key_Return)
+    rater.press(Key.Key_Return)
     (before,) = rater.kept()
     with closing(sqlite3.connect(rater.store_path)) as database, database:
         database.execute("UPDATE annotations SET check_sum = 'spoilt'")
     again = make()
-    rater.qtbot.waitUntil(lambda: drawn(again).robot == before.content.robot)
+    rater.qtbot.waitUntil(lambda: again.drawn.robot == before.content.robot)
     (after,) = again.kept()
     assert after.content == before.content
 
@@ -342,27 +347,27 @@ def test_progress_and_status(rater: Rater) -> None:
     rater.press(Key.Key_X, Key.Key_N)
     assert queue.progress_text == "1 of 3 done, 2 left"
     rater.press(Key.Key_N, Key.Key_U)
-    assert rater.desk.index == 1, "the next without an answer, around the end"
+    assert rater.model.index == 1, "the next without an answer, around the end"
     rater.press(Key.Key_X, Key.Key_End, Key.Key_X, Key.Key_N)
-    assert rater.window.panels.toast.text() == "The last image. All are done"
+    assert rater.message == "The last image. All are done"
     assert [one.content.cannot_tell for one in rater.kept()] == [True] * 3
 
 
 def test_a_blind_study_hides_the_algorithm_and_the_names(make: MakeRater) -> None:
     rater = make((ImageView.AS_IS, ImageView.MIRRORED), blind=True)
     rater.press(Key.Key_H)
-    assert "hidden" in rater.window.panels.toast.text()
+    assert "hidden" in rater.message
     rater.press(Key.Key_G)
-    assert rater.desk.proposal is None
-    assert rater.canvas.proposal is None
+    assert rater.model.proposal is None
+    assert rater.canvas.editor.drawing.proposal is None
     assert ".png" not in rater.window.panels.header._title.text()
-    assert len(rater.desk.items) == 6
+    assert len(rater.model.items) == 6
 
 
 def test_a_mirrored_repeat_is_kept_as_the_image_lies_on_the_disk(make: MakeRater) -> None:
     rater = make((ImageView.AS_IS, ImageView.MIRRORED), blind=True)
     rater.window.open(3)
-    rater.qtbot.waitUntil(lambda: rater.desk.is_open)
+    rater.qtbot.waitUntil(lambda: rater.model.is_open)
     mirrored = [tuple((SIZE[0] - 1 - x, y) for x, y in line) for line in (ROBOT, VESSEL)]
     rater.click(*mirrored[0])
     rater.press(Key.Key_Return)
@@ -379,21 +384,21 @@ def test_a_mirrored_repeat_is_kept_as_the_image_lies_on_the_disk(make: MakeRater
 def test_the_algorithms_answer_is_shown_and_taken_over_on_demand(rater: Rater) -> None:
     box = MaskPolygon(MaskTarget.VESSEL, ((100.0, 100.0), (300.0, 100.0), (300.0, 300.0)))
     pose = measure_lines(Annotation(ROBOT, VESSEL), SIZE, PerceptionConfig()).pose
-    item = rater.desk.item
+    item = rater.model.item
     assert item is not None
-    rater.desk._proposals[item.image.sha256] = Proposal(Annotation(ROBOT, VESSEL, PoseState.B, masks=(box,)), pose, 0.8)
-    assert rater.canvas.proposal is None
+    rater.model._proposals[item.image.sha256] = Proposal(Annotation(ROBOT, VESSEL, PoseState.B, masks=(box,)), pose, 0.8)
+    assert rater.canvas.editor.drawing.proposal is None
     rater.press(Key.Key_H)
-    assert rater.canvas.proposal is not None
-    assert "G takes it over" in rater.window.panels.toast.text()
-    assert drawn(rater) == Annotation(), "seen is not taken"
-    assert rater.desk.store.given_after_look() == set(), "nothing was answered yet"
+    assert rater.canvas.editor.drawing.proposal is not None
+    assert "G takes it over" in rater.message
+    assert rater.drawn == Annotation(), "seen is not taken"
+    assert rater.model.store.given_after_look() == set(), "nothing was answered yet"
     rater.press(Key.Key_G)
-    assert (drawn(rater).robot, drawn(rater).vessel, drawn(rater).state, drawn(rater).masks) == (ROBOT, VESSEL, None, ())
+    assert (rater.drawn.robot, rater.drawn.vessel, rater.drawn.state, rater.drawn.masks) == (ROBOT, VESSEL, None, ())
     rater.press(Key.Key_4, Key.Key_G)
-    assert drawn(rater).masks == (box,)
-    rater.qtbot.waitUntil(lambda: rater.desk.unsaved == 0)
-    assert rater.desk.store.given_after_look() == {item.key}
+    assert rater.drawn.masks == (box,)
+    rater.qtbot.waitUntil(lambda: rater.model.unsaved == 0)
+    assert rater.model.store.given_after_look() == {item.key}
 
 
 def test_an_answer_that_comes_after_it_was_switched_off_is_not_shown(rater: Rater) -> None:
@@ -403,41 +408,41 @@ def test_an_answer_that_comes_after_it_was_switched_off_is_not_shown(rater: Rate
         may_answer.wait(20.0)
         return make_scene(pose)
 
-    rater.desk._perceive = perceive
+    rater.model._perceive = perceive
     bar = rater.window.panels.bar
     rater.press(Key.Key_H)
     rater.press(Key.Key_G)
     assert bar.is_on("H"), "what is waited for cannot be taken over yet, and is waited for"
     rater.press(Key.Key_H)
     may_answer.set()
-    rater.qtbot.waitUntil(lambda: rater.desk.proposal is not None)
+    rater.qtbot.waitUntil(lambda: rater.model.proposal is not None)
     assert not bar.is_on("H")
-    assert rater.canvas.proposal is None
-    assert "Algorithm:" not in rater.window.panels.toast.text()
+    assert rater.canvas.editor.drawing.proposal is None
+    assert "Algorithm:" not in rater.message
     rater.press(Key.Key_H)
-    assert rater.canvas.proposal is not None, "the answer was kept"
+    assert rater.canvas.editor.drawing.proposal is not None, "the answer was kept"
 
 
 def test_without_an_answer_of_the_algorithm_it_says_why(rater: Rater) -> None:
-    item = rater.desk.item
+    item = rater.model.item
     assert item is not None
     blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
-    rater.desk._proposals[item.image.sha256] = proposal_of(Pipeline(TrueMasks(), PerceptionConfig()).perceive_single(blank))
+    rater.model._proposals[item.image.sha256] = proposal_of(Pipeline(TrueMasks(), PerceptionConfig()).perceive_single(blank))
     rater.press(Key.Key_H)
-    assert rater.window.panels.toast.text().startswith("The algorithm gives no pose: image black: 99 % of it")
+    assert rater.message.startswith("The algorithm gives no pose: image black: 99 % of it")
 
 
 def test_brush_and_outline(rater: Rater) -> None:
     rater.press(Key.Key_4)
     rater.click((100.0, 100.0), (300.0, 100.0), (300.0, 300.0))
     rater.press(Key.Key_Return)
-    assert len(drawn(rater).masks) == 1
+    assert len(rater.drawn.masks) == 1
     rater.press(Key.Key_T)
     rater.drag((500.0, 400.0), (520.0, 400.0))
-    assert len(drawn(rater).masks) == 2
-    before = sum(len(mask.points) for mask in drawn(rater).masks)
+    assert len(rater.drawn.masks) == 2
+    before = sum(len(mask.points) for mask in rater.drawn.masks)
     rater.press(Key.Key_S)
-    assert sum(len(mask.points) for mask in drawn(rater).masks) < before
+    assert sum(len(mask.points) for mask in rater.drawn.masks) < before
 
 
 def test_a_hole_in_a_mask_stays_open_on_the_screen(rater: Rater) -> None:
@@ -445,7 +450,7 @@ def test_a_hole_in_a_mask_stays_open_on_the_screen(rater: Rater) -> None:
         return MaskPolygon(MaskTarget.VESSEL, ((low, low), (high, low), (high, high), (low, high)), is_hole)
 
     bare = rater.canvas.grab().toImage()
-    rater.desk.edit(
+    rater.model.edit(
         "masks", Annotation(masks=(box(100, 300, is_hole=False), box(150, 250, is_hole=True), box(280, 400, is_hole=False)))
     )
     shown = rater.canvas.grab().toImage()
@@ -460,7 +465,7 @@ def test_letters_go_into_a_note_and_not_into_the_state(rater: Rater) -> None:
         QTest.keyClick(rater.window.panels.note, letter)
     rater.press(Key.Key_Return)
     assert rater.canvas.hasFocus()
-    assert (drawn(rater).note, drawn(rater).state) == ("bad", None)
+    assert (rater.drawn.note, rater.drawn.state) == ("bad", None)
 
 
 def test_zoom_keeps_the_place_under_the_cursor_and_clicks_stay_true(rater: Rater) -> None:
@@ -470,13 +475,13 @@ def test_zoom_keeps_the_place_under_the_cursor_and_clicks_stay_true(rater: Rater
         rater.press(Key.Key_Plus)
     assert rater.canvas.view.to_screen((200.0, 180.0)) == pytest.approx(before, abs=3.0)
     rater.click((201.2, 181.4))
-    assert drawn(rater).robot[0] == pytest.approx((201.2, 181.4), abs=0.1), "zoomed in, clicks are as fine"
+    assert rater.drawn.robot[0] == pytest.approx((201.2, 181.4), abs=0.1), "zoomed in, clicks are as fine"
     rater.press(Key.Key_F)
     assert rater.canvas.view.is_fitted
 
 
 def test_an_edit_that_cannot_be_written_is_shouted_and_written_later(rater: Rater, monkeypatch: pytest.MonkeyPatch) -> None:
-    store = rater.desk._store
+    store = rater.model.store
     whole = store.save
     monkeypatch.setattr(store, "save", lambda *_: (_ for _ in ()).throw(AnnotationError("the disk is full")))
     rater.click(*ROBOT)
@@ -494,10 +499,10 @@ def test_an_edit_that_cannot_be_written_is_shouted_and_written_later(rater: Rate
 def test_closing_asks_about_edits_that_the_disk_did_not_take(
     rater: Rater, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, last: str
 ) -> None:
-    monkeypatch.setattr(rater.desk._store, "save", lambda *_: (_ for _ in ()).throw(AnnotationError("the disk is full")))
+    monkeypatch.setattr(rater.model.store, "save", lambda *_: (_ for _ in ()).throw(AnnotationError("the disk is full")))
     asked: list[int] = []
     answer = False
-    monkeypatch.setattr(rater.window, "_may_lose", lambda: asked.append(rater.desk.unsaved) or answer)
+    monkeypatch.setattr(rater.window, "_may_lose", lambda: asked.append(rater.model.unsaved) or answer)
     if last != "only one":
         rater.press(Key.Key_A)
         rater.qtbot.waitUntil(lambda: "NOT SAVED: 1 edit" in rater.window.panels.header.saved_text)
@@ -518,20 +523,20 @@ def test_a_note_stays_with_its_picture(rater: Rater) -> None:
     rater.press(Key.Key_F2)
     QTest.keyClicks(rater.window.panels.note, "blurred")
     rater.press(Key.Key_PageDown)
-    rater.qtbot.waitUntil(lambda: rater.desk.index == 1 and rater.desk.is_open)
+    rater.qtbot.waitUntil(lambda: rater.model.index == 1 and rater.model.is_open)
     assert rater.window.panels.note.text() == ""
     rater.press(Key.Key_Return)
-    assert [(one.key.sha256, one.content.note) for one in rater.kept()] == [(rater.desk.items[0].key.sha256, "blurred")]
+    assert [(one.key.sha256, one.content.note) for one in rater.kept()] == [(rater.model.items[0].key.sha256, "blurred")]
 
 
 def test_an_image_that_vanished_is_named_and_the_others_go_on(rater: Rater) -> None:
-    rater.desk.items[2].image.path.unlink()
+    rater.model.items[2].image.path.unlink()
     rater.window.open(2)
-    rater.qtbot.waitUntil(lambda: "2.png: cannot be read" in rater.window.panels.toast.text())
-    assert not rater.desk.is_open
+    rater.qtbot.waitUntil(lambda: "2.png: cannot be read" in rater.message)
+    assert not rater.model.is_open
     rater.click(*ROBOT)
     rater.window.open(0)
-    rater.qtbot.waitUntil(lambda: rater.desk.is_open)
+    rater.qtbot.waitUntil(lambda: rater.model.is_open)
     assert rater.kept() == []
 
 

@@ -1,0 +1,153 @@
+"""Pictures for ``annotate`` among folders, links, videos and sessions; which of them are alike."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from app.annotator.comparison import groups_of
+from app.annotator.sources import default_store, image_files
+from core.annotation.store import DEFAULT_NAME
+from core.devices import UserError
+from core.learning.dataset import write_png
+from tests.core.session_data import QUICK, number_in, record, tick_of
+
+
+def test_a_link_that_leads_nowhere_keeps_nobody_from_the_rest(tmp_path: Path) -> None:
+    some, labelled = tmp_path / "some", tmp_path / "labelled"
+    some.mkdir()
+    write_png(some / "a.png", np.zeros((4, 4, 3), np.uint8))
+    for name in ("clip.mp4", "b.png"):
+        (some / name).symlink_to(tmp_path / "gone")
+    assert image_files([some], 4) == [some / "a.png"]
+    shutil.copytree(some, labelled / "images", symlinks=True)
+    (labelled / "c.png").symlink_to(tmp_path / "gone")
+    assert image_files([labelled], 4) == [labelled / "images" / "a.png"]
+    with pytest.raises(UserError, match="no such file or folder"):
+        image_files([some / "b.png"], 4)
+
+
+def film(video: Path, greys: Sequence[int], options: dict[str, str] | None = None) -> Path:
+    with av.open(str(video), "w") as container:
+        stream = container.add_stream("libx264", rate=30, options=options or {})
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for grey in greys:
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), grey, np.uint8), format="rgb24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return video
+
+
+def grey_of(path: Path) -> float:
+    return float(cv2.imread(str(path)).mean())
+
+
+def test_videos_whose_names_differ_in_their_endings_have_pictures_of_their_own(tmp_path: Path) -> None:
+    film(tmp_path / "run.mkv", [40] * 5)
+    film(tmp_path / "run.mp4", [200] * 5)
+    files = image_files([tmp_path], 2)
+    assert [path.parent.name for path in files] == ["run.mkv_frames"] * 2 + ["run.mp4_frames"] * 2
+    assert [round(grey_of(path), -1) for path in files] == [40, 40, 200, 200]
+
+
+def test_a_video_that_pictures_were_taken_of_is_gone_on_with_those(tmp_path: Path) -> None:
+    """The second rater's call does not say how many: a study of 500 must not become one of 48."""
+    video = film(tmp_path / "run.mp4", [4 * k for k in range(60)])
+    assert [len(image_files([video], count)) for count in (55, None)] == [55, 55]
+    other = film(tmp_path / "other.mp4", [4 * k for k in range(60)])
+    assert len(image_files([other], None)) == 48
+
+
+def test_a_session_in_several_files_is_one_recording(tmp_path: Path) -> None:
+    """The last minute of an hour must not count as much as the hour."""
+    config = QUICK.model_copy(update={"split_s": 1.4})
+    session = record(tmp_path, [tick_of(index, 1000.0 + index / 30.0) for index in range(60)], config)
+    assert len(list(session.glob("video_*.mkv"))) == 2
+    files = image_files([session], 7)
+    assert [path.parent.name for path in files] == ["video_0000_frames"] * 5 + ["video_0001_frames"] * 2
+    assert image_files([session], None) == files
+
+
+def test_pictures_of_an_older_video_of_its_name_are_not_taken_for_its_own(tmp_path: Path) -> None:
+    video = film(tmp_path / "take.mp4", [40] * 5)
+    files = image_files([video], 2)
+    film(video, [200] * 5)
+    for reuse in (False, True):
+        with pytest.raises(UserError, match=r"take_frames: holds pictures of another video than take.mp4 is now; move it away"):
+            image_files([video], 2, reuse=reuse)
+    assert round(grey_of(files[0]), -1) == 40
+    (video.with_name("take_frames") / "video.json").unlink()  # as folders were before they knew whose they are
+    with pytest.raises(UserError, match="holds pictures of another video"):
+        image_files([video], 2)
+    film(video, [40] * 5)
+    assert image_files([video], 2) == files
+    assert (files[0].parent / "video.json").is_file()
+
+
+def test_a_damaged_frame_is_left_out_and_no_neighbour_taken_for_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    video = film(tmp_path / "run.mkv", [8 * k for k in range(31)], {"g": "1", "bf": "0"})
+    with av.open(str(video)) as container:
+        packets = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
+    data = bytearray(video.read_bytes())
+    position, size = packets[10]
+    data[position + 4 : position + size] = bytes(size - 4)
+    video.write_bytes(data)
+    assert [path.name for path in image_files([video], 4)] == ["run_000000.png", "run_000020.png", "run_000030.png"]
+    assert "run.mkv: 1 of 4 chosen frames are lost or damaged: left out" in capsys.readouterr().err
+
+
+def test_what_a_decoder_conceals_in_a_session_is_not_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    session = record(tmp_path, (tick_of(index, 100.0 + index / 30) for index in range(60)))
+    video = session / "video_0000.mkv"
+    with av.open(str(video)) as container:
+        packets = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
+    data = bytearray(video.read_bytes())
+    position, size = packets[20]
+    data[position + size // 2] ^= 0xFF
+    video.write_bytes(data)
+    files = image_files([session], 60)
+    assert 20 <= len(files) < 60
+    assert {path.stem for path in files} & {f"video_0000_{place:06d}" for place in range(20, 30)} == set()
+    assert "chosen frames are lost or damaged: left out" in capsys.readouterr().err
+    for path in files:
+        assert number_in(cv2.imread(str(path))[:, :, ::-1]) == int(path.stem[-6:])
+
+
+def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
+    video = film(tmp_path / "run.mkv", [8 * k for k in range(31)])
+    files = image_files([video], 4)
+    assert [path.name for path in files] == ["run_000000.png", "run_000010.png", "run_000020.png", "run_000030.png"]
+    assert image_files([video], 4) == files, "written once"
+    assert [round(grey_of(path) / 8) for path in files] == [0, 10, 20, 30]
+    assert default_store([video]) == tmp_path / DEFAULT_NAME
+    assert image_files([video], 48, reuse=True) == files, "who evaluates finds what was annotated, however many those are"
+    for path in files:
+        path.unlink()
+    assert image_files([video], 4, reuse=True) == files
+
+
+def test_folders_inside_sessions_that_have_equal_names_are_told_apart() -> None:
+    one, other = Path("data/run_1/images/a.png"), Path("data/run_2/images/a.png")
+    assert groups_of([one, other]) == {one: "run_1/images", other: "run_2/images"}
+
+
+def test_pictures_of_one_recording_are_one_group(tmp_path: Path) -> None:
+    """Whatever folders its files have; of plain pictures in one folder nobody knows what they show."""
+    session, video, plain = (tmp_path / name for name in ("session_1", "run_frames", "pictures"))
+    parts = [session / f"video_000{k}_frames" for k in range(2)]
+    for place in (*parts, video, plain):
+        place.mkdir(parents=True)
+    (session / "frames.jsonl").touch()
+    (video / "video.json").touch()
+    of_session = [part / "a.png" for part in parts]
+    assert set(groups_of(of_session).values()) == {"session_1"}
+    assert groups_of([video / "a.png", video / "b.png"]) == {video / "a.png": "run_frames", video / "b.png": "run_frames"}
+    assert groups_of([plain / "a.png", plain / "b.png"]) == {plain / "a.png": None, plain / "b.png": None}
+    mixed = groups_of([*of_session, plain / "a.png"])
+    assert list(mixed.values()) == ["session_1", "session_1", "pictures"]
