@@ -1,45 +1,223 @@
-"""Processes of our own beside the application's: the servo bus and the twin.
-
-A slot of depth one between two processes: the newest value wins, and neither side ever waits for the other.
-
-A thread that serves one input device: it waits for bytes or for the time, and can be ended at once.
-"""
+"""Child processes (the servo bus and the twin), the shared memory between two processes, and threads that serve a device."""
 
 from __future__ import annotations
 
+import contextlib
+import json
 import logging
 import math
 import mmap
 import os
 import select
+import socket
 import struct
 import subprocess
 import sys
 import threading
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
+from core.devices import DeviceError
+
+_log = logging.getLogger(__name__)
 _ROOT = Path(__file__).resolve().parents[1]
+MESSAGE_BYTES = 131_072
+"""The largest message on a socket between two processes."""
+PARENT_CHECK_S = 1.0
+"""How often a process that waits for its first message looks whether its parent still lives."""
 
 
-def start_child(module: str, ends: Sequence[int], *arguments: str, talks: bool = False) -> subprocess.Popen[bytes]:
-    """``python -m module``, whose first arguments are the file descriptors `ends`, which it inherits; raises OSError.
+class ChildProcess:
+    """``python -m module``, which loads at once and waits for its first message: it may be started before it is needed.
 
-    In a session of its own: Ctrl-C and Ctrl-Z in the application's terminal do not reach it. One that `talks` has pipes for its
-    standard input and output, others have none.
+    The child inherits its ends of a shared memory, a pipe and a socket for JSON messages, and gets their numbers and our process id
+    as arguments: ``ParentLink`` reads them. It has a session of its own, so that Ctrl-C in our terminal does not reach it.
+
+    Parameters
+    ----------
+    module : has a ``main`` that makes a ``ParentLink`` of its arguments.
+    title : what messages call it.
+    error : raised when it cannot be started: no memory, no descriptors.
+    writes_pipe : whether our end of the pipe is the one that writes.
     """
-    path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH", ""))))
-    quiet = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    stream = subprocess.PIPE if talks else subprocess.DEVNULL
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", module, *map(str, ends), *arguments],
-        stdin=stream,
-        stdout=stream,
-        pass_fds=ends,
-        start_new_session=True,
-        env={**os.environ, **quiet, "PYTHONPATH": path},
-    )
+
+    def __init__(self, module: str, title: str, error: type[DeviceError] = DeviceError, *, writes_pipe: bool) -> None:
+        self._title, self._error = title, error
+        self._memory: mmap.mmap | None = None
+        self._is_claimed = self._has_message = False
+        with self._start_errors(), contextlib.ExitStack() as undo, contextlib.ExitStack() as theirs:
+            self._memory_fd = os.memfd_create(module, os.MFD_CLOEXEC)
+            undo.callback(os.close, self._memory_fd)
+            ends = os.pipe()
+            self.pipe, their_pipe = reversed(ends) if writes_pipe else ends
+            undo.callback(os.close, self.pipe)
+            theirs.callback(os.close, their_pipe)
+            self.socket, their_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            undo.callback(self.socket.close)
+            theirs.callback(their_socket.close)
+            fds = (self._memory_fd, their_pipe, their_socket.fileno())
+            path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH", ""))))
+            one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", module, *map(str, fds), str(os.getpid())],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                pass_fds=fds,
+                start_new_session=True,
+                env={**os.environ, **one_thread, "PYTHONPATH": path},
+            )
+            undo.pop_all()
+        os.set_blocking(self.pipe, False)
+        self.socket.setblocking(False)
+
+    @contextlib.contextmanager
+    def _start_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise self._error(f"{self._title} cannot be started ({error.strerror}): free memory, then try again") from None
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def exit_code(self) -> int | None:
+        """None while it runs; negative: the number of the signal that ended it."""
+        return self._process.poll()
+
+    def map_memory(self, size: int) -> mmap.mmap:
+        """Give the shared memory its length, before the first message."""
+        with self._start_errors():
+            os.ftruncate(self._memory_fd, size)
+            self._memory = mmap.mmap(self._memory_fd, size)
+        return self._memory
+
+    def send(self, message: dict[str, Any]) -> None:
+        """Raises OSError: BlockingIOError when the child does not read, another one when it is gone."""
+        self._has_message = True
+        self.socket.send(json.dumps(message).encode())
+
+    def receive(self, timeout_s: float) -> dict[str, Any] | None:
+        """The next message; None when none came in time. Raises OSError when the child is gone and has said all."""
+        ready, _, _ = select.select([self.socket], [], [], max(0.0, timeout_s))
+        if not ready:
+            return None
+        if not (data := self.socket.recv(MESSAGE_BYTES)):
+            raise ConnectionResetError
+        message = json.loads(data)
+        return message if isinstance(message, dict) else {}
+
+    def wait(self, timeout_s: float) -> bool:
+        """Whether it has ended, waiting for that at most so long."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout_s)
+        return self._process.poll() is not None
+
+    def request_end(self) -> None:
+        """Close our ends, which asks the child to end; it may still answer. Call it once."""
+        with contextlib.suppress(OSError):
+            self.socket.shutdown(socket.SHUT_WR)  # a forked child of ours may keep the pipe open
+        os.close(self.pipe)
+
+    def await_end(self, patience_s: float) -> bool:
+        """Wait after ``request_end``; False when it had to be killed. A child without a message has no work, and is killed at
+        once."""
+        if self._has_message and self.wait(patience_s):
+            return True
+        self._process.kill()
+        self._process.wait()
+        return not self._has_message
+
+    def release(self) -> None:
+        """Give socket and memory back, after the end."""
+        self.socket.close()
+        if self._memory is not None:
+            self._memory.close()
+        os.close(self._memory_fd)
+
+    def discard(self) -> None:
+        """End a child that was started ahead and not needed; one that ``claim`` gave away is left alone. May be called twice."""
+        if not self._is_claimed:
+            self._is_claimed = True
+            self.request_end()
+            self.await_end(0.0)
+            self.release()
+
+    @staticmethod
+    def claim(prestarted: ChildProcess | None, start: Callable[[], ChildProcess]) -> ChildProcess:
+        """The prestarted child if it still lives, else a new one: the caller's to end from now on."""
+        if prestarted is not None and prestarted.exit_code() is not None:
+            prestarted.discard()
+            prestarted = None
+        child = prestarted or start()
+        child._is_claimed = True
+        return child
+
+
+class ParentLink:
+    """The child's ends of what ``ChildProcess`` shares with it: ``pipe``, ``socket`` and the memory.
+
+    Parameters
+    ----------
+    arguments : of the command line: file descriptors of memory, pipe and socket, and the parent's process id.
+    """
+
+    def __init__(self, arguments: Sequence[str]) -> None:
+        self._memory_fd, self.pipe, socket_fd, self._parent = map(int, arguments)
+        self.socket = socket.socket(fileno=socket_fd)
+        os.set_blocking(self.pipe, False)
+        self._memory: mmap.mmap | None = None
+        self._is_cut = False
+
+    @property
+    def is_alone(self) -> bool:
+        """The parent is gone: its ends are closed, or, should a child of it keep them open, we have another parent now."""
+        return self._is_cut or os.getppid() != self._parent
+
+    def first_message(self) -> dict[str, Any] | None:
+        """What the parent wants of this process, however long it takes; None when the parent was gone before it said so.
+
+        A parent that has sent it and is gone is no reason to end at once: a request or STOP may wait behind the message.
+        """
+        self.socket.settimeout(PARENT_CHECK_S)
+        while True:
+            try:
+                message = json.loads(self.socket.recv(MESSAGE_BYTES) or b"null")
+            except TimeoutError:  # started ahead, and not needed yet
+                if self.is_alone:
+                    return None
+            except (OSError, ValueError):
+                return None
+            else:
+                self.socket.setblocking(False)
+                return message if isinstance(message, dict) else None
+
+    def map_memory(self, size: int) -> mmap.mmap:
+        self._memory = mmap.mmap(self._memory_fd, size)
+        return self._memory
+
+    def send(self, message: dict[str, Any]) -> None:
+        """A parent that does not listen gets no message."""
+        with contextlib.suppress(OSError):
+            self.socket.send(json.dumps(message).encode(), socket.MSG_DONTWAIT)
+
+    def wait_for_end(self, ended: threading.Event) -> None:
+        """Set `ended` when the parent closes its ends or is gone. For a thread of a child that takes no requests."""
+        while not self.is_alone:
+            ready, _, _ = select.select([self.socket], [], [], PARENT_CHECK_S)
+            with contextlib.suppress(BlockingIOError):
+                self._is_cut = bool(ready) and not self.socket.recv(MESSAGE_BYTES)
+        ended.set()
+
+    def close(self) -> None:
+        self.socket.close()
+        if self._memory is not None:
+            self._memory.close()
+        for fd in (self._memory_fd, self.pipe):
+            with contextlib.suppress(OSError):
+                os.close(fd)
 
 
 _HEAD = struct.Struct("<QII")  # sequence number from 1, length, CRC over both and the data
@@ -48,7 +226,7 @@ _TRIES = 4
 
 
 class SharedSlot:
-    """One writer, one reader, in shared memory.
+    """One value in shared memory, from one writer to one reader; the newest wins, and neither side waits.
 
     Parameters
     ----------
@@ -58,13 +236,11 @@ class SharedSlot:
     Notes
     -----
     No lock: a process that is stopped or killed while it holds one stops the other. Values go in turn into two halves, each with a
-    checksum; a half that is being written, or was left half-written, is no value, and the other one still holds the value before.
+    checksum; while one half is being written, or was left half-written, the other one still holds the value before.
     """
 
     def __init__(self, memory: mmap.mmap, offset: int, capacity: int) -> None:
-        self._memory = memory
-        self._offset = offset
-        self._capacity = capacity
+        self._memory, self._offset, self._capacity = memory, offset, capacity
         self._written = 0
         self._read: tuple[int, bytes] | None = None
 
@@ -73,14 +249,14 @@ class SharedSlot:
         """Bytes of memory for values of `capacity` bytes."""
         return 2 * (_HEAD.size + capacity)
 
-    def put(self, data: bytes) -> None:
-        """Replace the value.
+    @classmethod
+    def row(cls, memory: mmap.mmap, capacities: Sequence[int]) -> list[SharedSlot]:
+        """Slots one behind the other from the memory's beginning."""
+        starts = [sum(map(cls.size, capacities[:index])) for index in range(len(capacities))]
+        return [cls(memory, start, capacity) for start, capacity in zip(starts, capacities, strict=True)]
 
-        Raises
-        ------
-        ValueError
-            When it is longer than the slot.
-        """
+    def put(self, data: bytes) -> None:
+        """Replace the value; raises ValueError when it is longer than the slot."""
         if len(data) > self._capacity:
             raise ValueError(f"{len(data)} bytes do not fit into a slot of {self._capacity}")
         self._written += 1
@@ -94,7 +270,7 @@ class SharedSlot:
         """Number and bytes of the newest whole value; None before the first."""
         known = self._read[0] if self._read is not None else 0
         for _ in range(_TRIES):
-            numbers = sorted(((self._number(half), half) for half in (0, 1)), reverse=True)
+            numbers = sorted(((self._head(half)[0], half) for half in (0, 1)), reverse=True)
             if numbers[0][0] == known:
                 break
             found = next((value for _, half in numbers if (value := self._whole(half)) is not None), None)
@@ -103,25 +279,22 @@ class SharedSlot:
                 break
         return self._read
 
-    def _number(self, half: int) -> int:
-        """What a half says it holds; 0 while it is being written."""
-        at = self._half(half)
-        number: int = _HEAD.unpack(self._memory[at : at + _HEAD.size])[0]
-        return number
-
     def _half(self, number: int) -> int:
         return self._offset + (number % 2) * (_HEAD.size + self._capacity)
 
-    def _whole(self, half: int) -> tuple[int, bytes] | None:
+    def _head(self, half: int) -> tuple[int, int, int]:
+        """Number (0 while it is being written), length and checksum of a half."""
         at = self._half(half)
         number, length, check = _HEAD.unpack(self._memory[at : at + _HEAD.size])
+        return number, length, check
+
+    def _whole(self, half: int) -> tuple[int, bytes] | None:
+        number, length, check = self._head(half)
         if number == 0 or length > self._capacity:
             return None
-        data = self._memory[at + _HEAD.size : at + _HEAD.size + length]
+        at = self._half(half) + _HEAD.size
+        data = self._memory[at : at + length]
         return (number, data) if zlib.crc32(data, zlib.crc32(_KEY.pack(number, length))) == check else None
-
-
-_log = logging.getLogger(__name__)
 
 
 class DeviceThread:
@@ -129,15 +302,12 @@ class DeviceThread:
 
     Parameters
     ----------
-    name : of the thread.
-    serve : what it does; called in the thread.
-    failed : called in the thread with what `serve` raised: the one thing that must be seen is that nobody serves any more.
+    serve : called in the thread.
+    failed : called in the thread with what `serve` raised.
     """
 
     def __init__(self, name: str, serve: Callable[[], None], failed: Callable[[Exception], None]) -> None:
-        self._name = name
-        self._serve = serve
-        self._failed = failed
+        self._name, self._serve, self._failed = name, serve, failed
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._wake = (-1, -1)

@@ -18,7 +18,7 @@ from core.types import RobotStatus
 from hardware.cameras.undistorted import UndistortedCamera
 
 if TYPE_CHECKING:
-    from hardware.servos.bus_ipc import BusProcess
+    from hardware.processes import ChildProcess
     from hardware.servos.servo_robot import ServoRobot
     from hardware.twin.process import PrestartedProcesses
     from hardware.twin.world import TwinWorld
@@ -69,10 +69,10 @@ def start_ahead(config: Config) -> PrestartedProcesses | None:
     """Start what a rig loads for seconds, for ``open_rig`` to take over; None where there is nothing, or it cannot be started."""
     if not _has_own_process(config):
         return None
-    from hardware.twin.process import start_twin
+    from hardware.twin.process import PrestartedProcesses
 
     try:
-        return start_twin()
+        return PrestartedProcesses()
     except DeviceError:  # it will be tried again, and then said
         return None
 
@@ -212,11 +212,11 @@ def _direct_robot(config: Config, world: TwinWorld) -> GuardedRobot:
 
 def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
     """The twin and its seven software servos in a process of their own."""
-    from hardware.twin.process import RemoteCamera, RemoteTwin, start_twin
+    from hardware.twin.process import PrestartedProcesses, RemoteCamera, RemoteTwin
 
-    loading = ahead or start_twin()
+    loading = ahead or PrestartedProcesses()
     with ExitStack() as undo:
-        undo.callback(loading.bus.end)
+        undo.callback(loading.end)
         twin = RemoteTwin(config, START_INSERTION_MM, loading.twin)
         undo.callback(twin.close)
         robot = _twin_servos(config, twin.port, twin.status, process=loading.bus)
@@ -245,7 +245,7 @@ def _twin_servos(
     truth: Callable[[], RobotStatus],
     *,
     on_close: Callable[[], None] | None = None,
-    process: BusProcess | None = None,
+    process: ChildProcess | None = None,
 ) -> ServoRobot:
     """The real driver in its own process on the software servos' port; zeroed, not armed."""
     from hardware.servos.servo_robot import ServoRobot

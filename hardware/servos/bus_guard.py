@@ -1,7 +1,4 @@
-"""What the bus process decides: who may move the servos, with what goals, and what ends a motion. No port, no clock of its own.
-
-What one order may do: a dead application can move a joint by one bounded step at most. Pure.
-"""
+"""What the bus process decides: which source may move the servos, with what goals, and what ends a motion. Pure."""
 
 from __future__ import annotations
 
@@ -29,15 +26,17 @@ from core.control.joints import Joints, joint_goals
 from core.types import Command
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, IssuedGoals
 from hardware.servos.dynamixel_port import NotReady
-from hardware.servos.motion_watch import FollowWatch
 from hardware.servos.registers import MissingServo, ServoReading, ServoState
+from hardware.servos.tracking import TrackingMonitor
+
+_MENDED_BY_ARMING = frozenset({Cause.WATCHDOG, Cause.REBOOTED})
 
 
 class OneStep:
-    """Keeps the goals of one order within ``max_step_mm`` of where the joints were last seen before it came.
+    """Keeps the goals of one order within ``max_step_mm`` of where the joints were before it came.
 
-    An order is good for ``command_max_age_s``, which at full speed is more than a step. The gate's own step is counted from the
-    measured position of each cycle, and moves along with the joint.
+    So a dead application moves a joint by one bounded step at most: an order is good for ``command_max_age_s``, which at full speed
+    is more than a step, and the gate's own step is counted from the measured position of each cycle, which moves along.
     """
 
     def __init__(self, joints: Sequence[JointConfig]) -> None:
@@ -62,15 +61,14 @@ class OneStep:
         )
 
 
-_MENDED_BY_ARMING = frozenset({Cause.WATCHDOG, Cause.REBOOTED})
-
-
 def report_of(readings: Sequence[ServoReading], *, armed: bool, errors: int, rebooted: bool = False) -> BusReport:
     """A cycle's readings as the supervisor wants them; values of a servo that is missing in this cycle are left out for all."""
     states = [reading for reading in readings if isinstance(reading, ServoState)]
     missing = [reading for reading in readings if isinstance(reading, MissingServo)]
     whole = bool(states) and not missing
-    astray = [state.goal_mm - state.position_mm for state in states if state.goal_mm is not None and state.position_mm is not None]
+    errors_mm = [
+        state.goal_mm - state.position_mm for state in states if state.goal_mm is not None and state.position_mm is not None
+    ]
     return BusReport(
         misses=tuple(reading.misses if isinstance(reading, MissingServo) else 0 for reading in readings),
         errors=errors,
@@ -78,8 +76,8 @@ def report_of(readings: Sequence[ServoReading], *, armed: bool, errors: int, reb
         hardware_errors=tuple(int(r.error) if isinstance(r, ServoState) else 0 for r in readings),
         temperatures_c=tuple(state.temperature_c for state in states) if whole else (),
         voltages_v=tuple(state.voltage_v for state in states) if whole else (),
-        # goals mean something only while they are followed; nobody is astray before
-        tracking_mm=() if not whole else tuple(astray) if armed and len(astray) == len(readings) else (0.0,) * len(readings),
+        # goals mean something only while they are followed
+        tracking_mm=() if not whole else tuple(errors_mm) if armed and len(errors_mm) == len(readings) else (0.0,) * len(readings),
         currents_ma=tuple(reading.current_ma if isinstance(reading, ServoState) else None for reading in readings),
         rebooted=rebooted or any(reading.restarted for reading in missing) or (armed and any(not s.torque for s in states)),
         watchdog_tripped=any(state.watchdog_tripped for state in states),
@@ -102,40 +100,60 @@ class BusGuard:
         self.at_end: tuple[JointName, ...] = ()
         self.rejections: Counter[RejectReason] = Counter()
         self.clamp_count = 0
+        self.followed: BusOrder | None = None
         self._watch = BusWatch()
         self._gate = GateState()
         self._one_step = OneStep(servos.joints)
-        self._follow = FollowWatch(servos.joints, safety)
+        self._tracking = TrackingMonitor(servos.joints, safety)
         self._written_mm: Joints | None = None
         self._measurement: JointMeasurement | None = None
         self._before: JointMeasurement | None = None
-        self.followed: BusOrder | None = None
         self._orders: dict[Source, BusOrder] = {}
-        self._heard_s = self._cycle_s = self._armed_s = now_s
+        self._request_s = self._cycle_s = self._armed_s = now_s
 
     def silence_s(self, beat: Heartbeat | None, now_s: float) -> float:
-        """How long the application has given no sign of life; a request is one, too (``heard``)."""
-        return now_s - max(self._heard_s, beat.time_s if beat is not None else self._heard_s)
+        """How long the application has given no sign of life; a request is one, too (``note_request``)."""
+        return now_s - max(self._request_s, beat.time_s if beat is not None else self._request_s)
 
-    def heard(self, now_s: float) -> None:
+    def note_request(self, now_s: float) -> None:
         """The application asked for something, and waits for the answer."""
-        self._heard_s = now_s
+        self._request_s = now_s
 
-    def see(self, readings: Sequence[ServoReading], errors: int, beat: Heartbeat | None, now_s: float) -> Fault | None:
-        """Take in one cycle; the fault that ends the motion, when one is going on and must end."""
+    def update(self, readings: Sequence[ServoReading], errors: int, beat: Heartbeat | None, now_s: float) -> Fault | None:
+        """Evaluate one cycle's readings; the fault that ends the motion, when one is going on and must end."""
         report = report_of(readings, armed=self.armed, errors=errors)
         self.restarts += sum(isinstance(reading, MissingServo) and reading.restarted for reading in readings)
         self._watch = see_bus(self._watch, report, now_s, self._servos, self._safety)
-        self._measure(readings)
+        # a whole set of positions replaces the last one; one with gaps does not
+        found = [(r.position_mm, r.time_s) for r in readings if isinstance(r, ServoState) and r.position_mm is not None]
+        if readings and len(found) == len(readings):
+            self._before = self._measurement
+            self._measurement = JointMeasurement(tuple(at for at, _ in found), min(time_s for _, time_s in found))
         faults = bus_faults(self._watch, now_s, self._servos, self._safety)
         if self.armed:
-            faults += self._faults_of_motion(beat, now_s)
+            faults += self._motion_faults(beat, now_s)
         self._cycle_s = now_s
         self._activate(faults)
-        return self._ends() if self.armed else None
+        return (worst(self.active, Reaction.STOP) or worst(self.active, Reaction.DISARM)) if self.armed else None
 
-    def lost_port(self) -> Fault:
-        """Nothing is known about the servos any more."""
+    def _motion_faults(self, beat: Heartbeat | None, now_s: float) -> list[Fault]:
+        faults = []
+        silence_s, gap_s = self.silence_s(beat, now_s), now_s - self._cycle_s
+        if silence_s > self._servos.heartbeat_timeout_s:
+            faults.append(Fault(Cause.WORKER_DEAD, f"no heartbeat of the application for {1000 * silence_s:.0f} ms"))
+        if not 0.0 <= gap_s <= self._safety.clock_gap_s:
+            faults.append(Fault(Cause.CLOCK, f"the bus process stood still for {gap_s:.2f} s"))
+        if self._measurement is not None and (problem := self._tracking.update(self._written_mm, self._measurement)) is not None:
+            faults.append(Fault(Cause.TRACKING, problem))
+        return faults
+
+    def _activate(self, faults: Sequence[Fault]) -> None:
+        known = {fault.cause for fault in self.active}
+        self.active = tuple(faults)
+        self.fault_counts.update(fault.cause for fault in faults if fault.cause not in known)
+
+    def lose_port(self) -> Fault:
+        """The servos' state is unknown from now on; returns the fault."""
         self._watch, self._measurement, self._before = BusWatch(), None, None
         fault = Fault(Cause.PORT_LOST)
         self._activate([fault])
@@ -143,7 +161,6 @@ class BusGuard:
 
     def end_motion(self, fault: Fault) -> None:
         """Disarmed, and the first cause latched; a fault that stops also blocks arming until it is acknowledged."""
-        self.armed = False
         self.stopped = self.stopped or REACTION[fault.cause] is Reaction.STOP
         self.latched = self.latched or fault
         if fault.cause is Cause.STOP_PRESSED:
@@ -153,9 +170,9 @@ class BusGuard:
     def disarm(self) -> None:
         """No more goals; nothing is latched."""
         self.armed = False
-        self.sent = None  # a record from before tells nothing of where the next motion starts
+        self.sent = None  # where the next motion starts is not where this one ended
         self._gate, self._written_mm = GateState(), None
-        self._follow.forget()
+        self._tracking.reset()
         self._orders.clear()
         self.followed = None
         self.rejection, self.clamps, self.at_end = None, (), ()
@@ -172,40 +189,36 @@ class BusGuard:
         if self.armed:
             reasons.append("already armed")
         hinder = [f for f in self.active if REACTION[f.cause] >= Reaction.HOLD and f.cause not in _MENDED_BY_ARMING]
-        if reasons := reasons + [_text(fault) for fault in hinder] + self._astray():
-            raise NotReady(f"not armed: {'; '.join(reasons)}")
-
-    def _astray(self) -> list[str]:
-        """Joints from where no goal leads: the gate would believe no position of theirs, and nothing would ever move."""
+        reasons += [_text(fault) for fault in hinder]
+        # No goal leads from outside the envelope, so nothing would ever move. Joints without a zero have no positions.
         at = self._measurement
-        # joints without a zero have no positions: that the driver finds
-        if at is None or self._cycle_s - at.measured_s > self._safety.measurement_max_age_s:
-            return []
-        outside = outside_envelope(at.positions_mm, self._servos)
-        advice = "switch the torque off and move it back by hand, or zero it again"
-        return [f"outside its envelope: {joint}: {advice}" for joint in outside]
+        if at is not None and self._cycle_s - at.measured_s <= self._safety.measurement_max_age_s:
+            advice = "switch the torque off and move it back by hand, or zero it again"
+            reasons += [f"outside its envelope: {joint}: {advice}" for joint in outside_envelope(at.positions_mm, self._servos)]
+        if reasons:
+            raise NotReady(f"not armed: {'; '.join(reasons)}")
 
     def set_armed(self, now_s: float) -> None:
         """The driver has armed the servos. Orders from before do not count."""
         self._watch = BusWatch()
         self._gate, self._measurement, self._before = GateState(), None, None
         self._written_mm = None
-        self._follow.forget()
+        self._tracking.reset()
         self.armed = True
-        self._heard_s = self._cycle_s = self._armed_s = now_s
+        self._request_s = self._cycle_s = self._armed_s = now_s
 
     def step(self, order: BusOrder | None, beat: Heartbeat | None, now_s: float) -> GateStep:
         """The goals for this cycle, through the gate."""
-        # A permission holds good no longer than an order: whoever gives it must still be watching.
+        # A permission is good no longer than an order: the application that gives it must still be watching.
         fresh = beat is not None and now_s - beat.time_s <= self._safety.command_max_age_s
         permitted: Source | None = beat.permitted if self.armed and beat is not None and fresh else None
         self.followed = self._order_of(permitted, order, now_s)
-        request, at_end = self._request(self.followed, now_s), self.at_end
+        request, at_end = self._goal_request(self.followed, now_s)
         step = gate_step(self._gate, request, self._measurement, permitted, now_s, self._servos, self._safety)
         self._gate = step.state
         self.rejection, self.clamps = step.rejection, step.clamps
         if step.goals_mm is None:
-            # There is not even a hold, whoever may drive; and before there was one, nobody is permitted to. So this comes first.
+            # Not even a hold is sent. Why comes first: before there was a hold, no source is permitted to drive.
             self.rejection = measurement_problem(self._measurement, now_s, self._servos, self._safety) or step.rejection
             self.sent = self.sent.kept() if self.sent is not None else None
         self.at_end = () if step.is_hold else at_end
@@ -215,10 +228,10 @@ class BusGuard:
         return step
 
     def _order_of(self, permitted: Source | None, newest: BusOrder | None, now_s: float) -> BusOrder | None:
-        """The newest order of the permitted one, while it is valid; else the newest of all, which the gate will refuse by name.
+        """The newest order of the permitted source, while it is valid; else the newest of all, which the gate refuses by name.
 
-        At a hand-over the next one's order is there before his permission: the cycle between them goes on with the order before,
-        instead of holding. A hold is everybody's.
+        At a hand-over the new source's order is there before its permission: the cycle between them goes on with the order before,
+        instead of holding. Any source may hold.
         """
         if newest is None or newest.command is None:
             self._orders.clear()
@@ -228,50 +241,23 @@ class BusGuard:
         is_valid = found is not None and 0.0 <= now_s - found.issued_s <= self._safety.command_max_age_s
         return found if is_valid else newest
 
-    def wrote(self, goals_mm: Joints, order: BusOrder | None, now_s: float) -> None:
+    def _goal_request(self, order: BusOrder | None, now_s: float) -> tuple[GoalRequest | None, tuple[JointName, ...]]:
+        """What the gate is asked for, and the joints at the end of their envelope."""
+        if order is None or order.command is None or self._measurement is None or order.issued_s < self._armed_s:
+            return None, ()
+        at_mm = tuple(self._measurement.positions_mm)
+        before_mm = tuple((self._before or self._measurement).positions_mm)
+        wanted = joint_goals(order.command, self._gate.sent, at_mm, now_s, self._servos, self._safety)
+        goals_mm = self._one_step.bounded(wanted.goals_mm, (order.issued_s, order.command), before_mm)
+        return GoalRequest(goals_mm, order.source, order.issued_s, order.captured_s), wanted.at_end
+
+    def record_sent(self, goals_mm: Joints, order: BusOrder | None, now_s: float) -> None:
         """These goals went out, as the servos count them."""
         self._written_mm = goals_mm
         right, left, up, down, *_ = goals_mm
         speeds, pull_mm = self._gate.speeds_mm_s, 2.0 * self._servos.max_pull_mm
         motion = Command((right - left) / pull_mm, (up - down) / pull_mm, speeds[4], (speeds[5] + speeds[6]) / 2.0)
         self.sent = IssuedGoals(goals_mm, motion, now_s, order if self.rejection is None else None)
-
-    def _request(self, order: BusOrder | None, now_s: float) -> GoalRequest | None:
-        self.at_end = ()
-        if order is None or order.command is None or self._measurement is None or order.issued_s < self._armed_s:
-            return None
-        at_mm = tuple(self._measurement.positions_mm)
-        before_mm = tuple((self._before or self._measurement).positions_mm)
-        wanted = joint_goals(order.command, self._gate.sent, at_mm, now_s, self._servos, self._safety)
-        self.at_end = wanted.at_end
-        goals_mm = self._one_step.bounded(wanted.goals_mm, (order.issued_s, order.command), before_mm)
-        return GoalRequest(goals_mm, order.source, order.issued_s, order.captured_s)
-
-    def _measure(self, readings: Sequence[ServoReading]) -> None:
-        """A whole set of positions replaces the last one; one with gaps does not."""
-        found = [(r.position_mm, r.time_s) for r in readings if isinstance(r, ServoState) and r.position_mm is not None]
-        if readings and len(found) == len(readings):
-            self._before = self._measurement
-            self._measurement = JointMeasurement(tuple(at for at, _ in found), min(time_s for _, time_s in found))
-
-    def _faults_of_motion(self, beat: Heartbeat | None, now_s: float) -> list[Fault]:
-        faults = []
-        silence_s, gap_s = self.silence_s(beat, now_s), now_s - self._cycle_s
-        if silence_s > self._servos.heartbeat_timeout_s:
-            faults.append(Fault(Cause.WORKER_DEAD, f"no heartbeat of the application for {1000 * silence_s:.0f} ms"))
-        if not 0.0 <= gap_s <= self._safety.clock_gap_s:
-            faults.append(Fault(Cause.CLOCK, f"the bus process stood still for {gap_s:.2f} s"))
-        if self._measurement is not None and (strays := self._follow.see(self._written_mm, self._measurement)) is not None:
-            faults.append(Fault(Cause.TRACKING, strays))
-        return faults
-
-    def _activate(self, faults: Sequence[Fault]) -> None:
-        known = {fault.cause for fault in self.active}
-        self.active = tuple(faults)
-        self.fault_counts.update(fault.cause for fault in faults if fault.cause not in known)
-
-    def _ends(self) -> Fault | None:
-        return worst(self.active, Reaction.STOP) or worst(self.active, Reaction.DISARM)
 
 
 def _text(fault: Fault) -> str:

@@ -1,7 +1,6 @@
-"""Seven ideal servos and the bus process's decisions on a clock that the caller turns: no port, no process, no waiting.
+"""Seven ideal servos and the real ``BusGuard`` with its gate, on the caller's clock: no port, no process, no waiting.
 
-What decides is the real thing, ``BusGuard`` with the gate inside. Only line and motors are left out: a servo is where the cycle
-before sent it. For tests and studies in which the clock must not be the wall's.
+A servo is where the cycle before sent it. For trials, which must not depend on the wall clock.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ class LockStepServos:
         self._at_mm: tuple[float, ...] = (0.0,) * len(JOINT_NAMES)
         self._order: BusOrder | None = None
         self._beat: Heartbeat | None = None
-        self._torque = self._let_go = False
-        self._cycle = self._told = 0
+        self._torque = self._torque_off_done = False
+        self._cycle = self._reported = 0
         self.sent: list[tuple[float, tuple[float, ...]]] = []
         """Time and goals (mm) of every cycle that sent some, oldest first."""
 
@@ -56,14 +55,14 @@ class LockStepServos:
         """Read, decide, move."""
         now_s = self._clock()
         self._cycle += 1
-        fault = self._guard.see(self._readings(now_s), 0, self._beat, now_s)
+        fault = self._guard.update(self._readings(now_s), 0, self._beat, now_s)
         if fault is not None:
             self._guard.end_motion(fault)
         elif self._guard.armed:
             step = self._guard.step(self._order, self._beat, now_s)
             if step.goals_mm is not None:
                 self._at_mm = step.goals_mm
-                self._guard.wrote(step.goals_mm, self._guard.followed, now_s)
+                self._guard.record_sent(step.goals_mm, self._guard.followed, now_s)
                 self.sent.append((now_s, step.goals_mm))
 
     def _readings(self, now_s: float) -> tuple[ServoState, ...]:
@@ -88,7 +87,7 @@ class LockStepServos:
         )
 
     def connect(self) -> None:
-        """There is nothing to connect."""
+        """Nothing to do."""
 
     def close(self) -> None:
         self._guard.disarm()
@@ -110,7 +109,7 @@ class LockStepServos:
         """Raises NotReady."""
         if not self._guard.armed:
             now_s = self._clock()
-            self._guard.see(self._readings(now_s), 0, self._beat, now_s)
+            self._guard.update(self._readings(now_s), 0, self._beat, now_s)
         self._guard.check_arming()
         self._torque = True
         self._guard.set_armed(self._clock())
@@ -127,18 +126,18 @@ class LockStepServos:
         )
 
     def reboot(self, servo_id: int) -> None:
-        """They never need it."""
+        """Nothing to do."""
 
     def torque_off(self) -> None:
         self._guard.disarm()
-        self._torque, self._let_go = False, True
+        self._torque, self._torque_off_done = False, True
 
     def report(self) -> BusReport | None:
-        if self._cycle == self._told:
+        if self._cycle == self._reported:
             return None
-        self._told = self._cycle
+        self._reported = self._cycle
         report = report_of(self._readings(self._clock()), armed=self._guard.armed, errors=0)
-        let_go, self._let_go = self._let_go, False
+        let_go, self._torque_off_done = self._torque_off_done, False
         return replace(report, armed=self._guard.armed, ended=self._guard.latched, torque_off=let_go)
 
     def sent_motion(self) -> SentMotion | None:

@@ -1,4 +1,4 @@
-"""The robot behind the ``Robot`` protocol, moved by seven servos through the guarded bus process."""
+"""The robot behind the ``GuardedRobot`` protocol, moved by seven servos through the guarded bus process."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from dataclasses import replace
 
 from core.calibration.servos import zero_advice
 from core.config.calibration import ZeroConfig
-from core.config.safety import JointConfig, JointName, SafetyConfig, ServosConfig
+from core.config.safety import JointName, SafetyConfig, ServosConfig
 from core.control.gate import Rejection, Source
 from core.control.health import BusReport
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
+from hardware.processes import ChildProcess
 from hardware.servos.bus_guard import report_of
-from hardware.servos.bus_ipc import END_S, BusClient, BusOrder, BusPhase, BusProcess, BusStatus, Heartbeat, IssuedGoals
+from hardware.servos.bus_ipc import END_S, BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, IssuedGoals
 from hardware.servos.dynamixel_port import BusProcessLost, NotReady, ServoError
 from hardware.servos.registers import ServoReading, ServoState, wire_force_mn
 
-_OPEN_S, _ARM_S, _REQUEST_S, _LET_GO_S = 20.0, 10.0, 5.0, 10.0
+_OPEN_S, _ARM_S, _REQUEST_S, _TORQUE_OFF_S = 20.0, 10.0, 5.0, 10.0
 _HUNG_S = 0.2
 """For the end of a bus process that has just left a request unanswered."""
 
@@ -32,15 +33,15 @@ class ServoRobot:
     Parameters
     ----------
     servos, safety : the configuration; ``servos.port`` must be set.
-    name : for people.
+    name : shown to the operator.
     truth : tells the status instead of the servos, where the robot is simulated.
     on_close : called once, after the servos were let go.
     kept_zero : of the rig file; arming without a zero then says whether the servos have lost their turns since.
-    process : a bus process that is loading already, for the first connection.
+    process : a bus process that was started ahead, for the first connection.
 
     Notes
     -----
-    Nothing moves before ``zero`` and ``arm``. Orders and permissions hold good for 100 ms and must be repeated. A program with a
+    Nothing moves before ``zero`` and ``arm``. Orders and permissions are valid for 100 ms and must be repeated. A program with a
     supervisor calls ``beat`` at its every tick, and from the first call on nothing else is a sign of life; in a program without
     one ``send``, ``hold`` and ``status`` are, and permit the operator. ``arm``, ``zero`` and the like wait for their answer,
     ``stop`` waits for nothing.
@@ -55,19 +56,19 @@ class ServoRobot:
         truth: Callable[[], RobotStatus] | None = None,
         on_close: Callable[[], None] | None = None,
         kept_zero: ZeroConfig | None = None,
-        process: BusProcess | None = None,
+        process: ChildProcess | None = None,
     ) -> None:
         self._servos, self._safety = servos, safety
         self._name = name
         self._truth, self._on_close, self._kept_zero = truth, on_close, kept_zero
-        self._lock, self._letting_go = threading.Lock(), threading.Lock()
-        self._loading = process
-        self._link: BusClient | None = None
+        self._lock, self._releasing = threading.Lock(), threading.Lock()
+        self._prestarted = process
+        self._client: BusClient | None = None
         self._closes = 0
         self._supervised = False
         self._states: tuple[ServoReading, ...] = ()
         self._reported = (0, 0, 0)  # cycle, bad packets and restarts of the last report
-        self._told_offs = 0
+        self._reported_offs = 0
         self._not_connected: str | None = None
 
     @property
@@ -77,8 +78,8 @@ class ServoRobot:
     @property
     def failure(self) -> str | None:
         """One line when the bus process is gone though nobody closed it, or when it could not be started again."""
-        link = self._link
-        return link.failure if link is not None else self._not_connected
+        client = self._client
+        return client.failure if client is not None else self._not_connected
 
     def connect(self) -> None:
         """Start the bus process, open and lock the port, check all servos. Nothing moves, and nothing is armed.
@@ -94,35 +95,30 @@ class ServoRobot:
             raise NotReady("no servo port is configured: set servos.port")
         try:
             with ExitStack() as undo:
-                loading, self._loading = self._loading, None
-                link = BusClient(self._servos, self._safety, loading)
-                undo.callback(link.close)
-                link.request("open", _OPEN_S)
+                prestarted, self._prestarted = self._prestarted, None
+                client = BusClient(self._servos, self._safety, prestarted)
+                undo.callback(client.close)
+                client.request("open", _OPEN_S)
                 with self._lock:
                     if self._closes != closes:
                         raise NotReady(f"the {self._name} was closed meanwhile")
                     self._not_connected = None
                     self._reported = (0, 0, 0)
-                    self._told_offs = 0
+                    self._reported_offs = 0
                     self._states = ()
                     self._supervised = False
-                    self._link = link
+                    self._client = client
                 undo.pop_all()
         except ServoError as error:
             self._not_connected = str(error)
             raise
 
     def zero(self, names: Sequence[JointName] | None = None) -> None:
-        """The present positions are zero, of all joints or of those named; the wires must be slack.
-
-        Raises
-        ------
-        NotReady, NoAnswer
-        """
+        """The present positions are zero, of all joints or of those named; the wires must be slack. Raises NotReady, NoAnswer."""
         self._connected().request("zero", _REQUEST_S, names=None if names is None else list(names))
 
     def arm(self) -> None:
-        """Torque on, each servo holding where it stands; from now on the permitted one's orders are followed.
+        """Torque on, each servo holding where it stands; from now on the permitted source's orders are followed.
 
         Raises
         ------
@@ -132,16 +128,12 @@ class ServoRobot:
         try:
             self._connected().request("arm", _ARM_S)
         except NotReady as error:
-            raise NotReady(f"{error}{self._about_kept_zero()}") from None
-        self._live()
-
-    def _about_kept_zero(self) -> str:
-        """What the rig file's zero says of joints that are not zeroed; "" where it has none, or all are."""
-        status = self.bus_status()
-        if self._kept_zero is None or status is None or all(status.zeroed) or len(self._states) != len(self._servos.joints):
-            return ""
-        ticks = [reading.ticks for reading in self._states if isinstance(reading, ServoState)]
-        return f" ({zero_advice(self._servos, self._kept_zero, ticks)})"
+            status, advice = self.bus_status(), ""
+            if self._kept_zero is not None and status is not None and not all(status.zeroed) and self._states:
+                ticks = [reading.ticks for reading in self._states if isinstance(reading, ServoState)]
+                advice = f" ({zero_advice(self._servos, self._kept_zero, ticks)})"
+            raise NotReady(f"{error}{advice}") from None
+        self._beat_unsupervised()
 
     def disarm(self) -> None:
         """Hold, and follow no more orders. The torque stays on."""
@@ -149,8 +141,8 @@ class ServoRobot:
 
     def stop(self) -> None:
         """STOP: hold at once, latched, and the torque off if the configuration says so. Never fails and never waits."""
-        if (link := self._link) is not None:
-            link.stop()
+        if (client := self._client) is not None:
+            client.stop()
 
     def acknowledge(self) -> None:
         """The operator has seen why the servos were disarmed or stopped; arming is another request."""
@@ -163,34 +155,30 @@ class ServoRobot:
     def torque_off(self) -> None:
         """Disarm and switch all torque off, which releases the tension of the wires.
 
-        Where the bus process is gone or hangs, a new one does it, and ends. Servos obey also where a missing one keeps the robot
-        from being connected.
-
-        Raises
-        ------
-        TorqueStillOn
+        Where the bus process is gone or hangs, a new one does it, and ends; also where a missing servo keeps the robot from being
+        connected. Raises TorqueStillOn.
         """
         if (failure := self.failure) is None:
-            link = self._connected()
+            client = self._connected()
             try:
-                link.request("torque off", _REQUEST_S)
+                client.request("torque off", _REQUEST_S)
                 return
             except BusProcessLost as error:
                 failure = str(error)
-        with self._letting_go:  # one that has the port is enough
-            self._not_connected = failure  # and stays so: this process is not the one that drives
+        with self._releasing:  # only one process can have the port
+            self._not_connected = failure  # stays: the new process does not drive
             self._disconnect(_HUNG_S)
-            link = BusClient(self._servos, self._safety)
+            client = BusClient(self._servos, self._safety)
             try:
-                link.request("torque off", _LET_GO_S)
+                client.request("torque off", _TORQUE_OFF_S)
             finally:
-                link.close()
+                client.close()
 
     def beat(self, permitted: Source | None) -> None:
-        """A sign of life of the application, with what its supervisor says: whose orders may be followed (None: nobody's)."""
+        """A sign of life of the application; `permitted` says whose orders may be followed (None: of no source)."""
         self._supervised = True
-        if (link := self._link) is not None:
-            link.put_heartbeat(Heartbeat(time.monotonic(), permitted))
+        if (client := self._client) is not None:
+            client.put_heartbeat(Heartbeat(time.monotonic(), permitted))
 
     def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
         """Make `command` the newest order.
@@ -198,7 +186,7 @@ class ServoRobot:
         Parameters
         ----------
         command : limited to -1..1 and to the joints' speeds.
-        source, captured_s : who asks; the program must say when the frame behind it was taken (monotonic).
+        captured_s : when the frame behind it was taken (monotonic); needed of the program.
 
         Returns
         -------
@@ -215,32 +203,28 @@ class ServoRobot:
         if not all(math.isfinite(number) for number in (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s)):
             raise ValueError(f"command is not finite: {command}")
         joints = self._servos.joints
+        delivery_limit = min(joint.max_speed_mm_s for joint in joints[5:])
         limited = Command(
-            bend=_limited(command.bend, 1.0),
-            pitch=_limited(command.pitch, 1.0),
-            advance_mm_s=_limited(command.advance_mm_s, joints[4].max_speed_mm_s),
-            delivery_mm_s=_limited(command.delivery_mm_s, min(joint.max_speed_mm_s for joint in joints[5:])),
+            bend=max(-1.0, min(1.0, command.bend)),
+            pitch=max(-1.0, min(1.0, command.pitch)),
+            advance_mm_s=max(-joints[4].max_speed_mm_s, min(joints[4].max_speed_mm_s, command.advance_mm_s)),
+            delivery_mm_s=max(-delivery_limit, min(delivery_limit, command.delivery_mm_s)),
         )
-        link = self._connected()
-        link.put_order(BusOrder(limited, source, time.monotonic(), captured_s))
-        self._live()
-        sent = self._sent(link.status())
+        client = self._connected()
+        client.put_order(BusOrder(limited, source, time.monotonic(), captured_s))
+        self._beat_unsupervised()
+        sent = self._sent(client.status())
         return sent.motion if sent is not None else Command()
 
     def hold(self) -> None:
         """Stop all motion and keep the bend; stays armed."""
-        if (link := self._link) is not None:
-            link.put_order(BusOrder(None, Source.OPERATOR, time.monotonic()))
-            self._live()
+        if (client := self._client) is not None:
+            client.put_order(BusOrder(None, Source.OPERATOR, time.monotonic()))
+            self._beat_unsupervised()
 
     def status(self) -> RobotStatus:
-        """Where the robot is, as far as its servos told last (``time_s``, monotonic); 0 for a joint that is not zeroed.
-
-        Raises
-        ------
-        BusProcessLost
-        """
-        self._live()
+        """Where the robot is, as its servos told last (``time_s``, monotonic); 0 for a joint that is not zeroed. BusProcessLost."""
+        self._beat_unsupervised()
         self._connected()
         self.bus_status()
         if self._truth is not None:
@@ -249,7 +233,9 @@ class ServoRobot:
         if not states:
             return RobotStatus(time.monotonic(), 0.0, 0.0, (0.0,) * 4, (0.0,) * 4)
         at_mm = [state.position_mm or 0.0 for state in states]
-        right, left, up, down = (_force_mn(joint, state) for joint, state in zip(self._servos.joints[:4], states[:4], strict=True))
+        right, left, up, down = (
+            wire_force_mn(joint, state.current_ma or 0.0) for joint, state in zip(self._servos.joints[:4], states[:4], strict=True)
+        )
         return RobotStatus(
             time_s=min(state.time_s for state in states),
             insertion_mm=at_mm[4],
@@ -260,8 +246,8 @@ class ServoRobot:
 
     def bus_status(self) -> BusStatus | None:
         """The newest status of the bus process, also after its end (see ``failure``); None before the first. No heartbeat."""
-        link = self._link
-        status = link.status() if link is not None else None
+        client = self._client
+        status = client.status() if client is not None else None
         if status is not None and status.servos and all(isinstance(reading, ServoState) for reading in status.servos):
             self._states = status.servos
         return status
@@ -276,7 +262,7 @@ class ServoRobot:
             self._reported = status.cycle, bad_packets, restarts
             if status.phase is not BusPhase.CLOSED and not status.servos:
                 return None
-            torque_off, self._told_offs = status.torque_offs > self._told_offs, status.torque_offs
+            torque_off, self._reported_offs = status.torque_offs > self._reported_offs, status.torque_offs
             if status.phase is BusPhase.CLOSED:
                 return BusReport(port_open=False, torque_off=torque_off, torque_problem=status.torque_problem)
             self._reported = status.cycle, status.bad_packets, status.restarts
@@ -289,7 +275,7 @@ class ServoRobot:
     def sent_motion(self) -> SentMotion | None:
         """What left the gate in the newest cycle since it was armed; None before that, and when it is not armed. No heartbeat.
 
-        Of a bus that has told nothing for a while nobody knows that it sends anything: then it is a hold.
+        A bus whose status is old counts as holding: whether it still sends anything is unknown.
         """
         status = self.bus_status()
         sent = self._sent(status)
@@ -322,36 +308,27 @@ class ServoRobot:
         with self._lock:
             self._closes += 1  # a connection that is being made by another thread is given up
         self._disconnect()
-        loading, self._loading = self._loading, None
-        if loading is not None:
-            loading.end()
+        prestarted, self._prestarted = self._prestarted, None
+        if prestarted is not None:
+            prestarted.discard()
         on_close, self._on_close = self._on_close, None
         if on_close is not None:
             on_close()
 
     def _disconnect(self, patience_s: float = END_S) -> None:
-        link, self._link = self._link, None
-        if link is not None:
-            link.close(patience_s)
+        client, self._client = self._client, None
+        if client is not None:
+            client.close(patience_s)
 
     def _connected(self) -> BusClient:
-        link = self._link
-        if link is None:
+        client = self._client
+        if client is None:
             raise BusProcessLost(f"the {self._name} is not connected: connect it first")
-        if (failure := link.failure) is not None:
+        if (failure := client.failure) is not None:
             raise BusProcessLost(failure)
-        return link
+        return client
 
-    def _live(self) -> None:
+    def _beat_unsupervised(self) -> None:
         """A sign of life of a program without a supervisor."""
-        if (link := self._link) is not None and not self._supervised:
-            link.put_heartbeat(Heartbeat(time.monotonic(), Source.OPERATOR))
-
-
-def _force_mn(joint: JointConfig, state: ServoState) -> float:
-    """Pull of a wire as the motor's current tells it; 0 for models that report no current."""
-    return wire_force_mn(joint, state.current_ma or 0.0)
-
-
-def _limited(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
+        if (client := self._client) is not None and not self._supervised:
+            client.put_heartbeat(Heartbeat(time.monotonic(), Source.OPERATOR))

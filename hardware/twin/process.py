@@ -1,37 +1,24 @@
 """The bench twin in a process of its own: physics, pictures and software servos take no time from the program that looks at them.
 
-The application starts it (``twin_start``) as ``python -m hardware.twin.process MEMORY WAKE``, gives it the configuration as
-one line of JSON on standard input, and gets one line back: the servos' port, or what is wrong. From then on pictures and truth go
-through shared memory, a byte in the pipe WAKE tells that there is a new picture, and the end of standard input ends the process.
-
-Starts the twin's process, which loads its modules for seconds and then waits for the twin that it shall be.
-
-The application's end of the twin's process: a camera, the servos' port, and the truth about the robot.
-
-The two processes of a twin with servos, which load beside whatever else is loading.
-
-From the seven servos' motion to the twin's mechanics: wires pull, drums feed.
+The application starts it as ``python -m hardware.twin.process MEMORY PIPE SOCKET PARENT``, sends the configuration as its first
+message, and gets one back: the servos' port, or what is wrong. From then on pictures and truth go through shared memory, a byte in
+the pipe tells that there is a new picture, and the end of the socket ends the process.
 """
 
 from __future__ import annotations
 
 import contextlib
 import gc
-import json
 import math
-import mmap
 import os
 import select
 import signal
 import struct
-import subprocess
 import sys
 import threading
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -39,103 +26,23 @@ from core.config.models import Config, TwinConfig
 from core.config.safety import ServosConfig
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
-from hardware.processes import SharedSlot, start_child
-from hardware.servos.bus_ipc import BusProcess
+from hardware.processes import ChildProcess, ParentLink, SharedSlot
+from hardware.servos.bus_ipc import start_bus
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.world import TwinWorld
 
-_MODULE = "hardware.twin.process"
 _START_S, _END_S = 60.0, 5.0
-
-
-class TwinProcess:
-    """The process with its shared memory (a file of no length yet) and the pipe that tells of a new picture.
-
-    Raises
-    ------
-    DeviceError
-        When it cannot be started: no memory, no descriptors.
-    """
-
-    def __init__(self) -> None:
-        try:
-            with contextlib.ExitStack() as undo, contextlib.ExitStack() as always:
-                self.memory_fd = os.memfd_create("bench_twin", os.MFD_CLOEXEC)
-                undo.callback(os.close, self.memory_fd)
-                self.wake, wake_end = os.pipe()
-                undo.callback(os.close, self.wake)
-                always.callback(os.close, wake_end)
-                self._process = start_child(_MODULE, (self.memory_fd, wake_end), talks=True)
-                self._files = undo.pop_all()
-        except OSError as error:
-            raise DeviceError(f"the bench twin cannot be started ({error.strerror}): free memory, then try again") from None
-        self._has_begun = False
-        self.pid = self._process.pid
-
-    def begin(self, config: Config, insertion_mm: float) -> dict[str, Any]:
-        """Say what twin it shall be, with the memory in its length; returns what it answers, empty when it is gone."""
-        assert self._process.stdin is not None
-        self._has_begun = True
-        message = {"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm}
-        with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(json.dumps(message).encode() + b"\n")
-            self._process.stdin.flush()
-        return self.said(_START_S)
-
-    def said(self, timeout_s: float) -> dict[str, Any]:
-        """The next line of the process; empty when there is none."""
-        assert self._process.stdout is not None
-        ready, _, _ = select.select([self._process.stdout], [], [], timeout_s)
-        line = self._process.stdout.readline() if ready else b""
-        try:
-            found = json.loads(line) if line else {}
-        except ValueError:
-            found = {}
-        return found if isinstance(found, dict) else {}
-
-    def exit_code(self) -> int | None:
-        """None while it runs."""
-        return self._process.poll()
-
-    def end(self) -> None:
-        """The end of its input ends it; while it only loads there is nothing to wait for. May be called twice."""
-        if not self._has_begun:
-            self._process.kill()
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream is not None:
-                with contextlib.suppress(OSError):
-                    stream.close()
-        try:
-            self._process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._files.close()
 
 
 _FRAME = struct.Struct("<Qdii")  # index, captured, width, height
 _STATUS = struct.Struct("<3d8dd")  # time, insertion, delivery, pulls and forces, contact (NaN: unknown)
 
 
-@dataclass(frozen=True, slots=True)
-class MemoryLayout:
-    """Where the slots lie in the shared memory."""
-
-    frame_bytes: int
-
-    @property
-    def size(self) -> int:
-        return SharedSlot.size(self.frame_bytes) + SharedSlot.size(_STATUS.size)
-
-    def slots(self, memory: mmap.mmap) -> tuple[SharedSlot, SharedSlot]:
-        """Newest frame, newest status."""
-        after = SharedSlot.size(self.frame_bytes)
-        return SharedSlot(memory, 0, self.frame_bytes), SharedSlot(memory, after, _STATUS.size)
-
-
-def memory_layout(twin: TwinConfig) -> MemoryLayout:
-    """The layout for the twin's picture size; both processes compute it."""
-    return MemoryLayout(_FRAME.size + 3 * twin.image_width_px * twin.image_height_px)
+def _map_slots(process: ChildProcess | ParentLink, twin: TwinConfig) -> tuple[SharedSlot, SharedSlot]:
+    """Newest frame and newest status in the shared memory; its size follows from the twin's picture size."""
+    sizes = (_FRAME.size + 3 * twin.image_width_px * twin.image_height_px, _STATUS.size)
+    frames, status = SharedSlot.row(process.map_memory(sum(map(SharedSlot.size, sizes))), sizes)
+    return frames, status
 
 
 def pack_frame(frame: Frame) -> bytes:
@@ -162,10 +69,17 @@ def unpack_status(data: bytes) -> RobotStatus:
     return RobotStatus(time_s, insertion_mm, delivery_mm, (a, b, c, d), (e, f, g, h), known_n)
 
 
-class RemoteTwin:
-    """A running twin process: one that was started ahead, or a new one.
+def start_twin() -> ChildProcess:
+    """A twin process, which loads for seconds and then waits for its configuration; raises DeviceError."""
+    return ChildProcess("hardware.twin.process", "the bench twin", writes_pipe=False)
 
-    ``read`` and ``close`` belong to one thread, ``status`` to any.
+
+class RemoteTwin:
+    """A running twin process. ``read`` and ``close`` belong to one thread, ``status`` to any.
+
+    Parameters
+    ----------
+    prestarted : a process from ``start_twin``; without one, or when it has died meanwhile, one is started.
 
     Raises
     ------
@@ -173,19 +87,28 @@ class RemoteTwin:
         When it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
     """
 
-    def __init__(self, config: Config, insertion_mm: float, ahead: TwinProcess | None = None) -> None:
+    def __init__(self, config: Config, insertion_mm: float, prestarted: ChildProcess | None = None) -> None:
         self._number = 0
-        layout = memory_layout(config.twin)
+        self._closed = False
+        self._process = ChildProcess.claim(prestarted, start_twin)
         with contextlib.ExitStack() as undo:
-            self._process = ahead or TwinProcess()
-            undo.callback(self._process.end)
-            os.ftruncate(self._process.memory_fd, layout.size)
-            self._memory = undo.enter_context(mmap.mmap(self._process.memory_fd, layout.size))
-            self._frames, self._status = layout.slots(self._memory)
-            self.port, self.title = self._hello(config, insertion_mm)
+            undo.callback(self.close)
+            self._frames, self._status = _map_slots(self._process, config.twin)
+            with contextlib.suppress(OSError):  # a process that is gone has no answer either
+                self._process.send({"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm})
+            answer = self._receive(_START_S)
+            if "error" in answer:
+                raise DeviceError(answer["error"])
+            if "port" not in answer:
+                raise DeviceError("the bench twin did not start: free memory, then start the rig again (F5)")
+            self.port, self.title = answer["port"], answer["title"]
             undo.pop_all()
-        self._wake = self._process.wake
-        os.set_blocking(self._wake, False)
+
+    def _receive(self, timeout_s: float) -> dict[str, str]:
+        """What the process says; empty when it says nothing, or is gone."""
+        with contextlib.suppress(OSError):
+            return self._process.receive(timeout_s) or {}
+        return {}
 
     def read(self, timeout_s: float) -> Frame | None:
         """The newest frame, waiting at most `timeout_s` for one that was not given yet.
@@ -205,20 +128,14 @@ class RemoteTwin:
             if left_s <= 0.0:
                 self._check()
                 return None
-            select.select([self._wake], [], [], left_s)
+            select.select([self._process.pipe], [], [], left_s)
             with contextlib.suppress(BlockingIOError):
-                if os.read(self._wake, 4096) == b"":
+                if os.read(self._process.pipe, 4096) == b"":
                     self._check()
                     time.sleep(max(0.0, until_s - time.monotonic()))
 
     def status(self) -> RobotStatus:
-        """The truth, as the process told it last.
-
-        Raises
-        ------
-        DeviceError
-            Nothing was told yet.
-        """
+        """The truth, as the process told it last; raises DeviceError before the first time."""
         found = self._status.newest()
         if found is None:
             raise DeviceError("the bench twin has not told anything yet")
@@ -226,21 +143,16 @@ class RemoteTwin:
 
     def close(self) -> None:
         """End the process; may be called twice."""
-        self._process.end()
-        self._memory.close()
-
-    def _hello(self, config: Config, insertion_mm: float) -> tuple[str, str]:
-        answer = self._process.begin(config, insertion_mm)
-        if "error" in answer:
-            raise DeviceError(str(answer["error"]))
-        if "port" not in answer:
-            raise DeviceError("the bench twin did not start: free memory, then start the rig again (F5)")
-        return str(answer["port"]), str(answer["title"])
+        if not self._closed:
+            self._closed = True
+            self._process.request_end()
+            self._process.await_end(_END_S)
+            self._process.release()
 
     def _check(self) -> None:
         code = self._process.exit_code()
         if code is not None:
-            why = self._process.said(0.0).get("error", f"exit code {code}")
+            why = self._receive(0.0).get("error", f"exit code {code}")
             raise DeviceError(f"the bench twin stopped ({why}): start the rig again (F5)")
 
 
@@ -359,92 +271,69 @@ _WAIT_S = 0.2
 
 
 def main(arguments: list[str]) -> int:
-    """Run until standard input ends. Arguments: file descriptors of the shared memory and of the pipe."""
+    """Run until the application ends it, or is gone. Arguments: those of ``ParentLink``."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the application decides what Ctrl-C means
-    memory_fd, wake = map(int, arguments)
-    line = sys.stdin.readline()
-    if not line:  # started ahead, and not needed
+    link = ParentLink(arguments)
+    message = link.first_message()
+    if message is None:  # started ahead, and not needed
         return 0
-    message = json.loads(line)
     config = Config.model_validate(message["config"])
-    layout = memory_layout(config.twin)
-    with mmap.mmap(memory_fd, layout.size) as memory:
-        frames, status = layout.slots(memory)
-        try:
-            world = TwinWorld(config.twin, perception=config.perception)
-            world.insert(message["insertion_mm"])
-            wiring = wired(config.twin, config.servos)
-            servos = SoftServoBus(wiring, wire_time=True)
-            servos.start()
-        except (ValueError, OSError, DeviceError) as error:
-            _say({"error": str(error)})
-            return 1
-        drive_world(world, servos, wiring)
-        world.start()
-        gc.collect()
-        gc.freeze()  # what is loaded stays: later collections are short
-        _say({"port": servos.port, "title": world.phantom.title})
-        ended = threading.Event()
-        threading.Thread(target=_await_end, args=(ended,), name="end of input", daemon=True).start()
-        try:
-            _serve(world, frames, status, wake, ended)
-        finally:
-            world.stop()
-            servos.stop()
+    frames, status = _map_slots(link, config.twin)
+    try:
+        world = TwinWorld(config.twin, perception=config.perception)
+        world.insert(message["insertion_mm"])
+        wiring = wired(config.twin, config.servos)
+        servos = SoftServoBus(wiring, wire_time=True)
+        servos.start()
+    except (ValueError, OSError, DeviceError) as error:
+        link.send({"error": str(error)})
+        return 1
+    drive_world(world, servos, wiring)
+    world.start()
+    gc.collect()
+    gc.freeze()  # what is loaded stays: later collections are short
+    link.send({"port": servos.port, "title": world.phantom.title})
+    ended = threading.Event()
+    threading.Thread(target=link.wait_for_end, args=(ended,), name="end of link", daemon=True).start()
+    try:
+        _serve(world, frames, status, link, ended)
+    finally:
+        world.stop()
+        servos.stop()
     return 0
 
 
-def _serve(world: TwinWorld, frames: SharedSlot, status: SharedSlot, wake: int, ended: threading.Event) -> None:
-    os.set_blocking(wake, False)
+def _serve(world: TwinWorld, frames: SharedSlot, status: SharedSlot, link: ParentLink, ended: threading.Event) -> None:
     while not ended.is_set():
         if world.failure is not None:
-            _say({"error": world.failure})
+            link.send({"error": world.failure})
             return
         frame = world.frames.take(_WAIT_S)
         status.put(pack_status(world.physics.status()))
         if frame is not None:
             frames.put(pack_frame(frame))
             try:
-                os.write(wake, b".")
+                os.write(link.pipe, b".")
             except BlockingIOError:
                 pass  # a full pipe wakes as well
             except BrokenPipeError:
-                return  # the application was ended at this moment, before its end of the input is seen
+                return  # the application was ended at this moment, before the end of the link is seen
 
 
-def _await_end(ended: threading.Event) -> None:
-    """The application closes its end, or is gone."""
-    sys.stdin.read()
-    ended.set()
-
-
-def _say(message: dict[str, str]) -> None:
-    with contextlib.suppress(BrokenPipeError):
-        sys.stdout.write(json.dumps(message) + "\n")
-        sys.stdout.flush()
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class PrestartedProcesses:
-    """They load, and wait for what they shall be."""
+    """The twin and its servo bus, loading before the rig is opened. Raises DeviceError when they cannot be started."""
 
-    twin: TwinProcess
-    bus: BusProcess
+    def __init__(self) -> None:
+        self.twin = start_twin()  # first: it loads for longer
+        with contextlib.ExitStack() as undo:
+            undo.callback(self.twin.discard)
+            self.bus = start_bus()
+            undo.pop_all()
 
     def end(self) -> None:
-        """They are not needed. What was taken over is left alone."""
-        self.bus.end()
-        self.twin.end()
-
-
-def start_twin() -> PrestartedProcesses:
-    """Raises DeviceError when they cannot be started."""
-    with ExitStack() as undo:
-        twin = TwinProcess()  # first: it loads for longer
-        undo.callback(twin.end)
-        bus = BusProcess()
-        undo.pop_all()
-    return PrestartedProcesses(twin, bus)
+        """End those that no rig has taken over."""
+        self.bus.discard()
+        self.twin.discard()
 
 
 if __name__ == "__main__":

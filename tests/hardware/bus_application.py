@@ -47,8 +47,8 @@ def main(port: str) -> None:
     try:
         robot.zero()
         robot.arm()
-        assert robot._link is not None
-        say(bus_pid=robot._link.pid)
+        assert robot._client is not None
+        say(bus_pid=robot._client.pid)
         drive(robot)
     except ServoError as error:
         say(ended=str(error))

@@ -37,8 +37,8 @@ def drive(port: str) -> None:
     robot.connect()
     robot.zero()
     robot.arm()
-    assert robot._link is not None
-    say(bus_pid=robot._link.pid)
+    assert robot._client is not None
+    say(bus_pid=robot._client.pid)
     start_s = time.monotonic()
     while robot.failure is None:
         now_s = time.monotonic()

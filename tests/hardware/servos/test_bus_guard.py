@@ -21,8 +21,8 @@ from hardware.servos.bus_guard import BusGuard, OneStep
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, pack_heartbeat, pack_order, unpack_heartbeat, unpack_order
 from hardware.servos.dynamixel_port import NotReady
 from hardware.servos.lockstep import LockStepServos
-from hardware.servos.motion_watch import Jam, JamWatch
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
+from hardware.servos.tracking import Jam, JamMonitor
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 CYCLE_S = 0.02
@@ -101,8 +101,8 @@ def test_one_order_moves_a_joint_by_one_step_at_most() -> None:
 
 def test_a_joint_that_stands_though_its_goal_is_far_is_jammed() -> None:
     """Far: more than half of the tendon's step of 0.6 mm, for 0.2 s."""
-    watch, goals, at = JamWatch(SERVOS.joints, 0.2), (0.4,) + (0.0,) * 6, (0.0,) * 7
-    seen = [watch.see(goals, at, n * CYCLE_S) for n in range(12)]
+    watch, goals, at = JamMonitor(SERVOS.joints, 0.2), (0.4,) + (0.0,) * 6, (0.0,) * 7
+    seen = [watch.update(goals, at, n * CYCLE_S) for n in range(12)]
     assert seen[:10] == [None] * 10
     assert seen[10] == Jam(SERVOS.joints[0], 0.4, 0.2)
 
@@ -118,10 +118,10 @@ def test_a_joint_that_stands_though_its_goal_is_far_is_jammed() -> None:
     ids=["near", "lags but moves", "far now and then", "to and fro"],
 )
 def test_no_jam(path: Callable[[float], tuple[float, float]]) -> None:
-    watch = JamWatch(SERVOS.joints, 0.2)
+    watch = JamMonitor(SERVOS.joints, 0.2)
     for n in range(100):
         goal, at = path(n * CYCLE_S)
-        assert watch.see((goal,) + (0.0,) * 6, (at,) + (0.0,) * 6, n * CYCLE_S) is None
+        assert watch.update((goal,) + (0.0,) * 6, (at,) + (0.0,) * 6, n * CYCLE_S) is None
 
 
 # --- the guard -------------------------------------------------------------------------------------------------------------------
@@ -158,13 +158,13 @@ class Bench:
         if self.beating:
             self.beat = Heartbeat(self.now_s, self.permitted)
             self.order = BusOrder(self.command, Source.PROGRAM, self.now_s, self.now_s)
-        fault = self.guard.see(self.readings(), self.errors, self.beat, self.now_s)
+        fault = self.guard.update(self.readings(), self.errors, self.beat, self.now_s)
         if fault is not None:
             self.guard.end_motion(fault)
         elif self.guard.armed:
             step = self.guard.step(self.order, self.beat, self.now_s)
             if step.goals_mm is not None:
-                self.guard.wrote(step.goals_mm, self.order, self.now_s)
+                self.guard.record_sent(step.goals_mm, self.order, self.now_s)
                 self.goals = list(step.goals_mm)
                 if not self.frozen:
                     self.positions = list(step.goals_mm)
@@ -436,7 +436,7 @@ def test_fault_25_a_jam(bench: Bench) -> None:
 
 
 def test_fault_26_the_port_is_lost(bench: Bench) -> None:
-    bench.guard.end_motion(bench.guard.lost_port())
+    bench.guard.end_motion(bench.guard.lose_port())
     assert (bench.guard.armed, bench.guard.stopped) == (False, True)
     bench.guard.acknowledge()
     with pytest.raises(NotReady, match="servo port lost"):

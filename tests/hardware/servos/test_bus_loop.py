@@ -74,18 +74,18 @@ class PaperEnd:
     def wait(self, timeout_s: float) -> tuple[bool, bool]:
         return self.stop, self.waiting is not None
 
-    def take_stop(self) -> bool:
+    def read_stop(self) -> bool:
         taken, self.stop = self.stop, False
         return taken
 
-    def take_request(self) -> Request | None:
+    def read_request(self) -> Request | None:
         taken, self.waiting = self.waiting, None
         return taken
 
     def publish(self, status: BusStatus) -> None:
         self.told = status
 
-    def last_words(self, text: str) -> None:
+    def send_fatal(self, text: str) -> None:
         self.words.append(text)
 
     def answer(self, request: Request, error: ServoError | None) -> None:
@@ -109,9 +109,9 @@ class Paper:
     def turn(self) -> None:
         """A cycle in which the servos say nothing new."""
         self.now_s += 0.02
-        self.loop._guard.see = lambda *_: None  # type: ignore[method-assign]
+        self.loop._guard.update = lambda *_: None  # type: ignore[method-assign]
         self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
-        self.loop._talk()
+        self.loop._read_decide_write()
 
     def reads(self, advance_mm: float = 0.0) -> None:
         """From now on all servos tell that they stand at zero, but for one."""
@@ -307,7 +307,7 @@ def test_six_servos_of_seven_let_go_when_the_port_comes_back_without_the_seventh
     paper: Paper, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A bus that cannot be opened never tried the torque-off that it owed, and the six went on pulling."""
-    paper.loop._debt.owe()
+    paper.loop._release.request()
     paper.loop._lose_port()
     _six_of_seven(paper, monkeypatch)
     paper.loop._reopen(paper.now_s)
@@ -323,7 +323,7 @@ def test_six_servos_of_seven_let_go_when_the_port_comes_back_without_the_seventh
 
 
 def test_they_let_go_when_the_process_ends_too(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
-    paper.loop._debt.owe()
+    paper.loop._release.request()
     paper.loop._lose_port()
     _six_of_seven(paper, monkeypatch)
     paper.loop.end()
@@ -348,13 +348,11 @@ def test_arming_says_why_the_port_that_came_back_is_not_open(paper: Paper, monke
     assert str(paper.end.answers[0][1]) == "not armed: servo up (id 3): no answer"
 
 
-@pytest.mark.parametrize("how", ["end", "signal", "alone"])
+@pytest.mark.parametrize("how", ["signal", "alone"])
 def test_a_torque_off_that_is_owed_is_paid_before_the_process_ends(paper: Paper, how: str) -> None:
     _off_after(paper, 6)
     paper.hear(request="torque off")
-    if how == "end":
-        paper.end.waiting = Request(2, "end")
-    elif how == "signal":
+    if how == "signal":
         paper.loop.end()
     else:
         paper.end.is_alone = True
@@ -363,7 +361,7 @@ def test_a_torque_off_that_is_owed_is_paid_before_the_process_ends(paper: Paper,
     assert paper.end.words == []
 
 
-def test_a_process_that_cannot_prove_it_says_so_with_its_last_words(paper: Paper, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_process_that_cannot_prove_it_says_so_with_its_send_fatal(paper: Paper, caplog: pytest.LogCaptureFixture) -> None:
     _off_after(paper, 1000)
     paper.hear(request="torque off")
     paper.loop.end()
@@ -386,7 +384,7 @@ def test_arming_looks_where_the_joints_are_now(paper: Paper) -> None:
     """A quiet bus was not read for long: meanwhile somebody has turned a joint by hand."""
     for before_mm, now_mm, told in ((0.0, -7.0, []), (-7.0, 0.0, ["arm"])):
         paper.reads(before_mm)
-        paper.loop._talk()
+        paper.loop._read_decide_write()
         paper.reads(now_mm)
         paper.hear(request="arm")
         assert paper.bus.told == told
@@ -435,7 +433,7 @@ def test_a_robot_that_is_closed_while_it_connects_keeps_no_bus_process(monkeypat
         def close(self) -> None:
             alive.remove(self)
 
-    monkeypatch.setattr(servo_robot, "BusLink", PaperLink)
+    monkeypatch.setattr(servo_robot, "BusClient", PaperLink)
     robot = ServoRobot(ServosConfig(port="/dev/none"), SafetyConfig())
     failed: list[NotReady] = []
 

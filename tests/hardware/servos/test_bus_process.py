@@ -6,7 +6,6 @@ import contextlib
 import math
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -26,8 +25,9 @@ from core.control.faults import Cause
 from core.control.gate import RejectReason, Source
 from core.devices import DeviceError, Robot
 from core.types import Command
+from hardware.processes import PARENT_CHECK_S
 from hardware.rig import RigKind, open_rig
-from hardware.servos.bus_ipc import _LOOK_S, BusClient, BusOrder, BusPhase, BusProcess, BusStatus, Heartbeat
+from hardware.servos.bus_ipc import BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, start_bus
 from hardware.servos.dynamixel_port import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servos.bus import SoftServoBus
@@ -271,14 +271,14 @@ def test_stop_comes_through_floods_of_orders_and_requests(servos: SoftServoBus, 
 
 def test_stop_while_every_way_in_is_full(servos: SoftServoBus, armed: ServoRobot) -> None:
     """The bus process stands still; requests pile up until no more go in, STOPs too. It wakes up, and stops first."""
-    link = armed._link
+    link = armed._client
     assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
     os.kill(link.pid, signal.SIGSTOP)
     try:
         with pytest.raises(BlockingIOError):
             for number in range(100_000):
-                link._socket.send(b'{"id": %d, "do": "zero"}' % (1_000_000 + number))
+                link._process.send({"id": 1_000_000 + number, "do": "zero"})
         for _ in range(70_000):
             link.stop()
     finally:
@@ -306,8 +306,8 @@ def test_stop_switches_the_torque_off_when_that_is_the_policy(servos: SoftServoB
 @pytest.mark.slow  # what hangs is waited for, and then for its end
 def test_a_bus_process_that_hangs_keeps_no_torque_on(armed: ServoRobot, servos: SoftServoBus) -> None:
     """Asked and asked again it could not answer, and the port was its own: only opening the rig anew got out of it."""
-    assert armed._link is not None
-    os.kill(armed._link.pid, signal.SIGSTOP)
+    assert armed._client is not None
+    os.kill(armed._client.pid, signal.SIGSTOP)
     armed.torque_off()
     assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
     assert armed.failure is not None, "this process is not the one that drives"
@@ -338,7 +338,7 @@ def test_a_torque_off_that_is_owed_is_paid_when_the_application_closes(
 
 def test_torque_that_went_off_on_a_port_that_cannot_be_opened_is_told_at_once(robot: ServoRobot) -> None:
     """All seven had let go, but one of them was another one than before: told only when somebody had changed it back."""
-    link, status = robot._link, _seen(robot, lambda status: bool(status.servos))
+    link, status = robot._client, _seen(robot, lambda status: bool(status.servos))
     assert link is not None
     closed = replace(status, phase=BusPhase.CLOSED, servos=(), cycle=status.cycle + 1000, torque_offs=1)
     link.status = lambda: closed  # type: ignore[method-assign]
@@ -353,7 +353,7 @@ def test_torque_that_went_off_on_a_port_that_cannot_be_opened_is_told_at_once(ro
 
 def test_without_a_bus_process_and_without_a_servo_the_others_still_let_go(servos: SoftServoBus, armed: ServoRobot) -> None:
     """Nobody can connect seven servos of which one is missing, and six went on pulling."""
-    link = armed._link
+    link = armed._client
     assert link is not None
     os.kill(link.pid, signal.SIGKILL)
     end_s = time.monotonic() + PATIENCE_S
@@ -378,7 +378,7 @@ def test_without_a_bus_process_and_without_a_servo_the_others_still_let_go(servo
 
 def test_a_bus_process_that_tells_nothing_any_more_sends_nothing(servos: SoftServoBus, armed: ServoRobot) -> None:
     """It stands still, then it is gone: its last status would say for ever that the robot is being driven."""
-    link = armed._link
+    link = armed._client
     assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
     sent = armed.sent_motion()
@@ -452,7 +452,7 @@ def test_a_heartbeat_without_orders_holds_and_stays_armed(servos: SoftServoBus, 
 def test_an_order_that_is_not_finite_is_rejected_in_the_bus_process_too(
     servos: SoftServoBus, armed: ServoRobot, number: float
 ) -> None:
-    link = armed._link
+    link = armed._client
     assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 0.5)
     end_s = time.monotonic() + PATIENCE_S
@@ -569,7 +569,7 @@ def test_fault_26_the_port_vanishes_and_comes_back(servos: SoftServoBus, armed: 
 
 
 def test_a_killed_bus_process_is_seen_and_said(servos: SoftServoBus, armed: ServoRobot) -> None:
-    link = armed._link
+    link = armed._client
     assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
     assert armed.failure is None
@@ -592,7 +592,7 @@ def test_a_killed_bus_process_is_seen_and_said(servos: SoftServoBus, armed: Serv
 
 
 def test_a_bus_process_that_hangs_reports_nothing_new(servos: SoftServoBus, armed: ServoRobot) -> None:
-    link = armed._link
+    link = armed._client
     assert link is not None
     _seen(armed, lambda status: len(status.servos) == 7)
     assert armed.report() is not None
@@ -606,7 +606,7 @@ def test_a_bus_process_that_hangs_reports_nothing_new(servos: SoftServoBus, arme
 
 
 def test_it_dies_while_somebody_waits_for_an_answer(servos: SoftServoBus, robot: ServoRobot) -> None:
-    link = robot._link
+    link = robot._client
     assert link is not None
     os.kill(link.pid, signal.SIGSTOP)
     killer = threading.Timer(0.1, os.kill, (link.pid, signal.SIGKILL))
@@ -617,7 +617,7 @@ def test_it_dies_while_somebody_waits_for_an_answer(servos: SoftServoBus, robot:
 
 
 def test_a_bus_process_that_hangs_is_ended_by_close(servos: SoftServoBus, robot: ServoRobot) -> None:
-    link = robot._link
+    link = robot._client
     assert link is not None
     os.kill(link.pid, signal.SIGSTOP)
     robot.close()
@@ -625,11 +625,12 @@ def test_a_bus_process_that_hangs_is_ended_by_close(servos: SoftServoBus, robot:
 
 
 def test_asked_to_end_it_holds_and_ends_with_zero(servos: SoftServoBus, armed: ServoRobot) -> None:
-    link = armed._link
+    link = armed._client
     assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
     os.kill(link.pid, signal.SIGTERM)
-    assert link._process.wait(PATIENCE_S) == 0
+    assert link._process.wait(PATIENCE_S)
+    assert link._process.exit_code() == 0
     _settle_mm(servos)
 
 
@@ -658,7 +659,7 @@ def test_an_application_that_forgets_to_close_leaves_nothing_behind(servos: Soft
         "from hardware.servos.servo_robot import ServoRobot\n"
         "robot = ServoRobot(ServosConfig(port=sys.argv[1]), SafetyConfig())\nrobot.connect()\nrobot.zero()\nrobot.arm()\n"
         "child = os.fork()\nif child == 0:\n    time.sleep(30)\n    os._exit(0)\n"
-        "print(robot._link.pid, child, flush=True)\nos._exit(0)\n"
+        "print(robot._client.pid, child, flush=True)\nos._exit(0)\n"
     )
     run = subprocess.Popen([sys.executable, "-c", program, servos.port], cwd=ROOT, stdout=subprocess.PIPE, text=True)
     assert run.stdout is not None
@@ -694,46 +695,38 @@ def test_a_link_whose_process_fails_at_once_says_why() -> None:
         link.request("open", PATIENCE_S)
 
 
-def test_a_process_that_was_started_ahead_waits_for_its_servos_as_long_as_they_take() -> None:
-    process = BusProcess()
-    time.sleep(2.5 * _LOOK_S)
-    link = BusClient(ServosConfig(), SAFETY, process)
+@pytest.mark.parametrize("dies", [False, True])
+def test_a_process_that_was_started_ahead_waits_for_its_servos_and_is_replaced_when_it_dies(dies: bool) -> None:
+    process = start_bus()
+    if dies:
+        os.kill(process.pid, signal.SIGKILL)
+        assert process.wait(PATIENCE_S)
+    else:
+        time.sleep(2.5 * PARENT_CHECK_S)
+    client = BusClient(ServosConfig(), SAFETY, process)
     try:
-        assert link.pid == process.process.pid
+        assert (client.pid == process.pid) is not dies
         with pytest.raises(BusProcessLost, match="no servo port is configured"):
-            link.request("open", PATIENCE_S)
+            client.request("open", PATIENCE_S)
     finally:
-        link.close()
-        process.end()  # which is the link's, by then
-
-
-def test_a_process_that_is_gone_before_its_servos_are_named_is_replaced() -> None:
-    process = BusProcess()
-    process.process.kill()
-    process.process.wait()
-    link = BusClient(ServosConfig(), SAFETY, process)
-    try:
-        assert link.pid != process.process.pid
-        with pytest.raises(BusProcessLost, match="no servo port is configured"):
-            link.request("open", PATIENCE_S)
-    finally:
-        link.close()
+        client.close()
+        process.discard()  # which is the client's, by then
 
 
 def test_a_robot_that_is_never_connected_ends_the_process_that_loads_for_it() -> None:
-    process = BusProcess()
+    process = start_bus()
     ServoRobot(ServosConfig(), SAFETY, process=process).close()
-    assert process.process.poll() is not None
+    assert process.exit_code() is not None
 
 
 LETS_GO = """
 import os, signal, sys
 from core.config.safety import SafetyConfig
 from core.config.safety import ServosConfig
-from hardware.servos.bus_ipc import BusLink
+from hardware.servos.bus_ipc import BusClient
 
-link = BusLink(ServosConfig(port=sys.argv[1]), SafetyConfig())
-link._socket.send(b'{"id": 1, "do": "torque off"}')
+link = BusClient(ServosConfig(port=sys.argv[1]), SafetyConfig())
+link._process.send({"id": 1, "do": "torque off"})
 print(link.pid, flush=True)
 os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -748,13 +741,6 @@ def test_torque_off_is_done_though_the_application_dies_while_its_bus_process_lo
     while _lives(int(done.stdout)) and time.monotonic() < until_s:
         time.sleep(0.02)
     assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
-
-
-def test_an_application_that_goes_before_it_names_servos_leaves_a_process_that_ends_by_itself() -> None:
-    process = BusProcess()
-    process.socket.shutdown(socket.SHUT_RDWR)
-    assert process.process.wait(PATIENCE_S) == 0
-    process.end()
 
 
 def test_the_twins_rig_with_servos() -> None:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import signal
-import subprocess
-import sys
+import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -24,13 +23,12 @@ from core.config.rig_file import RigFileError
 from core.control.gate import Source
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
-from hardware.processes import SharedSlot
+from hardware.processes import ChildProcess
 from hardware.rig import RigKind, open_rig, start_ahead
-from hardware.servos.bus_ipc import BusProcess
+from hardware.servos.bus_ipc import start_bus
 from hardware.servos.dynamixel_port import BusProcessLost
 from hardware.servos.servo_robot import ServoRobot
-from hardware.twin.process import RemoteTwin, _serve, pack_frame, pack_status, unpack_frame, unpack_status
-from hardware.twin.world import TwinWorld
+from hardware.twin.process import RemoteTwin, _serve, pack_frame, pack_status, start_twin, unpack_frame, unpack_status
 
 CONFIG = Config.model_validate({"twin": {"image_width_px": 160, "image_height_px": 120}})
 
@@ -104,7 +102,7 @@ def test_an_application_that_was_ended_is_no_error_of_the_twin() -> None:
     listening, wake = os.pipe()
     os.close(listening)
     try:
-        _serve(cast("TwinWorld", world), cast("SharedSlot", slot), cast("SharedSlot", slot), wake, threading.Event())
+        _serve(cast("Any", world), cast("Any", slot), cast("Any", slot), cast("Any", SimpleNamespace(pipe=wake)), threading.Event())
     finally:
         os.close(wake)
 
@@ -123,15 +121,15 @@ def test_what_was_started_ahead_becomes_the_rig() -> None:
     assert ahead is not None
     rig = open_rig(CONFIG, ahead)
     try:
-        assert {child.pid for child in psutil.Process().children()} >= {ahead.twin.pid, ahead.bus.process.pid}
+        assert {child.pid for child in psutil.Process().children()} >= {ahead.twin.pid, ahead.bus.pid}
         assert isinstance(rig.robot, ServoRobot)
-        assert rig.robot._link is not None
-        assert rig.robot._link.pid == ahead.bus.process.pid
+        assert rig.robot._client is not None
+        assert rig.robot._client.pid == ahead.bus.pid
         frame = rig.camera.read(20.0)
         assert frame is not None
         assert frame.image.shape == (120, 160, 3)
         rig.robot.connect()
-        assert rig.robot._link.pid != ahead.bus.process.pid, "the second connection has a process of its own"
+        assert rig.robot._client.pid != ahead.bus.pid, "the second connection has a process of its own"
     finally:
         rig.close()
 
@@ -183,17 +181,33 @@ def test_a_process_that_cannot_be_started_is_a_device_error_when_the_rig_is_open
         with pytest.raises(DeviceError, match=r"the bench twin cannot be started \(Too many open files\)"):
             open_rig(CONFIG)
         with pytest.raises(BusProcessLost, match=r"the servo bus process cannot be started \(Too many open files\)"):
-            BusProcess()
+            start_bus()
     assert psutil.Process().num_fds() == open_before
 
 
-def test_an_application_that_ends_before_it_needs_a_twin_leaves_a_process_that_ends_by_itself() -> None:
-    ends = os.memfd_create("bench_twin"), os.open(os.devnull, os.O_WRONLY)
-    command = [sys.executable, "-m", "hardware.twin.process", *map(str, ends)]
-    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, pass_fds=ends, check=False)
-    for end in ends:
-        os.close(end)
-    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+@pytest.mark.parametrize("start", [start_twin, start_bus])
+def test_an_application_that_ends_before_it_needs_a_process_leaves_none_behind(
+    start: Callable[[], ChildProcess], capfd: pytest.CaptureFixture[str]
+) -> None:
+    process = start()
+    process.socket.shutdown(socket.SHUT_RDWR)
+    assert process.wait(20.0)
+    assert process.exit_code() == 0
+    process.discard()
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_a_twin_that_died_while_it_waited_is_replaced() -> None:
+    prestarted = start_twin()
+    os.kill(prestarted.pid, signal.SIGKILL)
+    assert prestarted.wait(10.0)
+    twin = RemoteTwin(CONFIG, 40.0, prestarted)
+    try:
+        assert twin._process.pid != prestarted.pid
+        next_frame(twin)
+    finally:
+        twin.close()
 
 
 @pytest.mark.real_time

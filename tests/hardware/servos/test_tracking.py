@@ -17,8 +17,8 @@ from core.types import Command
 from hardware.servos import registers
 from hardware.servos.bus_guard import BusGuard
 from hardware.servos.bus_ipc import BusOrder, Heartbeat
-from hardware.servos.motion_watch import FollowWatch, stray_limit_mm
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
+from hardware.servos.tracking import TrackingMonitor, drift_limit_mm
 from hardware.twin.servos.device import _ACCELERATION_TICKS_S2, _VELOCITY_TICKS_S, MotorGoal, ServoMotor
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
@@ -53,7 +53,7 @@ class Motors:
         self.goals_mm[place] = at_mm
 
     def arm(self) -> Motors:
-        self.guard.see(self._readings(), 0, None, self.now_s)
+        self.guard.update(self._readings(), 0, None, self.now_s)
         self.guard.check_arming()
         self.guard.set_armed(self.now_s)
         return self
@@ -68,7 +68,7 @@ class Motors:
     def cycle(self) -> None:
         self._live(self.period_s)
         beat = Heartbeat(self.now_s, self.permitted)
-        self.fault = self.guard.see(self._readings(), 0, beat, self.now_s)
+        self.fault = self.guard.update(self._readings(), 0, beat, self.now_s)
         if self.fault is not None:
             self.guard.end_motion(self.fault)
             return
@@ -76,7 +76,7 @@ class Motors:
         if step.goals_mm is not None:
             self._live(0.003)  # the write comes so much later than the read
             self.goals_mm = list(step.goals_mm)
-            self.guard.wrote(step.goals_mm, self.guard.followed, self.now_s)
+            self.guard.record_sent(step.goals_mm, self.guard.followed, self.now_s)
 
     def _live(self, seconds: float) -> None:
         self.now_s += seconds
@@ -130,7 +130,7 @@ def test_a_joint_that_runs_away_from_its_goal(speed_mm_s: float) -> None:
     rig.run(3.0)
     rig.stopped_for("advance")
     gone_mm = start_mm - rig.at_mm[ADVANCE]
-    assert gone_mm <= stray_limit_mm(SERVOS.joints[ADVANCE]) + abs(speed_mm_s) * 0.35
+    assert gone_mm <= drift_limit_mm(SERVOS.joints[ADVANCE]) + abs(speed_mm_s) * 0.35
 
 
 @pytest.mark.parametrize("speed_mm_s", [22.0, 40.0])
@@ -154,7 +154,7 @@ def test_a_joint_that_drifts_during_a_hold(permitted: Source | None, speed_mm_s:
     start_mm = rig.at_mm[RIGHT]
     rig.run(10.0)
     rig.stopped_for("right")
-    assert abs(rig.at_mm[RIGHT] - start_mm) <= stray_limit_mm(SERVOS.joints[RIGHT]) + speed_mm_s * 0.35
+    assert abs(rig.at_mm[RIGHT] - start_mm) <= drift_limit_mm(SERVOS.joints[RIGHT]) + speed_mm_s * 0.35
 
 
 def test_a_joint_that_stays_outside_its_envelope_from_the_first_cycle_on() -> None:
@@ -268,8 +268,8 @@ def test_a_nudge_that_is_let_go_again_is_none() -> None:
 
 
 def test_the_same_positions_told_again_say_nothing_new() -> None:
-    watch, goals = FollowWatch(SERVOS.joints, SAFETY), (0.0,) * 4 + (1.0, 0.0, 0.0)
+    watch, goals = TrackingMonitor(SERVOS.joints, SAFETY), (0.0,) * 4 + (1.0, 0.0, 0.0)
     old = JointMeasurement((0.0,) * 7, 1.0)
-    assert [watch.see(goals, old) for _ in range(100)] == [None] * 100
-    heard = [watch.see(goals, JointMeasurement((0.0,) * 7, 1.0 + 0.05 * n)) for n in range(8)]
+    assert [watch.update(goals, old) for _ in range(100)] == [None] * 100
+    heard = [watch.update(goals, JointMeasurement((0.0,) * 7, 1.0 + 0.05 * n)) for n in range(8)]
     assert heard[-1] == "advance stands 1.00 mm from its goal for 300 ms"
