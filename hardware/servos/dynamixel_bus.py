@@ -1,14 +1,11 @@
-"""The seven DYNAMIXEL X servos through the real SDK: who they are, arming, goals, state, and recovery.
-
-Getting seven servos ready: who they are, what they must be set to. Functions on an open line.
-"""
+"""The seven DYNAMIXEL X servos through the real SDK: identity, set-up, arming, goals, state, and recovery."""
 
 from __future__ import annotations
 
 import contextlib
 import logging
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from core.config.safety import JointConfig, JointName, ServosConfig
@@ -40,12 +37,17 @@ from hardware.servos.registers import (
     state_of,
 )
 
-EXTENDED_POSITION = 4
-TORQUE, WATCHDOG, GOAL, POSITION = 64, 98, 116, 132
-_RETURN_DELAY, _DRIVE_MODE, _MODE, _HOMING_OFFSET, _VELOCITY_LIMIT, _PROFILE = 9, 10, 11, 20, 44, 108
+_log = logging.getLogger(__name__)
+
+# Registers (Robotis e-Manual, X series)
+_RETURN_DELAY, _DRIVE_MODE, _MODE, _HOMING_OFFSET, _VELOCITY_LIMIT = 9, 10, 11, 20, 44
+TORQUE, _STATUS_RETURN, _HARDWARE_ERROR, _WATCHDOG, _PROFILE, _GOAL, _POSITION = 64, 68, 70, 98, 108, 116, 132
 _EEPROM_BYTES = 48
+_EXTENDED_POSITION = 4
 _COUNTING = frozenset({_DRIVE_MODE, _MODE, _HOMING_OFFSET})
+"""Registers that decide what a position means."""
 _SPEEDS = (57600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
+_REBOOT_S = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,36 +74,29 @@ def identify(line: ServoLine, config: ServosConfig) -> tuple[ServoIdentity, ...]
     silent = [joint for joint in config.joints if models[joint.id] is None]
     if silent:
         raise _silence(line, config, silent)
-    return tuple(identity_of(line, joint, config) for joint in config.joints)
+    return tuple(_identity(line, joint, config) for joint in config.joints)
 
 
-def identity_of(line: ServoLine, joint: JointConfig, config: ServosConfig) -> ServoIdentity:
-    """Who answers for a joint, by its own words.
-
-    Raises
-    ------
-    NoAnswer, WrongServo
-        Naming the servo.
-    """
+def _identity(line: ServoLine, joint: JointConfig, config: ServosConfig) -> ServoIdentity:
+    """What a joint's servo says of itself. Raises NoAnswer, WrongServo."""
     table = line.read(joint.id, 0, 8)
     model = int.from_bytes(table[:2], "little")
-    check_model(joint, model, config.model)
+    _check_model(joint, model, config.model)
     if table[7] != joint.id:
-        raise WrongServo(f"{call(joint)} says that its id is {table[7]}: give every servo an id of its own")
+        raise WrongServo(f"{_title(joint)} says that its id is {table[7]}: give every servo an id of its own")
     return ServoIdentity(joint.name, joint.id, model, table[6])
 
 
-def check_model(joint: JointConfig, model: int | None, expected: int) -> None:
-    """Raise WrongServo when a servo is not of the configuration's model."""
+def _check_model(joint: JointConfig, model: int | None, expected: int) -> None:
     if model != expected:
-        raise WrongServo(f"{call(joint)} is model {model}, not {expected}: swap the servo, or set servos.model or the joint's id")
+        raise WrongServo(f"{_title(joint)} is model {model}, not {expected}: swap the servo, or set servos.model or the joint's id")
 
 
 def _silence(line: ServoLine, config: ServosConfig, silent: list[JointConfig]) -> NoAnswer:
     """The error for servos that do not answer, after looking where they might be."""
     if len(silent) < len(config.joints):
         others = ", ".join(map(str, line.others())) or "none"
-        names = ", ".join(call(joint) for joint in silent)
+        names = ", ".join(_title(joint) for joint in silent)
         return NoAnswer(f"{names}: no answer; ids on the line: {others}. Check the cable, or set the joint's id")
     line.close()
     for baud in _SPEEDS:
@@ -116,98 +111,8 @@ def _silence(line: ServoLine, config: ServosConfig, silent: list[JointConfig]) -
     return NoAnswer(f"no servo answers on {line.port} at {config.baud} baud: check the servos' power and the cable")
 
 
-def holds(line: ServoLine, joint: JointConfig) -> bool:
-    """Whether its torque is on: then it may hold a wire under tension, which only the operator lets go."""
-    return line.read(joint.id, TORQUE, 1) != b"\0"
-
-
-def differences(line: ServoLine, joint: JointConfig) -> dict[int, bytes]:
-    """Registers of the EEPROM that are not as we need them, with what they must be."""
-    wanted = {
-        _RETURN_DELAY: b"\0",
-        _DRIVE_MODE: b"\0",  # not reversed, and the profile in velocities
-        _MODE: bytes([EXTENDED_POSITION]),
-        _HOMING_OFFSET: bytes(4),  # with one, a tripped watchdog can move the motor
-        _VELOCITY_LIMIT: registers.profile_velocity(joint).to_bytes(4, "little"),
-    }
-    table = line.read(joint.id, 0, _EEPROM_BYTES)
-    return {address: data for address, data in wanted.items() if table[address : address + len(data)] != data}
-
-
-def counts_anew(wrong: Collection[int]) -> bool:
-    """Whether positions mean something else once these registers were set."""
-    return not _COUNTING.isdisjoint(wrong)
-
-
-def configure(line: ServoLine, joint: JointConfig) -> bool:
-    """EEPROM as we need it, written only where it differs, because it wears; that takes the torque off. True: positions count anew.
-
-    Raises
-    ------
-    WrongServo
-        When a register keeps its value.
-    """
-    wrong = differences(line, joint)
-    if wrong:
-        line.write(joint.id, TORQUE, b"\0")
-    for address, data in wrong.items():
-        line.write(joint.id, address, data)
-        if line.read(joint.id, address, len(data)) != data:
-            raise WrongServo(f"{call(joint)} keeps register {address} as it is: it is no servo that this program can use")
-    return counts_anew(wrong)
-
-
-def map_block(line: ServoLine, joint: JointConfig) -> bool:
-    """Gather the status block; not written when it is in place already. True: it was not, so that the servo has restarted."""
-    wanted = indirect_addresses()
-    if line.read(joint.id, INDIRECT_ADDRESS, len(wanted)) == wanted:
-        return False
-    line.write(joint.id, INDIRECT_ADDRESS, wanted)
-    return True
-
-
-def set_profile(line: ServoLine, joint: JointConfig) -> None:
-    """Greatest acceleration and speed on the way to a goal, read back.
-
-    Raises
-    ------
-    Refused
-        When the servo goes by others.
-    """
-    profile = registers.profile_acceleration(joint).to_bytes(4, "little") + registers.profile_velocity(joint).to_bytes(4, "little")
-    line.write(joint.id, _PROFILE, profile)
-    if line.read(joint.id, _PROFILE, len(profile)) != profile:
-        raise WriteRefused(f"{call(joint)} did not take its greatest speed and acceleration: reboot it")
-
-
-def start_watchdogs(line: ServoLine, config: ServosConfig) -> None:
-    """From now on a servo that hears nothing for so long holds."""
-    for joint in config.joints:
-        line.write(joint.id, WATCHDOG, bytes([registers.watchdog_units(config.watchdog_s)]))
-
-
-def send_goals(line: ServoLine, goals: dict[int, int]) -> None:
-    """Goal ticks by id, in one packet."""
-    line.group_write(GOAL, {servo_id: ticks.to_bytes(4, "little", signed=True) for servo_id, ticks in goals.items()})
-
-
-def goal_to_position(line: ServoLine, config: ServosConfig) -> None:
-    """Goal = present position of all, proven by reading it back."""
-    goals = {joint.id: registers.signed(line.read(joint.id, POSITION, 4)) for joint in config.joints}
-    send_goals(line, goals)
-    for joint in config.joints:
-        if registers.signed(line.read(joint.id, GOAL, 4)) != goals[joint.id]:
-            raise WriteRefused(f"{call(joint)} did not take its own position as goal: reboot it")
-
-
-def call(joint: JointConfig) -> str:
-    """How messages name a servo."""
+def _title(joint: JointConfig) -> str:
     return f"servo {joint.name} (id {joint.id})"
-
-
-_STATUS_RETURN, _HARDWARE_ERROR = 68, 70
-_REBOOT_S = 1.5
-_log = logging.getLogger(__name__)
 
 
 class ServoBus:
@@ -221,7 +126,7 @@ class ServoBus:
     Notes
     -----
     Positions are joint millimetres from where ``set_zero`` was called. Every method but ``close`` may raise ``PortLost``; then the
-    bus is closed, and ``open`` starts anew: disarmed, without zeros.
+    bus is closed, and ``open`` starts again: disarmed, without zeros.
     """
 
     def __init__(self, config: ServosConfig, port: str | None = None) -> None:
@@ -231,11 +136,11 @@ class ServoBus:
         self.config = config
         self._joints = config.joints
         self._line = ServoLine(chosen, config.baud)
-        self._forget()
+        self._reset()
 
-    def _forget(self) -> None:
+    def _reset(self) -> None:
         self._armed = False
-        self._identities: tuple[ServoIdentity, ...] = ()
+        self.identities: tuple[ServoIdentity, ...] = ()
         self._zeros: dict[int, int] = {}
         self._put_off: set[int] = set()
         self._misses = dict.fromkeys((joint.id for joint in self._joints), 0)
@@ -248,12 +153,8 @@ class ServoBus:
 
     @property
     def is_armed(self) -> bool:
-        """Whether goals are taken. Nothing but ``arm`` makes it true; a restart, a lost torque or a lost port make it false."""
+        """Whether goals are taken. Only ``arm`` makes it true; a restart, a lost torque or a lost port make it false."""
         return self._armed and self._line.is_open
-
-    @property
-    def identities(self) -> tuple[ServoIdentity, ...]:
-        return self._identities
 
     @property
     def zero_ticks(self) -> tuple[int | None, ...]:
@@ -278,17 +179,17 @@ class ServoBus:
             A servo is missing, or not the one that the configuration names. The port is closed again.
         """
         self._line.open()
-        self._forget()
+        self._reset()
         try:
             self._line.broadcast(_STATUS_RETURN, bytes([ANSWERS_ALL]))  # else a servo may be set not to answer writes
-            self._identities = identify(self._line, self.config)
+            self.identities = identify(self._line, self.config)
             for joint in self._joints:
-                if not holds(self._line, joint):
+                if not self._holds(joint):
                     self._configure(joint)
-                elif differences(self._line, joint):
+                elif self._differences(joint):
                     self._put_off.add(joint.id)
-                    _log.warning("%s holds, so it is not set up before the servos are switched on", call(joint))
-                map_block(self._line, joint)
+                    _log.warning("%s holds, so it is not set up before the servos are switched on", _title(joint))
+                self._map_block(joint)
         except ServoError:
             self.close()
             raise
@@ -298,7 +199,7 @@ class ServoBus:
         if self.is_armed:
             with contextlib.suppress(ServoError):
                 self.hold()
-                self.read()  # whoever answers has heard the hold: it is not lost with the port
+                self.read()  # a servo that answers has heard the hold: it is not lost with the port
         self._armed = False
         self._line.close()
 
@@ -314,9 +215,16 @@ class ServoBus:
         if self.is_armed:
             raise NotReady("the servos are armed: disarm before zeroing")
         chosen = [joint for joint in self._joints if names is None or joint.name in names]
-        self._set_up_late(chosen)
-        found = {joint.id: registers.signed(self._line.read(joint.id, POSITION, 4)) for joint in chosen}
-        self._zeros.update(found)
+        for joint in chosen:
+            if joint.id not in self._put_off:
+                continue
+            if not self._holds(joint):
+                self._configure(joint)
+            elif not _COUNTING.isdisjoint(self._differences(joint)):
+                raise NotReady(
+                    f"{_title(joint)} holds in a mode of another program: switch the torque off (the wires go slack), then zero"
+                )
+        self._zeros.update({joint.id: self._read_signed(joint, _POSITION) for joint in chosen})
 
     def arm(self) -> None:
         """Torque on, each servo holding where it stands.
@@ -327,7 +235,7 @@ class ServoBus:
         ------
         NotReady
             A joint has no zero, has lost it by a restart, or a servo reports a hardware error.
-        WrongServo, NoAnswer, Refused
+        WrongServo, NoAnswer, WriteRefused
             Before the torque is touched: a servo is missing or another one. Later, the torque of all servos is off again.
         TorqueStillOn
             It could not be switched on everywhere, nor proven to be off again.
@@ -336,19 +244,20 @@ class ServoBus:
         self._check_ready()
         try:
             for joint in self._joints:
-                self._line.write(joint.id, WATCHDOG, b"\0")
+                self._line.write(joint.id, _WATCHDOG, b"\0")
             for joint in self._joints:
                 self._line.write(joint.id, TORQUE, b"\0")
             for joint in self._joints:
                 self._configure(joint)
-                if map_block(self._line, joint):  # else nobody would ever know: it counts from another turn now
+                if self._map_block(joint):  # the only sign that it has restarted: it counts from another turn now
                     self._zeros.pop(joint.id, None)
-                set_profile(self._line, joint)
+                self._set_profile(joint)
             self._check_zeroed()
-            goal_to_position(self._line, self.config)
+            self._send_position_as_goal()
             for joint in self._joints:
                 self._line.write(joint.id, TORQUE, b"\1")
-            start_watchdogs(self._line, self.config)
+            for joint in self._joints:  # from now on a servo that hears nothing for so long holds
+                self._line.write(joint.id, _WATCHDOG, bytes([registers.watchdog_units(self.config.watchdog_s)]))
         except PortLost:
             raise
         except ServoError as error:
@@ -362,7 +271,7 @@ class ServoBus:
         self._armed = True
 
     def disarm(self) -> None:
-        """Hold, and take no more goals. The torque stays on; the servos' watchdogs trip when nobody talks to them."""
+        """Hold, and take no more goals. The torque stays on; the servos' watchdogs trip when the line falls silent."""
         self._armed = False
         self.hold()
 
@@ -383,7 +292,10 @@ class ServoBus:
             if joint.id in answer.data:
                 readings.append(self._reading(joint, answer.data[joint.id], now))
             else:
-                readings.append(self._missing(joint, answer.missed[joint.id], now))
+                miss = answer.missed[joint.id]
+                self._misses[joint.id] += miss is not Miss.WAITING
+                self._silences[joint.id] += miss is Miss.SILENT
+                readings.append(MissingServo(joint.name, joint.id, now, self._misses[joint.id], miss.value))
         return tuple(readings)
 
     def write(self, goals_mm: Sequence[float]) -> tuple[float, ...]:
@@ -404,7 +316,7 @@ class ServoBus:
             joint.id: registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
             for joint, goal_mm in zip(self._joints, goals_mm, strict=True)
         }
-        send_goals(self._line, goals)
+        self._send_goals(goals)
         return tuple(registers.to_mm(joint, goals[joint.id], self._zeros[joint.id]) for joint in self._joints)
 
     def hold(self) -> tuple[ServoReading, ...]:
@@ -412,16 +324,13 @@ class ServoBus:
         readings = self.read()
         goals = {reading.id: reading.ticks for reading in readings if isinstance(reading, ServoState)}
         if goals:
-            send_goals(self._line, goals)
+            self._send_goals(goals)
         return readings
 
     def torque_off(self) -> None:
         """Switch all torque off: one packet to all, three times, read back. It releases the tension of the wires.
 
-        Raises
-        ------
-        TorqueStillOn
-            When a servo still has torque, or does not tell.
+        Raises TorqueStillOn when a servo still has torque, or does not tell.
         """
         self._armed = False
         for _ in range(3):
@@ -432,7 +341,7 @@ class ServoBus:
             raise TorqueStillOn(f"torque of {', '.join(doubtful)} is not proven to be off: cut the servos' power")
 
     def let_go(self) -> None:
-        """``torque_off`` on a closed bus that cannot be opened because not all seven answer: whoever hears it obeys.
+        """``torque_off`` on a closed bus that cannot be opened because not all seven answer: those that hear it obey.
 
         Raises
         ------
@@ -450,12 +359,11 @@ class ServoBus:
     def reboot(self, servo_id: int) -> None:
         """Restart one servo, which clears its hardware error. Afterwards the bus is disarmed, and the joint must be zeroed.
 
-        Raises
-        ------
-        NoAnswer
-            When it does not come back within 1.5 s.
+        Raises NoAnswer when it does not come back within 1.5 s.
         """
-        joint = self._joint(servo_id)
+        joint = next((joint for joint in self._joints if joint.id == servo_id), None)
+        if joint is None:
+            raise WrongServo(f"there is no servo with id {servo_id} in the configuration")
         self._armed = False
         self._zeros.pop(servo_id, None)
         self._line.reboot(servo_id)
@@ -463,60 +371,89 @@ class ServoBus:
         time.sleep(0.1)  # it answers for a moment before it goes down
         while (model := self._line.ping(servo_id)) is None:
             if time.monotonic() > until:
-                raise NoAnswer(f"{call(joint)} did not come back after its reboot: switch the servos' power off and on")
-        check_model(joint, model, self.config.model)
+                raise NoAnswer(f"{_title(joint)} did not come back after its reboot: switch the servos' power off and on")
+        _check_model(joint, model, self.config.model)
         self._configure(joint)
-        map_block(self._line, joint)
-
-    def clear_watchdog(self) -> None:
-        """Let servos whose bus watchdog tripped take goals again, starting where they stand.
-
-        Raises
-        ------
-        NotReady
-            When not armed: ``arm`` clears it, too.
-        """
-        if not self.is_armed:
-            raise NotReady("the servos are not armed: arming clears the bus watchdog")
-        for joint in self._joints:
-            set_profile(self._line, joint)  # a trip forgets it, and without one the servo moves as fast as it can
-            self._line.write(joint.id, WATCHDOG, b"\0")
-        goal_to_position(self._line, self.config)
-        start_watchdogs(self._line, self.config)
-
-    def _set_up_late(self, chosen: Sequence[JointConfig]) -> None:
-        """Those that held when the port was opened, if they do not any more."""
-        for joint in chosen:
-            if joint.id not in self._put_off:
-                continue
-            if not holds(self._line, joint):
-                self._configure(joint)
-            elif counts_anew(differences(self._line, joint)):
-                raise NotReady(
-                    f"{call(joint)} holds in a mode of another program: switch the torque off (the wires go slack), then zero"
-                )
+        self._map_block(joint)
 
     def _check_ready(self) -> None:
         if not self.is_open:
             raise NotReady("the servo port is not open: open it first")
         # again, since a servo may have been changed meanwhile
-        self._identities = tuple(identity_of(self._line, joint, self.config) for joint in self._joints)
+        self.identities = tuple(_identity(self._line, joint, self.config) for joint in self._joints)
         self._check_zeroed()
         for joint in self._joints:
             error = HardwareError(self._line.read(joint.id, _HARDWARE_ERROR, 1)[0])
             if error:
-                raise NotReady(f"{call(joint)} reports {describe(error)}: find the cause, then reboot the servo")
+                raise NotReady(f"{_title(joint)} reports {describe(error)}: find the cause, then reboot the servo")
 
     def _check_zeroed(self) -> None:
-        missing = [joint.name for joint in self._joints if joint.id not in self._zeros]
-        if missing:
-            names = ", ".join(missing)
+        names = ", ".join(joint.name for joint in self._joints if joint.id not in self._zeros)
+        if names:
             raise NotReady(f"not zeroed: {names} (or restarted since then): slacken the wires and zero before arming")
 
+    def _holds(self, joint: JointConfig) -> bool:
+        """Whether its torque is on: then it may hold a wire under tension, which only the operator lets go."""
+        return self._line.read(joint.id, TORQUE, 1) != b"\0"
+
+    def _differences(self, joint: JointConfig) -> dict[int, bytes]:
+        """Registers of the EEPROM that are not as we need them, with what they must be."""
+        wanted = {
+            _RETURN_DELAY: b"\0",
+            _DRIVE_MODE: b"\0",  # not reversed, and the profile in velocities
+            _MODE: bytes([_EXTENDED_POSITION]),
+            _HOMING_OFFSET: bytes(4),  # with one, a tripped watchdog can move the motor
+            _VELOCITY_LIMIT: registers.profile_velocity(joint).to_bytes(4, "little"),
+        }
+        table = self._line.read(joint.id, 0, _EEPROM_BYTES)
+        return {address: data for address, data in wanted.items() if table[address : address + len(data)] != data}
+
     def _configure(self, joint: JointConfig) -> None:
+        """EEPROM as we need it, written only where it differs, because it wears; that takes the torque off.
+
+        A joint whose positions mean something else afterwards loses its zero. Raises WrongServo when a register keeps its value.
+        """
         self._put_off.discard(joint.id)
-        if configure(self._line, joint):
+        wrong = self._differences(joint)
+        if wrong:
+            self._line.write(joint.id, TORQUE, b"\0")
+        for address, data in wrong.items():
+            self._line.write(joint.id, address, data)
+            if self._line.read(joint.id, address, len(data)) != data:
+                raise WrongServo(f"{_title(joint)} keeps register {address} as it is: it is no servo that this program can use")
+        if not _COUNTING.isdisjoint(wrong):
             self._zeros.pop(joint.id, None)
+
+    def _map_block(self, joint: JointConfig) -> bool:
+        """Gather the status block; not written when it is in place already. True: it was not, so that the servo has restarted."""
+        wanted = indirect_addresses()
+        if self._line.read(joint.id, INDIRECT_ADDRESS, len(wanted)) == wanted:
+            return False
+        self._line.write(joint.id, INDIRECT_ADDRESS, wanted)
+        return True
+
+    def _set_profile(self, joint: JointConfig) -> None:
+        """Greatest acceleration and speed on the way to a goal, read back. Raises WriteRefused."""
+        values = (registers.profile_acceleration(joint), registers.profile_velocity(joint))
+        profile = b"".join(value.to_bytes(4, "little") for value in values)
+        self._line.write(joint.id, _PROFILE, profile)
+        if self._line.read(joint.id, _PROFILE, len(profile)) != profile:
+            raise WriteRefused(f"{_title(joint)} did not take its greatest speed and acceleration: reboot it")
+
+    def _read_signed(self, joint: JointConfig, address: int) -> int:
+        return registers.signed(self._line.read(joint.id, address, 4))
+
+    def _send_goals(self, goals: dict[int, int]) -> None:
+        """Goal ticks by id, in one packet."""
+        self._line.group_write(_GOAL, {servo_id: ticks.to_bytes(4, "little", signed=True) for servo_id, ticks in goals.items()})
+
+    def _send_position_as_goal(self) -> None:
+        """Goal = present position of all, proven by reading it back."""
+        goals = {joint.id: self._read_signed(joint, _POSITION) for joint in self._joints}
+        self._send_goals(goals)
+        for joint in self._joints:
+            if self._read_signed(joint, _GOAL) != goals[joint.id]:
+                raise WriteRefused(f"{_title(joint)} did not take its own position as goal: reboot it")
 
     def _reading(self, joint: JointConfig, block: bytes, time_s: float) -> ServoReading:
         self._misses[joint.id] = self._silences[joint.id] = 0
@@ -525,19 +462,8 @@ class ServoBus:
             self._armed = False
             self._zeros.pop(joint.id, None)
             with contextlib.suppress(NoAnswer, WriteRefused):
-                map_block(self._line, joint)
+                self._map_block(joint)
             return MissingServo(joint.name, joint.id, time_s, 0, "restarted: zero and arm again", restarted=True)
         if not state.torque:
             self._armed = False
         return state
-
-    def _missing(self, joint: JointConfig, miss: Miss, time_s: float) -> MissingServo:
-        self._misses[joint.id] += miss is not Miss.WAITING
-        self._silences[joint.id] += miss is Miss.SILENT
-        return MissingServo(joint.name, joint.id, time_s, self._misses[joint.id], miss.value)
-
-    def _joint(self, servo_id: int) -> JointConfig:
-        for joint in self._joints:
-            if joint.id == servo_id:
-                return joint
-        raise WrongServo(f"there is no servo with id {servo_id} in the configuration")

@@ -1,10 +1,6 @@
-"""Requests and answers on the servo line, with every trap of the vendor's SDK between them and us handled.
+"""The servo line: the vendor's port and packet handlers with their traps mended (dynamixel-sdk 4.1.0), and typed errors.
 
-One thread owns a line. A request ends in bounded time with the bytes, or with a typed error.
-
-The vendor's port and packet handlers with their traps mended (dynamixel-sdk 4.1.0).
-
-What can go wrong on the servo bus, each with one line that says what to do.
+One thread owns a line. A request ends in bounded time with the bytes, or with an error that says in one line what to do.
 """
 
 from __future__ import annotations
@@ -47,7 +43,7 @@ class PortTaken(PortError):
 
 
 class PortLost(ServoError):
-    """The port vanished while it was open. The driver has closed it; ``open`` starts anew, disarmed and without zeros."""
+    """The port vanished while it was open. The driver has closed it; ``open`` starts again, disarmed and without zeros."""
 
 
 class NoAnswer(ServoError):
@@ -91,13 +87,7 @@ class LockedPort(PortHandler):  # type: ignore[misc]
         return time.monotonic() * 1000.0
 
     def setupPort(self, cflag_baud: int) -> bool:  # noqa: N802
-        """Open the port; called by ``openPort`` and ``setBaudRate``.
-
-        Raises
-        ------
-        PortError
-            With the reason and what to do.
-        """
+        """Open the port; called by ``openPort`` and ``setBaudRate``. Raises PortError."""
         if self.is_open:
             self.closePort()
         try:
@@ -190,7 +180,7 @@ def _port_error(port: str, error: Exception) -> PortError:
 
 
 LATE_S = 0.04
-"""An answer may come so much later than the request that gave up on it; who asks again before takes it for the new answer."""
+"""An answer may come so much later than the request that gave up on it; a request before would take it for its own."""
 ALERT_BIT = 0x80
 _ERROR_TEXT = {
     1: "could not process it",
@@ -235,7 +225,7 @@ class GroupAnswer:
 
 @dataclass(slots=True)
 class _Round:
-    """One group request: who still has to answer."""
+    """One group request, and its answers so far."""
 
     waiting: list[int]
     length: int
@@ -268,9 +258,13 @@ class ServoLine:
         """
         self.close()
         port = LockedPort(self.port)
-        with self._guard_new(port):
+        try:
             if not port.setBaudRate(self.baud):
                 raise PortError(f"servos.baud {self.baud} is not a speed of these servos: use 57600, 115200, 1000000, 2000000 ...")
+        except (OSError, termios.error) as error:
+            with contextlib.suppress(OSError, termios.error, AttributeError):
+                port.closePort()
+            raise PortError(f"servo port {self.port} vanished while it was opened ({error}): check the USB cable") from None
         self._port, self._owner = port, threading.get_ident()
         self.counts = LineCounts()
         self._quiet_until.clear()
@@ -284,15 +278,6 @@ class ServoLine:
                 port.closePort()
 
     @contextlib.contextmanager
-    def _guard_new(self, port: LockedPort) -> Iterator[None]:
-        try:
-            yield
-        except (OSError, termios.error) as error:
-            with contextlib.suppress(OSError, termios.error, AttributeError):
-                port.closePort()
-            raise PortError(f"servo port {self.port} vanished while it was opened ({error}): check the USB cable") from None
-
-    @contextlib.contextmanager
     def _exchange(self) -> Iterator[LockedPort]:
         """The open port for one request. Whatever happens, its busy flag is reset, and a lost port is closed."""
         port = self._port
@@ -304,7 +289,8 @@ class ServoLine:
             yield port
         except (OSError, termios.error) as error:  # SerialException is an OSError, termios.error is none
             self.close()
-            raise PortLost(f"servo port {self.port} is lost ({_short(error)}): check the USB cable, then connect again") from None
+            reason = " ".join(str(error).split())[:80]
+            raise PortLost(f"servo port {self.port} is lost ({reason}): check the USB cable, then connect again") from None
         finally:
             port.is_using = False
 
@@ -330,24 +316,14 @@ class ServoLine:
         return sorted(found)
 
     def read(self, servo_id: int, address: int, length: int) -> bytes:
-        """`length` bytes of the control table; two retries.
-
-        Raises
-        ------
-        NoAnswer, Refused
-        """
+        """`length` bytes of the control table; two retries. Raises NoAnswer, WriteRefused."""
         data, error = self._request(servo_id, lambda port: self._handler.readTxRx(port, servo_id, address, length), length)
         if error & ~ALERT_BIT:
             raise WriteRefused(f"servo {servo_id} answered a read of register {address}: it {_error_text(error)}")
         return data
 
     def write(self, servo_id: int, address: int, data: bytes) -> None:
-        """Write and wait for the servo's consent; two retries (a register write may be repeated).
-
-        Raises
-        ------
-        NoAnswer, Refused
-        """
+        """Write and wait for the servo's consent; two retries (a register write may be repeated). NoAnswer, WriteRefused."""
 
         def once(port: LockedPort) -> tuple[list[int], int, int]:
             result, error = self._handler.writeTxRx(port, servo_id, address, len(data), list(data))
@@ -364,12 +340,12 @@ class ServoLine:
             self._handler.reboot(port, servo_id)
 
     def broadcast(self, address: int, data: bytes) -> None:
-        """Write to all servos in one packet; nobody answers."""
+        """Write to all servos in one packet, which has no answer."""
         with self._exchange() as port:
             self._handler.writeTxOnly(port, BROADCAST_ID, address, len(data), list(data))
 
     def group_write(self, address: int, data: dict[int, bytes]) -> None:
-        """One packet with a register for each id; nobody answers, so read what was taken."""
+        """One packet with a register for each id; it has no answer, so read what was taken."""
         length = len(next(iter(data.values())))
         with self._exchange() as port:
             group = GroupSyncWrite(port, self._handler, address, length)
@@ -389,11 +365,11 @@ class ServoLine:
         rest = [i for i in ids if i not in missed]
         silences = retries = 0
         while rest:
-            turn = self._group_round(rest, address, length)
-            data.update(turn.data)
-            rest = [i for i in rest if i not in turn.data]
-            if rest and turn.corrupt:
-                self.counts.corrupt += turn.corrupt
+            round_ = self._group_round(rest, address, length)
+            data.update(round_.data)
+            rest = [i for i in rest if i not in round_.data]
+            if rest and round_.corrupt:
+                self.counts.corrupt += round_.corrupt
                 if retries:
                     missed.update(dict.fromkeys(rest, Miss.CORRUPT))
                     break
@@ -446,7 +422,7 @@ class ServoLine:
             turn.data[servo_id] = bytes(data)
 
     def _request(self, servo_id: int, ask: Callable[[LockedPort], tuple[list[int], int, int]], length: int) -> tuple[bytes, int]:
-        """A single servo's `length` bytes and error byte, asked for at most three times: nobody waits for these."""
+        """A single servo's `length` bytes and error byte, asked for at most three times: these are not urgent."""
         miss = Miss.SILENT
         for attempt in range(_ATTEMPTS):
             self.counts.retries += attempt > 0
@@ -481,8 +457,3 @@ class ServoLine:
 
 def _error_text(error: int) -> str:
     return _ERROR_TEXT.get(error & ~ALERT_BIT, f"answered with error {error & ~ALERT_BIT}")
-
-
-def _short(error: BaseException) -> str:
-    """One line of an error's text."""
-    return " ".join(str(error).split())[:80]

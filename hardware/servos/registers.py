@@ -1,12 +1,11 @@
-"""What a servo tells in one read: eighteen bytes or less, gathered through its indirect addresses. Pure.
+"""Registers of a DYNAMIXEL X servo in millimetres, degrees Celsius and seconds, and the status block that one read gives. Pure.
 
-Why indirect: the registers of interest lie between 64 and 146. Read as they lie, seven servos take 6.6 ms at 1 Mbps and 115 ms
-at the factory's 57600; gathered they take 2 and 33 ms. Why not more: the smallest servos have 20 indirect addresses.
+The block is eighteen bytes or less, gathered through the servo's indirect addresses. Why indirect: the registers of interest lie
+between 64 and 146. Read as they lie, seven servos take 6.6 ms at 1 Mbps and 115 ms at the factory's 57600; gathered they take 2
+and 33 ms. Why not more: the smallest servos have 20 indirect addresses.
 
 The addresses are forgotten in a reboot, and the block then reads as zeros. So the block begins with a register that the driver
 keeps at 2, and holds the supply voltage: zeros cannot pass for a servo at position 0.
-
-Between millimetres, degrees Celsius and seconds on our side and the registers of a DYNAMIXEL X servo. Pure.
 """
 
 from __future__ import annotations
@@ -38,13 +37,7 @@ _TORQUE_NM_PER_A = 4.1 / 2.3
 
 
 def to_ticks(joint: JointConfig, position_mm: float, zero_ticks: int) -> int:
-    """Goal register of a joint's position.
-
-    Raises
-    ------
-    ValueError
-        When the number is not finite or beyond what extended position mode can count.
-    """
+    """Goal register of a joint's position; raises ValueError when it is not finite, or beyond what the servo can count."""
     if not math.isfinite(position_mm):
         raise ValueError(f"joint {joint.name}: goal is not finite: {position_mm}")
     ticks = zero_ticks + round(position_mm * joint.ticks_per_mm)
@@ -188,13 +181,7 @@ def indirect_addresses() -> bytes:
 
 
 def split_block(block: bytes) -> dict[str, bytes]:
-    """The block's parts by name; `block` may carry padding.
-
-    Raises
-    ------
-    ValueError
-        When it is too short.
-    """
+    """The block's parts by name; `block` may carry padding. Raises ValueError when it is too short."""
     if len(block) < BLOCK_BYTES:
         raise ValueError(f"status block of {len(block)} bytes")
     parts, at = {}, 0
@@ -205,13 +192,7 @@ def split_block(block: bytes) -> dict[str, bytes]:
 
 
 def state_of(joint: JointConfig, model: int, zero_ticks: int | None, block: bytes, time_s: float) -> ServoState | None:
-    """A servo's state from its block; None when the block is not ours: the servo has lost its indirect addresses.
-
-    Raises
-    ------
-    ValueError
-        When the block is too short.
-    """
+    """A servo's state from its block; None when the servo has lost its indirect addresses. Raises ValueError for a short block."""
     parts = split_block(block)
     if parts["status_return"][0] != ANSWERS_ALL or parts["voltage"] == b"\0":
         return None

@@ -917,12 +917,14 @@ def test_27_a_reboot_without_return(twin: SoftServoBus, armed: ServoBus) -> None
 # --- the servos' own watchdog ----------------------------------------------------------------------------------------------------
 
 
-def test_a_tripped_watchdog_is_seen_though_writes_succeed_and_is_cleared(twin: SoftServoBus, armed: ServoBus, clock: Clock) -> None:
+def test_a_tripped_watchdog_is_seen_though_writes_succeed_and_is_cleared_by_arming(
+    twin: SoftServoBus, armed: ServoBus, clock: Clock
+) -> None:
     clock.ahead_s += 2.1
     armed.write([0.2] * 7)
     states = _states(armed)
     assert all(state.watchdog_tripped and state.torque and state.goal_mm == 0.0 for state in states)
-    armed.clear_watchdog()
+    armed.arm()
     armed.write([0.2] * 7)
     states = _states(armed)
     assert not any(state.watchdog_tripped for state in states)
@@ -941,11 +943,6 @@ def test_who_stops_talking_is_held_by_the_watchdog(twin: SoftServoBus, armed: Se
     assert places[10] > 10.0
     assert places[-1] == places[-10]
     assert places[-1] == pytest.approx(2.0 * 20.0, abs=5.0)
-
-
-def test_the_watchdog_is_cleared_by_arming_when_not_armed(bus: ServoBus) -> None:
-    with pytest.raises(NotReady, match="arming clears"):
-        bus.clear_watchdog()
 
 
 def test_without_power_for_a_moment_all_must_be_zeroed(twin: SoftServoBus, armed: ServoBus) -> None:
