@@ -29,7 +29,7 @@ PARENT_CHECK_S = 1.0
 """How often a process that waits for its first message looks whether its parent still lives."""
 
 
-class ChildProcess:
+class DeviceProcess:
     """``python -m module``, which loads at once and waits for its first message: it may be started before it is needed.
 
     The child inherits its ends of a shared memory, a pipe and a socket for JSON messages, and gets their numbers and our process id
@@ -146,7 +146,7 @@ class ChildProcess:
             self.release()
 
     @staticmethod
-    def claim(prestarted: ChildProcess | None, start: Callable[[], ChildProcess]) -> ChildProcess:
+    def claim(prestarted: DeviceProcess | None, start: Callable[[], DeviceProcess]) -> DeviceProcess:
         """The prestarted child if it still lives, else a new one: the caller's to end from now on."""
         if prestarted is not None and prestarted.exit_code() is not None:
             prestarted.discard()
@@ -157,7 +157,7 @@ class ChildProcess:
 
 
 class ParentLink:
-    """The child's ends of what ``ChildProcess`` shares with it: ``pipe``, ``socket`` and the memory.
+    """The child's ends of what ``DeviceProcess`` shares with it: ``pipe``, ``socket`` and the memory.
 
     Parameters
     ----------

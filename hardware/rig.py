@@ -18,7 +18,7 @@ from core.types import RobotStatus
 from hardware.cameras.undistorted import UndistortedCamera
 
 if TYPE_CHECKING:
-    from hardware.processes import ChildProcess
+    from hardware.processes import DeviceProcess
     from hardware.servos.servo_robot import ServoRobot
     from hardware.twin.process import PrestartedProcesses
     from hardware.twin.world import TwinWorld
@@ -245,7 +245,7 @@ def _twin_servos(
     truth: Callable[[], RobotStatus],
     *,
     on_close: Callable[[], None] | None = None,
-    process: ChildProcess | None = None,
+    process: DeviceProcess | None = None,
 ) -> ServoRobot:
     """The real driver in its own process on the software servos' port; zeroed, not armed."""
     from hardware.servos.servo_robot import ServoRobot

@@ -27,7 +27,7 @@ from core.control.faults import Cause, Fault
 from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Joints
 from core.types import Command
-from hardware.processes import MESSAGE_BYTES, ChildProcess, ParentLink, SharedSlot
+from hardware.processes import MESSAGE_BYTES, DeviceProcess, ParentLink, SharedSlot
 from hardware.servos import dynamixel_port
 from hardware.servos.dynamixel_port import BusProcessLost, LineCounts, ServoError
 from hardware.servos.registers import ServoReading
@@ -185,9 +185,9 @@ def unpack_heartbeat(data: bytes) -> Heartbeat | None:
     return Heartbeat(time_s, _SOURCES[source])
 
 
-def start_bus() -> ChildProcess:
+def start_bus() -> DeviceProcess:
     """A bus process that waits for its configuration; raises BusProcessLost."""
-    return ChildProcess("hardware.servos.bus_process", "the servo bus process", BusProcessLost, writes_pipe=True)
+    return DeviceProcess("hardware.servos.bus_process", "the servo bus process", BusProcessLost, writes_pipe=True)
 
 
 class BusClient:
@@ -203,13 +203,13 @@ class BusClient:
         When the process cannot be started.
     """
 
-    def __init__(self, servos: ServosConfig, safety: SafetyConfig, prestarted: ChildProcess | None = None) -> None:
+    def __init__(self, servos: ServosConfig, safety: SafetyConfig, prestarted: DeviceProcess | None = None) -> None:
         self._lock, self._requesting = threading.Lock(), threading.Lock()
         self._request_id = 0
         self._fatal = ""
         self._closed = False
         self._newest: tuple[int, BusStatus] | None = None
-        self._process = ChildProcess.claim(prestarted, start_bus)
+        self._process = DeviceProcess.claim(prestarted, start_bus)
         self._order, self._heartbeat, self._status = SharedSlot.row(self._process.map_memory(_MEMORY_BYTES), _SLOTS)
         with contextlib.suppress(OSError):  # the first request finds out that a process is gone
             self._process.send({"servos": servos.model_dump(), "safety": safety.model_dump()})

@@ -16,7 +16,7 @@ from core.control.gate import Rejection, Source
 from core.control.health import BusReport
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
-from hardware.processes import ChildProcess
+from hardware.processes import DeviceProcess
 from hardware.servos.bus_guard import report_of
 from hardware.servos.bus_ipc import END_S, BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, IssuedGoals
 from hardware.servos.dynamixel_port import BusProcessLost, NotReady, ServoError
@@ -56,7 +56,7 @@ class ServoRobot:
         truth: Callable[[], RobotStatus] | None = None,
         on_close: Callable[[], None] | None = None,
         kept_zero: ZeroConfig | None = None,
-        process: ChildProcess | None = None,
+        process: DeviceProcess | None = None,
     ) -> None:
         self._servos, self._safety = servos, safety
         self._name = name

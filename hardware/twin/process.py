@@ -26,7 +26,7 @@ from core.config.models import Config, TwinConfig
 from core.config.safety import ServosConfig
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
-from hardware.processes import ChildProcess, ParentLink, SharedSlot
+from hardware.processes import DeviceProcess, ParentLink, SharedSlot
 from hardware.servos.bus_ipc import start_bus
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.world import TwinWorld
@@ -38,7 +38,7 @@ _FRAME = struct.Struct("<Qdii")  # index, captured, width, height
 _STATUS = struct.Struct("<3d8dd")  # time, insertion, delivery, pulls and forces, contact (NaN: unknown)
 
 
-def _map_slots(process: ChildProcess | ParentLink, twin: TwinConfig) -> tuple[SharedSlot, SharedSlot]:
+def _map_slots(process: DeviceProcess | ParentLink, twin: TwinConfig) -> tuple[SharedSlot, SharedSlot]:
     """Newest frame and newest status in the shared memory; its size follows from the twin's picture size."""
     sizes = (_FRAME.size + 3 * twin.image_width_px * twin.image_height_px, _STATUS.size)
     frames, status = SharedSlot.row(process.map_memory(sum(map(SharedSlot.size, sizes))), sizes)
@@ -69,9 +69,9 @@ def unpack_status(data: bytes) -> RobotStatus:
     return RobotStatus(time_s, insertion_mm, delivery_mm, (a, b, c, d), (e, f, g, h), known_n)
 
 
-def start_twin() -> ChildProcess:
+def start_twin() -> DeviceProcess:
     """A twin process, which loads for seconds and then waits for its configuration; raises DeviceError."""
-    return ChildProcess("hardware.twin.process", "the bench twin", writes_pipe=False)
+    return DeviceProcess("hardware.twin.process", "the bench twin", writes_pipe=False)
 
 
 class RemoteTwin:
@@ -87,10 +87,10 @@ class RemoteTwin:
         When it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
     """
 
-    def __init__(self, config: Config, insertion_mm: float, prestarted: ChildProcess | None = None) -> None:
+    def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None) -> None:
         self._number = 0
         self._closed = False
-        self._process = ChildProcess.claim(prestarted, start_twin)
+        self._process = DeviceProcess.claim(prestarted, start_twin)
         with contextlib.ExitStack() as undo:
             undo.callback(self.close)
             self._frames, self._status = _map_slots(self._process, config.twin)

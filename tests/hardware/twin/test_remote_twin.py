@@ -23,7 +23,7 @@ from core.config.rig_file import RigFileError
 from core.control.gate import Source
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
-from hardware.processes import ChildProcess
+from hardware.processes import DeviceProcess
 from hardware.rig import RigKind, open_rig, start_ahead
 from hardware.servos.bus_ipc import start_bus
 from hardware.servos.dynamixel_port import BusProcessLost
@@ -187,7 +187,7 @@ def test_a_process_that_cannot_be_started_is_a_device_error_when_the_rig_is_open
 
 @pytest.mark.parametrize("start", [start_twin, start_bus])
 def test_an_application_that_ends_before_it_needs_a_process_leaves_none_behind(
-    start: Callable[[], ChildProcess], capfd: pytest.CaptureFixture[str]
+    start: Callable[[], DeviceProcess], capfd: pytest.CaptureFixture[str]
 ) -> None:
     process = start()
     process.socket.shutdown(socket.SHUT_RDWR)
