@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.compiled import loops
+from core.perception import compiled
 from core.types import Mask, Point, Points
 
 BEND_SHARE = 0.5
@@ -20,17 +20,17 @@ BEND_SHARE = 0.5
 
 def arc_length(points: Points) -> NDArray[np.float64]:
     """Distance walked from the first point to each point, shape (N,)."""
-    return loops.lines.arc_length(points)
+    return compiled.arc_length(points)
 
 
 def point_at(points: Points, along: NDArray[np.float64], position: NDArray[np.float64]) -> Points:
     """Points at arc-length `position` (M,), given the polyline's ``arc_length`` `along`; clamped to its ends. Shape (M, 2)."""
-    return loops.lines.point_at(points, along, position)
+    return compiled.point_at(points, along, position)
 
 
 def resample(points: Points, step_px: float) -> Points:
     """Points evenly spaced by about `step_px` along the polyline, both ends kept; a single point stays as it is."""
-    return loops.lines.resample(points, step_px)
+    return compiled.resample(points, step_px)
 
 
 def cut(points: Points, start_px: float, end_px: float, along: NDArray[np.float64] | None = None) -> Points:
@@ -38,7 +38,7 @@ def cut(points: Points, start_px: float, end_px: float, along: NDArray[np.float6
 
     `along` is the polyline's ``arc_length``, where it is known already.
     """
-    return loops.lines.cut(points, start_px, end_px, loops.lines.arc_length(points) if along is None else along)
+    return compiled.cut(points, start_px, end_px, compiled.arc_length(points) if along is None else along)
 
 
 def continued(points: Points, length_px: float, over_px: float) -> Points:
@@ -46,7 +46,7 @@ def continued(points: Points, length_px: float, over_px: float) -> Points:
 
     Its direction and its bend are taken over the last `over_px`, or all of a shorter line, and ``BEND_SHARE`` of the bend goes on.
     """
-    return loops.lines.continued(points, length_px, over_px, BEND_SHARE)
+    return compiled.extrapolate(points, length_px, over_px, BEND_SHARE)
 
 
 def nearest(points: Points, point: Point, along: NDArray[np.float64] | None = None) -> tuple[float, float, Point]:
@@ -54,8 +54,8 @@ def nearest(points: Points, point: Point, along: NDArray[np.float64] | None = No
 
     `along` is the polyline's ``arc_length``, where it is known already.
     """
-    along = loops.lines.arc_length(points) if along is None else along
-    distance, position, x, y = loops.lines.nearest(points, point[0], point[1], along)
+    along = compiled.arc_length(points) if along is None else along
+    distance, position, x, y = compiled.nearest(points, point[0], point[1], along)
     return distance, position, (x, y)
 
 
@@ -66,12 +66,12 @@ def smooth(points: Points, sigma: float, *, keeps_bends: bool = False) -> Points
     moment, so that parabolas stay as they are, for some more noise at the same sigma. Beyond its ends the line is mirrored through
     them: it goes on straight there, does not shrink, and the ends themselves are kept.
     """
-    return loops.lines.smooth(points, np.array((0, len(points))), sigma, keeps_bends)
+    return compiled.smooth(points, np.array((0, len(points))), sigma, keeps_bends)
 
 
 def sample(values: NDArray[np.float32] | Mask, points: Points) -> NDArray[np.float64]:
     """A map (h, w) at sub-pixel places (N, 2), bilinear; places beyond its border get the border's value. Shape (N,)."""
-    return loops.maps.sample(values, points[:, 0], points[:, 1])
+    return compiled.sample(values, points[:, 0], points[:, 1])
 
 
 def median(values: NDArray[np.float64]) -> float:
@@ -83,7 +83,7 @@ def median(values: NDArray[np.float64]) -> float:
 
 def normals(points: Points) -> Points:
     """Unit vectors across a polyline of at least two points, (N, 2), to its right as seen on screen."""
-    return loops.lines.normals(points, np.array((0, len(points))))
+    return compiled.normals(points, np.array((0, len(points))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,14 +108,14 @@ class Bundle:
 
 def resample_bundle(bundle: Bundle, step_px: float) -> Bundle:
     """``polyline.resample`` of each line."""
-    return Bundle(*loops.lines.resample_all(bundle.points, bundle.starts, step_px))
+    return Bundle(*compiled.resample_lines(bundle.points, bundle.starts, step_px))
 
 
 def smooth_bundle(bundle: Bundle, sigma: float, *, keeps_bends: bool = False) -> Bundle:
     """``polyline.smooth`` of each line."""
-    return Bundle(loops.lines.smooth(bundle.points, bundle.starts, sigma, keeps_bends), bundle.starts)
+    return Bundle(compiled.smooth(bundle.points, bundle.starts, sigma, keeps_bends), bundle.starts)
 
 
 def bundle_normals(bundle: Bundle) -> Points:
     """``polyline.normals`` of each line, for all points (N, 2); lines of a single point have none that means anything."""
-    return loops.lines.normals(bundle.points, bundle.starts)
+    return compiled.normals(bundle.points, bundle.starts)

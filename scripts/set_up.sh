@@ -152,16 +152,15 @@ install_python_packages() {
     fi
 }
 
-# The geometry's inner loops (core/perception/compiled), which the first start would else wait for. What goes wrong here does not
-# matter: the program compiles by itself.
-compile_loops() {
-    local loops=core/perception/compiled wanted folder
-    wanted=$(cat requirements.lock $loops/*.py <(stat -c %Y $loops/*.py; pwd -P) | sha256sum)
-    if [[ -f $compiled ]] && { read -r folder && read -r; } <"$compiled" && [[ $REPLY == "$wanted" && ($folder == None || -d $folder) ]]; then
-        return
+# The Numba kernels, which the first start would have to wait for. A failure here does not matter: the program compiles by itself.
+compile_kernels() {
+    local kernels=core/perception/kernels.py wanted folder
+    wanted=$(cat requirements.lock $kernels <(stat -c %Y $kernels; pwd -P) | sha256sum)
+    if [[ -f $compiled ]] && { read -r folder && read -r; } <"$compiled" && [[ $REPLY == "$wanted" ]]; then
+        [[ $folder != None ]] && ! compgen -G "$folder/kernels.*.nbi" >/dev/null || return 0
     fi
     say "set-up: compiling (some 15 seconds)"
-    folder=$("$venv/bin/python" -c 'import core.perception.compiled.all_loops; from core.perception.compiled.jit import folder; print(folder())') || return 0
+    folder=$("$venv/bin/python" -c 'from core.perception import kernels; print(kernels.arc_length.stats.cache_path)') || return 0
     { printf '%s\n' "$folder" "$wanted" >"$compiled"; } 2>/dev/null || true
 }
 
@@ -186,4 +185,4 @@ install_all() {
 }
 
 install_all
-[[ ${1:-} == packages ]] || compile_loops
+[[ ${1:-} == packages ]] || compile_kernels

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-LOOPS = "core/perception/compiled"
+KERNELS = "core/perception"
 PYTHON = """#!/usr/bin/env bash
 here=$(cd "$(dirname "$0")" && pwd)
 [[ -z ${PYTHONPATH:-}${PYTHONHOME:-} ]] || { echo "PYTHONPATH or PYTHONHOME is set" >&2; exit 1; }
@@ -19,9 +19,10 @@ here=$(cd "$(dirname "$0")" && pwd)
 case "$*" in
 "-m venv"*) [[ $* != *--clear* ]] || rm -rf "${@: -1}"; mkdir -p "${@: -1}/bin" && cp "$0" "${@: -1}/bin/python" ;;
 "-m pip install"*) [[ ! -e offline && $PIP_USER == 0 ]] && : >"$here/../packages" ;;
-"-c import core.perception.compiled.all_loops"*)
+"-c from core.perception import kernels"*)
     [[ -z ${PYTHONSAFEPATH:-} && ! -e broken ]] || exit 1
-    mkdir -p "$LOOPS/__pycache__/compiled-0" && echo >>"$here/../../compilations" && echo "$LOOPS/__pycache__/compiled-0" ;;
+    mkdir -p "$KERNELS/__pycache__" && touch "$KERNELS/__pycache__/kernels.thin-1.py311.nbi"
+    echo >>"$here/../../compilations" && echo "$KERNELS/__pycache__" ;;
 "-m pip uninstall"*) [[ ! -e record ]] || printf '%s\n' "$*" >>record ;;
 -) [[ -e record ]] && exec "$REAL_PYTHON" - ; cat >/dev/null ;;
 esac
@@ -36,8 +37,8 @@ def checkout(tmp_path: Path) -> Path:
     for name in ("Makefile", "scripts/set_up.sh"):
         shutil.copy(ROOT / name, folder / name)
     (folder / "requirements.lock").write_text("# nothing\n")
-    (folder / LOOPS).mkdir(parents=True)
-    (folder / LOOPS / "lines.py").write_text("# as it was\n")
+    (folder / KERNELS).mkdir(parents=True)
+    (folder / KERNELS / "kernels.py").write_text("# as it was\n")
     python = folder / "my python" / "python3.11"
     python.parent.mkdir()
     python.write_text(PYTHON)
@@ -48,7 +49,7 @@ def checkout(tmp_path: Path) -> Path:
 def set_up(checkout: Path, **more: str) -> subprocess.CompletedProcess[str]:
     """With `PYTHON=""` an interpreter is looked for."""
     chosen = str(checkout / "my python" / "python3.11")
-    env = {"PATH": os.environ["PATH"], "PYTHON": chosen, "REAL_PYTHON": sys.executable, "LOOPS": LOOPS, **more}
+    env = {"PATH": os.environ["PATH"], "PYTHON": chosen, "REAL_PYTHON": sys.executable, "KERNELS": KERNELS, **more}
     script = ["bash", str(checkout / "scripts" / "set_up.sh")]
     return subprocess.run(script, env=env, capture_output=True, text=True, check=False, timeout=60)
 
@@ -72,17 +73,17 @@ def test_a_venv_that_works_outlives_a_renewal_without_network(checkout: Path) ->
     assert {path.name for path in venv.iterdir()} == {"bin", "packages", ".ready", ".compiled", "kept"}
 
 
-def test_loops_are_compiled_once_and_again_when_they_are_others_or_the_machine_code_is_gone(checkout: Path) -> None:
+def test_kernels_are_compiled_once_and_again_when_they_have_changed_or_the_machine_code_is_gone(checkout: Path) -> None:
     def compilations() -> int:
         assert set_up(checkout, PYTHONSAFEPATH="1").returncode == 0
         return len((checkout / "compilations").read_text().splitlines())
 
     assert [compilations(), compilations()] == [1, 1]
-    (checkout / LOOPS / "lines.py").write_text("# as it is\n")
+    (checkout / KERNELS / "kernels.py").write_text("# as it is\n")
     assert [compilations(), compilations()] == [2, 2]
-    os.utime(checkout / LOOPS / "lines.py", (1e9, 1e9))  # what is compiled goes by its time, too
+    os.utime(checkout / KERNELS / "kernels.py", (1e9, 1e9))  # what is compiled goes by its time, too
     assert [compilations(), compilations()] == [3, 3]
-    shutil.rmtree(checkout / LOOPS / "__pycache__")
+    next((checkout / KERNELS / "__pycache__").glob("*.nbi")).unlink()
     assert [compilations(), compilations()] == [4, 4]
     assert renew(checkout, offline=False) == 0
     assert compilations() == 5
@@ -90,7 +91,7 @@ def test_loops_are_compiled_once_and_again_when_they_are_others_or_the_machine_c
     assert [compilations(), compilations()] == [6, 6]
 
 
-def test_loops_that_cannot_be_compiled_now_stop_nothing(checkout: Path) -> None:
+def test_kernels_that_cannot_be_compiled_now_stop_nothing(checkout: Path) -> None:
     (checkout / "broken").touch()
     assert set_up(checkout).returncode == 0
     assert not (checkout / ".venv" / ".compiled").exists()

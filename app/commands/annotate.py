@@ -33,7 +33,7 @@ from core.annotation.store import AnnotationStore, FoundImage, ItemKey
 from core.annotation.study import QueueOrder, StudySettings, Task, queue_order, repeat_views, settings_from, tasks
 from core.config.files import own_config
 from core.config.models import Config, choose_model, load_config
-from core.perception.compiled import loops
+from core.perception import compiled
 from core.types import Frame
 
 if TYPE_CHECKING:
@@ -311,7 +311,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     with AnnotationStore(store_path) as store:
         images = listed_images(files, store)
         items = queue_of(store, images, rater, options.study, config)
-        loops.load()  # drawing uses them, and may not wait
+        compiled.load()  # drawing uses them, and may not wait
         application = make_application(own_config().window)
 
         from app.annotator.model import AnnotationModel

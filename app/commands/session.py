@@ -27,7 +27,7 @@ from core.config.models import Config, sessions_folder
 from core.config.rig_file import as_calibrated
 from core.control.modes import Mode
 from core.devices import DeviceError, EndOfStream, UserError
-from core.perception.compiled import loops
+from core.perception import compiled
 from core.perception.model_file import check_model
 from core.session.export import export_csv, export_mp4
 from core.session.files import check_parent, is_being_written
@@ -382,7 +382,7 @@ def run_play(session: Path, against: Path | None = None) -> int:
     reader = SessionReader(session)
     try:
         config = recorded_config(reader.manifest)
-        loops.load()  # drawing uses them, and may not wait
+        compiled.load()  # drawing uses them, and may not wait
         application = make_application(own_config().window)
 
         from app.player.window import PlayerWindow

@@ -39,7 +39,7 @@ from app.widgets.preflight_list import PreflightList
 from core.config.files import settings_of_windows
 from core.config.models import Config, sessions_folder
 from core.control.modes import ARMED_MODES, Act, Mode
-from core.perception.compiled import loops
+from core.perception import compiled
 from core.session.writer import RecordStatus
 from core.types import Reason
 from hardware.rig import RigKind, rig_config, start_ahead
@@ -54,7 +54,7 @@ def finish_loading() -> None:
 
     Loading holds the interpreter's lock, and so stops the window, for up to a quarter of a second, mostly for such collections.
     """
-    loops.load()
+    compiled.load()
     gc.freeze()
 
 

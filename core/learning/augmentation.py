@@ -17,7 +17,7 @@ from torch.utils.data import Dataset
 
 from core.learning.dataset import WORKING_SIZE_PX, KeptFrames, Sample
 from core.learning.training_plan import TrainingPlan
-from core.perception.compiled import loops
+from core.perception import compiled
 from core.perception.segmentation import Probability, Segmenter, window_around
 from core.perception.skeleton import end_pixels, thin
 from core.perception.tip_refinement import WINDOW_PX, look_again, places_to_look
@@ -330,7 +330,7 @@ class NearCrops(Dataset[Crop]):
 def _load_for_workers(plan: TrainingPlan) -> None:
     """The robot's ends are found with the compiled loops, which workers that are forked from here need not load each."""
     if plan.end_weight > 0:
-        loops.load()
+        compiled.load()
 
 
 def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...], rng: Generator) -> Point:

@@ -22,24 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core import geometry
-from core.perception.compiled import loops
+from core.perception import compiled
 from core.types import Mask, Point, Points
 
 STEP_PX = 2.0
 """From point to point of all lines here."""
-OPENING_MIN_RADII = 0.8
-OPENING_MAX_RADII = 2.5
-"""An opening ends where the lumen is as narrow as the branch itself: looked for between these multiples of its junction's
-radius."""
-SETTLED = 1.1
-"""As narrow as the branch itself: at most this factor of its own radius (and a third of a pixel)."""
-BEYOND_RADII = 0.4
-"""The skeleton comes back to the middle a little later than the radius does."""
-WIDTH_POINTS = 5
-WIDTH_RADII = 0.3
-"""A branch's radius is that of so many points at its gate which are about as wide as it is."""
-HEADING_RADII = 1.0
-"""A branch's direction is taken over this many of its radii, and at least 12 px."""
 TRUNK_LEAD_DEG = 10.0
 """Where another pair of a lone junction's three arms is a trunk nearly as likely, by so much, it has no clear one."""
 WIDER_DEG = 100.0
@@ -84,7 +71,7 @@ def gate_of(arm: Arm, along: NDArray[np.float64], at_least_px: float, *, wider: 
 
     `along` is its arc length (N,); the gate lies at least `at_least_px` along it, and the opening counts as `wider` as it is.
     """
-    found, x, y, across, down, position_px, radius_px = loops.openings.gate(
+    found, x, y, across, down, position_px, radius_px = compiled.find_gate(
         arm.points,
         arm.radius,
         arm.half_width,
@@ -93,13 +80,6 @@ def gate_of(arm: Arm, along: NDArray[np.float64], at_least_px: float, *, wider: 
         at_least_px,
         arm.far_is_junction,
         STEP_PX,
-        OPENING_MIN_RADII,
-        OPENING_MAX_RADII,
-        SETTLED,
-        BEYOND_RADII,
-        WIDTH_POINTS,
-        WIDTH_RADII,
-        HEADING_RADII,
     )
     return Gate((x, y), (across, down), position_px, radius_px) if found else None
 
@@ -153,16 +133,6 @@ def meeting_point(gates: list[Gate]) -> Point:
     return (yy * right - xy * below) / determinant, (xx * below - xy * right) / determinant
 
 
-WALL_SEARCH_PX = 8
-WALL_RADII = 1.15
-"""A wall farther off than so many radii (and a pixel) is another one's: here is an opening. One so near to the trunk is its own."""
-TRUNK_STIFFNESS = 0.5
-BRANCH_STIFFNESS = 0.5
-"""How hard it is for walls to bend a line, in points of it."""
-ONE_WALL = 0.7
-"""How much a point counts that has a wall on one side only, whose distance should be the radius."""
-MEETING_PX = 0.75 * STEP_PX
-"""A side branch that is this near to a trunk has come to it, and goes on for as long as it comes nearer."""
 _NOTHING = np.empty((0, 0), np.bool_)
 
 
@@ -188,9 +158,7 @@ def between_walls(trunk: Trunk, vessel: Mask) -> Trunk:
 
     Between two walls a point is wanted in the middle; beside one it is wanted a radius off. Either way by at most half a radius.
     """
-    bent = loops.openings.trunk_between_walls(
-        trunk.points, trunk.radius, vessel, WALL_SEARCH_PX, WALL_RADII, ONE_WALL, TRUNK_STIFFNESS
-    )
+    bent = compiled.bend_trunk(trunk.points, trunk.radius, vessel)
     return Trunk(trunk.ends, bent, trunk.radius)
 
 
@@ -200,7 +168,7 @@ def side_branch(gate: Gate, trunk: Trunk, vessel: Mask | None = None) -> tuple[i
     It leaves the gate in its direction, and goes straight or, where the `vessel` is given, as a parabola that its walls bend; a
     wall of the trunk says nothing of it.
     """
-    return loops.openings.side_branch(
+    return compiled.side_branch(
         *gate.place,
         -gate.outward[0],
         -gate.outward[1],
@@ -210,11 +178,6 @@ def side_branch(gate: Gate, trunk: Trunk, vessel: Mask | None = None) -> tuple[i
         _NOTHING if vessel is None else vessel,
         vessel is not None,
         STEP_PX,
-        MEETING_PX,
-        WALL_SEARCH_PX,
-        WALL_RADII,
-        ONE_WALL,
-        BRANCH_STIFFNESS,
     )
 
 

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config.models import PathConfig, PerceptionConfig
-from core.perception import quality, robot_path, segmentation, skeleton
+from core.perception import compiled, quality, robot_path, segmentation, skeleton
 from core.perception.centerline import find as find_centerline
 from core.perception.centerline import route_or_reason
-from core.perception.compiled import loops
 from core.perception.inference import open_second_look, open_segmenter
 from core.perception.out_of_distribution import OutOfDistributionReference
 from core.perception.pose import StateFilter, measure
@@ -90,7 +89,7 @@ class Pipeline:
         *,
         swings: bool = False,
     ) -> None:
-        loops.load()  # not with the first picture
+        compiled.load()  # not with the first picture
         self._stream = Sight(segmenter, calibration, swings, familiarity)
         self._single = single or self._stream
         self._offered = glance

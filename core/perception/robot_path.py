@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from core import geometry
 from core.config.models import PathConfig, PerceptionConfig
-from core.perception import skeleton
-from core.perception.compiled import loops
+from core.perception import compiled, skeleton
 from core.perception.head_tail import Surroundings, is_at_vessel_end, is_entry, tail_first, was_the_head
 from core.perception.skeleton import PixelChain, PixelGraph, trace
 from core.types import Mask, Masks, Point, Points, Reason, Refusal, RobotPath, Skeletons, VesselGraph
@@ -370,7 +369,7 @@ def _centred(line: Points, probability: NDArray[np.float32], radius_px: float) -
     if len(line) < 3:
         return line, radius_px
     across = geometry.normals(line)
-    shift, total = loops.maps.middles(probability, line, across, int(np.ceil(1.5 * radius_px + 2.0)), radius_px)
+    shift, total = compiled.probability_centres(probability, line, across, int(np.ceil(1.5 * radius_px + 2.0)), radius_px)
     seen = total[total > 1.0]
     thickness = geometry.median(seen) if len(seen) else 2.0 * radius_px
     return line + shift[:, None] * across, 0.5 * thickness

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from core.config.models import CleaningConfig, GapConfig, PerceptionConfig
 from core.geometry import arc_length
-from core.perception.compiled import loops
+from core.perception import compiled
 from core.types import Mask, Masks, Point, Points, Skeletons
 
 MIN_HALF_SIZE_SHARE = 0.35
@@ -72,7 +72,7 @@ def thin(mask: Mask) -> Mask:
         framed = np.zeros((height + 2, width + 2), np.uint8)
         framed[1:-1, 1:-1] = mask[window]
         outer = np.flatnonzero(framed > cv2.erode(framed, _CROSS))
-        loops.pixels.thin(framed.reshape(-1), width + 2, outer, _TURNS)
+        compiled.thin(framed.reshape(-1), width + 2, outer, _TURNS)
         skeleton[window] = framed[1:-1, 1:-1]
     return skeleton
 
@@ -146,7 +146,7 @@ def trace(skeleton: Mask) -> PixelGraph:
     a chain and not a row of junctions. Pixels with three or more links are junctions, and touching ones are one node at their
     mean.
     """
-    nodes, starts, ends, points, marks = loops.pixels.trace(np.flatnonzero(skeleton), skeleton.shape[1])
+    nodes, starts, ends, points, marks = compiled.trace_graph(np.flatnonzero(skeleton), skeleton.shape[1])
     lines = zip(starts.tolist(), ends.tolist(), pairwise(marks.tolist()), strict=True)
     return PixelGraph(nodes, tuple(PixelChain(start, end, points[first:last]) for start, end, (first, last) in lines))
 

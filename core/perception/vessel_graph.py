@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from core import geometry
 from core.config.models import CleaningConfig
 from core.geometry import Bundle
+from core.perception import compiled
 from core.perception import skeleton as pixel_graph
-from core.perception.compiled import loops
 from core.perception.junctions import Arm, are_together, rebuild
 from core.perception.vectors import RadiusMap
 from core.types import GraphEdge, Mask, Points, VesselGraph
@@ -113,12 +113,6 @@ HEADING_PX = 24.0
 """A vessel's direction and bend at its end are taken over this length, and at least a radius."""
 REACH_RADII = 3.0
 """An end this near to the image's border goes on to it."""
-WALL_SEARCH_PX = 8
-VESSEL_ENDS_WIDTH_SHARE = 0.15
-"""What is narrower or wider than the vessel by more than this (and a pixel) is its end, or a branch's opening."""
-LEAST_POINTS = 3
-STIFFNESS = 0.15
-"""How hard it is for walls to turn and to bend a line, in points of it."""
 
 
 def led_on(points: Points, radius_px: float, vessel: Mask) -> Points:
@@ -137,9 +131,7 @@ def led_on(points: Points, radius_px: float, vessel: Mask) -> Points:
     lost_px = math.dist(points[-1].tolist(), kept[-1].tolist())
     onward = geometry.continued(kept, max(REACH_RADII * radius_px, 1.5 * lost_px) + 1.0, max(radius_px, HEADING_PX))
     # Walls are looked for as far as the mask is known to reach.
-    onward = loops.openings.end_between_walls(
-        onward, radius_px, lost_px, round(STEP_PX), vessel, WALL_SEARCH_PX, VESSEL_ENDS_WIDTH_SHARE, LEAST_POINTS, STIFFNESS
-    )
+    onward = compiled.bend_end(onward, radius_px, lost_px, round(STEP_PX), vessel)
     way_out = _way_out(onward, limit)
     reach = lost_px if way_out is None or way_out > max(REACH_RADII * radius_px, lost_px) else way_out
     if reach < 0.5:
@@ -173,16 +165,9 @@ STEP_PX = 2.0
 SMOOTHING_PX = 9.0
 """Standard deviation of the smoothing along the way, which keeps bends: more than a radius of boundary noise."""
 WIDTH_PX = 20.0
-WIDTH_SHARE = 0.2
-"""The same of a vessel's width, and by how much that may differ from what is seen at one place."""
+"""The same of a vessel's width."""
 SPUR_RADII = 1.5
 """A spur of thinning runs from the middle to a bump or corner of the wall: at most about one and a half lumen radii."""
-SEARCH_PX = 4
-"""A wall is looked for so far to both sides of where a distance map of every second pixel has it."""
-SOFTEST = 0.02
-"""Per px: a wall where the network's probability falls less steeply than this says as little as this."""
-MOST_SHIFT_PX = 2.0
-"""The map of distances is not farther off than this: what is, is the wall of something else."""
 RADIUS_POINTS = 30
 """So many points of a vessel's end tell its radius there."""
 
@@ -399,24 +384,11 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
     shift = by_wall_in_view(even, STEP_PX, normal, reach, 0.5 * (wider - narrower), level.shape)
     centred = _moved(even, normal, np.where(inner, shift, 0.0))
     normal = geometry.bundle_normals(centred)
-    shift, half_width = _between_walls(centred, normal, radius.at(centred.points), level)
+    expected, sigma = radius.at(centred.points), WIDTH_PX / STEP_PX
+    shift, half_width = compiled.centre_offsets(level, centred.points, centred.starts, normal, expected, sigma)
     centred = _moved(centred, normal, np.where(inner, shift, 0.0))
     for line, *values in zip(lines, *map(centred.split, (centred.points, radius.at(centred.points), half_width)), strict=True):
         line.points, line.radius, line.half_width = values
-
-
-def _between_walls(
-    lines: Bundle, normal: Points, expected: NDArray[np.float64], level: NDArray[np.float32]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """By how much each point lies beside the middle (N,), and half the way from wall to wall (N,); 0 and NaN where one is not seen.
-
-    A vessel's width changes slowly. So where one wall is soft, the middle is rather as far from the other one as half the width
-    that it has around there.
-    """
-    sigma = WIDTH_PX / STEP_PX
-    return loops.maps.between_walls(
-        level, lines.points, lines.starts, normal, expected, SEARCH_PX, SOFTEST, sigma, WIDTH_SHARE, MOST_SHIFT_PX
-    )
 
 
 def _moved(lines: Bundle, normal: Points, shift: NDArray[np.float64]) -> Bundle:

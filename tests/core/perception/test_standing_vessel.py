@@ -5,12 +5,12 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 import pytest
-from tests.core.test_glance import CONFIG, GREEN, GREY, RED, VESSEL, WHOLE, Colours, picture
 
 from core.config.models import PerceptionConfig, TrackingConfig
 from core.perception.pipeline import Pipeline, Sight
 from core.perception.roi import ORIENTATIONS, VesselAverage, cells_of
 from core.types import Frame, Image, Reason, Scene
+from tests.core.perception.test_glance import CONFIG, GREEN, GREY, RED, VESSEL, WHOLE, Colours, picture
 
 BIAS_PX = 3
 

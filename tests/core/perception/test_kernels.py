@@ -1,4 +1,4 @@
-"""The compiled loops against what NumPy, OpenCV and scikit-image say, on all kinds of arrays."""
+"""The kernels against what NumPy, OpenCV and scikit-image say, on all kinds of arrays."""
 
 import subprocess
 import sys
@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from core import geometry
-from core.perception.compiled import loops
-from core.perception.compiled.loops import lines, maps, openings, pixels
+from core.perception import compiled
 from core.types import Points
 
 
@@ -84,7 +83,7 @@ def test_a_map_is_read_as_opencv_reads_it_and_beyond_its_border_as_there(shape: 
 
 def test_places_that_are_no_number_are_read_at_the_border_and_end_nothing() -> None:
     values = np.arange(12.0, dtype=np.float32).reshape(3, 4)
-    found = maps.sample(values, np.array([np.nan, np.inf, -np.inf]), np.array([np.nan, 1.0, np.inf]))
+    found = compiled.sample(values, np.array([np.nan, np.inf, -np.inf]), np.array([np.nan, 1.0, np.inf]))
     assert found.tolist() == [0.0, 7.0, 8.0]
 
 
@@ -93,27 +92,39 @@ def test_arrays_of_any_strides_and_such_as_are_not_to_be_written() -> None:
     fixed = points.copy()
     fixed.setflags(write=False)
     for same in (fixed, np.asfortranarray(points), np.repeat(points, 2, axis=0)[::2], points[::-1][::-1]):
-        np.testing.assert_array_equal(lines.arc_length(same), lines.arc_length(points))
+        np.testing.assert_array_equal(compiled.arc_length(same), compiled.arc_length(points))
 
 
 @pytest.mark.parametrize("points", [np.zeros((3, 2), np.float32), np.zeros((3, 2), np.int64), np.zeros(3)])
 def test_an_array_of_another_kind_is_a_type_error_and_compiles_nothing(points: np.ndarray) -> None:
     with pytest.raises(TypeError):
-        lines.arc_length(points)
+        compiled.arc_length(points)
 
 
 def test_an_index_beyond_an_array_is_an_index_error() -> None:
     with pytest.raises(IndexError):
-        pixels.thin(np.ones(30, np.uint8), 6, np.array([29]), np.zeros(256, np.uint8))
+        compiled.thin(np.ones(30, np.uint8), 6, np.array([29]), np.zeros(256, np.uint8))
     with pytest.raises(IndexError):
-        lines.point_at(np.zeros((0, 2)), np.zeros(1), np.zeros(1))
+        compiled.point_at(np.zeros((0, 2)), np.zeros(1), np.zeros(1))
 
 
-def test_every_compiled_function_is_compiled_before_it_is_called() -> None:
-    for module in (lines, maps, openings, pixels):
-        kernels = [value for value in vars(module).values() if hasattr(value, "nopython_signatures")]
-        assert kernels
-        assert all(kernel.nopython_signatures and not kernel._can_compile for kernel in kernels)
+def test_every_kernel_is_compiled_before_it_is_called() -> None:
+    compiled.load()
+    kernels = [value for value in vars(compiled).values() if hasattr(value, "nopython_signatures")]
+    assert len(kernels) > 20
+    assert all(kernel.nopython_signatures and not kernel._can_compile for kernel in kernels)
+
+
+def test_kernels_compile_where_no_cache_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    from core.perception import kernels
+
+    def refuse(*_: object, **options: object) -> object:
+        if options.get("cache"):
+            raise RuntimeError("cannot cache function: no locator available")
+        return lambda function: function
+
+    monkeypatch.setattr(kernels, "_njit", refuse)
+    assert kernels.kernel((kernels.POINTS,))(len) is len
 
 
 def test_a_line_of_points_that_are_no_numbers_is_one_clear_error() -> None:
@@ -130,7 +141,7 @@ def test_walls_are_where_the_level_first_falls_through_a_half(seed: int, expecte
     level = (rng.random((60, 80)) > 0.2).astype(np.float32)
     level = cv2.GaussianBlur(level, (0, 0), blur) if blur else level
     points, across = rng.uniform(5.0, 55.0, (4, 2)), np.tile([np.cos(turn), np.sin(turn)], (4, 1))
-    reach, slope = maps.walls(level, points, across, np.full(4, expected), 4)
+    reach, slope = compiled.wall_distances(level, points, across, np.full(4, expected), 4)
     for side, sign in enumerate((1.0, -1.0)):
         for i in range(4):
             steps = np.maximum(expected + np.arange(-4.0, 5.0), 0.0)
@@ -152,7 +163,7 @@ def test_the_middle_of_the_robot_is_the_mean_place_of_what_falls_outwards(seed: 
     seen = cv2.GaussianBlur(rng.random((50, 50)).astype(np.float32), (0, 0), 2.0)
     points, turn = rng.uniform(-2.0, 52.0, (5, 2)), rng.uniform(0.0, 6.3, 5)
     across = np.column_stack([np.cos(turn), np.sin(turn)])
-    shift, total = maps.middles(seen, points, across, side, 3.0)
+    shift, total = compiled.probability_centres(seen, points, across, side, 3.0)
     for i in range(5):
         offsets = np.arange(-side, side + 1.0)
         places = points[i] + offsets[:, None] * across[i]
@@ -164,19 +175,20 @@ def test_the_middle_of_the_robot_is_the_mean_place_of_what_falls_outwards(seed: 
         assert shift[i] == pytest.approx(wanted, abs=1e-6)
 
 
-def test_they_are_loaded_when_the_first_is_called_for_and_never_by_a_twin() -> None:
+def test_kernels_are_loaded_by_the_first_call_and_never_by_a_twin() -> None:
     code = """
 import sys
 import numpy as np
 import app.commands.perceive, app.commands.train, core.perception.pipeline, core.session.reader
 from core.config.models import TwinConfig
-from core.perception import polyline
+from core import geometry
+from core.perception import compiled
 from hardware.twin.world import TwinWorld
 world = TwinWorld(TwinConfig(image_width_px=160, image_height_px=120))
 world.insert(20.0)
 world.frame()
 print("numba" in sys.modules)
-polyline.arc_length(np.zeros((2, 2)))
+geometry.arc_length(np.zeros((2, 2)))
 print("numba" in sys.modules)
 """
     root = Path(__file__).parents[3]
@@ -184,6 +196,6 @@ print("numba" in sys.modules)
     assert done.stdout.split() == ["False", "True"], done.stderr
 
 
-def test_a_loop_that_there_is_not_is_an_attribute_error() -> None:
+def test_an_unknown_kernel_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'circles'"):
-        loops.circles  # noqa: B018
+        compiled.circles  # noqa: B018
