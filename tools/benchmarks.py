@@ -177,8 +177,8 @@ def measure_player(config: Config, minutes: float) -> dict[str, Any]:
 def _make_session(config: Config, minutes: float, parent: str) -> None:
     begin_as_worker()
     from core.perception.pipeline import open_pipeline
+    from core.session.codec import row_of
     from core.session.files import EncodedFrame, SessionFiles
-    from core.session.format import row_of
     from core.session.manifest import about_rig
     from core.session.video import FrameEncoder
     from core.types import Frame, Tick

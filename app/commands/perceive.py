@@ -2,8 +2,6 @@
 
 What ``perceive`` is given: pictures, folders of pictures, videos. One item per picture, in order, unreadable ones too.
 
-A scene as the contract's JSON object, in source pixel coordinates; distances stay in working pixels.
-
 Frames of a set that cannot be read are left out and said once, at the end: one damaged picture must not cost a night's run.
 """
 
@@ -29,7 +27,8 @@ from core.control.policies import table_policy
 from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream, UserError
 from core.files import VIDEO_ENDINGS, ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS, write_mask, write_png
-from core.types import Frame, Image, Mask, Point, Points, Reason, Refusal, Scene, Vector
+from core.session.codec import scene_to_json, unread_to_json
+from core.types import Frame, Image, Mask, Point, Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,55 +178,6 @@ def _session_video(path: Path, stem: str) -> Iterator[SourcePicture]:
 def _named(path: Path, stem: str, index: int) -> tuple[str, str, tuple[str, ...]]:
     """Name and stems of a video's frame."""
     return f"{path}#{index}", f"{stem}_{index:06d}", (f"{path.stem}_{index:06d}", path.stem)
-
-
-def scene_to_json(name: str, scene: Scene) -> dict[str, Any]:
-    """One object per image, as the command line's contract says."""
-    pose, path = scene.pose, scene.path
-    return {
-        "image": name,
-        "width": scene.source_size[0],
-        "height": scene.source_size[1],
-        "head_xy": _point(scene, path.head) if path else None,
-        "tail_xy": _point(scene, path.tail) if path else None,
-        "robot_path_xy": _points(scene, path.points) if path else None,
-        "robot_vector": _vector(scene, scene.robot_vector),
-        "vessel_vector": _vector(scene, scene.vessel_vector),
-        "theta_deg": _round(pose.theta_deg) if pose else None,
-        "theta_signed_deg": _round(pose.theta_signed_deg) if pose else None,
-        "d_head_px": _round(pose.d_head_px) if pose else None,
-        "d_tail_px": _round(pose.d_tail_px) if pose else None,
-        "crossed": pose.crossed if pose else None,
-        "state": pose.state.value if pose else None,
-        "confidence": _round(pose.confidence) if pose else 0.0,
-        "reason": str(scene.refusal) if scene.refusal else None,
-        "latency_ms": {stage: round(ms, 3) for stage, ms in scene.latency_ms.items()},
-    }
-
-
-def unread_to_json(name: str, problem: str) -> dict[str, Any]:
-    """The object of an image that could not be read."""
-    blank = Scene(0, 0.0, (0, 0), 1.0, refusal=Refusal(Reason.UNREADABLE, problem))
-    return scene_to_json(name, blank) | {"width": None, "height": None}
-
-
-def _round(value: float) -> float:
-    return round(float(value), 4)
-
-
-def _point(scene: Scene, point: Point) -> list[float]:
-    x, y = scene.to_source(point)
-    return [round(x, 3), round(y, 3)]
-
-
-def _points(scene: Scene, points: Points) -> list[list[float]]:
-    return np.round(scene.points_to_source(points), 2).tolist()  # type: ignore[no-any-return]
-
-
-def _vector(scene: Scene, vector: Vector | None) -> dict[str, list[float]] | None:
-    if vector is None:
-        return None
-    return {name: _point(scene, getattr(vector, name)) for name in ("start", "center", "end")}
 
 
 _FARTHEST_PX = 1_000_000

@@ -25,7 +25,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from app.commands.perceive import _make_folder, scene_to_json, unread_to_json
+from app.commands.perceive import _make_folder
 from app.commands.progress import Interrupt, LineOutput, check_apart, check_no_input, check_no_session, progress_bar
 from app.commands.workers import over_cluster, over_processes
 from app.ui.texts import signed_degrees
@@ -34,6 +34,7 @@ from core.devices import UserError
 from core.evaluation.replay import STATES, Change, FrameResult, RecordedTargets, ReplayTally, changed_most, runs, seen
 from core.files import name_as_text, name_of
 from core.perception.model_file import check_model, model_folder, read_model_info
+from core.session.codec import scene_to_json, unread_to_json
 from core.session.manifest import FRAMES, MANIFEST, Manifest, SessionError
 from core.session.reader import SessionReader, check_is_session
 from core.types import Frame, Scene

@@ -26,9 +26,9 @@ from app.ui.workers import Worker
 from app.widgets.overlay_image import draw_overlay
 from core.devices import Latest, UserError
 from core.files import name_of
+from core.session.codec import RecordedRow, light_tick
 from core.session.export import export_mp4
 from core.session.files import add_event, is_being_written
-from core.session.format import RecordedRow, light_tick
 from core.session.manifest import Event, SessionError
 from core.session.reader import SessionReader
 from core.types import Image, Masks, Point, Points, Scene, Skeletons, Tick

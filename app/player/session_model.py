@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,11 @@ from app.ui.texts import refusal_text, signed_degrees
 from app.widgets.servo_table import number
 from core.devices import UserError
 from core.evaluation.replay import Change, event_target, seen
-from core.session.files import lines_of, parse, parse_line
-from core.session.format import InvalidRecord, RecordedRow, checked_number, choice, count, group, point, points, text
+from core.session.codec import InvalidRecord, PerceivedLine, RecordedRow, read_json, scene_from_json
+from core.session.files import lines_of, read_line
 from core.session.manifest import Event, EventKind
 from core.session.reader import SessionReader, Timeline, losses
-from core.types import Point, Pose, PoseState, Reason, Refusal, RobotPath, Scene, Vector
+from core.types import Point, PoseState, Scene
 
 _GAP_FACTOR, _LEAST_GAP_S = 4.0, 0.25
 
@@ -212,9 +213,12 @@ class Replayed:
         try:
             for line in lines_of(path):
                 try:
-                    record = parse_line(line)
-                    row = self._row_of(record, session)
-                    self._values[row] = _columns(record)
+                    record = read_line(partial(read_json, PerceivedLine), line)
+                    row = self._row_of(record.image, session)
+                    if record.state is not None and record.theta_signed_deg is None:
+                        raise InvalidRecord("theta_signed_deg: missing")
+                    state = list(PoseState).index(record.state) if record.state is not None else -1
+                    self._values[row] = (math.nan if state < 0 else record.theta_signed_deg or 0.0), state
                     self._places[row] = line.offset, len(line.data or b"")
                 except InvalidRecord:
                     self.skipped += 1
@@ -223,8 +227,8 @@ class Replayed:
         if not self._places:
             raise UserError(f"{path}: no results in it; write them with: replay SESSION --jsonl FILE")
 
-    def _row_of(self, record: dict[str, Any], session: str) -> int:
-        name, _, row = text(record.get("image"), "image").rpartition("#")
+    def _row_of(self, image: str, session: str) -> int:
+        name, _, row = image.rpartition("#")
         if not name or not row.isdecimal():
             raise InvalidRecord("image: not a row of a session")
         if name != session:
@@ -250,61 +254,9 @@ class Replayed:
         try:
             with self._path.open("rb") as file:
                 file.seek(offset)
-                return scene_from_json(parse(file.read(size)))
+                return scene_from_json(file.read(size))
         except (InvalidRecord, OSError):
             return None
-
-
-def _columns(record: dict[str, Any]) -> tuple[float, int]:
-    if record.get("state") is None:
-        return math.nan, -1
-    state = choice(PoseState, record["state"], "state")
-    return checked_number(record.get("theta_signed_deg"), "theta_signed_deg"), list(PoseState).index(state)
-
-
-def scene_from_json(record: dict[str, Any]) -> Scene:
-    """The way back from ``scene_to_json``: lines, pose or reason, all in source pixels. Raises Damaged."""
-    size = count(record.get("width"), "width"), count(record.get("height"), "height")
-    robot, vessel = (_vector(record.get(name), name) for name in ("robot_vector", "vessel_vector"))
-    line = record.get("robot_path_xy")
-    path = RobotPath(points(line, "robot_path_xy"), 0.0, None, False, 0.0, 0.0) if line else None
-    stages = {name: checked_number(ms, name) for name, ms in group(record.get("latency_ms", {}), "latency_ms").items()}
-    scene = Scene(0, 0.0, size, 1.0, path=path, robot_vector=robot, vessel_vector=vessel, latency_ms=stages)
-    if record.get("state") is None or robot is None or vessel is None:
-        return replace(scene, refusal=_refusal(record.get("reason")))
-    theta = checked_number(record.get("theta_signed_deg"), "theta_signed_deg")
-    sides = [math.copysign(1.0, _offset(vessel, end)) for end in (robot.end, robot.start)]
-    pose = Pose(
-        abs(theta),
-        theta,
-        sides[0] * checked_number(record.get("d_head_px"), "d_head_px"),
-        sides[1] * checked_number(record.get("d_tail_px"), "d_tail_px"),
-        sides[0] != sides[1],
-        choice(PoseState, record["state"], "state"),
-        checked_number(record.get("confidence"), "confidence"),
-    )
-    return replace(scene, pose=pose)
-
-
-def _offset(vessel: Vector, place: Point) -> float:
-    """Signed distance from the vessel's line (METHOD section 5), here only for its side."""
-    x, y = vessel.direction
-    return x * (place[1] - vessel.center[1]) - y * (place[0] - vessel.center[0])
-
-
-def _vector(value: Any, name: str) -> Vector | None:
-    if value is None:
-        return None
-    ends = [point(group(value, name).get(part), f"{name}.{part}") for part in ("start", "center", "end")]
-    if ends[0] == ends[2]:
-        raise InvalidRecord(f"{name}: no direction")
-    return Vector(ends[0], ends[1], ends[2])
-
-
-def _refusal(value: Any) -> Refusal:
-    told = text(value or "", "reason")
-    reason, _, detail = told.partition(": ")
-    return Refusal(choice(Reason, reason, "reason"), detail)
 
 
 def compared_line(before: Scene, after: Scene) -> str:

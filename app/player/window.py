@@ -51,7 +51,7 @@ from app.widgets.shortcut_page import KeyPage
 from app.widgets.sim_banner import SimBanner
 from core.config.models import Config
 from core.config.rig_file import scaled
-from core.session.format import RecordedRow
+from core.session.codec import RecordedRow
 from core.session.manifest import Event, EventKind, Manifest
 from core.session.reader import SessionReader
 from core.types import Point, Scene, Tick

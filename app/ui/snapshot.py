@@ -13,11 +13,11 @@ import cv2
 import platformdirs
 from PySide6.QtCore import QObject, Signal
 
-from app.commands.perceive import scene_to_json
 from app.ui.i18n import mark, tr
 from app.ui.workers import Worker
 from app.widgets.overlay_image import draw_overlay
 from core.devices import UserError
+from core.session.codec import scene_to_json
 from core.types import Image, Tick
 
 _FINISH_WITHIN_MS = 5_000

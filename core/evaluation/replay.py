@@ -6,7 +6,6 @@ The frames of a replay in sum: of one session, or of many without their frames b
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from core.session.format import RecordedRow
+from core.session.codec import RecordedRow
 from core.session.manifest import Event, EventKind
 from core.types import Point, PoseState, Reason, Scene
 
@@ -117,17 +116,9 @@ class RecordedTargets:
         return self._target
 
 
-_TEXT_OF_TARGET = re.compile(r"(-?\d+\.\d), (-?\d+\.\d)")
-
-
 def event_target(event: Event) -> Point | None:
-    """The destination that a target event tells, in source pixels; None: it was cleared, or it is damaged.
-
-    Windows have written it as text alone, "x, y", up to November 2026.
-    """
+    """The destination that a target event tells, in source pixels; None: it was cleared, or it is damaged."""
     place = event.data.get("xy")
-    if place is None and (written := _TEXT_OF_TARGET.fullmatch(event.text)):
-        place = [float(value) for value in written.groups()]
     is_point = isinstance(place, list) and len(place) == 2 and all(type(value) in (int, float) for value in place)
     return (float(place[0]), float(place[1])) if is_point and place is not None else None
 

@@ -1,11 +1,7 @@
-"""A session as CSV and as MP4. Files appear whole or not at all; what is there already is never overwritten.
+"""A session as CSV, MP4 and MCAP (Foxglove, PlotJuggler). Files appear whole or not at all; nothing is overwritten.
 
-A session as MCAP, for Foxglove and PlotJuggler: video, overlays as image annotations, plain time series, events as a log.
-
-All messages are JSON. The lossy video's packets are copied as they are (H.264 in Annex B form, which is what viewers decode); from
-a lossless one, which they do not know, JPEG pictures are made.
-
-JSON schemas of what is written to MCAP. Viewers know the messages named foxglove.* by its public definitions.
+All MCAP messages are JSON. The packets of a lossy video are copied as they are (H.264 in Annex B form, which viewers decode); of a
+lossless one, which they do not know, JPEG pictures are made.
 """
 
 from __future__ import annotations
@@ -30,11 +26,11 @@ from av.bitstream import BitStreamFilterContext
 from mcap.writer import Writer
 
 from core.control.modes import Mode
-from core.session.format import RecordedRow
+from core.session.codec import RecordedRow
 from core.session.manifest import EventKind, SessionError
-from core.session.reader import SessionReader, video_number
-from core.session.video import MS, PacketCheck, has_h264, media_name, open_video
-from core.types import Command, Image, Point, Points, PoseState, Tick, Vector
+from core.session.reader import SessionReader
+from core.session.video import MS, has_h264, media_name, open_video, sound_packets, video_number
+from core.types import Command, Image, Points, PoseState, Tick
 
 Draw = Callable[[Tick], Image]
 Advance = Callable[[], None]
@@ -91,85 +87,68 @@ def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None
             row = reader.row(place)
             if row is not None:
                 first_s = row.captured_s if first_s is None else first_s
-                out.writerow(_COLUMNS[name](row, first_s) for name in _COLUMNS)
+                values = _flat(row)
+                values["time_s"] = round(row.captured_s - first_s, 6)
+                values["source_px_per_working_px"] = round(row.source_px_per_working_px, 6)
+                out.writerow(values[name] for name in _COLUMNS)
                 written += 1
             on_row()
     return written
 
 
-def _point(row: RecordedRow, point: Point | None, axis: int) -> float | None:
-    return round(row.scene.to_source(point)[axis], 3) if point is not None else None
+_SIDES = ("right", "left", "up", "down")
+_MOTIONS = tuple(f"{who}_{name}" for who in ("asked", "commanded", "sent") for name in Command.__slots__)
+_COLUMNS = (
+    *("row", "index", "captured_s", "time_s", "video", "pts_ms", "dropped_frames", "camera_lost", "dropped_rows"),
+    *("width_px", "height_px", "source_px_per_working_px", "state", "theta_deg", "theta_signed_deg", "c_head_px", "c_tail_px"),
+    *("crossed", "confidence", "novelty", "refusal", "head_x_px", "head_y_px", "tail_x_px", "tail_y_px"),
+    *("advice_speed", "advice_advance_mm_s", "advice_steer_deg", "mode", "permitted", *_MOTIONS, "sent_by"),
+    *("insertion_mm", "delivery_mm", "wall_contact_n", "perception_ms", "latency_s"),
+)
 
 
-def _head(axis: int) -> Callable[[RecordedRow, float], Any]:
-    return lambda row, _: _point(row, row.scene.path.head if row.scene.path else None, axis)
-
-
-def _tail(axis: int) -> Callable[[RecordedRow, float], Any]:
-    return lambda row, _: _point(row, row.scene.path.tail if row.scene.path else None, axis)
-
-
-def _pose(name: str) -> Callable[[RecordedRow, float], Any]:
-    return lambda row, _: getattr(row.scene.pose, name) if row.scene.pose else None
-
-
-def _of(first: str, *names: str) -> Callable[[RecordedRow, float], Any]:
-    """An attribute of an attribute of the row, None as soon as one is missing."""
-
-    def value(row: RecordedRow, _: float) -> Any:
-        found: Any = getattr(row, first)
-        for name in names:
-            found = getattr(found, name) if found is not None else None
-        return found
-
-    return value
-
-
-def _motion(prefix: str, *names: str) -> dict[str, Callable[[RecordedRow, float], Any]]:
-    return {f"{prefix}_{field}": _of(*names, field) for field in Command.__slots__}
-
-
-_COLUMNS: dict[str, Callable[[RecordedRow, float], Any]] = {
-    "row": _of("row"),
-    "index": _of("index"),
-    "captured_s": _of("captured_s"),
-    "time_s": lambda row, first_s: round(row.captured_s - first_s, 6),
-    "video": _of("video"),
-    "pts_ms": _of("pts_ms"),
-    "dropped_frames": _of("dropped_frames"),
-    "camera_lost": _of("camera_lost"),
-    "dropped_rows": _of("dropped_rows"),
-    "width_px": lambda row, _: row.size[0],
-    "height_px": lambda row, _: row.size[1],
-    "source_px_per_working_px": lambda row, _: round(row.source_px_per_working_px, 6),
-    "state": _pose("state"),
-    "theta_deg": _pose("theta_deg"),
-    "theta_signed_deg": _pose("theta_signed_deg"),
-    "c_head_px": _pose("c_head_px"),
-    "c_tail_px": _pose("c_tail_px"),
-    "crossed": _pose("crossed"),
-    "confidence": _pose("confidence"),
-    "novelty": lambda row, _: row.scene.novelty,
-    "refusal": lambda row, _: str(row.scene.refusal) if row.scene.refusal else None,
-    "head_x_px": _head(0),
-    "head_y_px": _head(1),
-    "tail_x_px": _tail(0),
-    "tail_y_px": _tail(1),
-    "advice_speed": _of("advice", "speed"),
-    "advice_advance_mm_s": _of("advice", "advance_mm_s"),
-    "advice_steer_deg": _of("advice", "steer_deg"),
-    "mode": _of("drive", "mode"),
-    "permitted": _of("drive", "permitted"),
-    **_motion("asked", "drive", "asked"),
-    **_motion("commanded", "drive", "commanded"),
-    **_motion("sent", "sent"),
-    "sent_by": _of("drive", "sent_by"),
-    "insertion_mm": _of("status", "insertion_mm"),
-    "delivery_mm": _of("status", "delivery_mm"),
-    "wall_contact_n": _of("status", "wall_contact_n"),
-    "perception_ms": lambda row, _: row.scene.latency_ms.get("total"),
-    "latency_s": _of("drive", "latency_s"),
-}
+def _flat(row: RecordedRow) -> dict[str, Any]:
+    """The values of a row by the names that they have in CSV and MCAP; None where something is missing."""
+    scene, drive, path = row.scene, row.drive, row.scene.path
+    head, tail = (scene.to_source(path.head), scene.to_source(path.tail)) if path else ((None, None), (None, None))
+    values: dict[str, Any] = {
+        "row": row.row,
+        "index": row.index,
+        "captured_s": row.captured_s,
+        "video": row.video,
+        "pts_ms": row.pts_ms,
+        "frames_per_second": row.frames_per_second,
+        "dropped_frames": row.dropped_frames,
+        "camera_lost": row.camera_lost,
+        "dropped_rows": row.dropped_rows,
+        "width_px": row.size[0],
+        "height_px": row.size[1],
+        "source_px_per_working_px": row.source_px_per_working_px,
+        "novelty": scene.novelty,
+        "refusal": str(scene.refusal) if scene.refusal else None,
+        "advice_speed": row.advice.speed if row.advice else None,
+        "advice_advance_mm_s": row.advice.advance_mm_s if row.advice else None,
+        "advice_steer_deg": row.advice.steer_deg if row.advice else None,
+        "perception_ms": scene.latency_ms.get("total"),
+    }
+    for name, value in zip(("head_x_px", "head_y_px", "tail_x_px", "tail_y_px"), (*head, *tail), strict=True):
+        values[name] = round(value, 3) if value is not None else None
+    for name in ("theta_deg", "theta_signed_deg", "c_head_px", "c_tail_px", "crossed", "state", "confidence"):
+        values[name] = getattr(scene.pose, name, None)
+    for name in ("mode", "permitted", "sent_by", "latency_s"):
+        values[name] = getattr(drive, name, None)
+    for who, motion in (
+        ("asked", getattr(drive, "asked", None)),
+        ("commanded", getattr(drive, "commanded", None)),
+        ("sent", row.sent),
+    ):
+        values |= {f"{who}_{name}": getattr(motion, name, None) for name in Command.__slots__}
+    for name in ("insertion_mm", "delivery_mm", "wall_contact_n"):
+        values[name] = getattr(row.status, name, None)
+    for name in ("pull_mm", "force_mn"):
+        four = getattr(row.status, f"tendon_{name}", (None,) * 4)
+        values |= {f"tendon_{name}_{side}": value for side, value in zip(_SIDES, four, strict=True)}
+    return values
 
 
 def export_mp4(
@@ -266,10 +245,27 @@ Schema = dict[str, Any]
 _NUMBER: Schema = {"type": "number"}
 _MAYBE: Schema = {"type": ["number", "null"]}
 _TEXT: Schema = {"type": "string"}
-_TIME: Schema = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
+_INTEGER: Schema = {"type": "integer"}
+_TIME: Schema = {"type": "object", "properties": {"sec": _INTEGER, "nsec": _INTEGER}}
 _COLOUR: Schema = {"type": "object", "properties": dict.fromkeys("rgba", _NUMBER)}
 _POINT: Schema = {"type": "object", "properties": {"x": _NUMBER, "y": _NUMBER}}
 _DATA: Schema = {"type": "string", "contentEncoding": "base64"}
+# Values of ``_flat`` by topic, in the order of their messages.
+_POSE = {
+    "theta_signed_deg": _MAYBE,
+    "c_head_px": _MAYBE,
+    "c_tail_px": _MAYBE,
+    "source_px_per_working_px": _NUMBER,
+    "confidence": _MAYBE,
+    "novelty": _MAYBE,
+    "state": {"type": ["string", "null"]},
+    "state_number": _MAYBE,
+    "refusal": _TEXT,
+}
+_PACE = {"frames_per_second": _NUMBER, "dropped_frames": _NUMBER, "dropped_rows": _NUMBER, "perception_ms": _MAYBE}
+_TENDONS = {f"tendon_{what}_{side}": _NUMBER for what in ("pull_mm", "force_mn") for side in _SIDES}
+_ROBOT = {"insertion_mm": _NUMBER, "delivery_mm": _NUMBER, "wall_contact_n": _MAYBE, **_TENDONS}
+_MOTION = {"mode": _TEXT, "mode_number": _MAYBE, "sent_by": _TEXT, **dict.fromkeys(_MOTIONS, _MAYBE)}
 
 
 def _message(title: str, **properties: Schema) -> Schema:
@@ -280,73 +276,35 @@ def _list(item: Schema) -> Schema:
     return {"type": "array", "items": item}
 
 
-_MOTION = {
-    f"{who}_{what}": _MAYBE for who in ("asked", "commanded", "sent") for what in ("bend", "pitch", "advance_mm_s", "delivery_mm_s")
+_CIRCLE = {"position": _POINT, "diameter": _NUMBER, "thickness": _NUMBER, "fill_color": _COLOUR, "outline_color": _COLOUR}
+_POINTS = {
+    "type": _INTEGER,
+    "points": _list(_POINT),
+    "outline_color": _COLOUR,
+    "outline_colors": _list(_COLOUR),
+    "fill_color": _COLOUR,
+    "thickness": _NUMBER,
 }
-
+_LABEL = {"position": _POINT, "text": _TEXT, "font_size": _NUMBER, "text_color": _COLOUR, "background_color": _COLOUR}
+_ANNOTATIONS = {
+    "circles": _list(_message("foxglove.CircleAnnotation", **_CIRCLE)),
+    "points": _list(_message("foxglove.PointsAnnotation", **_POINTS)),
+    "texts": _list(_message("foxglove.TextAnnotation", **_LABEL)),
+}
+# Viewers know the messages named foxglove.* by their public definitions.
 SCHEMAS: dict[str, Schema] = {
     str(schema["title"]): schema
     for schema in (
         _message("foxglove.CompressedVideo", frame_id=_TEXT, data=_DATA, format=_TEXT),
         _message("foxglove.CompressedImage", frame_id=_TEXT, data=_DATA, format=_TEXT),
-        _message("foxglove.Log", level={"type": "integer"}, message=_TEXT, name=_TEXT, file=_TEXT, line={"type": "integer"}),
-        {
-            "title": "foxglove.ImageAnnotations",
-            "type": "object",
-            "properties": {
-                "circles": _list(
-                    _message(
-                        "foxglove.CircleAnnotation",
-                        position=_POINT,
-                        diameter=_NUMBER,
-                        thickness=_NUMBER,
-                        fill_color=_COLOUR,
-                        outline_color=_COLOUR,
-                    )
-                ),
-                "points": _list(
-                    _message(
-                        "foxglove.PointsAnnotation",
-                        type={"type": "integer"},
-                        points=_list(_POINT),
-                        outline_color=_COLOUR,
-                        outline_colors=_list(_COLOUR),
-                        fill_color=_COLOUR,
-                        thickness=_NUMBER,
-                    )
-                ),
-                "texts": _list(
-                    _message(
-                        "foxglove.TextAnnotation",
-                        position=_POINT,
-                        text=_TEXT,
-                        font_size=_NUMBER,
-                        text_color=_COLOUR,
-                        background_color=_COLOUR,
-                    )
-                ),
-            },
-        },
-        _message(
-            "lumenpilot.Pose",
-            theta_signed_deg=_MAYBE,
-            c_head_px=_MAYBE,
-            c_tail_px=_MAYBE,
-            source_px_per_working_px=_NUMBER,
-            confidence=_MAYBE,
-            novelty=_MAYBE,
-            state={"type": ["string", "null"]},
-            state_number=_MAYBE,
-            refusal=_TEXT,
-        ),
-        _message("lumenpilot.Robot", insertion_mm=_NUMBER, delivery_mm=_NUMBER, wall_contact_n=_MAYBE, **{
-            f"tendon_{what}_{side}": _NUMBER for what in ("pull_mm", "force_mn") for side in ("right", "left", "up", "down")
-        }),
-        _message("lumenpilot.Motion", mode=_TEXT, mode_number=_MAYBE, sent_by=_TEXT, **_MOTION),
-        _message("lumenpilot.Pace", frames_per_second=_NUMBER, dropped_frames=_NUMBER, dropped_rows=_NUMBER, perception_ms=_MAYBE),
+        _message("foxglove.Log", level=_INTEGER, message=_TEXT, name=_TEXT, file=_TEXT, line=_INTEGER),
+        {"title": "foxglove.ImageAnnotations", "type": "object", "properties": _ANNOTATIONS},
+        _message("lumenpilot.Pose", **_POSE),
+        _message("lumenpilot.Robot", **_ROBOT),
+        _message("lumenpilot.Motion", **_MOTION),
+        _message("lumenpilot.Pace", **_PACE),
     )
-}  # fmt: skip
-
+}
 
 Message = tuple[int, int, str, dict[str, Any]]
 """Time (ns since 1970), an order among equal times, topic, content."""
@@ -362,7 +320,6 @@ TOPICS = {
     "/events": "foxglove.Log",
 }
 _LINE_STRIP = 3
-_SIDES = ("right", "left", "up", "down")
 _LEVELS = {EventKind.FAULT: 4, EventKind.DROPPED: 3, EventKind.LOST: 3, EventKind.ALERT: 3, EventKind.OVERRIDE: 3}
 _JPEG_QUALITY = 90
 _COLOURS = {
@@ -433,60 +390,20 @@ def _rows(reader: SessionReader, clock: _Clock, on_row: Advance) -> Iterator[Mes
         # a clock that went back must not break the order of the file
         floor = at_ns = max(floor, clock.ns(row.captured_s))
         stamp = clock.stamp(row.captured_s)
+        values = _flat(row)
+        for name in ("refusal", "mode", "sent_by"):
+            values[name] = values[name] or ""
+        values["state_number"] = list(PoseState).index(values["state"]) if values["state"] else None
+        values["mode_number"] = list(Mode).index(values["mode"]) if values["mode"] else None
         yield at_ns, 1, "/camera/overlays", _overlays(row, stamp)
-        yield at_ns, 2, "/pose", {"timestamp": stamp, **_mcap_pose(row)}
-        yield at_ns, 3, "/pace", {"timestamp": stamp, **_pace(row)}
-        if row.status is not None:
-            yield at_ns, 4, "/robot", {"timestamp": stamp, **_robot(row)}
-        if row.sent is not None or row.drive is not None:
-            yield at_ns, 5, "/motion", {"timestamp": stamp, **_mcap_motion(row)}
-
-
-def _mcap_pose(row: RecordedRow) -> dict[str, Any]:
-    pose = row.scene.pose
-    return {
-        "theta_signed_deg": pose.theta_signed_deg if pose else None,
-        "c_head_px": pose.c_head_px if pose else None,
-        "c_tail_px": pose.c_tail_px if pose else None,
-        "source_px_per_working_px": row.source_px_per_working_px,
-        "confidence": pose.confidence if pose else None,
-        "novelty": row.scene.novelty,
-        "state": pose.state.value if pose else None,
-        "state_number": list(PoseState).index(pose.state) if pose else None,
-        "refusal": str(row.scene.refusal) if row.scene.refusal else "",
-    }
-
-
-def _pace(row: RecordedRow) -> dict[str, Any]:
-    return {
-        "frames_per_second": row.frames_per_second,
-        "dropped_frames": row.dropped_frames,
-        "dropped_rows": row.dropped_rows,
-        "perception_ms": row.scene.latency_ms.get("total"),
-    }
-
-
-def _robot(row: RecordedRow) -> dict[str, Any]:
-    status = row.status
-    assert status is not None
-    record: dict[str, Any] = {"insertion_mm": status.insertion_mm, "delivery_mm": status.delivery_mm}
-    record["wall_contact_n"] = status.wall_contact_n
-    for name, values in (("pull_mm", status.tendon_pull_mm), ("force_mn", status.tendon_force_mn)):
-        record |= {f"tendon_{name}_{side}": value for side, value in zip(_SIDES, values, strict=True)}
-    return record
-
-
-def _mcap_motion(row: RecordedRow) -> dict[str, Any]:
-    drive = row.drive
-    record: dict[str, Any] = {
-        "mode": drive.mode.value if drive else "",
-        "mode_number": list(Mode).index(drive.mode) if drive else None,
-        "sent_by": drive.sent_by.value if drive and drive.sent_by else "",
-    }
-    motions = {"asked": drive.asked if drive else None, "commanded": drive.commanded if drive else None, "sent": row.sent}
-    for who, motion in motions.items():
-        record |= {f"{who}_{name}": getattr(motion, name) if motion is not None else None for name in Command.__slots__}
-    return record
+        for order, topic, names, is_there in (
+            (2, "/pose", _POSE, True),
+            (3, "/pace", _PACE, True),
+            (4, "/robot", _ROBOT, row.status is not None),
+            (5, "/motion", _MOTION, row.sent is not None or row.drive is not None),
+        ):
+            if is_there:
+                yield at_ns, order, topic, {"timestamp": stamp} | {name: values[name] for name in names}
 
 
 def _overlays(row: RecordedRow, stamp: dict[str, int]) -> dict[str, Any]:
@@ -501,7 +418,7 @@ def _overlays(row: RecordedRow, stamp: dict[str, int]) -> dict[str, Any]:
         lines.append(("robot", scene.path.points, 2.0))
     for name, vector in (("vessel vector", scene.vessel_vector), ("robot vector", scene.robot_vector)):
         if vector is not None:
-            lines.append((name, _ends(vector), 3.0))
+            lines.append((name, np.array([vector.start, vector.end], np.float64), 3.0))
     for name, line, thickness in lines:
         corners = np.round(scene.points_to_source(line) + 0.5, 2).tolist()
         points.append(
@@ -509,7 +426,7 @@ def _overlays(row: RecordedRow, stamp: dict[str, int]) -> dict[str, Any]:
                 "timestamp": stamp,
                 "type": _LINE_STRIP,
                 "points": [{"x": x, "y": y} for x, y in corners],
-                "outline_color": _colour(name),
+                "outline_color": dict(zip("rgba", (*_COLOURS[name], 1.0), strict=True)),
                 "outline_colors": [],
                 "fill_color": {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0},
                 "thickness": thickness,
@@ -528,14 +445,6 @@ def _overlays(row: RecordedRow, stamp: dict[str, int]) -> dict[str, Any]:
         }
     )
     return {"circles": [], "points": points, "texts": texts}
-
-
-def _ends(vector: Vector) -> Points:
-    return np.array([vector.start, vector.end], np.float64)
-
-
-def _colour(name: str) -> dict[str, float]:
-    return dict(zip("rgba", (*_COLOURS[name], 1.0), strict=True))
 
 
 def _events(reader: SessionReader, clock: _Clock) -> Iterator[Message]:
@@ -567,33 +476,18 @@ def _video(reader: SessionReader, clock: _Clock) -> Iterator[Message]:
         number = video_number(path)
         if number is None:
             continue
-        try:
-            for pts_ms, data in _annex_b(path, PacketCheck(partial(reader.known_picture, number))):
-                time_s = time_of(number, pts_ms)
-                floor = max(floor, clock.ns(time_s))
-                coded = base64.b64encode(data).decode()
-                content = {"timestamp": clock.stamp(time_s), "frame_id": "camera", "data": coded, "format": "h264"}
-                yield floor, 0, "/camera/video", content
-        except (av.error.FFmpegError, OSError, ValueError):
-            # what could be read is there; the reader names damaged files
-            continue
-
-
-def _annex_b(path: Path, check: PacketCheck) -> Iterator[tuple[int, bytes]]:
-    """Time (ms) and trusted H.264 packets with start codes, each key picture with its parameter sets."""
-    with open_video(path) as container:
-        if not has_h264(container):
-            return
-        stream = container.streams.video[0]
-        to_annex_b = BitStreamFilterContext("h264_mp4toannexb", stream)
-        for packet in container.demux(stream):
-            if packet.pts is None or stream.time_base is None or not packet.size:
+        # What cannot be read of a damaged file is missing here; the reader names it.
+        with suppress(av.error.FFmpegError, OSError, ValueError), open_video(path) as container:
+            if not has_h264(container):
                 continue
-            pts_ms = round(packet.pts * stream.time_base * 1000)
-            if not check.take(pts_ms, bytes(packet), is_key=packet.is_keyframe, is_corrupt=packet.is_corrupt):
-                continue
-            for filtered in to_annex_b.filter(packet):
-                yield pts_ms, bytes(filtered)
+            to_annex_b = BitStreamFilterContext("h264_mp4toannexb", container.streams.video[0])
+            for pts_ms, packet in sound_packets(container, partial(reader.number_of, number)):
+                for filtered in to_annex_b.filter(packet):
+                    time_s = time_of(number, pts_ms)
+                    floor = max(floor, clock.ns(time_s))
+                    coded = base64.b64encode(bytes(filtered)).decode()
+                    content = {"timestamp": clock.stamp(time_s), "frame_id": "camera", "data": coded, "format": "h264"}
+                    yield floor, 0, "/camera/video", content
 
 
 def _images(reader: SessionReader, clock: _Clock) -> Iterator[Message]:

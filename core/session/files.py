@@ -1,8 +1,4 @@
-"""The last seconds, encoded, in memory: what "save the last 30 s" writes out. Bounded in time and in bytes.
-
-The files of one session while it is written. No thread of its own but the one that forces what is written to the disk.
-
-JSON lines out of files that nobody trusts: each line is a checked object, or it is named and skipped.
+"""The files of a session while it is written, and JSON lines that may be damaged when they are read.
 
 Every line that the recorder writes ends with the CRC-32 of what is before it: without it a flipped bit in a digit would pass as a
 measurement. A line without one (made by hand) is taken as it is.
@@ -20,18 +16,18 @@ import shutil
 import threading
 import time
 import zlib
-from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from io import FileIO
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TypeVar
 
 from core.config.models import RecordConfig
 from core.files import name_as_text
-from core.session.format import InvalidRecord
+from core.session.codec import InvalidRecord
 from core.session.manifest import (
+    ADDED_LATER,
     EVENTS,
     FRAMES,
     PREFIX,
@@ -39,10 +35,8 @@ from core.session.manifest import (
     Counts,
     Event,
     EventKind,
-    Manifest,
     Origin,
     SessionError,
-    as_added_later,
     event_to_json,
     new_manifest,
     read_manifest,
@@ -50,95 +44,13 @@ from core.session.manifest import (
 )
 from core.session.video import FrameEncoder, Packet, VideoError, VideoTrack
 
-_MAX_EVENTS = 2000
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class EncodedFrame:
-    """A frame ready to be written: its packet, the encoder that made it, and its row's JSON without its place in a session.
-
-    ``dropped`` counts the frames that the recorder dropped before it, ever.
-    """
-
-    captured_s: float
-    packet: Packet
-    encoder: FrameEncoder
-    row: str
-    dropped: int = 0
-
-    @property
-    def nbytes(self) -> int:
-        return len(self.packet.data) + len(self.row)
-
-
-class Ring:
-    """Keeps frames and events. What it holds always begins at a key picture, so it may reach up to a second further back."""
-
-    def __init__(self, seconds: float, max_bytes: int) -> None:
-        self._seconds = seconds
-        self._max_bytes = max_bytes
-        self._groups: deque[list[EncodedFrame]] = deque()
-        self._events: deque[Event] = deque()
-        self._target: Event | None = None
-        self._bytes = 0
-
-    @property
-    def seconds(self) -> float:
-        """How much it holds now."""
-        if not self._groups:
-            return 0.0
-        return max(0.0, self._groups[-1][-1].captured_s - self._groups[0][0].captured_s)
-
-    @property
-    def nbytes(self) -> int:
-        return self._bytes
-
-    def add(self, frame: EncodedFrame) -> None:
-        """Take a frame in and let the oldest go. Frames before the first key picture are not kept."""
-        if frame.packet.is_key:
-            self._groups.append([])
-        if not self._groups:
-            return
-        self._groups[-1].append(frame)
-        self._bytes += frame.nbytes
-        while len(self._groups) > 1 and (self._is_old(frame.captured_s) or self._bytes > self._max_bytes):
-            self._bytes -= sum(old.nbytes for old in self._groups.popleft())
-
-    def _is_old(self, now_s: float) -> bool:
-        """Is the oldest group not needed, since the next one reaches back far enough? A clock that went back ages everything."""
-        age_s = now_s - self._groups[1][0].captured_s
-        return age_s >= self._seconds or age_s < 0.0
-
-    def add_event(self, event: Event) -> None:
-        """Take it in and let the oldest go; the destination among these stays in force."""
-        self._events.append(event)
-        while len(self._events) > _MAX_EVENTS:
-            old = self._events.popleft()
-            if old.kind is EventKind.TARGET:
-                self._target = old
-
-    def content(self) -> tuple[list[EncodedFrame], list[Event]]:
-        """A copy: the frames in order, and the events since the first of them, with the destination that was chosen before."""
-        frames = [frame for group in self._groups for frame in group]
-        if not frames:
-            return [], []
-        first_s = frames[0].captured_s
-        chosen = [] if self._target is None else [self._target]
-        chosen += [event for event in self._events if event.kind is EventKind.TARGET and event.time_s < first_s]
-        before = [replace(event, time_s=first_s) for event in chosen[-1:] if event.data]
-        return frames, before + [event for event in self._events if event.time_s >= first_s]
-
-    def clear(self) -> None:
-        self._groups.clear()
-        self._events.clear()
-        self._target = None
-        self._bytes = 0
-
-
 MAX_LINE_BYTES = 4_000_000
 _CHUNK = 1 << 20
 _SEAL = re.compile(rb',"crc":"([0-9a-f]{8})"}')
 _SEAL_BYTES = 18
+_STILL_S = 10.0  # on a drive without locks a file that was written to so recently counts as being written
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,43 +72,31 @@ def sealed(line: str) -> str:
 
 
 def is_sealed(line: FileLine) -> bool:
-    """Does it carry a checksum, and the right one? Then it is what the recorder wrote."""
-    seal = _seal(line.data) if line.data is not None else None
-    return line.data is not None and seal is not None and seal == zlib.crc32(line.data[:-_SEAL_BYTES])
+    """Whether it has a checksum, and the right one: then it is what the recorder wrote."""
+    if line.data is None:
+        return False
+    seal = _SEAL.fullmatch(line.data[-_SEAL_BYTES:])
+    return seal is not None and int(seal[1], 16) == zlib.crc32(line.data[:-_SEAL_BYTES])
 
 
-def _seal(data: bytes) -> int | None:
-    found = _SEAL.fullmatch(data[-_SEAL_BYTES:])
-    return int(found[1], 16) if found is not None else None
+def check_seal(data: bytes) -> None:
+    """Raises InvalidRecord when the checksum of a line is wrong; a line without one passes."""
+    seal = _SEAL.fullmatch(data[-_SEAL_BYTES:])
+    if seal is not None and int(seal[1], 16) != zlib.crc32(data[:-_SEAL_BYTES]):
+        raise InvalidRecord("checksum wrong")
 
 
-def parse_line(line: FileLine) -> dict[str, Any]:
-    """The object in it. Raises Damaged: cut, checksum wrong, no JSON, NaN, nested too deeply, no object."""
+def read_line(read: Callable[[bytes], T], line: FileLine) -> T:
+    """What `read` makes of a line. Raises InvalidRecord: too long, checksum wrong, cut, or damaged."""
     if line.data is None:
         raise InvalidRecord(f"longer than {MAX_LINE_BYTES} bytes")
-    return parse(line.data, is_cut=line.is_cut)
-
-
-def parse(data: bytes, *, is_cut: bool = False) -> dict[str, Any]:
-    """Like `parse_line`, of bytes."""
-    seal = _seal(data)
-    if seal is not None and seal != zlib.crc32(data[:-_SEAL_BYTES]):
-        raise InvalidRecord("checksum wrong")
+    check_seal(line.data)
     try:
-        record = json.loads(data, parse_constant=_refuse)
-    except (ValueError, RecursionError) as error:
-        if isinstance(error, InvalidRecord):
-            raise
-        if is_cut:
+        return read(line.data)
+    except InvalidRecord:
+        if line.is_cut:
             raise InvalidRecord("cut off") from None
-        raise InvalidRecord("nested too deeply" if isinstance(error, RecursionError) else "not valid JSON") from None
-    if type(record) is not dict:
-        raise InvalidRecord("not an object")
-    return record
-
-
-def _refuse(name: str) -> NoReturn:
-    raise InvalidRecord(f"{name} is no number")
+        raise
 
 
 def lines_of(path: Path) -> Iterator[FileLine]:
@@ -216,18 +116,29 @@ def lines_of(path: Path) -> Iterator[FileLine]:
             number, offset = number + 1, offset + size
 
 
-_STILL_S = 10.0
+def _append(file: FileIO, line: str, end: int) -> int:
+    """Append all of a line to a file of `end` bytes, or nothing; returns its bytes. Raises OSError."""
+    data = memoryview(line.encode())
+    done = 0
+    try:
+        while done < len(data):
+            done += file.write(data[done:]) or 0
+    except OSError:
+        with contextlib.suppress(OSError):
+            os.ftruncate(file.fileno(), end)
+        raise
+    return done
 
 
 class LineFile:
-    """A file of JSON lines, each handed to the system at once. A line that cannot be written whole is taken back.
+    """A new file of JSON lines, each handed to the system at once. A line that cannot be written whole is taken back.
 
     The lock on it lasts as long as this process: it tells a session that is being recorded from one that was cut. A drive without
     locks knows only when it was last written to.
     """
 
     def __init__(self, path: Path) -> None:
-        # Appended to: a note that somebody else adds meanwhile, where no lock forbids it, is not written over.
+        # Opened for appending: a note that another process adds where no lock forbids it is not overwritten.
         self._file = FileIO(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666), "wb")
         self._end = 0
         try:
@@ -240,18 +151,9 @@ class LineFile:
 
     def write(self, line: str) -> int:
         """Append a line; returns its bytes. Raises OSError."""
-        data = memoryview(f"{line}\n".encode())
-        done = 0
-        try:
-            while done < len(data):
-                done += self._file.write(data[done:]) or 0
-        except OSError:
-            with contextlib.suppress(OSError):
-                os.ftruncate(self._file.fileno(), self._end)
-                self._file.seek(self._end)
-            raise
-        self._end += done
-        return done
+        size = _append(self._file, f"{line}\n", self._end)
+        self._end += size
+        return size
 
     def close(self) -> None:
         self._file.close()
@@ -265,24 +167,18 @@ def is_being_written(folder: Path) -> bool:
             return False
     except BlockingIOError:
         return True
-    except OSError:
-        return _has_just_grown(folder)
-
-
-def _has_just_grown(folder: Path) -> bool:
-    """Whether a session that has not ended was written to in the last seconds: all that can be told on a drive without locks."""
-    try:
-        return time.time() - (folder / FRAMES).stat().st_mtime < _STILL_S and not read_manifest(folder).closed
-    except (OSError, SessionError):
-        return False
+    except OSError:  # a drive without locks
+        try:
+            return time.time() - (folder / FRAMES).stat().st_mtime < _STILL_S and not read_manifest(folder).closed
+        except (OSError, SessionError):
+            return False
 
 
 @contextlib.contextmanager
 def alone_in(work: Path, busy: str) -> Iterator[None]:
     """An empty folder for one process at a time; what a killed one has left there is removed, and in the end the folder itself.
 
-    A window leaves a recovery going on when it is closed, and the next window offers it again. Raises SessionError (`busy`) and
-    OSError.
+    A closed window may leave a recovery running, and the next window offers it again. Raises SessionError (`busy`) and OSError.
     """
     while True:
         work.mkdir(parents=True, exist_ok=True)
@@ -296,7 +192,7 @@ def alone_in(work: Path, busy: str) -> Iterator[None]:
             pass  # a drive without locks
         if work.exists() and os.path.samestat(os.fstat(held), work.stat()):
             break
-        os.close(held)  # the other one has just ended, and taken its folder along
+        os.close(held)  # the other process has just ended, and removed its folder
     try:
         for left in work.iterdir():
             left.unlink()
@@ -312,7 +208,7 @@ def add_event(session: Path, event: Event) -> Event:
     Raises SessionError; nothing else is changed.
     """
     path = session / EVENTS
-    event = as_added_later(event)
+    event = replace(event, data=event.data | {ADDED_LATER: True})
     line = sealed(json.dumps(event_to_json(event), allow_nan=False)) + "\n"
     if is_being_written(session):
         raise SessionError(f"{session}: is being recorded; stop the recording first")
@@ -322,26 +218,18 @@ def add_event(session: Path, event: Event) -> Event:
                 fcntl.flock(file.fileno(), fcntl.LOCK_EX)
             end = file.seek(0, os.SEEK_END)
             if end:
-                # a last line that was cut must not swallow the new one
                 file.seek(end - 1)
-                line = line if file.read(1) == b"\n" else "\n" + line
-            _append(file, line.encode(), end)
+                line = line if file.read(1) == b"\n" else "\n" + line  # a last line that was cut must not swallow the new one
+            _append(file, line, end)
+            try:
+                os.fsync(file.fileno())
+            except OSError:
+                with contextlib.suppress(OSError):
+                    os.ftruncate(file.fileno(), end)
+                raise
     except OSError as error:
         raise SessionError(f"{path}: cannot be written ({error.strerror}); the note was not kept") from None
     return event
-
-
-def _append(file: FileIO, data: bytes, end: int) -> None:
-    """All of it, forced to the disk, or nothing: the file ends at `end` as before. Raises OSError."""
-    try:
-        rest = memoryview(data)
-        while rest:
-            rest = rest[file.write(rest) or 0 :]
-        os.fsync(file.fileno())
-    except OSError:
-        with contextlib.suppress(OSError):
-            os.ftruncate(file.fileno(), end)
-        raise
 
 
 def check_parent(folder: Path) -> None:
@@ -353,6 +241,24 @@ def check_parent(folder: Path) -> None:
         probe.unlink()
     except OSError as error:
         raise SessionError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EncodedFrame:
+    """A frame ready to be written: its packet, the encoder that made it, and its row's JSON without its place in a session.
+
+    ``dropped`` counts the frames that the recorder dropped before it, ever.
+    """
+
+    captured_s: float
+    packet: Packet
+    encoder: FrameEncoder
+    row: str
+    dropped: int = 0
+
+    @property
+    def nbytes(self) -> int:
+        return len(self.packet.data) + len(self.row)
 
 
 class SessionFiles:
@@ -401,7 +307,9 @@ class SessionFiles:
         self._track: VideoTrack | None = None
         self._encoder: FrameEncoder | None = None
         self._track_from_s = 0.0
-        self._syncer = _Syncer(self.folder, config.sync_s) if config.sync_s > 0 else None
+        self._is_closed = threading.Event()
+        if config.sync_s > 0:
+            threading.Thread(target=self._sync_until_closed, args=(config.sync_s,), name="session sync", daemon=True).start()
 
     def wants_key(self, captured_s: float) -> bool:
         """Must the next frame be a key picture, since a new file begins with it?"""
@@ -414,7 +322,6 @@ class SessionFiles:
         assert self._track is not None
         pts_ms = self._track.write(frame.packet)
         place = f'{{"row":{self.counts.frames},"video":{self.counts.videos - 1},"pts_ms":{pts_ms},'
-        place += f'"picture_crc":"{frame.packet.crc:08x}",'
         dropped = f',"dropped_rows":{max(0, frame.dropped - self.dropped_before)}}}'
         self.counts.bytes += self._rows.write(sealed(place + frame.row[1:-1] + dropped)) + len(frame.packet.data)
         self.counts.frames += 1
@@ -442,8 +349,7 @@ class SessionFiles:
         A session whose video cannot be closed stays marked as cut, so that it is recovered at the next start.
         """
         problem = ""
-        if self._syncer is not None:
-            self._syncer.stop()
+        self._is_closed.set()
         if self._track is not None:
             try:
                 self._track.close()
@@ -462,34 +368,15 @@ class SessionFiles:
             self._events.close()
         return problem
 
-    @property
-    def manifest(self) -> Manifest:
-        return self._manifest
-
-
-class _Syncer:
-    """Forces the files to the disk now and then, for the day when the power goes. A slow disk delays only this thread."""
-
-    def __init__(self, folder: Path, every_s: float) -> None:
-        self._folder = folder
-        self._every_s = every_s
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="session sync", daemon=True)
-        self._thread.start()
-
-    def _run(self) -> None:
-        while not self._stop.wait(self._every_s):
-            _sync_files(self._folder)
-
-    def stop(self) -> None:
-        self._stop.set()
+    def _sync_until_closed(self, every_s: float) -> None:
+        """A thread of its own: a slow disk delays no writing."""
+        while not self._is_closed.wait(every_s):
+            _sync_files(self.folder)
 
 
 def _sync_files(folder: Path, *, all_videos: bool = False) -> None:
-    """Now and then only the newest video, since one that was ended just before may have been forced too early: in the end, all.
-
-    What cannot be forced now is written by the system later.
-    """
+    """Force rows, events and the newest video to the disk; at the end all videos, since one that was closed in between may have
+    been forced before its index was written. What cannot be forced now is written by the system later."""
     videos = sorted(folder.glob("video_*.mkv"))
     for path in (folder / FRAMES, folder / EVENTS, *(videos if all_videos else videos[-1:])):
         with contextlib.suppress(OSError):

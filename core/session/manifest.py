@@ -8,15 +8,16 @@ from __future__ import annotations
 import contextlib
 import json
 import platform
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.config.calibration import CalibrationConfig
 from core.config.models import Config
@@ -28,7 +29,7 @@ from core.control.pilot import DriveView
 from core.devices import UserError
 from core.files import write_whole
 from core.perception.model_file import ModelError, model_folder, read_model_info
-from core.session.format import finite, finite_tree, group, moment, text
+from core.session.codec import JsonLayout, Moment, Text, finite, finite_tree, read_json
 from core.types import Point
 
 MANIFEST, FRAMES, EVENTS = "manifest.json", "frames.jsonl", "events.jsonl"
@@ -38,12 +39,16 @@ _MAX_BYTES = 8_000_000
 _PACKAGES = ("av", "mujoco-core", "numba", "numpy", "opencv-python-headless", "openvino", "scikit-image", "scipy", "torch")
 
 Kind = Literal["SIM", "LIVE", "PLAYBACK", "UNKNOWN"]
-"""What the banner said; UNKNOWN only where a damaged manifest, or one with the word of a later version, cannot tell."""
+"""What the banner said; UNKNOWN only in a copy that was recovered without its manifest."""
 Origin = Literal["recorded", "last seconds"]
 
 
 class SessionError(UserError):
     """A session cannot be written, read, recovered or exported; the message is one line that says what to do."""
+
+
+class NewerVersion(SessionError):
+    """The session was written by a newer version of the program."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,15 +112,6 @@ class Manifest(BaseModel):
     ended: str = ""
     counts: Counts = Counts()
     recovered: Loss | None = None
-
-    @field_validator("kind", "origin", mode="before")
-    @classmethod
-    def _of_a_later_version(cls, value: Any, info: ValidationInfo) -> Any:
-        """A word that this version does not know costs no session its manifest."""
-        if not isinstance(value, str):
-            return value
-        known, otherwise = (get_args(Kind), "UNKNOWN") if info.field_name == "kind" else (get_args(Origin), "recorded")
-        return value if value in known else otherwise
 
     @property
     def known(self) -> CalibrationConfig | None:
@@ -194,7 +190,7 @@ def read_manifest(folder: Path) -> Manifest:
         content = json.loads(data)
         version = content.get("format") if isinstance(content, dict) else None
         if type(version) is int and version > FORMAT:
-            raise SessionError(f"{path}: format {version} is of a newer version (this one knows {FORMAT}); update the program")
+            raise NewerVersion(f"{path}: format {version} is of a newer version (this one knows {FORMAT}); update the program")
         return Manifest.model_validate(content)
     except ValidationError as error:
         first: Any = error.errors()[0]
@@ -286,17 +282,12 @@ def frames_lost(events: Iterable[Event]) -> int:
     return sum(count for count in counts if type(count) is int and count > 0)
 
 
-_LONGEST_KIND = 40
-_ADDED_LATER = "added_later"
-
-
-def as_added_later(event: Event) -> Event:
-    """The event as it is kept when it is added to a session that has ended: the session's own counts know nothing of it."""
-    return replace(event, data=event.data | {_ADDED_LATER: True})
+ADDED_LATER = "added_later"
+"""Key in the data of an event that was added to a session that had ended: the session's own counts do not include it."""
 
 
 def was_added_later(event: Event) -> bool:
-    return event.data.get(_ADDED_LATER) is True
+    return event.data.get(ADDED_LATER) is True
 
 
 def event_to_json(event: Event) -> dict[str, Any]:
@@ -305,9 +296,23 @@ def event_to_json(event: Event) -> dict[str, Any]:
     return record | ({"data": finite_tree(event.data)} if event.data else {})
 
 
-def event_from_json(record: dict[str, Any]) -> Event:
-    """Raises Damaged. What a later version tells of is kept as a note that names its kind."""
-    kind, said = text(record.get("kind"), "kind"), text(record.get("text", ""), "text")
-    if kind not in set(EventKind):
-        kind, said = EventKind.NOTE, f"{kind[:_LONGEST_KIND]}: {said}"
-    return Event(moment(record.get("time_s"), "time_s"), EventKind(kind), said, group(record.get("data", {}), "data"))
+class _EventLayout(JsonLayout):
+    time_s: Moment
+    kind: EventKind
+    text: Text = ""
+    data: dict[str, Any] = Field(default_factory=dict)
+
+
+def event_from_json(data: bytes) -> Event:
+    """A line of ``events.jsonl``; raises InvalidRecord."""
+    return _upgraded(Event(**read_json(_EventLayout, data).__dict__))
+
+
+_TEXT_OF_TARGET = re.compile(r"(-?\d+\.\d), (-?\d+\.\d)")
+
+
+def _upgraded(event: Event) -> Event:
+    """An event of any earlier version as this one writes it: up to November 2026 a destination was text alone, "x, y"."""
+    if event.kind is EventKind.TARGET and "xy" not in event.data and (written := _TEXT_OF_TARGET.fullmatch(event.text)):
+        return replace(event, data=event.data | {"xy": [float(value) for value in written.groups()]})
+    return event

@@ -1,13 +1,4 @@
-"""The videos of a recorded session: its rows know how each picture was written, so that no damage in them passes.
-
-Pictures out of a session's video files, one at a time, by their time: decoded when asked for, never a neighbour's instead.
-
-A recorded session, read with suspicion: each bad record is named and skipped, a lost picture is None, nothing is guessed.
-
-Where each row of ``frames.jsonl`` is, and what the timeline shows of it: read once, in the background, a few bytes a row.
-
-What a session that ended properly has lost since, by its own counts: rows cut off at the end, videos and events that went.
-"""
+"""A recorded session: rows, events, pictures and timeline. A bad record is named and skipped, a lost picture is None."""
 
 from __future__ import annotations
 
@@ -18,7 +9,6 @@ from array import array
 from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -29,47 +19,43 @@ import av
 import av.error
 import cv2
 import numpy as np
-from av import VideoFrame
 from numpy.typing import NDArray
 
 from core.control.modes import Mode
-from core.session.files import FileLine, is_sealed, lines_of, parse, parse_line
-from core.session.format import InvalidRecord, RecordedRow, count, maybe_number, moment, row_from_json, text
-from core.session.manifest import EVENTS, FRAMES, Event, Manifest, SessionError, event_from_json, read_manifest, was_added_later
-from core.session.video import Known, PacketCheck, PictureRow, has_h264, open_video, upright
+from core.session.codec import Count, InvalidRecord, JsonLayout, Moment, RecordedRow, read_json, row_from_json
+from core.session.files import FileLine, check_seal, is_sealed, lines_of, read_line
+from core.session.manifest import (
+    EVENTS,
+    FRAMES,
+    Event,
+    Manifest,
+    NewerVersion,
+    SessionError,
+    event_from_json,
+    read_manifest,
+    was_added_later,
+)
+from core.session.video import NumberOf, has_h264, open_video, packet_times, sound_packets, upright, video_number
 from core.types import Frame, Image, PoseState, Tick
 
-_CACHE_BYTES = 48_000_000
-_STEP_MS = 1500
-"""So far ahead it is quicker to go on decoding than to seek: a group of pictures is a second long."""
-_OPEN_FILES = 2
+_CACHE_BYTES = 48_000_000  # of decoded pictures
+_STEP_MS = 1500  # up to this far ahead decoding on is quicker than seeking: a group of pictures is a second long
+_OPEN_FILES = 2  # videos open at once
 
 
-def video_path(folder: Path, number: int) -> Path:
-    return folder / f"video_{number:04d}.mkv"
-
-
-def video_number(path: Path) -> int | None:
-    """Of a video file; None when it is none of ours."""
-    digits = path.stem.rpartition("_")[2]
-    return int(digits) if digits.isascii() and digits.isdigit() else None
-
-
-def to_rgb(frame: av.VideoFrame) -> Image:
-    """A decoded frame as RGB uint8 (H, W, 3)."""
+def _to_rgb(frame: av.VideoFrame) -> Image:
     if frame.format.name == "yuv420p" and frame.width % 2 == 0 and frame.height % 2 == 0:
         return np.asarray(cv2.cvtColor(frame.to_ndarray(), cv2.COLOR_YUV2RGB_I420), np.uint8)
     return np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
 
 
 class _OpenVideo:
-    """One file and how far it has been decoded. What cannot be trusted is passed over."""
+    """One file and how far it has been decoded: ``at_ms``. Pictures that are damaged, or build on such ones, are left out."""
 
-    def __init__(self, path: Path, known: Known) -> None:
-        self._known = known
-        self._path = path
+    def __init__(self, path: Path, number_of: NumberOf) -> None:
+        self._path, self._number_of = path, number_of
         self._open()
-        self._frames: Iterator[av.VideoFrame] = self._decode()
+        self._frames = self._decode()
         self.at_ms: int | None = None
 
     def _open(self) -> None:
@@ -81,12 +67,11 @@ class _OpenVideo:
         self._stream.codec_context.thread_count = 1
 
     def seek(self, pts_ms: int) -> None:
-        """To the key picture at or before it; to the beginning where the file has no index that says where that is."""
+        """To the key picture at or before it; to the beginning where the file has no index."""
         base = self._stream.time_base
         try:
             self._container.seek(max(0, int(pts_ms / 1000 / base)) if base else 0, stream=self._stream)
-        except (av.error.FFmpegError, OSError, OverflowError):
-            # where its index is damaged too, only opening it again leads back to the beginning
+        except (av.error.FFmpegError, OSError, OverflowError):  # a damaged index: only opening it again leads to the beginning
             self._container.close()
             self._open()
         self._frames, self.at_ms = self._decode(), None
@@ -94,51 +79,41 @@ class _OpenVideo:
     def next(self) -> tuple[int, av.VideoFrame] | None:
         """The next good picture and its time; None at the end of what can be read."""
         for frame in self._frames:
-            if frame.pts is None or frame.time_base is None:
-                continue
-            self.at_ms = round(frame.pts * frame.time_base * 1000)
-            return self.at_ms, frame
+            if frame.pts is not None and frame.time_base is not None:
+                self.at_ms = round(frame.pts * frame.time_base * 1000)
+                return self.at_ms, frame
         return None
 
     def _decode(self) -> Iterator[av.VideoFrame]:
-        check = PacketCheck(self._known)
-        packets = self._container.demux(self._stream)
-        base = self._stream.time_base
-        while True:
-            try:
-                packet = next(packets)
-            except (StopIteration, av.error.FFmpegError, OSError):
-                return
-            if packet.pts is not None and base is not None:
-                pts_ms = round(packet.pts * base * 1000)
-                if not check.take(pts_ms, bytes(packet), is_key=packet.is_keyframe, is_corrupt=packet.is_corrupt):
+        is_whole = True
+        with contextlib.suppress(av.error.FFmpegError, OSError):  # of the file, where it ends early
+            for _, packet in sound_packets(self._container, self._number_of):
+                is_whole = is_whole or packet.is_keyframe
+                try:
+                    frames = packet.decode()
+                except (av.error.FFmpegError, OSError):
+                    is_whole = False
                     continue
-            try:
-                frames = packet.decode()
-            except (av.error.FFmpegError, OSError):
-                check.fail()
-                continue
-            for frame in frames:
-                if frame.is_corrupt:
-                    check.fail()
-                else:
-                    yield frame
+                for frame in frames:
+                    is_whole = is_whole and not frame.is_corrupt
+                    if is_whole:
+                        yield frame
 
     def close(self) -> None:
         self._container.close()
 
 
-class Pictures:
-    """The pictures of a session. All methods may be called from any thread; one at a time is served.
+class _Pictures:
+    """The pictures of a session, for one thread at a time.
 
     Parameters
     ----------
-    known : what the rows tell of the picture of a file at a time; see `PacketCheck`.
+    number_of : file and time in it (ms) -> number of the row, None where there is none.
     on_problem : is told of each file and each picture that cannot be read, once.
     """
 
-    def __init__(self, folder: Path, known: Callable[[int, int], PictureRow | None], on_problem: Callable[[str], None]) -> None:
-        self._known = known
+    def __init__(self, folder: Path, number_of: Callable[[int, int], int | None], on_problem: Callable[[str], None]) -> None:
+        self._number_of = number_of
         self._folder = folder
         self._on_problem = on_problem
         self._lock = threading.Lock()
@@ -148,22 +123,19 @@ class Pictures:
         self._cache: OrderedDict[tuple[int, int], av.VideoFrame] = OrderedDict()
         self._cache_bytes = 0
 
-    def picture(self, video: int, pts_ms: int) -> Image | None:
-        """The picture of file number `video` at exactly this time; None when it is lost or damaged."""
-        frame = self.decoded(video, pts_ms)
-        return to_rgb(frame) if frame is not None else None
-
     def decoded(self, video: int, pts_ms: int) -> av.VideoFrame | None:
-        """The same as it was decoded."""
+        """The picture of file number `video` at exactly this time; None when it is lost or damaged."""
         with self._lock:
             key = video, pts_ms
             if key not in self._cache and key not in self._missing:
                 self._decode_up_to(video, pts_ms)
             frame = self._cache.get(key)
-            if frame is None:
-                self._miss(video, pts_ms)
-                return None
-            self._cache.move_to_end(key)
+            if frame is not None:
+                self._cache.move_to_end(key)
+            elif key not in self._missing:
+                self._missing.add(key)
+                if video not in self._unreadable:
+                    self._on_problem(f"{self._path(video).name}: no picture at {pts_ms / 1000:.3f} s")
             return frame
 
     def close(self) -> None:
@@ -173,87 +145,45 @@ class Pictures:
             self._open.clear()
             self._cache.clear()
 
-    def _miss(self, video: int, pts_ms: int) -> None:
-        if (video, pts_ms) not in self._missing:
-            self._missing.add((video, pts_ms))
-            if video not in self._unreadable:
-                self._on_problem(f"{video_path(self._folder, video).name}: no picture at {pts_ms / 1000:.3f} s")
+    def _path(self, number: int) -> Path:
+        return self._folder / f"video_{number:04d}.mkv"
 
     def _decode_up_to(self, number: int, pts_ms: int) -> None:
-        video = self._video(number)
-        if video is None:
+        if number in self._unreadable:
             return
-        if video.at_ms is None or not 0 < pts_ms - video.at_ms <= _STEP_MS:
-            try:
+        try:
+            video = self._video(number)
+            if video.at_ms is None or not 0 < pts_ms - video.at_ms <= _STEP_MS:
                 video.seek(pts_ms)
-            except (av.error.FFmpegError, OSError, ValueError) as error:
-                self._give_up(number, error)
-                return
+        except (av.error.FFmpegError, OSError, ValueError) as error:
+            self._unreadable.add(number)
+            self._open.pop(number, None)
+            self._on_problem(f"{self._path(number).name}: cannot be read as a video ({getattr(error, 'strerror', None) or error})")
+            return
         while (found := video.next()) is not None:
             at_ms, frame = found
-            self._keep((number, at_ms), frame)
+            if (number, at_ms) not in self._cache:
+                self._cache[number, at_ms] = frame
+                self._cache_bytes += frame.width * frame.height * 3
+                while self._cache_bytes > _CACHE_BYTES and len(self._cache) > 1:
+                    _, old = self._cache.popitem(last=False)
+                    self._cache_bytes -= old.width * old.height * 3
             if at_ms >= pts_ms:
                 return
-        # at its end the decoder gives no more: it must be sought again
-        video.at_ms = None
+        video.at_ms = None  # at its end the decoder gives no more until it is sought again
 
-    def _keep(self, key: tuple[int, int], frame: av.VideoFrame) -> None:
-        if key in self._cache:
-            return
-        self._cache[key] = frame
-        self._cache_bytes += _size(frame)
-        while self._cache_bytes > _CACHE_BYTES and len(self._cache) > 1:
-            _, old = self._cache.popitem(last=False)
-            self._cache_bytes -= _size(old)
-
-    def _video(self, number: int) -> _OpenVideo | None:
-        if number in self._open:
-            self._open.move_to_end(number)
-            return self._open[number]
-        if number in self._unreadable:
-            return None
-        try:
-            self._open[number] = _OpenVideo(video_path(self._folder, number), partial(self._known, number))
-        except (av.error.FFmpegError, OSError, ValueError) as error:
-            self._give_up(number, error)
-            return None
-        while len(self._open) > _OPEN_FILES:
-            self._open.popitem(last=False)[1].close()
+    def _video(self, number: int) -> _OpenVideo:
+        if number not in self._open:
+            self._open[number] = _OpenVideo(self._path(number), partial(self._number_of, number))
+            while len(self._open) > _OPEN_FILES:
+                self._open.popitem(last=False)[1].close()
+        self._open.move_to_end(number)
         return self._open[number]
 
-    def _give_up(self, number: int, error: Exception) -> None:
-        self._unreadable.add(number)
-        self._open.pop(number, None)
-        reason = getattr(error, "strerror", None) or error
-        self._on_problem(f"{video_path(self._folder, number).name}: cannot be read as a video ({reason})")
 
-
-def _size(frame: Any) -> int:
-    return int(frame.width) * int(frame.height) * 3
-
-
-def packet_times(path: Path) -> list[tuple[int, bool]]:
-    """Time in ms and "is a key picture" of all packets that can be read, without decoding; empty when it is no video."""
-    found: list[tuple[int, bool]] = []
-    try:
-        with open_video(path) as container:
-            if not container.streams.video:
-                return []
-            stream = container.streams.video[0]
-            for packet in container.demux(stream):
-                if packet.pts is not None and stream.time_base is not None:
-                    found.append((round(packet.pts * stream.time_base * 1000), packet.is_keyframe))
-    except (av.error.FFmpegError, OSError):
-        pass
-    return found
-
-
-_STATES: dict[Any, int] = {None: -1, **{state.value: place for place, state in enumerate(PoseState)}}
-_MODES: dict[Any, int] = {None: -1, **{mode.value: place for place, mode in enumerate(Mode)}}
-_PUBLISH_EVERY = 500
-
-Columns = tuple[int, float, int, int, float, int, int, int]
-"""Row, time (s), file, time in it (ms), theta (deg), places of state and mode, checksum of the picture."""
+_STATES = {None: -1} | {state.value: place for place, state in enumerate(PoseState)}
+_MODES = {None: -1} | {mode.value: place for place, mode in enumerate(Mode)}
+_PUBLISH_EVERY = 500  # rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -273,8 +203,50 @@ class Timeline:
     mode: NDArray[np.int8]
 
 
-class RowIndex:
-    """Reads the rows' places in a thread; what it has read so far can be used at once.
+class RowColumns(JsonLayout):
+    """The columns of ``Timeline`` in a row's JSON."""
+
+    row: Count
+    captured_s: Moment
+    video: Count
+    pts_ms: Count
+    theta_signed_deg: float | None = None
+    state: str | None = None
+    mode: str | None = None
+
+
+# What the recorder writes at the beginning of a row. Measured: 12 us a row, where reading all of its JSON takes 130.
+_NUMBER = rb"(-?\d{1,15}(?:\.\d{1,9})?)"
+_HEAD = re.compile(
+    rb'{"row":(\d{1,18}),"video":(\d{1,9}),"pts_ms":(\d{1,18}),(?:"picture_crc":"[0-9a-f]{8}",)?"index":\d+,"captured_s":'
+    + _NUMBER
+    + rb',[^{}]{0,200}"mode":(?:null|"('
+    + "|".join(Mode).encode()
+    + rb')"),"state":(?:null|"([A-D])"),"theta_signed_deg":(?:null|'
+    + _NUMBER
+    + rb"),"
+)
+
+
+def row_columns(line: FileLine) -> RowColumns:
+    """The columns of a row; raises InvalidRecord. Of a row whose checksum is right only the beginning is read."""
+    found = _HEAD.match(line.data) if line.data is not None else None
+    if found is None or not is_sealed(line):
+        return read_line(partial(read_json, RowColumns), line)
+    row, video, pts_ms, captured_s, mode, state, theta = found.groups()
+    return RowColumns.model_construct(
+        row=int(row),
+        captured_s=float(captured_s),
+        video=int(video),
+        pts_ms=int(pts_ms),
+        theta_signed_deg=float(theta) if theta is not None else None,
+        state=state.decode() if state is not None else None,
+        mode=mode.decode() if mode is not None else None,
+    )
+
+
+class _RowIndex:
+    """Reads the places of the rows in a thread; what it has read so far can be used at once.
 
     Parameters
     ----------
@@ -285,67 +257,59 @@ class RowIndex:
         self._path = path
         self._on_problem = on_problem
         self._lock = threading.Lock()
-        self._offsets, self._sizes = array("q"), array("q")
-        self._columns: tuple[array[Any], ...] = tuple(array(code) for code in "qdqqdbbq")
-        self._keys = array("q")
-        self._stop = threading.Event()
-        self._done = threading.Event()
+        self._places: list[tuple[int, int]] = []
+        self._columns: tuple[array[Any], ...] = tuple(array(code) for code in "qdqqdbb")
+        self._keys = array("q")  # file and time of the picture as one number, rising
+        self._stop, self._done = threading.Event(), threading.Event()
         self.missing = 0
         self._thread = threading.Thread(target=self._read, name="row index", daemon=True)
         self._thread.start()
 
     def __len__(self) -> int:
-        """Rows that can be used now."""
         with self._lock:
-            return len(self._offsets)
+            return len(self._places)
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Until all is read; False when it is not yet."""
         return self._done.wait(timeout_s)
 
     def place(self, row: int) -> tuple[int, int]:
         """Offset and size in bytes of the n-th good row. Raises IndexError."""
         with self._lock:
-            return self._offsets[row], self._sizes[row]
+            return self._places[row]
 
     def timeline(self) -> Timeline:
-        """A copy of the columns so far."""
         with self._lock:
-            row, time_s, video, pts, theta, state, mode, _ = (np.array(column) for column in self._columns)
-        return Timeline(row, time_s, video, pts, theta, state, mode)
+            return Timeline(*(np.array(column) for column in self._columns))
 
-    def picture(self, video: int, pts_ms: int) -> PictureRow | None:
-        """The row whose picture is at this time of this file; None: no such row yet."""
+    def number_of(self, video: int, pts_ms: int) -> int | None:
+        """Number of the row whose picture is at this time of this file; None: no such row yet."""
         key = _key(video, pts_ms)
         with self._lock:
             place = bisect_left(self._keys, key)
-            if place == len(self._keys) or self._keys[place] != key:
-                return None
-            number, crc = self._columns[0][place], self._columns[-1][place]
-        return PictureRow(place, number, None if crc < 0 else crc)
+            return int(self._columns[0][place]) if place < len(self._keys) and self._keys[place] == key else None
 
     def close(self) -> None:
         self._stop.set()
         self._thread.join()
 
     def _read(self) -> None:
-        waiting: list[tuple[int, int, tuple[Any, ...]]] = []
+        waiting: list[tuple[FileLine, RowColumns]] = []
         last_row = -1
         try:
             for line in lines_of(self._path):
                 if self._stop.is_set():
                     return
                 try:
-                    columns = quick_columns(line) or columns_of(parse_line(line))
-                    if columns[0] <= last_row:
-                        raise InvalidRecord(f"row {columns[0]} after row {last_row}")
+                    columns = row_columns(line)
+                    if columns.row <= last_row:
+                        raise InvalidRecord(f"row {columns.row} after row {last_row}")
                 except InvalidRecord as error:
                     self._on_problem(f"{self._path.name}: line {line.number}: {error}; skipped")
                     continue
-                self.missing += columns[0] - last_row - 1
-                last_row = columns[0]
-                waiting.append((line.offset, len(line.data or b""), columns))
-                if len(waiting) >= _PUBLISH_EVERY or len(self._offsets) == 0:
+                self.missing += columns.row - last_row - 1
+                last_row = columns.row
+                waiting.append((line, columns))
+                if len(waiting) >= _PUBLISH_EVERY or not self._places:
                     self._publish(waiting)
                     waiting = []
         except FileNotFoundError:
@@ -356,83 +320,24 @@ class RowIndex:
             self._publish(waiting)
             self._done.set()
 
-    def _publish(self, waiting: list[tuple[int, int, tuple[Any, ...]]]) -> None:
+    def _publish(self, waiting: list[tuple[FileLine, RowColumns]]) -> None:
         with self._lock:
-            for offset, size, values in waiting:
-                self._offsets.append(offset)
-                self._sizes.append(size)
-                self._keys.append(_key(values[2], values[3]))
+            for line, row in waiting:
+                self._places.append((line.offset, len(line.data or b"")))
+                self._keys.append(_key(row.video, row.pts_ms))
+                theta = float("nan") if row.theta_signed_deg is None else row.theta_signed_deg
+                states = _STATES.get(row.state, -1), _MODES.get(row.mode, -1)
+                values = row.row, row.captured_s, row.video, row.pts_ms, theta, *states
                 for column, value in zip(self._columns, values, strict=True):
                     column.append(value)
 
 
 def _key(video: int, pts_ms: int) -> int:
-    """One number that orders files and times."""
     return (min(video, 2**20) << 42) + min(pts_ms, 2**42 - 1)
 
 
-# What the recorder writes at the beginning of a row. Measured: 12 us a row, where reading all of its JSON takes 100.
-_NUMBER = rb"(-?\d{1,15}(?:\.\d{1,9})?)"
-_HEAD = re.compile(
-    rb'{"row":(\d{1,18}),"video":(\d{1,9}),"pts_ms":(\d{1,18}),"picture_crc":"([0-9a-f]{8})","index":\d+,"captured_s":'
-    + _NUMBER
-    + rb',[^{}]{0,200}"mode":(?:null|"('
-    + "|".join(Mode).encode()
-    + rb')"),"state":(?:null|"([A-D])"),"theta_signed_deg":(?:null|'
-    + _NUMBER
-    + rb"),"
-)
-
-
-def quick_columns(line: FileLine) -> Columns | None:
-    """The columns of a row whose checksum proves that it is the recorder's; None for others, which must be read whole."""
-    found = _HEAD.match(line.data) if line.data is not None else None
-    if found is None or not is_sealed(line):
-        return None
-    row, video, pts_ms, crc, captured_s, mode, state, theta = found.groups()
-    return (
-        int(row),
-        float(captured_s),
-        int(video),
-        int(pts_ms),
-        float(theta) if theta is not None else float("nan"),
-        _STATES[state.decode() if state is not None else None],
-        _MODES[mode.decode() if mode is not None else None],
-        int(crc, 16),
-    )
-
-
-def columns_of(record: dict[str, Any]) -> Columns:
-    """What the timeline needs. Raises Damaged."""
-    theta = maybe_number(record.get("theta_signed_deg"), "theta_signed_deg")
-    state, mode = record.get("state"), record.get("mode")
-    if not isinstance(state, str | None) or not isinstance(mode, str | None):
-        raise InvalidRecord("state or mode: not a text")
-    return (
-        count(record.get("row"), "row"),
-        moment(record.get("captured_s"), "captured_s"),
-        count(record.get("video"), "video"),
-        count(record.get("pts_ms"), "pts_ms"),
-        float("nan") if theta is None else theta,
-        _STATES.get(state, -1),  # a later version may know more of them
-        _MODES.get(mode, -1),
-        _crc(record.get("picture_crc")),
-    )
-
-
-def _crc(value: Any) -> int:
-    """-1 where a row made by hand has none."""
-    if value is None:
-        return -1
-    try:
-        return int(text(value, "picture_crc"), 16) & 0xFFFFFFFF
-    except ValueError:
-        raise InvalidRecord("picture_crc: no checksum") from None
-
-
 _MAX_PROBLEMS = 200
-_ROWS_KEPT = 16
-"""A row with its masks weighs megabytes."""
+_ROWS_KEPT = 16  # a row with its masks weighs megabytes
 
 
 class SessionReader:
@@ -452,15 +357,20 @@ class SessionReader:
         self._lock = threading.Lock()
         self._problems: list[str] = []
         self._more_problems = 0
-        self._later: set[str] = set()
-        self.manifest: Manifest | None = self._read_manifest()
+        check_is_session(folder)
+        self.manifest: Manifest | None = None
+        try:
+            self.manifest = read_manifest(folder)
+        except NewerVersion:
+            raise
+        except SessionError as error:
+            self._problem(str(error))
         self._rows: OrderedDict[int, RecordedRow | None] = OrderedDict()
         self._file: IO[bytes] | None = None
-        # what cannot be opened is named by the index
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError):  # the index names what cannot be opened
             self._file = (folder / FRAMES).open("rb")
-        self._index = RowIndex(folder / FRAMES, self._problem)
-        self._pictures = Pictures(folder, self._index.picture, self._problem)
+        self._index = _RowIndex(folder / FRAMES, self._problem)
+        self._pictures = _Pictures(folder, self._index.number_of, self._problem)
 
     def __enter__(self) -> SessionReader:
         return self
@@ -473,16 +383,6 @@ class SessionReader:
         self._pictures.close()
         if self._file is not None:
             self._file.close()
-
-    def _read_manifest(self) -> Manifest | None:
-        check_is_session(self.folder)
-        try:
-            return read_manifest(self.folder)
-        except SessionError as error:
-            if "newer version" in str(error):
-                raise
-            self._problem(str(error))
-            return None
 
     @property
     def is_closed(self) -> bool:
@@ -529,35 +429,23 @@ class SessionReader:
             if self._file is not None:
                 self._file.seek(offset)
                 data = self._file.read(size)
-        row = self._read_row(place, data)
+        row = None
+        try:
+            check_seal(data)
+            row = row_from_json(data)
+        except InvalidRecord as error:
+            self._problem(f"{FRAMES}: row {place}: {error}; skipped")
         with self._lock:
             self._rows[place] = row
             while len(self._rows) > _ROWS_KEPT:
                 self._rows.popitem(last=False)
         return row
 
-    def _read_row(self, place: int, data: bytes) -> RecordedRow | None:
-        try:
-            row = row_from_json(parse(data))
-        except InvalidRecord as error:
-            self._problem(f"{FRAMES}: row {place}: {error}; skipped")
-            return None
-        for word in row.unknown:
-            self._tell_later(word)
-        return row
-
-    def _tell_later(self, word: str) -> None:
-        with self._lock:
-            is_new = word not in self._later
-            self._later.add(word)
-        if is_new:
-            self._problem(f"{FRAMES}: {word} is a word of a later version, and is left out; update the program to see it")
-
     def frame(self, place: int) -> Frame | None:
         """Picture, index and time of the n-th row; None when row or picture is lost. Raises IndexError."""
         row = self.row(place)
-        image = self._pictures.picture(row.video, row.pts_ms) if row is not None else None
-        return Frame(row.index, row.captured_s, image) if row is not None and image is not None else None
+        picture = self.decoded(row.video, row.pts_ms) if row is not None else None
+        return Frame(row.index, row.captured_s, _to_rgb(picture)) if row is not None and picture is not None else None
 
     def tick(self, place: int) -> Tick | None:
         """All that was recorded of the n-th row, as the live window would show it; None when row or picture is lost."""
@@ -567,14 +455,6 @@ class SessionReader:
     def timeline(self) -> Timeline:
         """Columns of the rows known so far, for plots and jumps."""
         return self._index.timeline()
-
-    def place_at(self, time_s: float) -> int:
-        """The row shown at a time of the recorded clock: the last one captured until then, or the first. Raises IndexError."""
-        times = self.timeline().time_s
-        if not len(times):
-            raise IndexError("no rows")
-        # a clock that went back must not confuse the search
-        return max(0, int(np.searchsorted(np.maximum.accumulate(times), time_s, side="right")) - 1)
 
     @property
     def duration_s(self) -> float:
@@ -589,7 +469,7 @@ class SessionReader:
         try:
             for line in lines_of(self.folder / EVENTS):
                 try:
-                    found.append(event_from_json(parse_line(line)))
+                    found.append(read_line(event_from_json, line))
                 except InvalidRecord as error:
                     self._problem(f"{EVENTS}: line {line.number}: {error}; skipped")
         except OSError as error:
@@ -601,24 +481,11 @@ class SessionReader:
         """The video files that are there."""
         return tuple(sorted(self.folder.glob("video_*.mkv")))
 
-    @cached_property
-    def loose_pictures(self) -> tuple[tuple[int, int], ...]:
-        """(video, pts_ms) of all pictures in the files, for a session that has lost its rows. Reads the files once, undecoded."""
-        found: list[tuple[int, int]] = []
-        for path in self.videos:
-            if (number := video_number(path)) is not None:
-                found += [(number, pts_ms) for pts_ms, _ in packet_times(path)]
-        return tuple(found)
+    def number_of(self, video: int, pts_ms: int) -> int | None:
+        """Number of the row whose picture is at this time (ms) of a video; None: no row has it."""
+        return self._index.number_of(video, pts_ms)
 
-    def known_picture(self, video: int, pts_ms: int) -> PictureRow | None:
-        """What the rows tell of a picture."""
-        return self._index.picture(video, pts_ms)
-
-    def loose_picture(self, video: int, pts_ms: int) -> Image | None:
-        """A picture by file and time."""
-        return self._pictures.picture(video, pts_ms)
-
-    def decoded(self, video: int, pts_ms: int) -> VideoFrame | None:
+    def decoded(self, video: int, pts_ms: int) -> av.VideoFrame | None:
         """A picture by file and time, as it was decoded; None when it is lost or damaged."""
         return self._pictures.decoded(video, pts_ms)
 
@@ -649,10 +516,10 @@ def is_of_session(video: Path) -> bool:
 
 def times_of(video: Path) -> list[int]:
     """When its pictures were, in ms, in order."""
-    return sorted({pts_ms for pts_ms, _ in packet_times(video)})
+    return sorted(set(packet_times(video)))
 
 
-@contextmanager
+@contextlib.contextmanager
 def session_video(video: Path) -> Iterator[tuple[list[int], Take]]:
     """The times of one of a session's videos, and how to take its pictures. Raises SessionError."""
     number = video_number(video)
@@ -679,7 +546,7 @@ def rows_cut_off(reader: SessionReader) -> int:
 
 
 def losses(reader: SessionReader, events: Sequence[Event]) -> list[str]:
-    """A line for each kind of loss; of a session that is still open or was cut, none: its counts were never written.
+    """What a session has lost since it ended, a line each; none of one that is open or was cut: its counts were never written.
 
     `events` are those that are there; notes that were added later were never counted.
     """

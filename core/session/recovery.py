@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from core.files import name_as_text, sync_folder
-from core.session.files import FileLine, alone_in, is_being_written, is_sealed, lines_of, parse_line
-from core.session.format import InvalidRecord, count, row_from_json
+from core.session.codec import Count, InvalidRecord, JsonLayout, read_json, row_from_json
+from core.session.files import FileLine, alone_in, is_being_written, is_sealed, lines_of, read_line
 from core.session.manifest import (
     EVENTS,
     FRAMES,
@@ -25,16 +25,19 @@ from core.session.manifest import (
     EventKind,
     Loss,
     Manifest,
+    NewerVersion,
     SessionError,
     event_from_json,
     read_manifest,
     was_added_later,
     write_manifest,
 )
-from core.session.reader import check_is_session, columns_of, packet_times, quick_columns, video_number
-from core.session.video import Expected, VideoError, remux
+from core.session.reader import check_is_session, row_columns
+from core.session.video import VideoError, packet_times, remux, video_number
 
 _PROBLEMS_KEPT = 50
+OnBytes = Callable[[int], None]
+"""Is told how many more bytes were read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +81,10 @@ def _why_cut(folder: Path) -> str:
         return ""
     try:
         return "" if read_manifest(folder).closed else "it did not end properly"
+    except NewerVersion:
+        return ""
     except SessionError as error:
-        return "" if "newer version" in str(error) else str(error)
+        return str(error)
 
 
 def payload_bytes(folder: Path) -> int:
@@ -93,25 +98,101 @@ def payload_bytes(folder: Path) -> int:
     return total
 
 
+class _Dropped(JsonLayout):
+    dropped_rows: Count = 0
+
+
 @dataclass(slots=True)
 class _Salvage:
-    """What was found so far. ``places`` are the video, time (ms) and capture time (s) of every good row, ``expected`` what that
-    means for each video file."""
+    """What was found so far.
+
+    ``rows`` are the numbers of all good rows, ``captured_s`` their times, ``expected`` the time in its video file (ms) and the row
+    number of each picture that they tell of, by file; ``kept`` are the files and times of the pictures that are there.
+    """
 
     problems: list[str] = field(default_factory=list)
     rows: list[int] = field(default_factory=list)
-    places: list[tuple[int, int, float]] = field(default_factory=list)
-    expected: dict[int, list[Expected]] = field(default_factory=dict)
-    last_row: FileLine | None = None
+    captured_s: list[float] = field(default_factory=list)
+    expected: dict[int, dict[int, int]] = field(default_factory=dict)
     events: int = 0
     dropped: int = 0
     last_event_s: float | None = None
     kept: set[tuple[int, int]] = field(default_factory=set)
     videos: int = 0
 
+    def read_rows(self, source: Path, target: Path, on_bytes: OnBytes) -> None:
+        """Copy the good lines as they are, and name the others."""
+        last = self._copy_lines(source, target, self._take_row, on_bytes)
+        if last is not None:  # a session that was cut has no count in its manifest
+            with contextlib.suppress(InvalidRecord):
+                self.dropped = max(self.dropped, read_json(_Dropped, last).dropped_rows)
 
-_Take = Callable[[FileLine, _Salvage], None]
-OnBytes = Callable[[int], None]
+    def read_events(self, source: Path, target: Path) -> None:
+        self._copy_lines(source, target, self._take_event, lambda _: None)
+
+    def _copy_lines(self, source: Path, target: Path, take: Callable[[FileLine], None], on_bytes: OnBytes) -> bytes | None:
+        """Returns the last line that was taken. Raises OSError for what may be read another time."""
+        last: bytes | None = None
+        with target.open("wb") as output:
+            try:
+                for line in lines_of(source):
+                    on_bytes(len(line.data or b""))
+                    try:
+                        take(line)
+                    except InvalidRecord as error:
+                        self.problems.append(f"{source.name}: line {line.number}: {error}; left out")
+                    else:
+                        last = line.data or b""
+                        output.write(last + b"\n")
+            except FileNotFoundError:
+                self.problems.append(f"{source.name}: missing")
+            except OSError as error:
+                if error.errno != errno.EIO:
+                    raise
+                self.problems.append(f"{source.name}: cannot be read further ({error.strerror})")
+        return last
+
+    def _take_row(self, line: FileLine) -> None:
+        columns = row_columns(line)
+        if not is_sealed(line):  # a sealed row is as it was written
+            read_line(row_from_json, line)
+        if self.rows and columns.row <= self.rows[-1]:
+            raise InvalidRecord(f"row {columns.row} after row {self.rows[-1]}")
+        self.rows.append(columns.row)
+        self.captured_s.append(columns.captured_s)
+        self.expected.setdefault(columns.video, {})[columns.pts_ms] = columns.row
+
+    def _take_event(self, line: FileLine) -> None:
+        event = read_line(event_from_json, line)
+        if was_added_later(event):
+            return  # kept, but neither counted nor a sign of how long was recorded
+        self.events += 1
+        self.last_event_s = event.time_s
+        if event.kind is EventKind.DROPPED and isinstance(total := event.data.get("total"), int):
+            self.dropped = max(self.dropped, total)
+
+    def copy_video(self, path: Path, target: Path) -> None:
+        video = video_number(path)
+        if video is None:
+            self.problems.append(f"{path.name}: not a name of ours; left out")
+            return
+        kept_ms, problems = remux(path, target, self.expected.get(video, {}))
+        self.problems += problems
+        self.kept |= {(video, pts_ms) for pts_ms in kept_ms}
+        self.videos += bool(kept_ms)
+
+    def check_anything(self, session: Path) -> None:
+        if not self.rows and not self.kept:
+            raise SessionError(f"{session}: nothing left to recover: neither rows nor pictures can be read")
+
+    def period_s(self) -> float:
+        """Time from picture to picture, by the rows, by the videos where rows are lost, or as cameras usually have it."""
+        kept = sorted(self.kept)
+        steps_s = [(after - before) / 1000.0 for (video, before), (same, after) in pairwise(kept) if video == same]
+        for steps in (np.diff(self.captured_s), np.array(steps_s)):
+            if (steps > 0).any():
+                return float(np.median(steps[steps > 0]))
+        return 1.0 / 30.0
 
 
 def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda _: None) -> Recovery:
@@ -134,7 +215,8 @@ def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda 
                 raise SessionError(f"{target}: is there already; remove it to recover again")
             recovery = _salvage(session, work, target, on_bytes)
             for path in work.iterdir():
-                _sync(path)
+                with path.open("rb") as file:
+                    os.fsync(file.fileno())
             work.rename(target)
             with contextlib.suppress(OSError):  # some file systems cannot; the copy is in place by now
                 sync_folder(parent)
@@ -145,11 +227,6 @@ def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda 
         what_to_do = "let it be read, and try again" if is_source else "make room or choose another folder"
         raise SessionError(f"{error.filename or work}: {error.strerror or error}; {what_to_do}") from None
     return recovery
-
-
-def _sync(path: Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())
 
 
 def expected_loss(session: Path, on_bytes: OnBytes = lambda _: None) -> Recovery:
@@ -166,15 +243,13 @@ def expected_loss(session: Path, on_bytes: OnBytes = lambda _: None) -> Recovery
         raise SessionError(f"{session}: is being recorded; stop the recording first")
     manifest, problems = _manifest_of(session)
     found = _Salvage(problems)
-    nowhere = Path(os.devnull)
-    _copy_lines(session / FRAMES, nowhere, found, _take_row, on_bytes)
-    _copy_lines(session / EVENTS, nowhere, found, _take_event, lambda _: None)
+    found.read_rows(session / FRAMES, Path(os.devnull), on_bytes)
+    found.read_events(session / EVENTS, Path(os.devnull))
     for path in sorted(session.glob("video_*.mkv")):
         if (video := video_number(path)) is not None:
-            found.kept |= {(video, pts_ms) for pts_ms, _ in packet_times(path)}
+            found.kept |= {(video, pts_ms) for pts_ms in packet_times(path)}
         on_bytes(path.stat().st_size)
-    if not found.rows and not found.kept:
-        raise SessionError(f"{session}: nothing left to recover: neither rows nor pictures can be read")
+    found.check_anything(session)
     return Recovery(session, len(found.rows), len(found.kept), _loss(session, manifest, found))
 
 
@@ -182,9 +257,9 @@ def _manifest_of(session: Path) -> tuple[Manifest, list[str]]:
     """The manifest, or one that claims nothing, and what is wrong with it. Raises SessionError for a newer version."""
     try:
         return read_manifest(session), []
+    except NewerVersion:
+        raise
     except SessionError as error:
-        if "newer version" in str(error):
-            raise
         return _unknown(session), [str(error)]
 
 
@@ -192,20 +267,16 @@ def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Reco
     manifest, problems = _manifest_of(session)
     is_unknown = bool(problems)
     found = _Salvage(problems)
-    _copy_lines(session / FRAMES, work / FRAMES, found, _take_row, on_bytes)
-    _copy_lines(session / EVENTS, work / EVENTS, found, _take_event, lambda _: None)
+    found.read_rows(session / FRAMES, work / FRAMES, on_bytes)
+    found.read_events(session / EVENTS, work / EVENTS)
     for path in sorted(session.glob("video_*.mkv")):
-        _copy_video(path, work / path.name, found)
+        found.copy_video(path, work / path.name)
         on_bytes(path.stat().st_size)
-    if not found.rows and not found.kept:
-        raise SessionError(f"{session}: nothing left to recover: neither rows nor pictures can be read")
-    if is_unknown and found.places:
-        # The rows' clock began anywhere; its moment that the folder's name tells of is the first row's.
-        manifest = manifest.model_copy(update={"started_monotonic_s": found.places[0][2]})
+    found.check_anything(session)
+    if is_unknown and found.rows:
+        # The clock of the rows began at any time; the moment that the folder's name tells of is the first row's.
+        manifest = manifest.model_copy(update={"started_monotonic_s": found.captured_s[0]})
     loss = _loss(session, manifest, found)
-    if found.last_row is not None:  # a session that was cut has no count in its manifest
-        with contextlib.suppress(InvalidRecord):
-            found.dropped = max(found.dropped, count(parse_line(found.last_row).get("dropped_rows", 0), "dropped_rows"))
     counts = Counts(frames=len(found.rows), events=found.events, videos=found.videos)
     counts.dropped = max(found.dropped, manifest.counts.dropped)
     counts.bytes = sum(path.stat().st_size for path in work.iterdir())
@@ -224,91 +295,16 @@ def _unknown(session: Path) -> Manifest:
     return Manifest(id=name.rpartition("_")[2][:64], kind="UNKNOWN", started_utc=started, started_monotonic_s=0.0)
 
 
-def _copy_lines(source: Path, target: Path, found: _Salvage, take: _Take, on_bytes: OnBytes) -> None:
-    """Copy the good lines as they are; name the others."""
-    with target.open("wb") as output:
-        for line in _readable(source, found):
-            on_bytes(len(line.data or b""))
-            try:
-                take(line, found)
-            except InvalidRecord as error:
-                found.problems.append(f"{source.name}: line {line.number}: {error}; left out")
-            else:
-                output.write((line.data or b"") + b"\n")
-
-
-def _readable(source: Path, found: _Salvage) -> Iterator[FileLine]:
-    """The lines until the file ends or the disk gives no more of it. Raises OSError for what may be read another time."""
-    try:
-        yield from lines_of(source)
-    except FileNotFoundError:
-        found.problems.append(f"{source.name}: missing")
-    except OSError as error:
-        if error.errno != errno.EIO:
-            raise
-        found.problems.append(f"{source.name}: cannot be read further ({error.strerror})")
-
-
-def _take_row(line: FileLine, found: _Salvage) -> None:
-    columns = quick_columns(line)
-    if columns is None:
-        record = parse_line(line)
-        columns = columns_of(record)
-        if not is_sealed(line):  # what is sealed is as it was written, whatever of it this version understands
-            row_from_json(record)
-    row, captured_s, video, pts_ms, *_, crc = columns
-    found.last_row = line
-    if found.rows and row <= found.rows[-1]:
-        raise InvalidRecord(f"row {row} after row {found.rows[-1]}")
-    found.rows.append(row)
-    found.places.append((video, pts_ms, captured_s))
-    found.expected.setdefault(video, []).append(Expected(row, pts_ms, crc if crc >= 0 else None))
-
-
-def _take_event(line: FileLine, found: _Salvage) -> None:
-    event = event_from_json(parse_line(line))
-    if was_added_later(event):
-        return  # kept, but neither counted nor a sign of how long was recorded
-    found.events += 1
-    found.last_event_s = event.time_s
-    if event.kind is EventKind.DROPPED and isinstance(total := event.data.get("total"), int):
-        found.dropped = max(found.dropped, total)
-
-
-def _copy_video(path: Path, target: Path, found: _Salvage) -> None:
-    video = video_number(path)
-    if video is None:
-        found.problems.append(f"{path.name}: not a name of ours; left out")
-        return
-    done = remux(path, target, found.expected.get(video, []))
-    found.problems += done.problems
-    found.kept |= {(video, pts_ms) for pts_ms in done.kept_ms}
-    found.videos += bool(done.kept_ms)
-
-
-def _period_s(row_steps_s: np.ndarray, found: _Salvage) -> float:
-    """Time from picture to picture, by the rows, where these are gone by the videos' own clock, or as cameras usually have it."""
-    kept = sorted(found.kept)
-    steps_s = [(after - before) / 1000.0 for (video, before), (same, after) in pairwise(kept) if video == same]
-    for steps in (row_steps_s, np.array(steps_s)):
-        if (steps > 0).any():
-            return float(np.median(steps[steps > 0]))
-    return 1.0 / 30.0
-
-
 def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:
     """Rows that should be there and are not, pictures that rows tell of and that are not there, and how long all that lasted."""
-    told = {(video, pts_ms) for video, pts_ms, _ in found.places}
+    told = {(video, pts_ms) for video, pictures in found.expected.items() for pts_ms in pictures}
     pictures = len(told - found.kept)
     before = manifest.recovered  # of a copy that is recovered again: it has counted the rows that it has
     whole = max(found.rows[-1] + 1 if found.rows else 0, manifest.counts.frames + (before.rows if before else 0))
     rows = max(whole - len(found.rows), len(found.kept - told))
-    times = np.array([captured_s for *_, captured_s in found.places])
-    period_s = _period_s(np.diff(times), found)
-    seconds = (pictures + rows) * period_s
-    if found.last_event_s is not None and len(times) and not manifest.closed:
-        # an event after the last row: at least until then it was recording
-        seconds = max(seconds, found.last_event_s - float(times[-1]))
+    seconds = (pictures + rows) * found.period_s()
+    if found.last_event_s is not None and found.rows and not manifest.closed:
+        seconds = max(seconds, found.last_event_s - found.captured_s[-1])  # it was recording at least until its last event
     told_before = before.problems if before else ()
     problems = [*told_before, *found.problems[:_PROBLEMS_KEPT]]
     if len(found.problems) > _PROBLEMS_KEPT:

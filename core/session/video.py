@@ -1,35 +1,22 @@
-"""Pictures to packets, and packets to a video file that survives the death of its writer.
+"""Video files of sessions: encoding, writing, decoding, and copying what is left of a damaged one.
 
 Measured at 640x480 with a kill after some seconds: Matroska with its clusters closed every 200 ms and flushed packet by packet
-loses 0.2 s; MP4 loses everything. ``ultrafast`` at crf 21 costs 2.3 ms a frame on one core and 9 MB a minute in the twin; a bound
-on the rate keeps a noisy camera from filling the disk. RGB without loss (x264, qp 0) costs 10 ms and 1 GB a minute; FFV1 takes
-27 ms for the same size.
-
-Opens videos to read, and gives their pictures as a person sees them: none that a decoder invented, in order, upright, in square
-pixels.
-
-What is left of a video file that was cut or damaged, as a whole file: its packets copied, not encoded again.
-
-Which packets of a video can be trusted: those that are as they were written, and whose picture builds on such ones only.
-
-Decoders conceal damage: they show something. What they show must not be measured, so every row of a session carries the checksum of
-its picture's packet.
+loses 0.2 s; MP4 loses everything. ``ultrafast`` at crf 21 costs 2.3 ms a frame on one core and 9 MB a minute in the twin; a limit
+of the rate keeps a noisy camera from filling the disk. Lossless RGB (x264, qp 0) costs 10 ms and 1 GB a minute; FFV1 takes 27 ms
+for the same size.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-import re
 import struct
-import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from heapq import heappop, heappush
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import av
 import av.error
@@ -41,84 +28,6 @@ from av.video.frame import PictureType
 
 from core.config.models import GOP_FRAMES, RecordConfig
 from core.types import Image
-
-_START = re.compile(b"\x00\x00\x00?\x01")
-
-
-class PictureRow(NamedTuple):
-    """What the rows tell of a picture: place of its row among the good ones, the row's own number, and the checksum of the packet
-    (None: the row has none)."""
-
-    place: int
-    number: int
-    crc: int | None
-
-
-Known = Callable[[int], PictureRow | None]
-"""Time in ms -> its picture's row. None: no row has it."""
-
-
-def checksum_with_codes(packet: bytes) -> int:
-    """CRC-32 of the NAL units of an H.264 packet as the encoder gives it, with start codes."""
-    return _checksum(unit for unit in _START.split(packet) if unit)
-
-
-def checksum_with_lengths(packet: bytes) -> int:
-    """The same of a packet as Matroska stores it, with lengths of four bytes."""
-    return _checksum(_with_lengths(packet))
-
-
-def _checksum(units: Iterable[bytes]) -> int:
-    total = 0
-    for unit in units:
-        # zeros at the end belong to the next start code
-        total = zlib.crc32(unit.rstrip(b"\x00"), total)
-    return total
-
-
-def _with_lengths(packet: bytes) -> Iterator[bytes]:
-    at = 0
-    while at + 4 <= len(packet):
-        size = int.from_bytes(packet[at : at + 4], "big")
-        yield packet[at + 4 : at + 4 + size]
-        at += 4 + size
-
-
-class PacketCheck:
-    """Follows the packets of one file in order, from the beginning or from a seek on."""
-
-    def __init__(self, known: Known) -> None:
-        self._known = known
-        self._last: PictureRow | None = None
-        self._unknown = 0
-        self._is_whole = False
-
-    def take(self, pts_ms: int, data: bytes, *, is_key: bool, is_corrupt: bool = False) -> bool:
-        """Can the picture of this packet be trusted? After a damaged or missing one none can until the next key picture."""
-        found = self._known(pts_ms)
-        if found is not None:
-            if self._last is not None and not self._follows(self._last, found):
-                self._is_whole = False
-            if is_corrupt or (found.crc is not None and checksum_with_lengths(data) != found.crc):
-                self._is_whole = False
-                return False
-            self._last, self._unknown = found, 0
-        elif is_corrupt:
-            self._is_whole = False
-            return False
-        else:
-            self._unknown += 1
-        self._is_whole = self._is_whole or is_key
-        return self._is_whole
-
-    def _follows(self, last: PictureRow, found: PictureRow) -> bool:
-        """Is no picture missing in between? Where rows are lost, too, their pictures must have come by."""
-        return found.place == last.place + 1 and found.number - last.number - 1 <= self._unknown
-
-    def fail(self) -> None:
-        """The decoder refused the packet."""
-        self._is_whole = False
-
 
 MS = Fraction(1, 1000)
 LOSSY, LOSSLESS = "libx264", "libx264rgb"
@@ -138,12 +47,11 @@ class VideoError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """One encoded picture. ``pts_ms`` counts from the encoder's first picture; ``crc`` is its checksum (``packet_check``)."""
+    """One encoded picture. ``pts_ms`` counts from the encoder's first picture."""
 
     data: bytes
     pts_ms: int
     is_key: bool
-    crc: int = 0
 
 
 class FrameEncoder:
@@ -189,8 +97,7 @@ class FrameEncoder:
             raise VideoError(f"a picture could not be encoded ({error})") from None
         if len(packets) != 1:
             raise VideoError(f"the encoder gave {len(packets)} packets for one picture")
-        data = bytes(packets[0])
-        return Packet(data, self._pts_ms, packets[0].is_keyframe, checksum_with_codes(data))
+        return Packet(bytes(packets[0]), self._pts_ms, packets[0].is_keyframe)
 
     def _frame(self, image: Image) -> av.VideoFrame:
         if self._lossless:
@@ -358,118 +265,111 @@ def _is_mirrored(frame: av.VideoFrame) -> bool:
     return bool(across_x * down_y - across_y * down_x < 0)
 
 
-_MAX_STEP_MS = 5_000
-_NO_END_MS = 2**62
+_MAX_STEP_MS = 5_000  # a larger step between pictures of which no row tells is a damaged time
+NumberOf = Callable[[int], int | None]
+"""Time in the file (ms) -> number of the row whose picture it is; None: no row has it."""
 
 
-@dataclass(slots=True)
-class Remuxed:
-    """Times (ms) of the pictures that were kept, and what was wrong."""
-
-    kept_ms: set[int] = field(default_factory=set)
-    problems: list[str] = field(default_factory=list)
+def video_number(path: Path) -> int | None:
+    """The number of a session's video file; None when the name is none of ours."""
+    digits = path.stem.rpartition("_")[2]
+    return int(digits) if digits.isascii() and digits.isdigit() else None
 
 
-@dataclass(frozen=True, slots=True)
-class Expected:
-    """A picture that a row tells of: number of the row, time in the file, checksum of the packet (None: the row has none)."""
-
-    row: int
-    pts_ms: int
-    crc: int | None
+def has_h264(container: InputContainer) -> bool:
+    """Whether it has a video of the kind that the recorder writes. Damage can turn the name of its codec into another's."""
+    context = container.streams.video[0].codec_context if container.streams.video else None
+    return context is not None and context.name == "h264" and context.width > 0 and context.height > 0
 
 
-def remux(source: Path, target: Path, expected: Sequence[Expected]) -> Remuxed:
-    """Copy what can be read of `source` and be trusted.
+def packets_of(container: InputContainer) -> Iterator[tuple[int, av.Packet[av.VideoStream]]]:
+    """Time (ms) and packet of each picture of the first video. Raises FFmpegError, OSError where the file cannot be read on."""
+    stream = container.streams.video[0]
+    for packet in container.demux(stream):
+        if packet.pts is not None and packet.size and stream.time_base is not None:
+            yield round(packet.pts * stream.time_base * 1000), packet
+
+
+def sound_packets(container: InputContainer, number_of: NumberOf) -> Iterator[tuple[int, av.Packet[av.VideoStream]]]:
+    """As ``packets_of``, without damaged packets, and without those that build on a damaged or missing one."""
+    last: int | None = None
+    unknown, is_whole = 0, False
+    for pts_ms, packet in packets_of(container):
+        number = number_of(pts_ms)
+        if packet.is_corrupt:
+            is_whole = False
+            continue
+        if number is None:
+            unknown += 1
+        else:
+            if last is not None and number > last + 1 + unknown:
+                is_whole = False
+            last, unknown = number, 0
+        is_whole = is_whole or packet.is_keyframe
+        if is_whole:
+            yield pts_ms, packet
+
+
+def packet_times(path: Path) -> list[int]:
+    """Times (ms) of all pictures that can be found, without decoding; empty when it is no video."""
+    found: list[int] = []
+    with contextlib.suppress(av.error.FFmpegError, OSError), open_video(path) as container:
+        if container.streams.video:
+            found += (pts_ms for pts_ms, _ in packets_of(container))
+    return found
+
+
+def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int], list[str]]:
+    """Copy the sound packets of `source`; nothing is written where there are none.
 
     Parameters
     ----------
-    expected : the pictures that rows tell of, in order. What differs from them, or is built on one that is missing, is left out.
+    rows : time (ms) -> row number of the pictures that rows tell of.
+
+    Returns
+    -------
+    tuple
+        Times (ms) of the pictures that were kept, and what was wrong, a line each.
 
     Raises
     ------
     VideoError
-        When the target cannot be written. A source that cannot be read is a problem in the result.
+        The target cannot be written. A source that cannot be read is a problem in the result.
     """
-    done = Remuxed()
+    kept: set[int] = set()
+    problems: list[str] = []
     try:
         container = open_video(source)
     except (av.error.FFmpegError, OSError) as error:
-        done.problems.append(f"{source.name}: cannot be read as a video ({getattr(error, 'strerror', None) or error})")
-        return done
+        return kept, [f"{source.name}: cannot be read as a video ({_words(error)})"]
     with container:
         if not has_h264(container):
-            done.problems.append(f"{source.name}: has no H.264 video in it")
-            return done
-        _copy(container, target, expected, done)
-    if not done.kept_ms:
-        target.unlink(missing_ok=True)
-        done.problems.append(f"{source.name}: no picture left")
-    return done
-
-
-def has_h264(container: Any) -> bool:
-    """Is there a video of the kind that the recorder writes? Damage can turn the name of its codec into another's."""
-    streams = container.streams.video
-    context = streams[0].codec_context if streams else None
-    return context is not None and context.name == "h264" and context.width > 0 and context.height > 0
-
-
-def _copy(container: Any, target: Path, expected: Sequence[Expected], done: Remuxed) -> None:
-    stream = container.streams.video[0]
-    try:
-        with av.open(media_name(target), "w", format="matroska") as output:
-            copy = output.add_stream_from_template(stream)
-            for packet, pts_ms in _whole(container, stream, expected, done):
-                packet.stream = copy
-                packet.dts = packet.pts
-                output.mux_one(packet)
-                done.kept_ms.add(pts_ms)
-    except (av.error.FFmpegError, OSError, ValueError) as error:
-        raise VideoError(f"{target}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
-
-
-def _whole(container: Any, stream: Any, expected: Sequence[Expected], done: Remuxed) -> Iterator[tuple[Any, int]]:
-    """Packets whose picture can be trusted, in order."""
-    known = {one.pts_ms: PictureRow(place, one.row, one.crc) for place, one in enumerate(expected)}
-    check, gaps = PacketCheck(known.get), _gaps(expected)
-    last_ms, left_out = -1, 0
-    # Rows that were cut off leave their pictures, each soon after the one before; a damaged time leaps.
-    end_ms = expected[-1].pts_ms if expected else _NO_END_MS
-    for packet in _packets(container, stream, done):
-        pts_ms = round(packet.pts * stream.time_base * 1000)
-        # a time that no row tells of is a damaged time, unless rows are missing there
-        is_told = pts_ms in known or any(low < pts_ms < high for low, high in gaps)
-        is_after = end_ms < pts_ms < max(last_ms, end_ms) + _MAX_STEP_MS
-        is_possible = pts_ms > last_ms and (is_told or is_after)
-        if not is_possible or not check.take(pts_ms, bytes(packet), is_key=packet.is_keyframe, is_corrupt=packet.is_corrupt):
-            left_out += 1
-            continue
-        last_ms = pts_ms
-        yield packet, pts_ms
-    if left_out:
-        done.problems.append(f"{container.name.rpartition('/')[2]}: {left_out} damaged pictures left out")
-
-
-def _gaps(expected: Sequence[Expected]) -> list[tuple[int, int]]:
-    """Between which times (ms) pictures may be of which no row tells: where rows are missing."""
-    if not expected:
-        return [(-1, _NO_END_MS)]
-    gaps = [(a.pts_ms, b.pts_ms) for a, b in pairwise(expected) if b.row > a.row + 1]
-    if expected[0].pts_ms > 0:
-        gaps.append((-1, expected[0].pts_ms))
-    return gaps
-
-
-def _packets(container: Any, stream: Any, done: Remuxed) -> Iterator[Any]:
-    packets = container.demux(stream)
-    while True:
+            return kept, [f"{source.name}: has no H.264 video in it"]
+        packets, last_ms, left_out = sound_packets(container, rows.get), -1, 0
         try:
-            packet = next(packets)
-        except StopIteration:
-            return
-        except (av.error.FFmpegError, OSError) as error:
-            done.problems.append(f"{container.name.rpartition('/')[2]}: ends early ({getattr(error, 'strerror', None) or error})")
-            return
-        if packet.pts is not None and packet.size:
-            yield packet
+            with av.open(media_name(target), "w", format="matroska") as output:
+                copy = output.add_stream_from_template(container.streams.video[0])
+                while True:
+                    try:
+                        pts_ms, packet = next(packets)
+                    except StopIteration:
+                        break
+                    except (av.error.FFmpegError, OSError) as error:
+                        problems.append(f"{source.name}: ends early ({_words(error)})")
+                        break
+                    if pts_ms <= last_ms or (pts_ms not in rows and last_ms >= 0 and pts_ms > last_ms + _MAX_STEP_MS):
+                        left_out += 1
+                        continue
+                    last_ms = pts_ms
+                    packet.stream = copy
+                    packet.dts = packet.pts
+                    output.mux_one(packet)
+                    kept.add(pts_ms)
+        except (av.error.FFmpegError, OSError, ValueError) as error:
+            raise VideoError(f"{target}: cannot be written ({_words(error)})") from None
+    if left_out:
+        problems.append(f"{source.name}: {left_out} damaged pictures left out")
+    if not kept:
+        target.unlink(missing_ok=True)
+        problems.append(f"{source.name}: no picture left")
+    return kept, problems

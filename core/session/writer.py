@@ -1,10 +1,6 @@
 """The recorder: takes ticks without ever making their sender wait, and writes sessions in a thread of its own.
 
-What the recorder's thread does: encode once, keep the last seconds, write the session. Not to be called from other threads.
-
-Writes what the ring held as a session, in a thread of its own: a slow disk must not hold up the session that may be running.
-
-How a recording is going: one frozen picture of it for the window, and what the disk allows.
+It encodes each picture once, keeps the last seconds in memory, and writes the session if one is being recorded.
 """
 
 from __future__ import annotations
@@ -26,8 +22,8 @@ from typing import Any
 from core.config.models import RecordConfig, sessions_folder
 from core.control.faults import Cause, Fault
 from core.control.pilot import DriveView
-from core.session.files import EncodedFrame, Ring, SessionFiles
-from core.session.format import light_tick, row_of
+from core.session.codec import light_tick, row_of
+from core.session.files import EncodedFrame, SessionFiles
 from core.session.manifest import About, Event, EventKind, SessionError, events_between
 from core.session.video import FrameEncoder, VideoError
 from core.types import Frame, Tick
@@ -35,6 +31,9 @@ from core.types import Frame, Tick
 STOPPED = "recording stopped: "
 """Before a problem that has ended a session."""
 _MB = 1e6
+_RING_EVENTS = 2000
+_EARLY_EVENTS = 1000  # kept between start and the first frame
+_REPORT_EVERY_S = 1.0  # lost and dropped frames are reported at most so often
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,37 +88,31 @@ def faults_between(before: RecordStatus, now: RecordStatus) -> list[Fault]:
     return faults
 
 
-class StatusBoard:
-    """Where the threads of the recorder write what has changed."""
+class _SharedStatus:
+    """The status, which the threads of the recorder change."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._status = RecordStatus()
+        self.now = RecordStatus()
 
-    def show(self, **changes: Any) -> None:
+    def update(self, **changes: Any) -> None:
         with self._lock:
-            self._status = replace(self._status, **changes)
+            self.now = replace(self.now, **changes)
 
-    def fail(self, problem: str, *, is_disk_full: bool = False) -> None:
+    def report_problem(self, problem: str, *, is_disk_full: bool = False) -> None:
         """The recording stopped, or could not start."""
         with self._lock:
-            count = self._status.problems + 1
-            self._status = replace(self._status, problem=problem, is_disk_full=is_disk_full, problems=count)
+            self.now = replace(self.now, problem=problem, is_disk_full=is_disk_full, problems=self.now.problems + 1)
 
-    def notice(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """Something to say that stops no recording."""
         with self._lock:
-            self._status = replace(self._status, notice=text, notices=self._status.notices + 1)
-
-    @property
-    def status(self) -> RecordStatus:
-        with self._lock:
-            return self._status
+            self.now = replace(self.now, notice=text, notices=self.now.notices + 1)
 
 
 @dataclass(frozen=True, slots=True)
 class Disk:
-    """What is free (bytes); `warning` and `full` are lines to show, empty when there is room."""
+    """Free space (bytes); `warning` and `full` are lines to show, empty when there is room."""
 
     free: int
     warning: str
@@ -127,36 +120,96 @@ class Disk:
 
 
 def look_at_disk(folder: Path, config: RecordConfig) -> Disk | None:
-    """The disk of a folder that may not be there yet; None when it cannot be told."""
+    """The disk of a folder that need not exist yet; None when it cannot be read."""
     try:
         there = next(parent for parent in (folder, *folder.parents) if parent.exists())
         total, _, free = shutil.disk_usage(there)
     except (OSError, StopIteration):
         return None
-    is_low = free < config.warn_free_mb * _MB or free < config.warn_free_share * total
     left = f"{free / _MB:,.0f}"
+    is_low = free < config.warn_free_mb * _MB or free < config.warn_free_share * total
     warning = f"disk nearly full: {left} MB left" if is_low else ""
     full = f"disk full ({left} MB left in {folder})" if free < config.stop_free_mb * _MB else ""
     return Disk(free, warning, full)
 
 
-class RingSaver:
-    """One saving at a time; how it went is on the board."""
+class Ring:
+    """The last encoded frames and events, bounded in time and bytes.
 
-    def __init__(self, parent: Path, config: RecordConfig, board: StatusBoard) -> None:
+    It always begins at a key picture, so it may reach up to a second further back.
+    """
+
+    def __init__(self, seconds: float, max_bytes: int) -> None:
+        self._seconds = seconds
+        self._max_bytes = max_bytes
+        self.clear()
+
+    def clear(self) -> None:
+        self._groups: deque[list[EncodedFrame]] = deque()
+        self._events: deque[Event] = deque()
+        self._target: Event | None = None
+        self.nbytes = 0
+
+    @property
+    def seconds(self) -> float:
+        """How much it holds now."""
+        return max(0.0, self._groups[-1][-1].captured_s - self._groups[0][0].captured_s) if self._groups else 0.0
+
+    def add(self, frame: EncodedFrame) -> None:
+        """Add a frame and drop the oldest. Frames before the first key picture are not kept."""
+        if frame.packet.is_key:
+            self._groups.append([])
+        if not self._groups:
+            return
+        self._groups[-1].append(frame)
+        self.nbytes += frame.nbytes
+        while len(self._groups) > 1:
+            age_s = frame.captured_s - self._groups[1][0].captured_s
+            # The second group reaches back far enough, or the clock went back, which ages everything.
+            if not (age_s >= self._seconds or age_s < 0.0 or self.nbytes > self._max_bytes):
+                break
+            self.nbytes -= sum(old.nbytes for old in self._groups.popleft())
+
+    def add_event(self, event: Event) -> None:
+        """Add an event and drop the oldest; the newest dropped destination stays in force."""
+        self._events.append(event)
+        while len(self._events) > _RING_EVENTS:
+            old = self._events.popleft()
+            if old.kind is EventKind.TARGET:
+                self._target = old
+
+    def content(self) -> tuple[list[EncodedFrame], list[Event]]:
+        """A copy: the frames in order, and the events since the first of them, with the destination that was chosen before."""
+        frames = [frame for group in self._groups for frame in group]
+        if not frames:
+            return [], []
+        first_s = frames[0].captured_s
+        chosen = [] if self._target is None else [self._target]
+        chosen += [event for event in self._events if event.kind is EventKind.TARGET and event.time_s < first_s]
+        before = [replace(event, time_s=first_s) for event in chosen[-1:] if event.data]
+        return frames, before + [event for event in self._events if event.time_s >= first_s]
+
+
+class RingSaver:
+    """Writes what the ring held as a session, in a thread of its own: a slow disk must not delay a running session.
+
+    One saving at a time; the status shows how it went.
+    """
+
+    def __init__(self, parent: Path, config: RecordConfig, status: _SharedStatus) -> None:
         self._parent = parent
         self._config = config
-        self._board = board
+        self._status = status
         self._thread: threading.Thread | None = None
 
     def save(self, about: About, frames: list[EncodedFrame], events: list[Event], now_s: float) -> None:
         """Start to write; `now_s` is the frames' clock now."""
         if not frames:
-            self._board.notice("nothing to save: no frames in memory yet")
+            self._status.notify("nothing to save: no frames in memory yet")
         elif self._thread is not None and self._thread.is_alive():
-            self._board.notice("the last seconds are still being saved")
+            self._status.notify("the last seconds are still being saved")
         else:
-            self._board.show(saving=True)
+            self._status.update(saving=True)
             arguments = (about, frames, events, now_s)
             self._thread = threading.Thread(target=self._write, args=arguments, name="ring saver", daemon=True)
             self._thread.start()
@@ -186,34 +239,30 @@ class RingSaver:
             problem = str(error)
         except OSError as error:
             problem = f"{error.filename or self._parent}: {error.strerror or error}"
-        finally:  # also after what nobody has thought of, which goes on to the log
+        finally:  # also after an unexpected error, which goes on to the log
             try:
-                if files is not None:
-                    # The folder itself says that it is not whole: a message in a window is soon forgotten.
+                if files is not None:  # the folder itself must say that it is not whole
                     lost = frames[-1].dropped - frames[0].dropped + len(frames) - written
                     at_end = files.close(problem or "saved from memory", lost)
                     problem = problem or at_end
             finally:
-                self._tell(problem, files, written, len(frames))
+                self._status.update(saving=False)
+                if not problem:
+                    self._status.update(saved=files.folder if files is not None else None)
+                elif not written:
+                    self._status.notify(f"the last seconds were not saved: {problem}")
+                else:
+                    self._status.notify(f"of the last seconds only {written} of {len(frames)} frames were saved: {problem}")
 
     def _check_room(self) -> None:
-        """The last room of a disk is not for this, as it is for no recording: what is open must still be closed. SessionError."""
+        """Raises SessionError where the disk is nearly full: its last room is for closing what is open."""
         disk = look_at_disk(self._parent, self._config)
         if disk is not None and disk.full:
             raise SessionError(f"{disk.full}; make room and save them again")
 
-    def _tell(self, problem: str, files: SessionFiles | None, written: int, frames: int) -> None:
-        self._board.show(saving=False)
-        if not problem:
-            self._board.show(saved=files.folder if files is not None else None)
-        elif not written:
-            self._board.notice(f"the last seconds were not saved: {problem}")
-        else:
-            self._board.notice(f"of the last seconds only {written} of {frames} frames were saved: {problem}")
-
 
 def _beginning(first: EncodedFrame, events: Sequence[Event]) -> Iterator[Event]:
-    """Where driving stood at the first frame, as every session must tell by itself; nothing where the ring knows how it began."""
+    """Mode and faults at the first frame, which every session must tell by itself; nothing where the ring has the beginning."""
     drive = json.loads(first.row)["drive"]
     mode = next((event for event in events if event.kind is EventKind.MODE), None)
     if drive is None or (mode is not None and "from" not in mode.data):
@@ -221,10 +270,6 @@ def _beginning(first: EncodedFrame, events: Sequence[Event]) -> Iterator[Event]:
     yield Event(first.captured_s, EventKind.MODE, drive["mode"])
     for cause, detail in drive["active"]:
         yield Event(first.captured_s, EventKind.FAULT, cause, {"detail": detail})
-
-
-_TELL_EVERY_S = 1.0
-_MAX_EARLY_EVENTS = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -239,29 +284,29 @@ class RecordedTick:
 
 @dataclass(frozen=True, slots=True)
 class _Lost:
-    """How many frames of the camera are known to be lost, how many of them were told, and when (or when it was first looked at)."""
+    """Frames that the camera has lost, how many of them were reported, and when (or when they were first counted)."""
 
     total: int
-    told: int
-    told_s: float
+    reported: int
+    reported_s: float
 
 
 class Recording:
-    """The ring, and the session if there is one.
+    """What the recorder's thread does: the ring, and the session if there is one. For that thread only.
 
     Parameters
     ----------
     parent : where sessions are made.
     clock : the clock of the frames.
-    board : where the state is shown.
+    status : is kept up to date.
     """
 
-    def __init__(self, config: RecordConfig, about: About, parent: Path, clock: Callable[[], float], board: StatusBoard) -> None:
+    def __init__(self, config: RecordConfig, about: About, parent: Path, clock: Callable[[], float], status: _SharedStatus) -> None:
         self._config = config
         self._about = about
         self._parent = parent
         self._clock = clock
-        self._board = board
+        self._status = status
         self._ring = Ring(config.ring_s, round(config.ring_mb * 1e6)) if config.ring_s > 0 else None
         self._encoder: FrameEncoder | None = None
         self._files: SessionFiles | None = None
@@ -269,18 +314,18 @@ class Recording:
         self._early: list[Event] = []
         self._drive: DriveView | None = None
         self._target: Event | None = None
-        self._dropped_told = 0
-        self._dropped_told_s = -math.inf
+        self._dropped_reported = 0
+        self._dropped_reported_s = -math.inf
         self._last_s = 0.0
         self._lost: _Lost | None = None
         # read by other threads
         self.dropped_before = 0
         self.began_s = 0.0
-        self.saver = RingSaver(parent, config, board)
+        self.saver = RingSaver(parent, config, status)
 
     @property
     def wants_pictures(self) -> bool:
-        """Is there anybody who would take them?"""
+        """Are pictures of use, for the ring or for a session?"""
         return self._ring is not None or self._files is not None or self._is_armed
 
     @property
@@ -288,7 +333,7 @@ class Recording:
         """Is a session being recorded, or about to be?"""
         return self._files is not None or self._is_armed
 
-    def take_picture(self, picture: RecordedTick) -> None:
+    def write_tick(self, picture: RecordedTick) -> None:
         """Encode it, keep it, write it. Raises VideoError, SessionError or OSError, after which `fail` must be called."""
         if not self.wants_pictures:
             return
@@ -299,17 +344,17 @@ class Recording:
         if self._is_armed:
             self._open(picture)
         if self._drive is None and picture.drive is not None:
-            self.take_drive(picture.drive)  # where it began; what changes then comes by itself, all of it and in order
-        self._tell_lost(picture.tick.frame)
+            self.write_drive(picture.drive)  # how driving began; later changes come by themselves
+        self._report_lost(picture.tick.frame)
         encoded = self._encoded(picture)
         if self._ring is not None:
             self._ring.add(encoded)
-            self._board.show(ring_s=self._ring.seconds)
+            self._status.update(ring_s=self._ring.seconds)
         if self._files is not None:
             self._files.write_frame(encoded)
             self._last_s = encoded.captured_s
-            self._tell_dropped(picture)
-            self._board.show(frames=self._files.counts.frames, bytes=self._files.counts.bytes)
+            self._report_dropped(picture)
+            self._status.update(frames=self._files.counts.frames, bytes=self._files.counts.bytes)
 
     def _encoded(self, picture: RecordedTick) -> EncodedFrame:
         frame = picture.tick.frame
@@ -323,51 +368,51 @@ class Recording:
         written = json.dumps(row, allow_nan=False, separators=(",", ":"))
         return EncodedFrame(frame.captured_s, packet, self._encoder, written, picture.dropped)
 
-    def take_drive(self, view: DriveView) -> None:
+    def write_drive(self, view: DriveView) -> None:
         """Write what changed since the last view; one that is overtaken by a newer one tells nothing new. Raises OSError."""
         if self._drive is not None and view.time_s < self._drive.time_s:
             return
         for event in events_between(self._drive, view):
-            self.take_event(event)
+            self.write_event(event)
         self._drive = view
 
-    def take_event(self, event: Event) -> None:
-        """Keep it and write it; between start and the first frame it waits. Raises OSError."""
+    def write_event(self, event: Event) -> None:
+        """Keep and write an event; between start and the first frame it waits. Raises OSError."""
         if event.kind is EventKind.TARGET:
             self._target = event
         if self._ring is not None:
             self._ring.add_event(event)
         if self._files is not None:
             self._files.write_event(event)
-        elif self._is_armed and len(self._early) < _MAX_EARLY_EVENTS:
+        elif self._is_armed and len(self._early) < _EARLY_EVENTS:
             self._early.append(event)
 
-    def _tell_dropped(self, picture: RecordedTick) -> None:
-        """At most once a second: a recorder that is behind must not be kept busy with saying so."""
+    def _report_dropped(self, picture: RecordedTick) -> None:
+        """At most once a second: a recorder that is behind must not be kept busy with it."""
         total, now_s = picture.dropped - self.dropped_before, picture.tick.frame.captured_s
-        if total > self._dropped_told and now_s - self._dropped_told_s >= _TELL_EVERY_S:
-            event = _dropped_event(now_s, total - self._dropped_told, total)
-            self._dropped_told, self._dropped_told_s = total, now_s
-            self.take_event(event)
+        if total > self._dropped_reported and now_s - self._dropped_reported_s >= _REPORT_EVERY_S:
+            event = _dropped_event(now_s, total - self._dropped_reported, total)
+            self._dropped_reported, self._dropped_reported_s = total, now_s
+            self.write_event(event)
 
-    def _tell_lost(self, frame: Frame) -> None:
+    def _report_lost(self, frame: Frame) -> None:
         """Frames that never came from the camera; at most once a second, too. A camera that was opened again counts from 0."""
         known = self._lost
         if known is None or frame.lost < known.total:
-            for event in self._untold(frame.captured_s):
-                self.take_event(event)
+            for event in self._unreported(frame.captured_s):
+                self.write_event(event)
             self._lost = _Lost(frame.lost, frame.lost, frame.captured_s)
             return
         self._lost = replace(known, total=frame.lost)
-        if frame.captured_s - known.told_s >= _TELL_EVERY_S:
-            for event in self._untold(frame.captured_s):
-                self.take_event(event)
+        if frame.captured_s - known.reported_s >= _REPORT_EVERY_S:
+            for event in self._unreported(frame.captured_s):
+                self.write_event(event)
 
-    def _untold(self, time_s: float) -> Iterator[Event]:
-        """What the camera has lost and nobody was told yet; it counts as told then."""
+    def _unreported(self, time_s: float) -> Iterator[Event]:
+        """What the camera has lost and was not reported yet; it counts as reported then."""
         known = self._lost
-        if known is not None and known.total > known.told:
-            count = known.total - known.told
+        if known is not None and known.total > known.reported:
+            count = known.total - known.reported
             self._lost = _Lost(known.total, known.total, time_s)
             yield Event(time_s, EventKind.LOST, f"{count} frames", {"count": count, "total": known.total})
 
@@ -375,20 +420,20 @@ class Recording:
         """A session begins with the next frame; nothing happens when one is being recorded."""
         if self._files is None:
             self._is_armed = True
-            self._board.show(armed=True, problem="", is_disk_full=False)
+            self._status.update(armed=True, problem="", is_disk_full=False)
 
     def _open(self, picture: RecordedTick) -> None:
         self._is_armed = False
         first_s = self._last_s = picture.tick.frame.captured_s
         self._files = SessionFiles(self._parent, self._about, self._config, first_s=first_s, now_s=self._clock())
         self.dropped_before = self._files.dropped_before = picture.dropped
-        self._dropped_told, self._dropped_told_s = 0, -math.inf
+        self._dropped_reported, self._dropped_reported_s = 0, -math.inf
         self.began_s = self._clock()
         self._leave_losses_before(picture.tick.frame)
-        self._board.show(armed=False, recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
+        self._status.update(armed=False, recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
         drive = picture.drive or self._drive
         if drive is not None:
-            # the session must tell by itself where it began
+            # the session must tell by itself how it began
             self._drive = replace(drive, time_s=first_s)
             self._files.write_event(next(events_between(None, self._drive)))
             for fault in drive.active:
@@ -400,12 +445,12 @@ class Recording:
             self._files.write_event(event)
 
     def _leave_losses_before(self, first: Frame) -> None:
-        """What was lost before the first frame of a session is not the session's: the ring is told, which reaches further back."""
+        """What was lost before the first frame of a session is not the session's: the ring gets it, which reaches further back."""
         if self._ring is None:
-            self._lost = None  # nobody has counted between two sessions
+            self._lost = None  # between two sessions lost frames were not counted
         elif self._lost is not None:
             self._lost = replace(self._lost, total=max(first.lost, self._lost.total))
-            for event in self._untold(first.captured_s):
+            for event in self._unreported(first.captured_s):
                 self._ring.add_event(event)
 
     def end(self, ended: str, dropped: int) -> None:
@@ -413,29 +458,29 @@ class Recording:
         self._is_armed, self._early = False, []
         files, self._files = self._files, None
         if files is None:
-            self._board.show(armed=False)
+            self._status.update(armed=False)
             return
         count, elapsed_s = dropped - self.dropped_before, max(0.0, self._clock() - self.began_s)
         with contextlib.suppress(OSError):  # the disk may be why it ends; manifest and rows have the counts, too
-            for event in self._untold(self._last_s):
+            for event in self._unreported(self._last_s):
                 if self._ring is not None:
                     self._ring.add_event(event)
                 files.write_event(event)
-            if count > self._dropped_told:
-                files.write_event(_dropped_event(self._last_s, count - self._dropped_told, count))
+            if count > self._dropped_reported:
+                files.write_event(_dropped_event(self._last_s, count - self._dropped_reported, count))
         problem = files.close(ended, count)
-        self._board.show(recording=False, elapsed_s=elapsed_s, dropped=count, bytes=files.counts.bytes)
+        self._status.update(recording=False, elapsed_s=elapsed_s, dropped=count, bytes=files.counts.bytes)
         if problem:
-            self._board.fail(problem)
+            self._status.report_problem(problem)
         else:
-            self._board.show(saved=files.folder)
+            self._status.update(saved=files.folder)
 
     def fail(self, problem: str, dropped: int, *, is_disk_full: bool = False) -> None:
         """End the session, keeping what was written. The ring goes on, with a new encoder."""
         was_on = self.is_on
         self.end(problem, dropped)
         self.drop_encoder()
-        self._board.fail(f"{STOPPED}{problem}" if was_on else problem, is_disk_full=is_disk_full)
+        self._status.report_problem(f"{STOPPED}{problem}" if was_on else problem, is_disk_full=is_disk_full)
 
     def change_rig(self, about: About, dropped: int) -> None:
         """A session never mixes two rigs, and neither does the ring."""
@@ -443,7 +488,7 @@ class Recording:
         self._about, self._drive, self._lost = about, None, None
         if self._ring is not None:
             self._ring.clear()
-            self._board.show(ring_s=0.0)
+            self._status.update(ring_s=0.0)
             if self._target is not None:  # under other thresholds the rig and its destination are the same
                 self._ring.add_event(self._target)
 
@@ -496,20 +541,26 @@ class SessionWriter:
         self._dropped = 0
         self._ends_waiting: deque[int] = deque()
         self._is_closing = False
-        self._board = StatusBoard()
-        self._recording = Recording(config, about, self._parent, clock, self._board)
+        self._status = _SharedStatus()
+        self._recording = Recording(config, about, self._parent, clock, self._status)
         self._wants_pictures = self._recording.wants_pictures
-        self._looked_s = -math.inf
+        self._disk_seen_s = -math.inf
         self._thread = threading.Thread(target=self._run, name="session writer", daemon=True)
         self._thread.start()
 
     def start(self) -> None:
         """Begin a session with the next frame. Does nothing when one is being recorded."""
+
+        def begin() -> None:
+            with self._changed:
+                self._starts_waiting -= 1
+            self._recording.begin()
+
         with self._changed:
             if not self._is_closing:
                 self._wants_pictures = True
                 self._starts_waiting += 1
-                self._waiting.append(self._begin)
+                self._waiting.append(begin)
                 self._changed.notify()
 
     def stop(self, ended: str = "stopped") -> None:
@@ -521,14 +572,14 @@ class SessionWriter:
         self._order(self._recording.save_ring)
 
     def set_about(self, about: About) -> None:
-        """Another rig was opened: the running session ends, and the ring begins anew, for a session never mixes two rigs."""
+        """Another rig was opened: the running session ends and the ring is cleared, since a session never mixes two rigs."""
         self._order_end(lambda dropped: self._recording.change_rig(about, dropped))
 
     def put(self, tick: Tick, drive: DriveView | None = None, bus: Any = None) -> bool:
         """Hand a tick over, with who drives and the newest status of the servo bus (a dataclass) where there are such.
 
-        Where driving began is taken from the first one; what changes then is told by `drive`. Never waits for the disk. False when
-        it was dropped, because the recorder is behind or has ended.
+        How driving began is taken from the first one; later changes come by `drive`. Never waits for the disk. False when it was
+        dropped, because the recorder is behind or has ended.
         """
         if not self._wants_pictures:
             return self._thread.is_alive()
@@ -549,7 +600,7 @@ class SessionWriter:
 
         False when the recorder has ended or is hopelessly behind.
         """
-        return self._queue(lambda: self._recording.take_drive(view))
+        return self._queue(lambda: self._recording.write_drive(view))
 
     def event(self, kind: EventKind, text: str = "", data: dict[str, Any] | None = None, time_s: float | None = None) -> bool:
         """Add an event (a note, a destination, an alert); modes, faults and acknowledgements are found in the drive views."""
@@ -579,7 +630,7 @@ class SessionWriter:
 
     def status(self) -> RecordStatus:
         """How it is going, now."""
-        status = self._board.status
+        status = self._status.now
         if not status.recording:
             return status
         elapsed_s = max(0.0, self._clock() - self._recording.began_s)
@@ -603,7 +654,7 @@ class SessionWriter:
                 self._changed.notify()
 
     def _order_end(self, end: Callable[[int], None]) -> None:
-        """An order that ends the session. It hears how many frames were dropped until it was given: later ones are not its."""
+        """Queue an order that ends the session; it gets the number of frames dropped until now."""
 
         def order() -> None:
             try:
@@ -619,7 +670,7 @@ class SessionWriter:
                 self._changed.notify()
 
     def _dropped_until_end(self) -> int:
-        """Frames dropped until now, ever, or until somebody asked for the end of the session that is being written."""
+        """Frames dropped until now, ever, or until the end of the session that is being written was asked for."""
         with self._changed:
             return self._ends_waiting[0] if self._ends_waiting else self._dropped
 
@@ -653,9 +704,9 @@ class SessionWriter:
     def _take(self, item: RecordedTick | Event | _Order) -> None:
         try:
             if isinstance(item, RecordedTick):
-                self._recording.take_picture(item)
+                self._recording.write_tick(item)
             elif isinstance(item, Event):
-                self._recording.take_event(item)
+                self._recording.write_event(item)
             else:
                 item()
         except (VideoError, SessionError) as error:
@@ -663,22 +714,17 @@ class SessionWriter:
         except OSError as error:
             self._fail(f"{error.filename or self._parent}: {error.strerror or error}", is_disk_full=_is_disk_full(error))
 
-    def _begin(self) -> None:
-        with self._changed:
-            self._starts_waiting -= 1
-        self._recording.begin()
-
     def _fail(self, problem: str, *, is_disk_full: bool = False) -> None:
         self._recording.fail(problem, self._dropped_until_end(), is_disk_full=is_disk_full)
 
     def _watch_disk(self) -> None:
         now_s = time.monotonic()
-        if now_s - self._looked_s < _LOOK_AT_DISK_S:
+        if now_s - self._disk_seen_s < _LOOK_AT_DISK_S:
             return
-        self._looked_s = now_s
+        self._disk_seen_s = now_s
         disk = look_at_disk(self._parent, self._config)
         if disk is not None:
-            self._board.show(disk_free=disk.free, warning=disk.warning)
+            self._status.update(disk_free=disk.free, warning=disk.warning)
             if disk.full and self._recording.is_on:
                 self._fail(f"{disk.full}; make room and record again", is_disk_full=True)
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from core.config.models import PerceptionConfig, TwinConfig, load_config
 from core.perception.pipeline import open_pipeline
+from core.session.codec import row_of
 from core.session.files import sealed
-from core.session.format import row_of
 from core.session.manifest import FRAMES, about_rig, event_of_target
 from core.session.reader import SessionReader
 from core.session.writer import SessionWriter

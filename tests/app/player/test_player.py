@@ -18,7 +18,6 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.commands.perceive import scene_to_json
 from app.player import decoder
 from app.player.decoder import drawable
 from app.player.session_model import JumpKind, scene_from_json
@@ -26,6 +25,7 @@ from app.player.window import PlayerWindow
 from app.ui.texts import signed_degrees
 from core.config.models import Config
 from core.control.modes import Mode
+from core.session.codec import scene_to_json
 from core.session.files import LineFile
 from core.session.manifest import Event, EventKind, SessionError, event_of_target, read_manifest, write_manifest
 from core.session.reader import SessionReader
@@ -648,7 +648,7 @@ def test_a_pose_comes_back_from_its_json(session: Path) -> None:
         reader.wait()
         row = reader.row(7)
     assert row is not None
-    again = scene_from_json(scene_to_json("x#7", row.scene))
+    again = scene_from_json(json.dumps(scene_to_json("x#7", row.scene)).encode())
     assert again.pose is not None
     assert row.scene.pose is not None
     for name in ("theta_signed_deg", "c_head_px", "c_tail_px", "confidence"):

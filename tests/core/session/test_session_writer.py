@@ -25,11 +25,11 @@ from core.control.pilot import DriveView
 from core.evaluation.replay import event_target
 from core.session import files as session_files
 from core.session import writer as session_writer
-from core.session.files import EncodedFrame, Ring, SessionFiles, is_being_written
+from core.session.files import EncodedFrame, SessionFiles, is_being_written
 from core.session.manifest import About, Event, EventKind, SessionError, event_of_target, read_manifest, write_manifest
 from core.session.reader import SessionReader
 from core.session.video import FrameEncoder, Packet
-from core.session.writer import SessionWriter, faults_between
+from core.session.writer import Ring, SessionWriter, faults_between
 from core.types import Tick
 from tests.core.session_data import ABOUT, QUICK, SIZE, drive_of, number_in, record, tick_of, wait_for
 
@@ -747,7 +747,7 @@ sys.path[:0] = [{root!r}]
 from pathlib import Path
 from dataclasses import replace
 import numpy as np
-from core.session.writer import SessionWriter
+from core.session.writer import Ring, SessionWriter
 from tests.core.session_data import ABOUT, QUICK, tick_of, wait_for
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))

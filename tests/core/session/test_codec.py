@@ -1,4 +1,4 @@
-"""A tick becomes a row and a tick again: nothing is lost but what is said, and nothing that is not finite gets through."""
+"""Rows of sessions and lines of ``perceive``: what is written is read back, and what is damaged is named."""
 
 from __future__ import annotations
 
@@ -12,7 +12,16 @@ import pytest
 from core.control.frame_reports import is_sound
 from core.control.modes import Mode
 from core.control.pilot import DriveView
-from core.session.format import InvalidRecord, RecordedRow, light_tick, row_from_json, row_of
+from core.session.codec import (
+    InvalidRecord,
+    RecordedRow,
+    light_tick,
+    row_from_json,
+    row_of,
+    scene_from_json,
+    scene_to_json,
+    unread_to_json,
+)
 from core.session.manifest import Event, EventKind, event_from_json, event_to_json, events_between
 from core.types import Command, Masks, Pose, PoseState, Reason, Refusal, Tick, Vector
 from tests.core.session_data import drive_of, full_scene, tick_of
@@ -21,7 +30,7 @@ PLACE = {"row": 3, "video": 0, "pts_ms": 99, "dropped_rows": 0}
 
 
 def through_json(tick: Tick, drive: DriveView | None = None) -> RecordedRow:
-    return row_from_json(json.loads(json.dumps(PLACE | row_of(light_tick(tick), drive), allow_nan=False)))
+    return row_from_json(json.dumps(PLACE | row_of(light_tick(tick), drive), allow_nan=False).encode())
 
 
 def test_pose_vectors_advice_command_and_status_come_back_as_they_were() -> None:
@@ -40,7 +49,7 @@ def test_the_distance_from_known_pictures_comes_back_and_older_rows_have_none(no
     assert through_json(tick).scene.novelty == novelty
     record = PLACE | row_of(light_tick(tick), None)
     del record["novelty"]
-    assert row_from_json(json.loads(json.dumps(record))).scene.novelty is None
+    assert row_from_json(json.dumps(record).encode()).scene.novelty is None
 
 
 def test_a_distance_that_is_no_number_is_named() -> None:
@@ -159,7 +168,7 @@ def test_a_light_tick_keeps_what_is_recorded() -> None:
 def test_a_damaged_value_is_named(key: str, value: object, named: str) -> None:
     record = PLACE | row_of(tick_of(0, 1.0, full=True), None) | {key: value}
     with pytest.raises(InvalidRecord, match=named.replace(".", r"\.")):
-        row_from_json(record)
+        row_from_json(json.dumps(record).encode())
 
 
 @pytest.mark.parametrize(
@@ -181,7 +190,7 @@ def test_damaged_geometry_is_named(key: str, value: object) -> None:
     record = PLACE | row_of(tick_of(0, 1.0, full=True), None)
     record["scene"] = record["scene"] | {key: value}
     with pytest.raises(InvalidRecord):
-        row_from_json(record)
+        row_from_json(json.dumps(record).encode())
 
 
 def kinds(before: DriveView | None, after: DriveView) -> list[EventKind]:
@@ -213,62 +222,37 @@ def test_a_fault_whose_measured_value_changes_is_no_new_fault() -> None:
 
 def test_an_event_comes_back() -> None:
     event = Event(12.5, EventKind.NOTE, "kink at the second branch", {"xy": [1.0, 2.0]})
-    assert event_from_json(json.loads(json.dumps(event_to_json(event), allow_nan=False))) == event
+    assert event_from_json(json.dumps(event_to_json(event), allow_nan=False).encode()) == event
 
 
 @pytest.mark.parametrize(("time_s", "kind"), [(None, "note"), ("x", "note"), (1e18, "note"), (1.0, 3), (1.0, None)])
 def test_a_damaged_event_is_named(time_s: object, kind: object) -> None:
     with pytest.raises(InvalidRecord):
-        event_from_json({"time_s": time_s, "kind": kind})
+        event_from_json(json.dumps({"time_s": time_s, "kind": kind}).encode())
 
 
-def test_half_a_character_in_a_text_brings_nobody_down() -> None:
-    """It is none that could be drawn or written: an export of such a row ended the program."""
-    event = event_from_json(json.loads('{"time_s": 1.0, "kind": "note", "text": "kink \\ud800 \\u00b0"}'))
+def test_half_a_character_in_a_text_is_written_out() -> None:
+    """Python writes it, but it can be neither drawn nor exported."""
+    event = event_from_json(b'{"time_s": 1.0, "kind": "note", "text": "kink \\ud800 \\u00b0"}')
     assert event.text == "kink \\ud800 \N{DEGREE SIGN}"
     assert event.text.encode()
 
 
-def test_words_of_a_later_version_cost_what_they_belong_to_and_no_row() -> None:
-    record = json.loads(json.dumps(PLACE | row_of(light_tick(tick_of(7, 12.25, full=True)), drive_of(12.0))))
-    known = row_from_json(record)
-    assert known.unknown == ()
-    assert known.drive is not None
-    record["state"] = "E"
-    record["advice"]["speed"] = "backwards"
-    record["drive"]["latched"] = ["servo too warm", "joint 3"]
-    record["drive"]["active"] += [["servo too warm", "joint 3"]]
-    record["drive"]["against_arming"] += ["the moon is full"]
-    record["drive"]["sent_by"] = "somebody else"
-    record["something_new"] = {"a": 1}
-    row = row_from_json(record)
-    assert row.scene.pose is None
-    assert row.advice is None
-    assert row.scene.robot_vector == known.scene.robot_vector
-    assert row.drive is not None
-    assert (row.drive.latched, row.drive.sent_by) == (None, None)
-    assert (row.drive.active, row.drive.against_arming) == (known.drive.active, known.drive.against_arming)
-    assert row.unknown == (
-        "state 'E'", "speed 'backwards'", "sent_by 'somebody else'", "fault 'servo too warm'", "against_arming 'the moon is full'",
-    )  # fmt: skip
+def test_a_destination_written_as_text_alone_gets_its_place() -> None:
+    assert event_from_json(b'{"time_s": 1.0, "kind": "target", "text": "12.0, -3.5"}').data == {"xy": [12.0, -3.5]}
+    assert event_from_json(b'{"time_s": 1.0, "kind": "target", "text": "cleared"}').data == {}
 
 
-def test_a_mode_or_a_reason_of_a_later_version_costs_no_row_either() -> None:
-    record = json.loads(json.dumps(PLACE | row_of(light_tick(tick_of(0, 1.0)), drive_of(1.0))))
-    record["drive"]["mode"] = record["mode"] = "asleep"
-    record["refusal"]["reason"] = "too cold"
-    row = row_from_json(record)
-    assert (row.drive, row.scene.refusal) == (None, None)
-    assert row.unknown == ("refusal 'too cold'", "mode 'asleep'")
-
-
-def test_what_is_no_word_at_all_is_damage_as_before() -> None:
-    record = json.loads(json.dumps(PLACE | row_of(light_tick(tick_of(0, 1.0)), drive_of(1.0))))
-    record["drive"]["mode"] = 3
-    with pytest.raises(InvalidRecord, match=r"drive\.mode"):
-        row_from_json(record)
-
-
-def test_an_event_of_a_later_version_is_a_note_that_names_its_kind() -> None:
-    event = event_from_json({"time_s": 1.0, "kind": "weather", "text": "rain", "data": {"mm": 3}})
-    assert event == Event(1.0, EventKind.NOTE, "weather: rain", {"mm": 3})
+def test_a_perceived_line_comes_back_in_source_pixels() -> None:
+    scene = replace(full_scene(7, 1.0), scale=0.5, scale_xy=(0.5, 0.5), source_size=(192, 128))
+    assert scene.path is not None
+    line = scene_to_json("x#7", scene)
+    again = scene_from_json(json.dumps(line).encode())
+    assert (line["image"], again.source_size, again.pose is not None) == ("x#7", (192, 128), True)
+    assert again.path is not None
+    assert again.path.head == pytest.approx(scene.to_source(scene.path.head), abs=0.01)
+    assert scene_from_json(json.dumps(scene_to_json("x", tick_of(0, 1.0).scene)).encode()).refusal == Refusal(
+        Reason.NO_ROBOT, "0 px"
+    )
+    with pytest.raises(InvalidRecord):
+        scene_from_json(json.dumps(unread_to_json("x", "empty file")).encode())

@@ -1,0 +1,76 @@
+"""Files of earlier versions are read as those versions read them (``tests/data/old_version/README.txt``)."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from core.annotation.agreement_report import agreement_report, choose_study, manual_measurements, measured_alike
+from core.annotation.store import AnnotationStore, ItemKey
+from core.config.files import read_settings
+from core.config.models import Config
+from core.config.rig_file import read_rig
+from core.evaluation.evaluation import write_measurements
+from core.session.export import export_csv
+from core.session.reader import SessionReader, losses
+from core.session.recovery import recover
+
+OLD = Path(__file__).parents[2] / "data" / "old_version"
+SESSIONS = {"today": next(OLD.glob("session_*")), "older": next(OLD.glob("older/session_*"))}
+ANNOTATIONS = {"today": OLD / "annotations", "older": OLD / "older/annotations"}
+
+
+@pytest.mark.parametrize("version", SESSIONS)
+def test_a_session_is_read_exported_and_recovered(version: str, tmp_path: Path) -> None:
+    expected = (OLD / "expected" / f"{version}_session.csv").read_text()
+    session = Path(shutil.copytree(SESSIONS[version], tmp_path / SESSIONS[version].name))
+    for folder in (session, recover(session).folder):
+        out = tmp_path / f"{folder.name}.csv"
+        with SessionReader(folder) as reader:
+            rows = export_csv(reader, out)
+            ticks = [reader.tick(place) for place in range(rows)]
+            assert all(tick is not None and tick.scene.masks is not None and tick.scene.pose is not None for tick in ticks)
+            assert losses(reader, reader.events) == []
+            assert reader.problems == ()
+        assert out.read_text() == expected
+
+
+@pytest.mark.parametrize("version", ANNOTATIONS)
+def test_annotations_are_read_measured_and_written(version: str, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(ANNOTATIONS[version], tmp_path / "annotations"))
+    path = folder / "annotations.lumenpilot.sqlite"
+    config = Config().perception
+
+    def report() -> object:
+        with AnnotationStore(path, read_only=True) as store:
+            images = store.images()
+            names = {sha256: image.name for sha256, image in images.items()}
+            own, _ = measured_alike(choose_study(store.annotations(), "", ""), images, config)
+            write_measurements(tmp_path / "out.csv", manual_measurements(own, names))
+            study, _ = measured_alike(choose_study(store.annotations(), "pilot", ""), images, config)
+            assert store.problems == []
+            assert {key.rater for key in store.given_after_look()} == ({"bob"} if version == "today" else set())
+            return json.loads(json.dumps({"study": "pilot"} | agreement_report(study, names)))
+
+    expected = json.loads((OLD / "expected" / f"{version}_study_report.json").read_text())
+    assert report() == expected
+    assert (tmp_path / "out.csv").read_text() == (OLD / "expected" / f"{version}_annotations.csv").read_text()
+    with AnnotationStore(path) as store:  # opened for writing once, it has what this version needs
+        key = ItemKey(next(iter(store.images())), "", "ann")
+        assert store.history(key).can_undo
+        store.keep_look(key, 0)
+        assert key in store.given_after_look()
+    with AnnotationStore(path, read_only=True) as store:
+        assert len(store.taken_over()) == 1
+
+
+def test_a_rig_and_settings_are_read() -> None:
+    rig = json.loads((OLD / "expected/rig_bench.json").read_text())
+    del rig["path"]
+    assert read_rig(OLD / "rig_bench.toml").model_dump(mode="json") == rig
+    settings = read_settings(OLD / "settings.toml", may_move=False)
+    assert settings.problems == ()
+    assert (settings.config.rig.name, settings.config.camera.gain, settings.config.policy.name) == ("webcam", 16.0, "table")
