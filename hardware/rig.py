@@ -10,15 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from core.config.calibration import ZeroConfig
-from core.config.models import Config, RigConfig, load_config, merge
+from core.config.models import CameraConfig, Config, RigConfig, load_config, merge
 from core.config.rig_file import RESERVED, calibration_of, find_rig, with_rig
 from core.control.robot import GuardedRobot
 from core.devices import Camera, DeviceError, UserError
 from core.types import RobotStatus
+from hardware.cameras.kinds import CAMERA_KINDS, FoundCamera
 from hardware.cameras.undistorted import UndistortedCamera
 
 if TYPE_CHECKING:
     from hardware.processes import DeviceProcess
+    from hardware.servos.discovery import FoundPort
     from hardware.servos.servo_robot import ServoRobot
     from hardware.twin.process import PrestartedProcesses
     from hardware.twin.world import TwinWorld
@@ -34,7 +36,7 @@ class RigKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """An open rig. ``robot`` is None when pictures are only looked at; ``world`` exists when the rig is the twin."""
+    """An open rig. ``robot`` is None when pictures are only looked at; ``world`` exists when the twin is in this process."""
 
     name: str
     kind: RigKind
@@ -55,14 +57,15 @@ class Rig:
 
 
 START_INSERTION_MM = 70.0
-"""The twin's robot already lies so far in the vessel when the rig is opened."""
+"""The twin's robot already lies so far in the vessel when the rig is opened: the first picture shows all that is perceived."""
+TWIN_TITLE = "Bench twin (no hardware)"
 
 
 def kind_of(rig: RigConfig) -> RigKind:
     """What a configured rig is, without opening it."""
     if rig.camera == "twin":
         return RigKind.SIM
-    return RigKind.LIVE if rig.camera in {"realsense", "webcam"} and rig.source is None else RigKind.PLAYBACK
+    return RigKind.LIVE if CAMERA_KINDS[rig.camera].live is not None and rig.source is None else RigKind.PLAYBACK
 
 
 def start_ahead(config: Config) -> PrestartedProcesses | None:
@@ -73,12 +76,12 @@ def start_ahead(config: Config) -> PrestartedProcesses | None:
 
     try:
         return PrestartedProcesses()
-    except DeviceError:  # it will be tried again, and then said
+    except DeviceError:  # ``open_rig`` tries again, and reports it
         return None
 
 
 def open_rig(config: Config, ahead: PrestartedProcesses | None = None) -> Rig:
-    """Open camera and robot; what was opened is closed again when the rest fails. Pictures come straightened by the rig's lens.
+    """Open camera and robot; what was opened is closed again when the rest fails. Frames come undistorted by the rig's lens.
 
     `ahead` is what ``start_ahead`` gave, perhaps for another rig than this one.
 
@@ -106,25 +109,15 @@ def open_rig(config: Config, ahead: PrestartedProcesses | None = None) -> Rig:
 
 
 def _open_playback(config: Config) -> Rig:
-    """Pictures that were taken before; nobody drives."""
-    if config.rig.source is None:
-        raise DeviceError(f"rig {config.rig.name}: camera {config.rig.camera} needs rig.source, the path of the video or folder")
-    source = Path(config.rig.source)
-    camera: Camera
-    if config.rig.camera == "realsense":
-        from hardware.cameras.realsense import RealSenseRecording
-
-        camera = RealSenseRecording(source)
-    elif config.rig.camera == "video_file":
-        from hardware.cameras.files import VideoFile
-
-        camera = VideoFile(source)
-    elif config.rig.camera == "image_folder":
-        from hardware.cameras.files import ImageFolder
-
-        camera = ImageFolder(source, watch=config.rig.watch_folder)
-    else:
-        raise DeviceError(f"rig {config.rig.name}: a webcam plays no files: leave rig.source out, or set rig.camera to video_file")
+    """Pictures that were taken before, without a robot."""
+    rig = config.rig
+    if rig.source is None:
+        raise DeviceError(f"rig {rig.name}: camera {rig.camera} needs rig.source, the path of the video or folder")
+    play = CAMERA_KINDS[rig.camera].recorded
+    if play is None:
+        raise DeviceError(f"rig {rig.name}: a {rig.camera} plays no files: leave rig.source out, or set rig.camera to video_file")
+    source = Path(rig.source)
+    camera = play(source, rig)
     camera.open()
     return Rig(source.name, RigKind.PLAYBACK, camera, None)
 
@@ -142,28 +135,21 @@ def _open_live(config: Config, zero: ZeroConfig | None) -> Rig:
     with ExitStack() as undo:
         camera.open()
         undo.callback(camera.close)
-        robot = _real_servos(config, zero) if rig.robot == "servos" else None
+        robot: ServoRobot | None = None
+        if rig.robot == "servos":
+            from hardware.servos.servo_robot import ServoRobot
+
+            robot = ServoRobot(config.servos, config.safety, name=rig.name, kept_zero=zero)
+            robot.connect()
         undo.pop_all()
     return Rig(rig.name, RigKind.LIVE, camera, robot)
 
 
 def real_camera(config: Config) -> Camera:
     """The camera of a live rig, not open yet."""
-    if config.rig.camera == "realsense":
-        from hardware.cameras.realsense import realsense_camera
-
-        return realsense_camera(config.camera)
-    from hardware.cameras.webcam import webcam_camera
-
-    return webcam_camera(config.camera)
-
-
-def _real_servos(config: Config, zero: ZeroConfig | None) -> ServoRobot:
-    from hardware.servos.servo_robot import ServoRobot
-
-    robot = ServoRobot(config.servos, config.safety, name=config.rig.name, kept_zero=zero)
-    robot.connect()
-    return robot
+    live = CAMERA_KINDS[config.rig.camera].live
+    assert live is not None
+    return live(config.camera)
 
 
 def _has_own_process(config: Config) -> bool:
@@ -181,18 +167,20 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
         raise DeviceError(f"rig {config.rig.name} has servos of its own: leave servos.port ({config.servos.port}) out")
     if _has_own_process(config):
         return _open_remote_twin(config, ahead)
-    from hardware.twin.world import TwinCamera, TwinWorld
+    from hardware.twin.world import DirectRobot, TwinCamera, TwinWorld
 
     try:
         world = TwinWorld(config.twin, perception=config.perception)
     except ValueError as error:
         raise DeviceError(str(error)) from None
-    # A robot that already lies in the vessel: the first picture shows all that the program can tell.
     world.insert(START_INSERTION_MM)
     camera = TwinCamera(world)
     robot: GuardedRobot | None = None
-    if config.rig.robot == "twin":
-        robot = _servo_robot(config, world) if config.servos.driver == "dynamixel" else _direct_robot(config, world)
+    if config.rig.robot == "twin" and config.servos.driver == "dynamixel":
+        robot = _soft_servos(config, world)
+    elif config.rig.robot == "twin":
+        robot = DirectRobot(world.robot, config.safety)
+        robot.connect()
     try:
         camera.open()
     except DeviceError:
@@ -200,14 +188,6 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
             robot.close()
         raise
     return Rig(config.rig.name, RigKind.SIM, camera, robot, world)
-
-
-def _direct_robot(config: Config, world: TwinWorld) -> GuardedRobot:
-    from hardware.twin.world import DirectRobot
-
-    robot = DirectRobot(world.robot, config.safety)
-    robot.connect()
-    return robot
 
 
 def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
@@ -224,7 +204,7 @@ def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
     return Rig(config.rig.name, RigKind.SIM, RemoteCamera(twin), robot)
 
 
-def _servo_robot(config: Config, world: TwinWorld) -> ServoRobot:
+def _soft_servos(config: Config, world: TwinWorld) -> ServoRobot:
     """The twin's robot moved by seven software servos in this process."""
     from hardware.twin.process import drive_world, wired
     from hardware.twin.servos.bus import SoftServoBus
@@ -259,6 +239,49 @@ def _twin_servos(
         robot.close()
         raise
     return robot
+
+
+@dataclass(frozen=True, slots=True)
+class FoundDevices:
+    """Cameras and serial ports of this computer, and why some could not be searched for."""
+
+    cameras: tuple[FoundCamera, ...]
+    ports: tuple[FoundPort, ...]
+    problems: tuple[str, ...] = ()
+
+
+def find_devices() -> FoundDevices:
+    """Cameras, the twin last, and serial ports. A kind of camera that cannot be searched for is a problem, not the end."""
+    from hardware.servos.discovery import find_ports
+
+    cameras: list[FoundCamera] = []
+    problems = []
+    for kind in CAMERA_KINDS.values():
+        try:
+            # a RealSense that is in the list already can do less as a webcam
+            cameras += [c for c in kind.find() if not (cameras and c.kind == "webcam" and "RealSense" in c.title)]
+        except (ImportError, DeviceError) as error:
+            problems.append(f"{kind.title}: {' '.join(str(error).split())}")
+    return FoundDevices((*cameras, FoundCamera("twin", TWIN_TITLE)), find_ports(), tuple(problems))
+
+
+def with_camera(config: Config, camera: FoundCamera) -> Config:
+    """The configuration with this camera; real ones keep the servos when a port is known."""
+    if camera.kind == "twin":
+        rig = RigConfig(name="twin", camera="twin", robot="twin")
+        return config.model_copy(update={"rig": rig, "servos": config.servos.model_copy(update={"port": None})})
+    settings = CameraConfig.model_validate({**config.camera.model_dump(), "serial": camera.serial, "device": camera.device})
+    robot = "servos" if config.servos.port is not None else "none"
+    rig = RigConfig.model_validate({"name": camera.kind, "camera": camera.kind, "robot": robot})
+    return config.model_copy(update={"rig": rig, "camera": settings})
+
+
+def with_port(config: Config, port: str | None) -> Config:
+    """The configuration with its servos on `port`; None: pictures are only looked at. A twin has servos of its own."""
+    if config.rig.camera == "twin":
+        return config
+    rig = config.rig.model_copy(update={"robot": "servos" if port is not None else "none"})
+    return config.model_copy(update={"rig": rig, "servos": config.servos.model_copy(update={"port": port})})
 
 
 _REALSENSE_ENDING = ".bag"

@@ -24,8 +24,8 @@ from core.config.models import Config
 from core.config.rig_file import ListedRig, RigFileError, calibration_of, find_rig, list_rigs, set_port, with_rig
 from core.control.modes import ARMED_MODES, Mode
 from core.types import Point
-from hardware.rig import RigKind, kind_of
-from hardware.servos.discovery import FoundCamera, search, with_camera
+from hardware.cameras.kinds import FoundCamera
+from hardware.rig import RigKind, find_devices, kind_of, with_camera
 
 _LEAVING = mark("Waiting for the wizard to give camera and servos back; where a driver hangs, start the program again")
 _SLOW_MS = 3000
@@ -142,7 +142,7 @@ class RigMenuController(QObject):
         if why := self.hindrance():
             self._cameras.addAction(tr("The rig stays as it is: {why}", why=why)).setEnabled(False)
             return
-        for camera in search().cameras:
+        for camera in find_devices().cameras:
             self._cameras.addAction(tr_text(camera.title).replace("&", "&&"), partial(self.choose_camera, camera))
 
     # ---- choosing

@@ -32,7 +32,8 @@ from core.config.models import CameraConfig, Config
 from core.config.rig_file import check_rig_name, rig_path
 from core.devices import UserError
 from core.types import Image, Point
-from hardware.servos.discovery import Found, FoundCamera, with_camera
+from hardware.cameras.kinds import FoundCamera
+from hardware.rig import FoundDevices, find_devices, with_camera
 
 
 class CameraPage(WizardPage):
@@ -83,7 +84,7 @@ class CameraPage(WizardPage):
         self.problem = note("")
         self.column.addWidget(self.problem)
         self.column.addStretch(1)
-        self.found = Found((), ())
+        self.found = FoundDevices((), ())
         self.ask: Callable[[str, str, Callable[[], None]], None] = lambda _question, _answer, action: action()
         """Asks before something is lost: a question, the answer that does it, and what is done then."""
 
@@ -106,9 +107,7 @@ class CameraPage(WizardPage):
 
     def search(self) -> None:
         """Find cameras and ports."""
-        from hardware.servos import discovery
-
-        self.desk.run(tr("looking for cameras"), discovery.search, self._on_found)
+        self.desk.run(tr("looking for cameras"), find_devices, self._on_found)
 
     def refresh(self) -> None:
         for control in (self.open_button, self.search_button, self.cameras):
@@ -122,7 +121,7 @@ class CameraPage(WizardPage):
         tell(self.problem, "\n".join(line for line in lines if line))
 
     def _on_found(self, found: object) -> None:
-        assert isinstance(found, Found)
+        assert isinstance(found, FoundDevices)
         self.found = found
         self.cameras.clear()
         for camera in found.cameras:

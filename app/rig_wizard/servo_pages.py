@@ -19,7 +19,8 @@ from core.calibration.servos import Assignment
 from core.config.safety import JOINT_NAMES, TENDONS, JointName, ServosConfig
 from core.devices import UserError
 from hardware.calibration.rig_draft import RigDraft
-from hardware.servos.discovery import find_ports, with_port
+from hardware.rig import with_port
+from hardware.servos.discovery import find_ports
 
 _JOINT_TEXT: dict[JointName, str] = {
     "right": mark("tendon right"),

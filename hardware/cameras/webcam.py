@@ -17,8 +17,8 @@ import numpy as np
 
 from core.config.models import CameraConfig
 from core.devices import DeviceError
+from hardware.cameras import sysfs
 from hardware.cameras.live import CaptureClock, LiveCamera, Shot
-from hardware.servos.discovery import DEV, SYS, VideoDevice, video_devices
 
 _log = logging.getLogger(__name__)
 
@@ -38,11 +38,6 @@ def _open_v4l2(node: str) -> Any:
     return cv2.VideoCapture(node, cv2.CAP_V4L2)
 
 
-def _sign_of(device: VideoDevice) -> tuple[Path | None, str]:
-    """By what a camera is known again: its stable path, or its name where it has none."""
-    return device.stable, device.title
-
-
 class WebcamSensor:
     """A V4L2 camera.
 
@@ -50,18 +45,14 @@ class WebcamSensor:
     ----------
     config : which one, and how it takes its pictures.
     open_capture : makes OpenCV's capture object of a device node.
-    dev, sys : where devices are looked up.
     """
 
-    def __init__(
-        self, config: CameraConfig, open_capture: Callable[[str], Any] = _open_v4l2, dev: Path = DEV, sys: Path = SYS
-    ) -> None:
+    def __init__(self, config: CameraConfig, open_capture: Callable[[str], Any] = _open_v4l2) -> None:
         self._config, self._open_capture = config, open_capture
-        self._dev, self._sys = dev, sys
         self._capture: Any = None
         self._clock = CaptureClock()
         self._title = config.device or "webcam"
-        self._own: tuple[Path | None, str] | None = None
+        self._own: tuple[Path | None, str] | None = None  # stable path and name, by which a camera is known again
         self._is_new = True
 
     @property
@@ -118,21 +109,21 @@ class WebcamSensor:
 
     def _find(self) -> Path:
         wanted = self._config.device
-        devices = video_devices(self._dev, self._sys)
+        devices = sysfs.video_devices()
         if wanted is None and self._own is not None:
-            # Another camera's pictures must not take the place of a lost one's: somebody is driving by them.
-            node = next((device.node for device in devices if _sign_of(device) == self._own), None)
+            # Another camera's pictures must not take the place of a lost one's: the operator drives by them.
+            node = next((device.node for device in devices if (device.stable, device.title) == self._own), None)
             if node is None:
                 raise DeviceError(f"{self.name} is not there any more: plug it in, or start again with another one")
         elif wanted is None:
             if not devices:
                 raise DeviceError("no webcam: plug it in; main.py doctor --rig webcam says more")
             node = devices[0].node
-            self._own = _sign_of(devices[0])
+            self._own = (devices[0].stable, devices[0].title)
         else:
-            node = self._dev / f"video{wanted}" if wanted.isdigit() else Path(wanted)
+            node = sysfs.webcam_node(wanted)
             if not node.exists():
-                paths = ", ".join(str(device.stable or device.node) for device in devices) or "none"
+                paths = ", ".join(device.path for device in devices) or "none"
                 raise DeviceError(f"webcam {wanted} is not there; webcams: {paths}: plug it in, or set camera.device")
         # Resolved at every start: behind the stable path there may be another number after it was plugged in again.
         node = node.resolve()

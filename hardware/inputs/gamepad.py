@@ -1,11 +1,7 @@
-"""Gamepad: drives by hand. Found by itself, also when it is plugged in later, through the joystick interface of Linux.
-
-What a gamepad's sticks and buttons mean. Pure: events of the Linux joystick interface in, states out.
-"""
+"""Gamepad: drives by hand. Found by itself, also when it is plugged in later, through the joystick interface of Linux."""
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import fcntl
 import math
@@ -29,6 +25,11 @@ BUTTON, AXIS, INIT = 0x01, 0x02, 0x80
 _FULL = 32767
 SETTLE_S = 0.3
 """What was held when the gamepad was found has been reported by then."""
+PERIOD_S = 0.02
+RESCAN_S = 1.0
+_CHUNK = 512 * EVENT.size
+"""More than the kernel keeps for a reader: one read takes all."""
+_FOLDER = Path("/dev/input")
 
 
 class Axis(Enum):
@@ -49,9 +50,9 @@ class Button(Enum):
 
 
 GAMEPAD_BUTTON = 0x130
-"""BTN_GAMEPAD, the lower one of the four (A, cross): whoever has it is a gamepad, not a wheel or a motion sensor."""
+"""BTN_GAMEPAD, the lower one of the four (A, cross): a wheel or a motion sensor does not have it."""
 RIGHT_STICK = frozenset({0x03, 0x04})
-"""ABS_RX and ABS_RY. Whoever has its right stick elsewhere has it where the triggers are here, and its buttons are others."""
+"""ABS_RX and ABS_RY. A gamepad with its right stick elsewhere has it where the triggers are here, and other buttons."""
 _TRIGGERS = (Axis.LEFT_TRIGGER, Axis.RIGHT_TRIGGER)
 
 
@@ -83,19 +84,18 @@ class GamepadState:
 def shaped(value: float, dead_zone: float, expo: float) -> float:
     """A deflection of -1..1 without its dead zone: 0 inside, 1 at the end, without a step between; `expo` mixes in the cube.
 
-    Each axis by itself, not the stick as a whole: who pushes forward must not bend.
+    Each axis by itself, not the stick as a whole: pushing forward must not bend.
     """
     way = (min(abs(value), 1.0) - dead_zone) / (1.0 - dead_zone)
     return math.copysign((1.0 - expo) * way + expo * way**3, value) if way > 0.0 else 0.0
 
 
 class GamepadControls:
-    """From events to states.
+    """Makes states of events.
 
-    Nothing moves by what was so at the start: a control counts once it has been at rest, ``SETTLE_S`` after the first event or
-    later. Earlier, the kernel may say "at rest" of a stick or button that is held and that it has not heard yet, for many gamepads
-    report only after somebody has opened them. Triggers that have not been touched may stand in the middle of their way. Only STOP
-    counts at once.
+    A control counts once it has been at rest, ``SETTLE_S`` after the first event or later. Earlier, the kernel may report a held
+    stick or button as "at rest", as many gamepads report only after they were opened. Untouched triggers may stand in the middle of
+    their way. Only STOP counts at once.
     """
 
     def __init__(self, config: GamepadConfig, layout: Layout | None = None) -> None:
@@ -155,17 +155,8 @@ class GamepadControls:
 
 
 def at_rest(config: GamepadConfig, now_s: float) -> GamepadState:
-    """All let go: the state of a gamepad that is not there."""
+    """Nothing is held: the state of a gamepad that is not there."""
     return GamepadState(deadman=False if config.deadman else None, time_s=now_s)
-
-
-__all__ = ["Gamepad", "GamepadError", "GamepadState"]
-
-PERIOD_S = 0.02
-RESCAN_S = 1.0
-_CHUNK = 512 * EVENT.size
-"""More than the kernel keeps for a reader: one read takes all."""
-_FOLDER = Path("/dev/input")
 
 
 class GamepadError(DeviceError):
@@ -173,11 +164,7 @@ class GamepadError(DeviceError):
 
 
 class GamepadRefused(GamepadError):
-    """A gamepad is there, and people must be told why it does nothing: its STOP does nothing either."""
-
-
-class _Lost(Exception):
-    """The gamepad was unplugged."""
+    """A gamepad is there that cannot be used; the operator must know why, since its STOP does nothing either."""
 
 
 class Gamepad:
@@ -212,7 +199,7 @@ class Gamepad:
 
     @property
     def problem(self) -> GamepadError | None:
-        """Why a gamepad that is there, or that the configuration names, cannot be used; in one line that says what to do."""
+        """Why a gamepad that is there, or that the configuration names, cannot be used."""
         return self._problem
 
     def start(self) -> None:
@@ -229,9 +216,9 @@ class Gamepad:
             try:
                 found = find_gamepad(self._config, drives=True)
             except GamepadError as error:
-                self._tell(None, error)
+                self._report_device(None, error)
             else:
-                self._tell(found[1] if found else None, None)
+                self._report_device(found[1] if found else None, None)
                 if found is not None:
                     self._listen(*found)
             self._thread.wait(None, RESCAN_S)
@@ -241,38 +228,39 @@ class Gamepad:
         controls = GamepadControls(self._config, layout)
         try:
             self._on_state(at_rest(self._config, time.monotonic()))
-            with contextlib.suppress(_Lost):
-                self._follow(device, controls)
+            due_s = time.monotonic()
+            while not self._thread.stopping:
+                if self._thread.wait(device, due_s - time.monotonic()):
+                    data = _read(device)
+                    if data is None:
+                        break
+                    for state in controls.feed(data, time.monotonic()):
+                        self._on_state(state)
+                now_s = time.monotonic()
+                if now_s >= due_s:
+                    self._on_state(controls.tick(now_s))
+                    due_s = now_s + PERIOD_S
         finally:
             os.close(device)
             self._on_state(at_rest(self._config, time.monotonic()))
-            self._tell(None, None)
+            self._report_device(None, None)
 
-    def _follow(self, device: int, controls: GamepadControls) -> None:
-        due_s = time.monotonic()
-        while not self._thread.stopping:
-            if self._thread.wait(device, due_s - time.monotonic()):
-                for state in controls.feed(_read(device), time.monotonic()):
-                    self._on_state(state)
-            now_s = time.monotonic()
-            if now_s >= due_s:
-                self._on_state(controls.tick(now_s))
-                due_s = now_s + PERIOD_S
-
-    def _tell(self, name: str | None, problem: GamepadError | None) -> None:
+    def _report_device(self, name: str | None, problem: GamepadError | None) -> None:
         if (name, str(problem)) != (self._name, str(self._problem)):
             self._name, self._problem = name, problem
             if self._on_device is not None:
                 self._on_device(name, problem)
 
     def _fail(self, error: Exception) -> None:
-        self._tell(None, GamepadError(f"the gamepad is no longer read ({type(error).__name__}: {error}): start the program again"))
+        self._report_device(
+            None, GamepadError(f"the gamepad is no longer read ({type(error).__name__}: {error}): start the program again")
+        )
 
 
 def find_gamepad(config: GamepadConfig, *, drives: bool = False) -> tuple[int, str, Layout] | None:
     """Open the configured gamepad, or the first that there is: file descriptor, name, layout. None when none is plugged in.
 
-    Who `drives` with it has it alone; a check only looks.
+    With `drives` it is locked: one gamepad must not drive the robots of two windows.
 
     Raises
     ------
@@ -310,40 +298,29 @@ def _open(path: str, *, drives: bool) -> tuple[int, str, Layout]:
     if layout is None or GAMEPAD_BUTTON not in layout.buttons:
         os.close(device)
         raise GamepadError(f"{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is")
-    name = _read_name(device) or Path(path).name
+    raw = (_ask(device, 0x13, 128) or b"").split(b"\0")[0].decode("utf-8", "replace")
+    name = " ".join(re.sub(r"[^\x20-\uffff]", " ", raw).split()) or Path(path).name
     if not RIGHT_STICK.issubset(layout.axes):
         os.close(device)
         raise GamepadRefused(f"gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one")
-    if drives:
-        _take(device, name)
+    try:
+        if drives:
+            fcntl.flock(device, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(device)
+        if isinstance(error, BlockingIOError):
+            text = "is in use by another window, so its STOP does nothing here: close that window, or set gamepad.device"
+        else:
+            text = f"cannot be locked ({error.strerror}), so its STOP does nothing here: unplug it and plug it in again"
+        raise GamepadRefused(f"gamepad {name} {text}") from error
     return device, name, layout
 
 
-def _take(device: int, name: str) -> None:
-    """Lock it: one gamepad must not drive the robots of two windows."""
-    try:
-        fcntl.flock(device, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        os.close(device)
-        raise GamepadRefused(
-            f"gamepad {name} is in use by another window, so its STOP does nothing here: close that window, or set gamepad.device"
-        ) from error
-    except OSError as error:
-        os.close(device)
-        raise GamepadRefused(
-            f"gamepad {name} cannot be locked ({error.strerror}), so its STOP does nothing here: unplug it and plug it in again"
-        ) from error
-
-
-def _request(number: int, size: int) -> int:
-    """Code of a joystick ioctl that reads `size` bytes (_IOR in linux/ioctl.h)."""
-    return 2 << 30 | size << 16 | ord("j") << 8 | number
-
-
 def _ask(device: int, number: int, size: int) -> bytes | None:
+    """What a joystick ioctl reads (_IOR in linux/ioctl.h)."""
     buffer = bytearray(size)
     try:
-        fcntl.ioctl(device, _request(number, size), buffer)
+        fcntl.ioctl(device, 2 << 30 | size << 16 | ord("j") << 8 | number, buffer)
     except OSError:  # a pipe or a file in its place
         return None
     return bytes(buffer)
@@ -359,19 +336,11 @@ def read_layout(device: int) -> Layout | None:
     return Layout(tuple(axis_map[: axes[0]]), tuple(codes[: buttons[0]]))
 
 
-def _read_name(device: int) -> str | None:
-    raw = _ask(device, 0x13, 128)
-    text = "" if raw is None else raw.split(b"\0")[0].decode("utf-8", "replace")
-    return " ".join(re.sub(r"[^\x20-\uffff]", " ", text).split()) or None
-
-
-def _read(device: int) -> bytes:
+def _read(device: int) -> bytes | None:
+    """What has come; None when the gamepad was unplugged."""
     try:
-        data = os.read(device, _CHUNK)
+        return os.read(device, _CHUNK) or None
     except BlockingIOError:
         return b""
     except OSError:
-        raise _Lost from None
-    if not data:
-        raise _Lost
-    return data
+        return None

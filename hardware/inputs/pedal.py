@@ -1,9 +1,5 @@
 """Foot pedal: deadman and STOP over a serial line. It finds its port again by itself after the plug was pulled.
 
-The serial port of a foot pedal: opening, locking, reading, and what can go wrong, each with one line that says what to do.
-
-What a foot pedal says, and what that means. Pure: bytes and times in, reports out.
-
 A report is seven bytes of ASCII, sent every 20 ms without being asked:
 
 ======  ==============================================================================================================
@@ -38,6 +34,16 @@ from core.devices import DeviceError
 from hardware.processes import DeviceThread
 
 _CHUNK = 4096
+PERIOD_S = 0.02
+NUMBERS = 32
+_LENGTH = 6
+"""Of a line, without its end."""
+_START_UP_S = 3.0
+"""Opening the port resets many boards; they talk again when their boot loader has waited in vain."""
+_PATIENCE_S = 0.5
+"""Silence of a pedal that has talked before, until the operator is told. It releases the deadman long before that."""
+_PAUSE_S = PERIOD_S / 10
+"""A reader that had to wait so long for bytes has read all that waited."""
 
 
 class PedalError(DeviceError):
@@ -69,25 +75,18 @@ class PedalPort:
         self.fd: int = port.fileno()
 
     def read(self) -> bytes:
-        """What has come; at least one byte when the port is readable.
-
-        Raises
-        ------
-        PedalLost
-            An adapter that was pulled out reads as an error, or as readable without a byte.
-        """
+        """What has come; PedalLost: an adapter that was pulled out reads as an error, or as readable without a byte."""
         try:
-            data = os.read(self.fd, _CHUNK)
+            if data := os.read(self.fd, _CHUNK):
+                return data
         except BlockingIOError:
             return b""
         except OSError as error:
             raise PedalLost(f"the pedal at {self.name} is gone ({error.strerror}): plug its USB cable in") from None
-        if not data:
-            raise PedalLost(f"the pedal at {self.name} is gone: plug its USB cable in")
-        return data
+        raise PedalLost(f"the pedal at {self.name} is gone: plug its USB cable in")
 
     def close(self) -> None:
-        """Give the port back at once: a plug that comes back while it is held gets another name. Never fails."""
+        """Give the port back at once: a plug that comes back meanwhile gets another name. Never fails."""
         with contextlib.suppress(OSError, termios.error):  # a vanished port raises termios.error, which is no OSError
             self._port.close()
 
@@ -126,12 +125,6 @@ def _port_error(config: PedalConfig, error: Exception) -> PedalPortError:
         return PedalPortError(f"pedal port {port} has no device behind it: unplug the pedal and plug it in again")
     reason = " ".join(str(error).split())[:120]
     return PedalPortError(f"{port} cannot be used as pedal port at {config.baud} baud ({reason}): set pedal.port and pedal.baud")
-
-
-PERIOD_S = 0.02
-NUMBERS = 32
-_LENGTH = 6
-"""Of a line, without its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +174,7 @@ _LINES = {
 
 
 class PedalParser:
-    """Finds lines in whatever comes, in any pieces."""
+    """Finds lines in bytes, however they are cut."""
 
     def __init__(self) -> None:
         self._rest = b""
@@ -189,36 +182,35 @@ class PedalParser:
 
     def feed(self, data: bytes) -> list[PedalLine | None]:
         """The lines that end in `data`, in order; None for a damaged one. What cannot become a line is told at once, and once."""
-        *whole, rest = (self._rest + data).split(b"\n")
+        *whole, self._rest = (self._rest + data).split(b"\n")
         found: list[PedalLine | None] = []
         for line in whole:
             if self._skipping:  # the end of what has been told already
                 self._skipping = False
             else:
                 found.append(_LINES.get(line))
-        if self._skipping:
-            rest = b""
-        elif len(rest) > _LENGTH:
+        if not self._skipping and len(self._rest) > _LENGTH:
             found.append(None)
-            self._skipping, rest = True, b""
-        self._rest = rest
+            self._skipping = True
+        if self._skipping:
+            self._rest = b""
         return found
 
 
-class PedalWatch:
-    """From lines and silences to reports.
+class PedalFilter:
+    """Makes reports of lines and silences.
 
     A press counts from the second whole report in a row on (``press_reports``), so that one line that is wrong in spite of its CRC,
     or a touch shorter than a report, moves nothing. It ends with the first report that says so, and with anything else than the
     next number in time: damage, silence, a number again or left out. After that it takes two reports in a row again, and after an
-    interruption longer than ``resume_s``, or a new connection, a lifted foot first: who has looked away may have stepped down.
+    interruption longer than ``resume_s``, or a new connection, a lifted foot first: the foot may have come down meanwhile.
 
-    What ends a press without a lifted foot is no release: nobody knows, and that holds the robot as well. Told as a release, it
+    What ends a press without a lifted foot makes the deadman unknown, which holds the robot as well. Reported as a release, it
     would make a new press of a pedal that has been down all the time, since before arming for instance.
 
     A STOP counts at once, from any whole line, even one that comes late or with a wrong number: a false STOP costs a restart, a
-    missed one more. But damage and silence are none. They say that nobody knows, and a deadman that nobody holds is the answer to
-    that: it holds the robot. A STOP is latched and may switch the torque off, so an unplugged cable must not cause it.
+    missed one more. Damage and silence are no STOP: it is latched and may switch the torque off, so an unplugged cable must not
+    cause it. They make the deadman unknown, which holds.
     """
 
     def __init__(self, config: PedalConfig) -> None:
@@ -229,8 +221,8 @@ class PedalWatch:
         self._lifted = False
         self._run = 0
 
-    def hear(self, line: PedalLine | None, now_s: float, *, late: bool = False) -> PedalReport:
-        """A line, or a damaged one (None), has come; `late`: it has waited somewhere, so nobody knows when it was true."""
+    def update(self, line: PedalLine | None, now_s: float, *, late: bool = False) -> PedalReport:
+        """A line, or a damaged one (None), has come; `late`: it has waited, so when it was true is unknown."""
         if line is None:
             return self.silence(now_s)
         in_order = (
@@ -257,16 +249,6 @@ class PedalWatch:
         return PedalReport(None, False, now_s)
 
 
-__all__ = ["Pedal", "PedalError", "PedalReport"]
-
-_START_UP_S = 3.0
-"""Opening the port resets many boards; they talk again when their boot loader has waited in vain."""
-_PATIENCE_S = 0.5
-"""Silence of a pedal that has talked before, until people are told. Nobody holds its deadman long before that."""
-_PAUSE_S = PERIOD_S / 10
-"""Who had to wait so long for bytes has read all that waited."""
-
-
 class Pedal:
     """Reads the pedal in a thread of its own, from ``start`` to ``close``.
 
@@ -274,17 +256,15 @@ class Pedal:
     ----------
     config : section `pedal`; its port must be set.
     on_report : gets every report, in order, from the pedal's thread, some 50 a second while the pedal talks and one every
-        ``silence_s`` while it is silent; one with a deadman of which nobody knows comes first after every opening, and last before
-        the port is given up. It should return within some milliseconds, and must not call ``close``. Without a pedal nothing is
-        reported: nobody holds a silent deadman either.
+        ``silence_s`` while it is silent; one with an unknown deadman comes first after every opening, and last before the port is
+        given up. It should return within some milliseconds, and must not call ``close``. Without a pedal nothing is reported.
     on_problem : gets the newest ``problem`` when it changes, from the same thread.
 
     Notes
     -----
     A report with ``stop`` is repeated while STOP is pressed, so that a latched stop cannot be acknowledged before it is let go.
 
-    Reports that have waited in the port while this program stood still say nothing about now: of those only STOP counts, until
-    the port is read empty.
+    Of reports that have waited in the port while this program stood still only STOP counts, until the port is read empty.
     """
 
     def __init__(
@@ -307,34 +287,31 @@ class Pedal:
         return self._problem
 
     def start(self) -> None:
-        """Start reading. It never raises: what hinders is the ``problem``, and it is tried again and again."""
+        """Start reading. It never raises: what hinders it is the ``problem``, and it is tried again and again."""
         self._thread.start()
 
     def close(self) -> None:
-        """Report that nobody knows of the deadman any more, give the port back; may be called twice."""
+        """Report an unknown deadman, give the port back; may be called twice."""
         self._thread.close()
 
     def _serve(self) -> None:
         while not self._thread.stopping:
             try:
-                self._listen_to_next()
+                with contextlib.closing(open_pedal_port(self._config)) as port:
+                    try:
+                        self._listen(port)
+                    finally:
+                        self._on_report(PedalReport(None, False, time.monotonic()))
             except PedalError as error:
                 self._set_problem(error)
                 self._thread.wait(None, self._config.reconnect_s)
 
-    def _listen_to_next(self) -> None:
-        with contextlib.closing(open_pedal_port(self._config)) as port:
-            try:
-                self._listen(port)
-            finally:
-                self._on_report(PedalReport(None, False, time.monotonic()))
-
     def _listen(self, port: PedalPort) -> None:
         """From opening to the loss of the port, or to ``close``."""
         silence_s = self._config.silence_s
-        parser, watch = PedalParser(), PedalWatch(self._config)
+        parser, filter_ = PedalParser(), PedalFilter(self._config)
         opened_s = read_s = time.monotonic()
-        self._on_report(watch.silence(opened_s))
+        self._on_report(filter_.silence(opened_s))
         due_s, complain_s = opened_s + silence_s, opened_s + _START_UP_S
         behind = True
         damaged = 0
@@ -351,7 +328,7 @@ class Pedal:
                     behind = False
                 read_s = now_s
                 for line in parser.feed(port.read()):
-                    self._on_report(watch.hear(line, now_s, late=behind))
+                    self._on_report(filter_.update(line, now_s, late=behind))
                     if line is None:
                         damaged += 1
                     else:
@@ -359,10 +336,14 @@ class Pedal:
                         due_s, complain_s = now_s + silence_s, now_s + _PATIENCE_S
                         self._set_problem(None)
             if now_s >= due_s:
-                self._on_report(watch.silence(now_s))
+                self._on_report(filter_.silence(now_s))
                 due_s = now_s + silence_s
-            if now_s >= complain_s:
-                self._set_problem(_unheard(port.name, damaged))
+            if now_s >= complain_s and damaged:
+                hint = "is no pedal's report: check pedal.baud, the cable, and that it is the pedal"
+                self._set_problem(PedalUnheard(f"what comes from {port.name} {hint}"))
+            elif now_s >= complain_s:
+                hint = "is silent: check its power and firmware, then plug it in again"
+                self._set_problem(PedalUnheard(f"the pedal at {port.name} {hint}"))
 
     def _set_problem(self, problem: PedalError | None) -> None:
         if str(problem) != str(self._problem):
@@ -372,9 +353,3 @@ class Pedal:
 
     def _fail(self, error: Exception) -> None:
         self._set_problem(PedalError(f"the pedal is no longer read ({type(error).__name__}: {error}): start the program again"))
-
-
-def _unheard(port: str, damaged: int) -> PedalUnheard:
-    if damaged:
-        return PedalUnheard(f"what comes from {port} is no pedal's report: check pedal.baud, the cable, and that it is the pedal")
-    return PedalUnheard(f"the pedal at {port} is silent: check its power and firmware, then plug it in again")

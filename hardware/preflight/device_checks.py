@@ -1,8 +1,6 @@
-"""The configured camera, and which cameras there are.
+"""Preflight checks of the rig's devices: camera, servo port and servos, foot pedal, gamepad.
 
-The servo port, the servos behind it, and the adapter's latency. Only looks: no torque, no goal, no setting is ever written.
-
-Foot pedal and gamepad, where they are configured.
+They only look: no torque, no goal, no setting is ever written.
 """
 
 from __future__ import annotations
@@ -16,149 +14,71 @@ import stat
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from core.config.models import Config, GamepadConfig, PedalConfig
 from core.config.safety import ServosConfig
 from core.devices import Camera, DeviceError
 from core.types import Frame
-from hardware.preflight.checks import NOT_CONFIGURED, REALSENSE, RENEW, Check, load_problem, one_line
+from hardware.cameras import sysfs
+from hardware.cameras.kinds import CAMERA_KINDS
+from hardware.preflight.checks import NOT_CONFIGURED, RENEW, Check, one_line
 from hardware.rig import RigKind, kind_of, real_camera
-from hardware.servos.discovery import DEV, SYS, USB3_MBIT_S, latency_timer, realsense_on_usb, video_devices
-
-if TYPE_CHECKING:
-    from hardware.cameras.realsense import RealSenseInfo
-
 
 _SEE_LIBRARIES = "see the vendor libraries in main.py doctor"
-_FIRST_WITHIN_S, _WATCHED_S = 6.0, 1.5
-_FEWEST = 3
+_FIRST_FRAME_WITHIN_S, _WATCHED_S = 6.0, 1.5
+_FEWEST_FRAMES = 3
 _LEAST_RATE = 0.8
-_UDEV = (
-    "install librealsense's udev rules: sudo cp 99-realsense-libusb.rules /etc/udev/rules.d/ "
-    "&& sudo udevadm control --reload-rules && sudo udevadm trigger, then plug the camera in again"
-)
+"""Of the frame rate that the camera is asked for."""
 
 
-def _realsense() -> Sequence[RealSenseInfo]:
-    _check_realsense_library()
-    from hardware.cameras.realsense import find_cameras
-
-    return find_cameras()
-
-
-def _check_realsense_library() -> None:
-    """Raises ImportError. A library cut short ends whoever loads it with a memory fault, and all checks with it."""
-    if problem := load_problem(REALSENSE):
-        raise ImportError(f"the library of RealSense cameras cannot be used: {problem}")
-
-
-def _camera_of(config: Config) -> Camera:
-    if config.rig.camera == "realsense":
-        _check_realsense_library()
-    return real_camera(config)
-
-
-def check_camera(
-    config: Config, found: Callable[[], Sequence[RealSenseInfo]] = _realsense, dev: Path = DEV, sys: Path = SYS
-) -> Check:
+def check_camera(config: Config) -> Check:
     """The rig's camera: there, permitted, on a fast enough port."""
-    rig = config.rig
+    rig, kind = config.rig, CAMERA_KINDS[config.rig.camera]
     if rig.camera == "twin":
         return Check("camera", True, "the bench twin needs none")
-    if rig.source is not None or rig.camera in {"video_file", "image_folder"}:
+    if rig.source is not None or kind.check is None:
         there = rig.source is not None and Path(rig.source).exists()
         detail = f"{rig.camera}: {rig.source}" + ("" if there else " is not there")
         return Check("camera", there, detail, "" if there else "set rig.source to the recording, video or folder")
-    return _check_webcam(config, dev, sys) if rig.camera == "webcam" else _check_realsense(config, found, sys)
-
-
-def _check_realsense(config: Config, found: Callable[[], Sequence[RealSenseInfo]], sys: Path) -> Check:
-    wanted = config.camera.serial
     try:
-        cameras = list(found())
+        return kind.check(config.camera)
     except (ImportError, DeviceError) as error:
         return Check("camera", False, one_line(error), _SEE_LIBRARIES)
-    chosen = [camera for camera in cameras if wanted in {None, camera.serial}]
-    if not chosen:
-        return _no_realsense(wanted, cameras, sys)
-    if len(chosen) > 1:
-        serials = ", ".join(camera.serial for camera in chosen)
-        return Check("camera", False, f"{len(chosen)} RealSense cameras: {serials}", f'set camera.serial = "{chosen[0].serial}"')
-    camera = chosen[0]
-    speeds = [device.mbit_s for device in realsense_on_usb(sys) if len(cameras) == 1 or device.serial in {"", camera.serial}]
-    on_usb2 = camera.usb.startswith(("1", "2")) or any(0 < speed < USB3_MBIT_S for speed in speeds)
-    if on_usb2:
-        fix = "use a blue USB 3 port and the camera's own cable: on USB 2 it gives 640x480 at most, and loses frames"
-        return Check("camera", False, camera.describe(), fix)
-    if camera.is_outdated:
-        fix = f"update its firmware to {camera.recommended_firmware}: realsense-viewer, or rs-fw-update -s {camera.serial} -f FILE"
-        return Check("camera", False, camera.describe(), fix)
-    return Check("camera", True, camera.describe())
 
 
-def _no_realsense(wanted: str | None, cameras: Sequence[RealSenseInfo], sys: Path) -> Check:
-    if cameras:
-        others = ", ".join(camera.serial for camera in cameras)
-        return Check("camera", False, f"no RealSense camera {wanted}; there are: {others}", "set camera.serial to one of these")
-    if plugged := realsense_on_usb(sys):
-        return Check("camera", False, f"{plugged[0].product} is plugged in, but cannot be opened", _UDEV)
-    return Check("camera", False, "no RealSense camera", "plug it into a USB 3 port; if it is: another cable, or another port")
+def _safe_camera(config: Config) -> Camera:
+    CAMERA_KINDS[config.rig.camera].check_library()
+    return real_camera(config)
 
 
-def _check_webcam(config: Config, dev: Path, sys: Path) -> Check:
-    devices = video_devices(dev, sys)
-    wanted = config.camera.device
-    if not devices and wanted is None:
-        return Check("camera", False, "no webcam", "plug it in; if it is: another cable, or another port")
-    if wanted is None:
-        node, note = devices[0].node, f"{devices[0].title}, the first of {len(devices)}"
-    else:
-        node = dev / f"video{wanted}" if wanted.isdigit() else Path(wanted)
-        known = [device.title for device in devices if device.node.resolve() == node.resolve()]
-        note = f"{wanted}, {known[0]}" if known else wanted
-        if not node.exists():
-            paths = ", ".join(str(device.stable or device.node) for device in devices) or "none"
-            return Check("camera", False, f"{wanted} is not there; webcams: {paths}", "plug it in, or set camera.device")
-    if not os.access(node, os.R_OK | os.W_OK):
-        return Check("camera", False, f"no permission for {node}", "sudo usermod -aG video $USER, then log in again")
-    return Check("camera", True, note)
-
-
-def check_picture(config: Config, make_camera: Callable[[Config], Camera] = _camera_of, watched_s: float = _WATCHED_S) -> Check:
+def check_picture(config: Config, make_camera: Callable[[Config], Camera] = _safe_camera, watched_s: float = _WATCHED_S) -> Check:
     """A real camera is opened for a moment: it gives frames, at its rate, and they are neither black nor white nor blurred."""
     name = "picture"
     if kind_of(config.rig) is not RigKind.LIVE:
         return Check(name, True, "only real cameras are tried")
+    frames: list[Frame] = []
     try:
         camera = make_camera(config)
         try:
             camera.open()
-            frames = _watch(camera, watched_s)
+            until_s = time.monotonic() + _FIRST_FRAME_WITHIN_S
+            while time.monotonic() < until_s:
+                frame = camera.read(0.1)
+                if frame is not None:
+                    until_s = until_s if frames else time.monotonic() + watched_s
+                    frames.append(frame)
         finally:
             camera.close()
     except ImportError as error:
         return Check(name, False, one_line(error), _SEE_LIBRARIES)
     except DeviceError as error:
         return Check(name, False, one_line(error), "see the camera; close other programs that use it (fuser -v /dev/video*)")
-    if len(frames) < _FEWEST:
+    if len(frames) < _FEWEST_FRAMES:
         return Check(name, False, f"{len(frames)} frames in {watched_s:g} s", "check the cable; another USB port, without a hub")
-    return _judge_camera(config, frames)
+    return _judge_frames(config, frames)
 
 
-def _watch(camera: Camera, watched_s: float) -> list[Frame]:
-    """Frames of so many seconds, from the first one on."""
-    frames: list[Frame] = []
-    until_s = time.monotonic() + _FIRST_WITHIN_S
-    while time.monotonic() < until_s:
-        frame = camera.read(0.1)
-        if frame is not None:
-            until_s = until_s if frames else time.monotonic() + watched_s
-            frames.append(frame)
-    return frames
-
-
-def _judge_camera(config: Config, frames: Sequence[Frame]) -> Check:
+def _judge_frames(config: Config, frames: Sequence[Frame]) -> Check:
     from core.perception.quality import check_image
     from core.perception.segmentation import to_working
 
@@ -176,13 +96,15 @@ def _judge_camera(config: Config, frames: Sequence[Frame]) -> Check:
     return Check(name, True, detail)
 
 
-def list_cameras(found: Callable[[], Sequence[RealSenseInfo]] = _realsense, dev: Path = DEV, sys: Path = SYS) -> Check:
+def list_cameras() -> Check:
     """All cameras that this computer has, for those who set up a rig. Never a failure."""
-    try:
-        lines = [camera.describe() for camera in found()]
-    except (ImportError, DeviceError) as error:
-        lines = [f"RealSense: {one_line(error)}"]
-    lines += [f"{device.title} ({device.stable or device.node})" for device in video_devices(dev, sys)]
+    lines = []
+    for kind in CAMERA_KINDS.values():
+        try:
+            kind.check_library()
+            lines += [camera.title for camera in kind.find()]
+        except (ImportError, DeviceError) as error:
+            lines.append(f"{kind.title}: {one_line(error)}")
     return Check("cameras found", True, "; ".join(lines) or "none")
 
 
@@ -206,11 +128,9 @@ def check_servo_port(port: str | None, *, wanted: bool = False) -> Check:
     if not stat.S_ISCHR(mode):
         return Check(name, False, f"{port} is no serial port", "set servos.port (ls /dev/serial/by-id)")
     if not os.access(path, os.R_OK | os.W_OK):
-        return Check(name, False, f"no permission for {port} (group {_group(path)})", _join(_group(path)))
-    return _check_lock(name, port)
-
-
-def _check_lock(name: str, port: str) -> Check:
+        group = _group(path)  # root's own is that of a port that udev has not seen
+        fix = f"sudo usermod -aG {'dialout' if group in {'root', '0'} else group} $USER, then log in again"
+        return Check(name, False, f"no permission for {port} (group {group})", fix)
     try:
         handle = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
@@ -238,11 +158,6 @@ def _group(path: Path) -> str:
         return str(number)
 
 
-def _join(group: str) -> str:
-    """What makes the port permitted for good. Root's own group is a port that udev has not seen."""
-    return f"sudo usermod -aG {'dialout' if group in {'root', '0'} else group} $USER, then log in again"
-
-
 def check_servos(config: ServosConfig) -> Check:
     """All seven answer, are the configured model, and report no trouble."""
     name = "servos"
@@ -251,40 +166,30 @@ def check_servos(config: ServosConfig) -> Check:
     try:
         from hardware.servos.dynamixel_bus import identify
         from hardware.servos.dynamixel_port import PortError, ServoError, ServoLine
+        from hardware.servos.registers import HardwareError, describe
     except ImportError as error:
         return Check(name, False, one_line(error), RENEW)
     line = ServoLine(config.port, config.baud)
     try:
         line.open()
         found = identify(line, config)
-        readings = [
-            (joint.name, *_reading(line.read(joint.id, _TORQUE, 7), line.read(joint.id, _VOLTAGE, 3))) for joint in config.joints
-        ]
+        tables = {joint.name: (line.read(joint.id, _TORQUE, 7), line.read(joint.id, _VOLTAGE, 3)) for joint in config.joints}
     except PortError as error:
         return Check(name, False, f"not asked: {one_line(error)}", "see the servo port")
     except ServoError as error:
         return Check(name, False, one_line(error), "switch the servos' 12 V on, check the cables, servos.baud and the joints' ids")
     finally:
         line.close()
-    firmware = sorted({identity.firmware for identity in found})
-    return _judge_servo(
-        name, config, readings, f"{len(found)} answer, model {config.model}, firmware {', '.join(map(str, firmware))}"
-    )
-
-
-def _reading(status: bytes, supply: bytes) -> tuple[bool, int, float, float]:
-    """Torque, hardware error, volts, degrees Celsius from registers 64 to 70 and 144 to 146."""
-    return status[0] == 1, status[_ERROR - _TORQUE], int.from_bytes(supply[:2], "little") / 10.0, float(supply[2])
-
-
-def _judge_servo(name: str, config: ServosConfig, readings: Sequence[tuple[str, bool, int, float, float]], what: str) -> Check:
-    from hardware.servos.registers import HardwareError, describe
-
-    volts, degrees = min(reading[3] for reading in readings), max(reading[4] for reading in readings)
-    torque = [reading[0] for reading in readings if reading[1]]
-    torque_text = f"torque on: {', '.join(torque)}" if torque else "torque off"
-    detail = f"{what}; {volts:.1f} V at least, {degrees:.0f} \N{DEGREE SIGN}C at most, {torque_text}"
-    if broken := [f"{reading[0]}: {describe(HardwareError(reading[2]))}" for reading in readings if reading[2]]:
+    firmware = ", ".join(map(str, sorted({identity.firmware for identity in found})))
+    # registers 64 (torque) to 70 (hardware error), and 144 (voltage in 0.1 V) to 146 (temperature)
+    volts = min(int.from_bytes(supply[:2], "little") / 10.0 for _, supply in tables.values())
+    degrees = max(float(supply[2]) for _, supply in tables.values())
+    what = f"{len(found)} answer, model {config.model}, firmware {firmware}"
+    on = ", ".join(joint for joint, (status, _) in tables.items() if status[0] == 1)
+    torque = f"torque on: {on}" if on else "torque off"
+    detail = f"{what}; {volts:.1f} V at least, {degrees:.0f} \N{DEGREE SIGN}C at most, {torque}"
+    errors = {joint: HardwareError(status[_ERROR - _TORQUE]) for joint, (status, _) in tables.items()}
+    if broken := [f"{joint}: {describe(error)}" for joint, error in errors.items() if error]:
         fix = "find the reason (jam, heat, supply), then restart that servo in the servo table"
         return Check(name, False, f"hardware error, {'; '.join(broken)}", fix)
     if volts < config.min_voltage_v:
@@ -294,13 +199,13 @@ def _judge_servo(name: str, config: ServosConfig, readings: Sequence[tuple[str, 
     return Check(name, True, detail)
 
 
-def check_latency(port: str | None, sys: Path = SYS) -> Check:
+def check_latency(port: str | None) -> Check:
     """How long an FTDI adapter keeps bytes back. The driver sets it when it opens the port, so it is looked at after that."""
     name = "adapter latency"
     if port is None:
         return Check(name, True, NOT_CONFIGURED)
-    timer = latency_timer(Path(port), sys)
-    if timer is None:
+    timer = sysfs.SYS / "bus" / "usb-serial" / "devices" / Path(port).resolve().name / "latency_timer"
+    if not timer.is_file():
         return Check(name, True, f"{port} has no latency timer to set")
     try:
         latency_ms = int(timer.read_text(encoding="ascii"))

@@ -1,12 +1,7 @@
-"""The checks before driving in a process of their own: ``python -m hardware.preflight.preflight``, for the window, not for people.
+"""The preflight: everything that must be right before the bench is used, in one table, ``CHECKS``.
 
-Reads the configuration as JSON from standard input; writes each check as one JSON object a line as soon as it is made.
-
-Everything that must be right before the bench is used, each with what to do when it is not.
-
-The part of the preflight that is looked at before the program may be handed over to, while the rig is open.
-
-What the open rig knows itself better (its camera's pictures, its servos' answers) is not asked for again: their devices are in use.
+``python -m hardware.preflight.preflight`` makes the checks before driving in a process of their own, for the window: it reads the
+configuration as JSON from standard input, and writes each check as one JSON object a line as soon as it is made.
 """
 
 from __future__ import annotations
@@ -14,19 +9,14 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from enum import StrEnum
 
 from pydantic import ValidationError
 
 from core.config.models import Config
-from hardware.preflight import checks as machine
-from hardware.preflight import checks as model
-from hardware.preflight import checks as program
-from hardware.preflight import device_checks
+from hardware.preflight import checks, device_checks, model_checks
 from hardware.preflight.checks import Check
-
-_WRONG_DATE = "the date is wrong"
 
 
 class Level(StrEnum):
@@ -37,36 +27,54 @@ class Level(StrEnum):
     BAD = "not ready"
 
 
-def driving_checks(config: Config) -> Iterator[Check]:
-    """The checks, one by one, each made when it is asked for. Nothing moves, nothing is set, no device in use is opened.
+CHECKS: dict[str, tuple[Callable[[Config], Check], Level | None]] = {
+    "python": (lambda config: checks.check_python(), None),
+    "packages": (lambda config: checks.check_packages(), Level.BAD),
+    "system libraries": (lambda config: checks.check_libraries(), None),
+    "vendor libraries": (lambda config: checks.check_binaries(), None),
+    "display": (lambda config: checks.check_display(os.environ), None),
+    "model": (lambda config: model_checks.check_model(config.perception.segmentation.model), Level.BAD),
+    "self-test": (lambda config: model_checks.check_self_test(config.perception), Level.BAD),
+    "cameras found": (lambda config: device_checks.list_cameras(), None),
+    "camera": (device_checks.check_camera, Level.BAD),
+    "picture": (device_checks.check_picture, None),
+    "servo port": (lambda config: device_checks.check_servo_port(config.servos.port, wanted=config.rig.robot == "servos"), None),
+    "servos": (lambda config: device_checks.check_servos(config.servos), None),
+    # after the driver has had the port open
+    "adapter latency": (lambda config: device_checks.check_latency(config.servos.port), Level.BAD),
+    "foot pedal": (lambda config: device_checks.check_pedal(config.pedal), None),
+    "gamepad": (lambda config: device_checks.check_gamepad(config.gamepad), Level.WARNING),
+    "recordings": (lambda config: checks.check_disk(config.record), Level.WARNING),  # a full disk stops a recording, not the robot
+    "clock": (lambda config: checks.check_clock(), Level.BAD),
+    "cores and memory": (lambda config: checks.check_machine(), Level.WARNING),
+}
+"""By name, in an order that makes sense to read: what makes the check, and what its failure means for driving.
 
-    Takes some seconds, most of them for the self-test of the network.
+None: it is not made before driving, as it does not matter then, or the open rig has its device in use and knows the answer itself.
+"""
+
+
+def run_checks(config: Config) -> Iterator[Check]:
+    """All checks; each is made when it is asked for.
+
+    Nothing moves and nothing is set: the servos are asked who and how they are, when a port is configured, and their torque stays
+    as it is. A real camera is opened for a moment. Takes some seconds, most of them for the self-test of the network.
     """
-    checks: tuple[Callable[[], Check], ...] = (
-        program.check_packages,
-        lambda: model.check_model(config.perception.segmentation.model),
-        lambda: model.check_self_test(config.perception),
-        lambda: device_checks.check_camera(config),
-        lambda: device_checks.check_latency(config.servos.port),
-        lambda: device_checks.check_gamepad(config.gamepad),
-        lambda: machine.check_disk(config.record),
-        machine.check_clock,
-        machine.check_machine,
-    )
-    for check in checks:
-        yield check()
+    return (make(config) for make, _ in CHECKS.values())
 
 
-_ONLY_WARN = frozenset({"recordings", "cores and memory", "gamepad"})
-"""Who can do without: a disk that is nearly full stops a recording, not the robot."""
+def driving_checks(config: Config) -> Iterator[Check]:
+    """The checks before the program may drive. Nothing moves, nothing is set, no device in use is opened."""
+    return (make(config) for make, level in CHECKS.values() if level is not None)
 
 
 def level_of(check: Check) -> Level:
-    """Whether a finding stands against driving, or only ought to be known."""
+    """Whether a finding stands against driving, or is only worth knowing."""
     if check.ok:
         return Level.GOOD
-    only_warns = check.name in _ONLY_WARN or (check.name == "clock" and _WRONG_DATE in check.detail)
-    return Level.WARNING if only_warns else Level.BAD
+    if check.name == "clock" and checks.WRONG_DATE in check.detail:
+        return Level.WARNING
+    return CHECKS[check.name][1] or Level.BAD
 
 
 def main() -> int:
@@ -80,42 +88,6 @@ def main() -> int:
         sys.stdout.write(json.dumps(check.to_json()) + "\n")
         sys.stdout.flush()
     return 0
-
-
-__all__ = ["Check", "run_checks"]
-
-
-def run_checks(config: Config, environ: Mapping[str, str] | None = None) -> Iterator[Check]:
-    """All checks, in an order that makes sense to read; each is made when it is asked for.
-
-    Nothing moves and nothing is set: the servos are asked who and how they are, when a port is configured, and their torque stays
-    as it is. A real camera is opened for a moment. Takes some seconds, most of them for the self-test of the network.
-
-    Parameters
-    ----------
-    config : the rig to check.
-    environ : default: the process's own.
-    """
-    environ = os.environ if environ is None else environ
-    checks: tuple[Callable[[], Check], ...] = (
-        *program.OF_THE_PROGRAM,
-        lambda: program.check_display(environ),
-        lambda: model.check_model(config.perception.segmentation.model),
-        lambda: model.check_self_test(config.perception),
-        device_checks.list_cameras,
-        lambda: device_checks.check_camera(config),
-        lambda: device_checks.check_picture(config),
-        lambda: device_checks.check_servo_port(config.servos.port, wanted=config.rig.robot == "servos"),
-        lambda: device_checks.check_servos(config.servos),
-        lambda: device_checks.check_latency(config.servos.port),  # after the driver has had the port open
-        lambda: device_checks.check_pedal(config.pedal),
-        lambda: device_checks.check_gamepad(config.gamepad),
-        lambda: machine.check_disk(config.record),
-        machine.check_clock,
-        machine.check_machine,
-    )
-    for check in checks:
-        yield check()
 
 
 if __name__ == "__main__":

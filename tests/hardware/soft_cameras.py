@@ -11,9 +11,11 @@ from typing import Any
 import cv2
 import numpy as np
 import pyrealsense2 as rs
+import pytest
 
 from core.config.models import CameraConfig
 from core.types import Image
+from hardware.cameras import sysfs
 
 WIDTH, HEIGHT = 160, 120
 CONFIG = CameraConfig(width_px=WIDTH, height_px=HEIGHT, frames_per_second=30, lost_after_s=0.2, reconnect_s=0.1)
@@ -158,10 +160,12 @@ class SoftCapture:
 
 
 class SoftWebcam:
-    """A webcam and the folders in which it is listed. ``gate`` closed: its driver hangs."""
+    """A webcam and the folders in which the kernel lists it. ``gate`` closed: its driver hangs."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, patch: pytest.MonkeyPatch) -> None:
         self.dev, self.sys = folder / "dev", folder / "sys"
+        patch.setattr(sysfs, "DEV", self.dev)
+        patch.setattr(sysfs, "SYS", self.sys)
         self.plugged = True
         self.size = (WIDTH, HEIGHT)
         self.number = 0

@@ -6,21 +6,23 @@ import threading
 import time
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from core.calibration.camera import BoardSpec, BoardView, find_board, fit_lens, scale_of_board, straighten
 from core.config.calibration import CalibrationConfig, LensConfig
-from core.config.models import TwinConfig, load_config
+from core.config.models import RigConfig, TwinConfig, load_config
 from core.config.rig_file import RigFileError, make_rig, with_rig, write_rig
 from core.devices import CameraLost, DeviceError
 from core.types import Frame
+from hardware.cameras import realsense, sysfs
+from hardware.cameras.kinds import CAMERA_KINDS
 from hardware.cameras.live import CameraFeed
 from hardware.cameras.realsense import RealSenseInfo
 from hardware.cameras.undistorted import UndistortedCamera
-from hardware.rig import open_rig
-from hardware.servos.discovery import search, with_camera, with_port
+from hardware.rig import find_devices, open_rig, with_camera, with_port
 from hardware.twin.rendering.calibration_board import BoardPictures
 
 LENS = LensConfig(k1=-0.12, center_px=(319.5, 239.5), size_px=(640, 480), residual_px=0.1, pictures=3)
@@ -128,30 +130,43 @@ def test_a_camera_that_is_gone_for_good_ends_the_feed() -> None:
 # ---- what there is
 
 
-def test_without_hardware_there_is_the_twin(tmp_path: Path) -> None:
-    found = search(lambda: [], tmp_path, tmp_path)
-    assert [camera.kind for camera in found.cameras] == ["twin"]
-    assert found.problems == ()
+def test_every_kind_of_camera_that_a_rig_may_name_is_in_the_table() -> None:
+    assert set(CAMERA_KINDS) == set(get_args(RigConfig.model_fields["camera"].annotation))
 
 
-def test_a_library_that_cannot_look_is_no_end(tmp_path: Path) -> None:
+@pytest.fixture
+def computer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A computer without devices; its folder for /sys."""
+    monkeypatch.setattr(sysfs, "DEV", tmp_path / "dev")
+    monkeypatch.setattr(sysfs, "SYS", tmp_path)
+    monkeypatch.setattr(realsense, "find_cameras", lambda: [])
+    return tmp_path
+
+
+@pytest.mark.parametrize("problem", ["", "RealSense library: no libusb"])
+def test_without_hardware_there_is_the_twin_also_when_a_library_cannot_search(
+    computer: Path, problem: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def broken() -> list[RealSenseInfo]:
-        raise DeviceError("RealSense library: no libusb")
+        raise DeviceError(problem)
 
-    found = search(broken, tmp_path, tmp_path)
-    assert found.problems == ("RealSense: RealSense library: no libusb",)
+    if problem:
+        monkeypatch.setattr(realsense, "find_cameras", broken)
+    found = find_devices()
+    assert found.problems == ((f"RealSense: {problem}",) if problem else ())
     assert [camera.kind for camera in found.cameras] == ["twin"]
 
 
-def test_a_realsense_and_a_webcam_are_listed_once_each(tmp_path: Path) -> None:
+def test_a_realsense_and_a_webcam_are_listed_once_each(computer: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for k, name in enumerate(("RealSense L515", "HD Webcam")):
-        folder = tmp_path / "class" / "video4linux" / f"video{k}"
+        folder = computer / "class" / "video4linux" / f"video{k}"
         folder.mkdir(parents=True)
         (folder / "name").write_text(name)
-    found = search(lambda: [RealSenseInfo("L515", "f123")], tmp_path / "dev", tmp_path)
+    monkeypatch.setattr(realsense, "find_cameras", lambda: [RealSenseInfo("L515", "f123")])
+    found = find_devices()
     assert [(camera.kind, camera.serial or camera.device) for camera in found.cameras[:2]] == [
         ("realsense", "f123"),
-        ("webcam", str(tmp_path / "dev" / "video1")),
+        ("webcam", str(computer / "dev" / "video1")),
     ]
     config = with_camera(load_config(), found.cameras[0])
     assert (config.rig.camera, config.rig.robot, config.camera.serial) == ("realsense", "none", "f123")

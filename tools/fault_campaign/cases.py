@@ -62,7 +62,7 @@ from core.session.reader import SessionReader
 from core.session.recovery import find_cut_sessions, recover
 from core.session.video import FrameEncoder
 from core.types import Frame, Image, Point, Reason, Refusal, Scene
-from hardware.preflight.checks import judge as judge_model
+from hardware.preflight.model_checks import judge as judge_model
 from hardware.rig import RigKind, kind_of
 from hardware.servos.bus_ipc import BusPhase, BusStatus
 from hardware.servos.dynamixel_port import WrongServo

@@ -24,8 +24,9 @@ from core.control.pilot import DriveView
 from core.devices import DeviceError
 from core.session.manifest import read_manifest
 from hardware.calibration.bench import CalibrationBench
+from hardware.cameras.kinds import FoundCamera
 from hardware.inputs.gamepad import GamepadState
-from hardware.servos.discovery import Found, FoundCamera
+from hardware.rig import FoundDevices
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until
 from tests.app.rig_wizard.test_rig_wizard import StillCamera
 
@@ -100,11 +101,11 @@ def test_no_camera_is_looked_for_while_the_robot_is_armed(
     """The look asks the cameras' drivers, in the window's thread: a window that hangs disarms."""
     looks: list[bool] = []
 
-    def look() -> Found:
+    def look() -> FoundDevices:
         looks.append(True)
-        return Found((FoundCamera("twin", "Bench twin"),), ())
+        return FoundDevices((FoundCamera("twin", "Bench twin"),), ())
 
-    monkeypatch.setattr("app.operator.rig_menu.search", look)
+    monkeypatch.setattr("app.operator.rig_menu.find_devices", look)
     desk = _desk(window)
     pilot = window.pilot
     assert pilot is not None

@@ -37,7 +37,9 @@ from core.config.files import Profiles
 from core.config.models import Config, load_config
 from core.control.pilot import DriveView
 from hardware.calibration.bench import CalibrationBench
-from hardware.servos.discovery import Found, FoundCamera, FoundServo, FoundServos
+from hardware.cameras.kinds import FoundCamera
+from hardware.rig import FoundDevices
+from hardware.servos.discovery import FoundServo, FoundServos
 from tests.app.fakes import make_scene, until
 from tests.app.operator.test_preflight import BAD, GOOD, done, says
 from tests.app.rig_wizard.test_rig_wizard import StillCamera
@@ -221,7 +223,7 @@ def test_the_steps_tell_which_are_done_and_where_one_is(wizard: RigWizard, qtbot
 
 def test_size_and_rate_can_be_set_for_real_cameras_only(wizard: RigWizard) -> None:
     page = wizard.camera_page
-    page._on_found(Found((FoundCamera("webcam", "A webcam", device="/dev/video0"), FoundCamera("twin", "The twin")), ()))
+    page._on_found(FoundDevices((FoundCamera("webcam", "A webcam", device="/dev/video0"), FoundCamera("twin", "The twin")), ()))
     page.cameras.setCurrentRow(0)
     assert all(field.isEnabled() for field in (*page.sizes, page.rate))
     page.cameras.setCurrentRow(1)

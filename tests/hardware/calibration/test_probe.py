@@ -179,7 +179,7 @@ def test_nobody_answers(servos: SoftServoBus) -> None:
 def test_no_port(tmp_path: Path) -> None:
     with pytest.raises(PortError):
         find_servos(str(tmp_path / "ttyUSB0"))
-    assert find_ports(tmp_path) is not None
+    assert find_ports() is not None
 
 
 def test_stop_ends_the_search(servos: SoftServoBus) -> None:

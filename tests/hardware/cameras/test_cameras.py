@@ -68,9 +68,9 @@ def _realsense(_: Path, undo: ExitStack) -> Camera:
     return realsense_camera(SOFT, undo.enter_context(SoftRealSense()).context)
 
 
-def _webcam(folder: Path, _: ExitStack) -> Camera:
-    soft = SoftWebcam(folder)
-    return LiveCamera(WebcamSensor(SOFT, soft.open_capture, soft.dev, soft.sys), SOFT)
+def _webcam(folder: Path, undo: ExitStack) -> Camera:
+    soft = SoftWebcam(folder, undo.enter_context(pytest.MonkeyPatch.context()))
+    return LiveCamera(WebcamSensor(SOFT, soft.open_capture), SOFT)
 
 
 MAKERS: dict[str, Callable[[Path, ExitStack], Camera]] = {

@@ -527,12 +527,12 @@ def test_a_cut_recording_is_one_clear_line(bag: Path, tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def webcam(tmp_path: Path) -> SoftWebcam:
-    return SoftWebcam(tmp_path)
+def webcam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SoftWebcam:
+    return SoftWebcam(tmp_path, monkeypatch)
 
 
 def _sensor(webcam: SoftWebcam, **changes: object) -> WebcamSensor:
-    return WebcamSensor(CONFIG.model_copy(update=changes), webcam.open_capture, webcam.dev, webcam.sys)
+    return WebcamSensor(CONFIG.model_copy(update=changes), webcam.open_capture)
 
 
 def test_a_webcam_gives_rgb_with_the_kernels_time(webcam: SoftWebcam) -> None:

@@ -22,6 +22,7 @@ from core.devices import DeviceError
 from hardware.inputs.pedal import (
     Pedal,
     PedalError,
+    PedalFilter,
     PedalLine,
     PedalLost,
     PedalParser,
@@ -29,7 +30,6 @@ from hardware.inputs.pedal import (
     PedalPortTaken,
     PedalReport,
     PedalUnheard,
-    PedalWatch,
     crc8,
     line_bytes,
     open_pedal_port,
@@ -129,7 +129,7 @@ def play(script: str, config: PedalConfig = CONFIG) -> str:
     ``-`` lifted, ``D`` down, ``x`` damaged, ``_`` nothing; of a foot that is down: ``=`` the number again, ``>`` a number left out,
     ``<`` a number from before, ``l`` late.
     """
-    watch, number, said = PedalWatch(config), 0, ""
+    watch, number, said = PedalFilter(config), 0, ""
     for turn, what in enumerate(script):
         now_s = 5.0 + 0.02 * turn
         if what == "_":
@@ -137,7 +137,7 @@ def play(script: str, config: PedalConfig = CONFIG) -> str:
             continue
         number += {"=": 0, ">": 2, "<": -1}.get(what, 1)
         line = None if what == "x" else PedalLine(number % 32, what != "-", False)
-        report = watch.hear(line, now_s, late=what == "l")
+        report = watch.update(line, now_s, late=what == "l")
         assert (report.stop, report.time_s) == (False, now_s)
         said += {True: "1", False: "0", None: "?"}[report.deadman]
     return said
@@ -184,12 +184,12 @@ def test_a_press_counts_however_soon_a_foot_must_be_lifted_after_an_interruption
 
 
 def test_stop_counts_from_any_whole_report_and_from_nothing_else() -> None:
-    watch = PedalWatch(CONFIG)
-    assert watch.hear(PedalLine(7, False, True), 1.0) == PedalReport(None, True, 1.0)
-    assert watch.hear(PedalLine(7, True, True), 1.02).stop  # stuck
-    assert watch.hear(PedalLine(20, False, True), 1.04, late=True).stop
-    assert watch.hear(PedalLine(21, False, False), 1.06) == PedalReport(False, False, 1.06)
-    assert watch.hear(None, 1.08) == PedalReport(None, False, 1.08)
+    watch = PedalFilter(CONFIG)
+    assert watch.update(PedalLine(7, False, True), 1.0) == PedalReport(None, True, 1.0)
+    assert watch.update(PedalLine(7, True, True), 1.02).stop  # stuck
+    assert watch.update(PedalLine(20, False, True), 1.04, late=True).stop
+    assert watch.update(PedalLine(21, False, False), 1.06) == PedalReport(False, False, 1.06)
+    assert watch.update(None, 1.08) == PedalReport(None, False, 1.08)
     assert watch.silence(1.2) == PedalReport(None, False, 1.2)
 
 
@@ -200,13 +200,13 @@ _HEARD = st.tuples(st.integers(0, 31) | st.none(), st.booleans(), st.booleans(),
 def test_a_press_is_always_the_second_good_report_of_a_foot_that_was_seen_lifted(
     heard: list[tuple[int | None, bool, bool, float]], in_order: bool
 ) -> None:
-    watch, now_s, number = PedalWatch(CONFIG), 3.0, 0
+    watch, now_s, number = PedalFilter(CONFIG), 3.0, 0
     lines: list[tuple[PedalLine | None, float]] = []
     for told, down, late, pause_s in heard:
         now_s += pause_s
         number = number + 1 if in_order or told is None else told
         line = PedalLine(number % 32, down, False) if told is not None else None
-        report = watch.hear(line, now_s, late=late)
+        report = watch.update(line, now_s, late=late)
         lines.append((line, now_s))
         assert report.deadman is not False or (line is not None and not line.down and not late)  # a foot that was seen lifted now
         if report.deadman:

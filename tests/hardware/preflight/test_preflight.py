@@ -10,6 +10,7 @@ import re
 import shutil
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 
@@ -21,18 +22,20 @@ from core.config.safety import ServosConfig
 from core.devices import DeviceError
 from core.perception.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, sha256_of
 from core.types import Frame, Image
+from hardware.cameras import realsense, sysfs
 from hardware.cameras.realsense import RealSenseInfo
 from hardware.preflight import checks as machine
-from hardware.preflight import checks as model
 from hardware.preflight import checks as program
 from hardware.preflight import device_checks
+from hardware.preflight import model_checks as model
 from hardware.preflight.checks import Check
-from hardware.preflight.preflight import run_checks
+from hardware.preflight.preflight import CHECKS, run_checks
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.soft_pedal import SoftPedal
 
 ROOT = Path(__file__).resolve().parents[3]
 L515 = RealSenseInfo("Intel RealSense L515", "f1", "1.5.8.1", "1.5.8.1", "3.2")
+D435 = RealSenseInfo("Intel RealSense D435", "d2")
 
 
 def _bad(check: Check, detail: str, fix: str) -> None:
@@ -143,7 +146,7 @@ def test_a_realsense_library_cut_short_ends_no_other_check(tmp_path: Path, monke
     config = _rig(camera="realsense")
     for check in (device_checks.check_camera(config), device_checks.check_picture(config)):
         _bad(check, "library of RealSense cameras cannot be used: .*SIGBUS", "see the vendor libraries in main.py doctor")
-    _good(device_checks.list_cameras(dev=tmp_path, sys=tmp_path), "RealSense: the library .*SIGBUS")
+    _good(device_checks.list_cameras(), "RealSense: the library .*SIGBUS")
 
 
 def test_a_display(tmp_path: Path) -> None:
@@ -291,17 +294,28 @@ def test_a_model_with_swapped_outputs_is_found(copied: Path) -> None:
 
 
 @pytest.fixture
-def dev(tmp_path: Path) -> Path:
+def dev(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "dev"
     (folder / "v4l" / "by-id").mkdir(parents=True)
+    monkeypatch.setattr(sysfs, "DEV", folder)
     return folder
 
 
 @pytest.fixture
-def sys_(tmp_path: Path) -> Path:
+def sys_(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "sys"
     folder.mkdir()
+    monkeypatch.setattr(sysfs, "SYS", folder)
     return folder
+
+
+@pytest.fixture
+def plugged(monkeypatch: pytest.MonkeyPatch, dev: Path, sys_: Path) -> list[RealSenseInfo]:
+    """The RealSense cameras that the library finds; there is nothing else."""
+    found: list[RealSenseInfo] = []
+    monkeypatch.setattr(realsense, "find_cameras", lambda: found)
+    monkeypatch.setattr("hardware.preflight.checks.load_problem", lambda _: "")
+    return found
 
 
 def _plug_realsense(sys_: Path, mbit_s: str) -> None:
@@ -335,47 +349,48 @@ def test_the_twin_needs_no_camera_and_a_recording_must_be_there(tmp_path: Path) 
     _bad(device_checks.check_camera(_rig(camera="image_folder")), "None is not there", "rig.source")
 
 
-def test_a_realsense_camera(sys_: Path) -> None:
-    config = _rig(camera="realsense")
-    _good(device_checks.check_camera(config, lambda: [L515], sys=sys_), r"L515 f1, firmware 1\.5\.8\.1, USB 3\.2")
-    _bad(device_checks.check_camera(config, lambda: [], sys=sys_), "no RealSense camera", "plug it")
-    other = RealSenseInfo("Intel RealSense D435", "d2")
-    _bad(device_checks.check_camera(config, lambda: [L515, other], sys=sys_), "2 RealSense cameras: f1, d2", "camera.serial")
-    _good(device_checks.check_camera(_rig(camera="realsense", serial="d2"), lambda: [L515, other], sys=sys_), "D435 d2")
-    _bad(
-        device_checks.check_camera(_rig(camera="realsense", serial="x"), lambda: [L515], sys=sys_),
-        "no RealSense camera x",
-        "serial",
-    )
+@pytest.mark.parametrize(
+    ("there", "settings", "detail", "fix"),
+    [
+        ([L515], {}, r"L515 f1, firmware 1\.5\.8\.1, USB 3\.2", None),
+        ([L515, D435], {"serial": "d2"}, "D435 d2", None),
+        ([], {}, "no RealSense camera", "plug it"),
+        ([L515, D435], {}, "2 RealSense cameras: f1, d2", "camera.serial"),
+        ([L515], {"serial": "x"}, "no RealSense camera x", "serial"),
+        ([replace(L515, usb="2.1")], {}, r"USB 2\.1", "USB 3 port"),
+        ([replace(L515, firmware="1.5.1.3")], {}, r"1\.5\.1\.3", r"firmware to 1\.5\.8\.1"),
+    ],
+)
+def test_a_realsense_camera(
+    plugged: list[RealSenseInfo], there: list[RealSenseInfo], settings: dict[str, object], detail: str, fix: str | None
+) -> None:
+    plugged += there
+    check = device_checks.check_camera(_rig(camera="realsense", **settings))
+    if fix is None:
+        _good(check, detail)
+    else:
+        _bad(check, detail, fix)
 
 
-def test_usb_2_and_old_firmware_are_found(sys_: Path) -> None:
-    config = _rig(camera="realsense")
-    slow = RealSenseInfo("Intel RealSense L515", "f1", "1.5.8.1", "1.5.8.1", "2.1")
-    _bad(device_checks.check_camera(config, lambda: [slow], sys=sys_), r"USB 2\.1", "USB 3 port")
-    old = RealSenseInfo("Intel RealSense L515", "f1", "1.5.1.3", "1.5.8.1", "3.2")
-    _bad(device_checks.check_camera(config, lambda: [old], sys=sys_), r"1\.5\.1\.3", r"firmware to 1\.5\.8\.1")
+def test_a_realsense_camera_on_usb_2_and_one_that_cannot_be_opened(plugged: list[RealSenseInfo], sys_: Path) -> None:
     _plug_realsense(sys_, "480")
-    silent = RealSenseInfo("Intel RealSense L515", "f1")
-    _bad(device_checks.check_camera(config, lambda: [silent], sys=sys_), "L515 f1", "USB 3 port")
+    _bad(device_checks.check_camera(_rig(camera="realsense")), "cannot be opened", "udevadm trigger")
+    plugged.append(RealSenseInfo("Intel RealSense L515", "f1"))
+    _bad(device_checks.check_camera(_rig(camera="realsense")), "L515 f1", "USB 3 port")
 
 
-def test_a_camera_that_is_plugged_in_but_closed_to_us_needs_the_udev_rules(sys_: Path) -> None:
-    _plug_realsense(sys_, "5000")
-    _bad(device_checks.check_camera(_rig(camera="realsense"), lambda: [], sys=sys_), "cannot be opened", "udevadm trigger")
-
-
-def test_webcams(dev: Path, sys_: Path) -> None:
-    _bad(device_checks.check_camera(_rig(camera="webcam"), dev=dev, sys=sys_), "no webcam", "plug it in")
+def test_webcams(dev: Path, sys_: Path, plugged: list[RealSenseInfo]) -> None:
+    _bad(device_checks.check_camera(_rig(camera="webcam")), "no webcam", "plug it in")
     _plug_webcam(dev, sys_, 0, "Logi")
     _plug_webcam(dev, sys_, 1, "Industrial")
-    _good(device_checks.check_camera(_rig(camera="webcam"), dev=dev, sys=sys_), "Logi, the first of 2")
+    _good(device_checks.check_camera(_rig(camera="webcam")), "Logi, the first of 2")
     stable = dev / "v4l" / "by-id" / "usb-Industrial-index0"
-    _good(device_checks.check_camera(_rig(camera="webcam", device=str(stable)), dev=dev, sys=sys_), "Industrial")
-    _good(device_checks.check_camera(_rig(camera="webcam", device="2"), dev=dev, sys=sys_), "Industrial")
+    _good(device_checks.check_camera(_rig(camera="webcam", device=str(stable))), "Industrial")
+    _good(device_checks.check_camera(_rig(camera="webcam", device="2")), "Industrial")
     gone = _rig(camera="webcam", device=str(dev / "video9"))
-    _bad(device_checks.check_camera(gone, dev=dev, sys=sys_), "video9 is not there; webcams: .*Logi.*Industrial", "camera.device")
-    found = device_checks.list_cameras(lambda: [L515], dev=dev, sys=sys_)
+    _bad(device_checks.check_camera(gone), "video9 is not there; webcams: .*Logi.*Industrial", "camera.device")
+    plugged.append(L515)
+    found = device_checks.list_cameras()
     _good(found, r"L515 f1.*; Logi \(.*usb-Logi-index0\); Industrial")
 
 
@@ -433,11 +448,11 @@ def line() -> Iterator[str]:
     os.close(slave)
 
 
-def test_without_a_port_nothing_is_wrong(sys_: Path) -> None:
+def test_without_a_port_nothing_is_wrong() -> None:
     for check in (
         device_checks.check_servo_port(None),
         device_checks.check_servos(ServosConfig()),
-        device_checks.check_latency(None, sys_),
+        device_checks.check_latency(None),
     ):
         _good(check, "not configured")
 
@@ -480,11 +495,11 @@ def test_the_latency_of_an_ftdi_adapter(sys_: Path, dev: Path, text: str, ok: bo
     port = dev / "ttyUSB0"
     port.touch()
     (dev / "usb-U2D2").symlink_to(port)
-    _good(device_checks.check_latency(str(port), sys_), "no latency timer")
+    _good(device_checks.check_latency(str(port)), "no latency timer")
     timer = sys_ / "bus" / "usb-serial" / "devices" / "ttyUSB0" / "latency_timer"
     timer.parent.mkdir(parents=True)
     timer.write_text(text + "\n")
-    check = device_checks.check_latency(str(dev / "usb-U2D2"), sys_)
+    check = device_checks.check_latency(str(dev / "usb-U2D2"))
     if ok:
         _good(check, f"^{text} ms")
     else:
@@ -560,17 +575,16 @@ def test_the_pedal_is_heard() -> None:
 # --- all of it -------------------------------------------------------------------------------------------------------------------
 
 
-def test_all_checks_are_made_one_after_the_other_and_have_names_of_their_own(tmp_path: Path) -> None:
+def test_all_checks_are_made_one_after_the_other_and_named_as_in_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("QT_QPA_PLATFORM", "offscreen")
     config = Config(
         rig=RigConfig(camera="image_folder", robot="none", source=str(tmp_path)),
         record=RecordConfig(folder=str(tmp_path), warn_free_mb=0.0, warn_free_share=0.0),
         perception=_segmentation(tmp_path / "no model"),
         gamepad=GamepadConfig(enabled=False),
     )
-    checks = list(run_checks(config, {"QT_QPA_PLATFORM": "offscreen"}))
-    names = [check.name for check in checks]
-    assert len(set(names)) == len(names)
-    assert {"packages", "system libraries", "display", "model", "self-test", "camera", "servo port", "clock"} <= set(names)
+    checks = list(run_checks(config))
+    assert [check.name for check in checks] == list(CHECKS)
     assert all(check.ok == (check.fix == "") for check in checks)
     assert {check.name for check in checks if not check.ok} == {"model", "self-test"}
     assert checks[0].to_json().keys() == {"name", "ok", "detail", "fix"}

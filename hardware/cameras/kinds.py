@@ -1,0 +1,175 @@
+"""The kinds of camera in one table: ``CAMERA_KINDS``. Rig, device search, wizard and preflight take what they need from its row.
+
+A new camera is a module with a ``Sensor`` (see ``live``) or a ``Camera``, a row here, and its name in ``RigConfig.camera``. Drivers
+are imported where they are used: their libraries take long to load, or may be missing.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from core.config.models import CameraConfig, RigConfig
+from core.devices import Camera
+from hardware.cameras import sysfs
+
+if TYPE_CHECKING:
+    from hardware.preflight.checks import Check
+
+
+@dataclass(frozen=True, slots=True)
+class FoundCamera:
+    """A camera that a rig can have. ``serial`` of a RealSense, ``device`` of a webcam."""
+
+    kind: str
+    title: str
+    serial: str | None = None
+    device: str | None = None
+
+
+def _nothing_found() -> Sequence[FoundCamera]:
+    return ()
+
+
+def _no_library() -> None:
+    """Nothing to check."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraKind:
+    """What can be done with a value of ``rig.camera``. Cameras that are made are not open yet.
+
+    Attributes
+    ----------
+    live : the plugged-in camera of a configuration; None: there is no such camera.
+    recorded : plays ``rig.source``; None: it cannot.
+    find : the cameras that are plugged in. Raises ImportError, DeviceError.
+    check : the preflight's check of the configured camera, without opening it. Raises ImportError, DeviceError.
+    check_library : raises ImportError when the driver's library must not even be loaded.
+    """
+
+    title: str
+    live: Callable[[CameraConfig], Camera] | None = None
+    recorded: Callable[[Path, RigConfig], Camera] | None = None
+    find: Callable[[], Sequence[FoundCamera]] = _nothing_found
+    check: Callable[[CameraConfig], Check] | None = None
+    check_library: Callable[[], None] = _no_library
+
+
+def _realsense_live(config: CameraConfig) -> Camera:
+    from hardware.cameras.realsense import realsense_camera
+
+    return realsense_camera(config)
+
+
+def _realsense_recording(source: Path, _: RigConfig) -> Camera:
+    from hardware.cameras.realsense import RealSenseRecording
+
+    return RealSenseRecording(source)
+
+
+def _find_realsense() -> Sequence[FoundCamera]:
+    from hardware.cameras.realsense import find_cameras
+
+    return [FoundCamera("realsense", camera.describe(), serial=camera.serial) for camera in find_cameras()]
+
+
+def _check_realsense_library() -> None:
+    """A library cut short ends a process that loads it with a memory fault."""
+    from hardware.preflight.checks import REALSENSE, load_problem
+
+    if problem := load_problem(REALSENSE):
+        raise ImportError(f"the library of RealSense cameras cannot be used: {problem}")
+
+
+_UDEV = (
+    "install librealsense's udev rules: sudo cp 99-realsense-libusb.rules /etc/udev/rules.d/ "
+    "&& sudo udevadm control --reload-rules && sudo udevadm trigger, then plug the camera in again"
+)
+
+
+def _check_realsense(config: CameraConfig) -> Check:
+    """There, permitted, on a fast enough port, with a firmware that the library knows."""
+    _check_realsense_library()
+    from hardware.cameras.realsense import find_cameras
+    from hardware.preflight.checks import Check
+
+    cameras = find_cameras()
+    chosen = [camera for camera in cameras if config.serial in {None, camera.serial}]
+    if not chosen:
+        if cameras:
+            others = ", ".join(camera.serial for camera in cameras)
+            detail, fix = f"no RealSense camera {config.serial}; there are: {others}", "set camera.serial to one of these"
+        elif plugged := sysfs.realsense_on_usb():
+            detail, fix = f"{plugged[0].product} is plugged in, but cannot be opened", _UDEV
+        else:
+            detail, fix = "no RealSense camera", "plug it into a USB 3 port; if it is: another cable, or another port"
+        return Check("camera", False, detail, fix)
+    if len(chosen) > 1:
+        serials = ", ".join(camera.serial for camera in chosen)
+        return Check("camera", False, f"{len(chosen)} RealSense cameras: {serials}", f'set camera.serial = "{chosen[0].serial}"')
+    camera = chosen[0]
+    speeds = [device.mbit_s for device in sysfs.realsense_on_usb() if len(cameras) == 1 or device.serial in {"", camera.serial}]
+    if camera.usb.startswith(("1", "2")) or any(0 < speed < sysfs.USB3_MBIT_S for speed in speeds):
+        fix = "use a blue USB 3 port and the camera's own cable: on USB 2 it gives 640x480 at most, and loses frames"
+        return Check("camera", False, camera.describe(), fix)
+    if camera.is_outdated:
+        fix = f"update its firmware to {camera.recommended_firmware}: realsense-viewer, or rs-fw-update -s {camera.serial} -f FILE"
+        return Check("camera", False, camera.describe(), fix)
+    return Check("camera", True, camera.describe())
+
+
+def _webcam_live(config: CameraConfig) -> Camera:
+    from hardware.cameras.webcam import webcam_camera
+
+    return webcam_camera(config)
+
+
+def _find_webcams() -> Sequence[FoundCamera]:
+    return [FoundCamera("webcam", f"{device.title} ({device.path})", device=device.path) for device in sysfs.video_devices()]
+
+
+def _check_webcam(config: CameraConfig) -> Check:
+    from hardware.preflight.checks import Check
+
+    devices, wanted = sysfs.video_devices(), config.device
+    if wanted is not None:
+        node = sysfs.webcam_node(wanted)
+        known = [device.title for device in devices if device.node.resolve() == node.resolve()]
+        note = f"{wanted}, {known[0]}" if known else wanted
+        if not node.exists():
+            paths = ", ".join(device.path for device in devices) or "none"
+            return Check("camera", False, f"{wanted} is not there; webcams: {paths}", "plug it in, or set camera.device")
+    elif devices:
+        node, note = devices[0].node, f"{devices[0].title}, the first of {len(devices)}"
+    else:
+        return Check("camera", False, "no webcam", "plug it in; if it is: another cable, or another port")
+    if not os.access(node, os.R_OK | os.W_OK):
+        return Check("camera", False, f"no permission for {node}", "sudo usermod -aG video $USER, then log in again")
+    return Check("camera", True, note)
+
+
+def _video_file(source: Path, _: RigConfig) -> Camera:
+    from hardware.cameras.files import VideoFile
+
+    return VideoFile(source)
+
+
+def _image_folder(source: Path, rig: RigConfig) -> Camera:
+    from hardware.cameras.files import ImageFolder
+
+    return ImageFolder(source, watch=rig.watch_folder)
+
+
+CAMERA_KINDS: dict[str, CameraKind] = {
+    "twin": CameraKind("bench twin"),  # opened by the rig, together with its robot
+    "realsense": CameraKind(
+        "RealSense", _realsense_live, _realsense_recording, _find_realsense, _check_realsense, _check_realsense_library
+    ),
+    "webcam": CameraKind("webcam", _webcam_live, None, _find_webcams, _check_webcam),
+    "video_file": CameraKind("video", recorded=_video_file),
+    "image_folder": CameraKind("pictures", recorded=_image_folder),
+}
